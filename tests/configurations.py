@@ -102,6 +102,7 @@ STRONG = {
     **ESTIMATOR,
     "estimator.correlation": Range(1.0, 1e6, Status.BAD_CORRELATION),
     "estimator.row_weight": Range(1.0, 1.0, Status.BAD_ROW_WEIGHT),
+    "exact_every": Range(0, 255, Status.BAD_DIVIDER),
 }
 WEAK = {
     **RIG_FIELDS,
@@ -221,7 +222,7 @@ RANGES = {
 }
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 SIZES = {
-    "strong": BANK,
+    "strong": {**BANK, "bank.block": Range(0, 314, Status.BAD_STRIDE)},
     "weak": DESIGN,
     "corrected": DESIGN,
     "weak q31": DESIGN_Q31,
@@ -268,7 +269,7 @@ class Subject:
         sizes = {name: table.size for name, table in self.identifier.tables.items()}
         self.tables: dict[str, Any] = {}
         self.fields = {field.name: field for field in headers.scalars(config, prefix)}
-        model = getattr(self.identifier.estimator, "model", None)  # the strong form in fixed point has none
+        model = getattr(self.identifier.estimator, "model", None)  # the strong forms have estimators of their own
         self.n_theta = int(model.n_theta) if model is not None else 0
         self.design: Any = config.design[0] if "design.taps" in self.fields else None
         self.entries = {name: sizes[name.rpartition(".")[2]] for name, field in self.fields.items() if is_table(field)}

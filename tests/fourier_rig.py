@@ -73,7 +73,8 @@ def engine_rig(name: str, seed: int = 0, soft: bool = False) -> EngineRig:
     tables = design_tables(model, rows, simulation.truth)
     samples = np.stack([np.asarray(run[one], np.float32) for one in model.sample_names], axis=1)
     config = config_of(tables, rig.sample_rate, made.parameters)
-    return EngineRig(config, samples, simulation.truth, rows, fourier_native(compiled, tables))
+    largest = replace(tables, decimation=max(tables.decimation, 16))  # that `resized` may get
+    return EngineRig(config, samples, simulation.truth, rows, fourier_native(compiled, largest))
 
 
 def in_pieces(core: FourierIdentifier, samples: Float32, frozen: Mask) -> Record:

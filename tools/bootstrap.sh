@@ -205,7 +205,8 @@ requirements() { cat "$root/host/pyproject.toml" "$root/tools/requirements.txt" 
 requirements_are_installed() { # requirements_are_installed PROFILE
     local wanted stamp
     wanted=$(requirements)
-    for stamp in "$venv/installed-test" "$venv/installed-$1"; do
+    for stamp in "$venv/installed-test" "$venv/installed-more" "$venv/installed-$1"; do
+        [[ $1 != test || $stamp == *-test ]] || continue
         [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && return
     done
     return 1
@@ -214,24 +215,29 @@ requirements_are_installed() { # requirements_are_installed PROFILE
 # The packages of the lock file, each with its hash: those that others are built with first, for what pip fetches to
 # build with it does not check. Then pvid itself.
 install_requirements() { # install_requirements PROFILE
-    local lock=$root/tools/requirements.txt pip=("$python" -m pip install --disable-pip-version-check --no-input)
+    # Modules are compiled when they are first imported: compiling all of them takes as long as the download.
+    local lock=$root/tools/requirements.txt
+    local pip=("$python" -m pip install --disable-pip-version-check --no-input --no-compile)
     requirements_are_installed "$1" && return
     say "installing Python packages: those of tools/requirements.txt"
     rm -f "$venv"/installed-*
     sed '/^# to use pvid$/,$d' "$lock" >"$venv/builders.txt"
     if [[ $1 != test ]]; then
-        sed '/^# for the tests alone$/,$d' "$lock" >"$venv/requirements.txt"
+        local without="# for the tests alone"
+        [[ $1 == more ]] || without="# for parquet, mcap and campaigns"
+        sed "/^$without\$/,\$d" "$lock" >"$venv/requirements.txt"
         lock=$venv/requirements.txt
     fi
     local failed="pip install failed; its output is above"
     logged pip-builders "${pip[@]}" --require-hashes --only-binary :all: --requirement "$venv/builders.txt" ||
         die "$failed"
     logged pip "${pip[@]}" --require-hashes --no-build-isolation --requirement "$lock" || die "$failed"
-    # From inside host/: a path is read as a URL, which spaces break.
-    logged pip-pvid env -C "$root/host" "${pip[@]}" --no-index --no-deps --no-build-isolation --editable . ||
-        die "$failed"
-    # tools/bench, behind the installed packages, so that no module of tools/ hides one of theirs.
-    printf '%s\n' "$root/tools" >"$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/pvid-tools.pth"
+    # The tests that numpy, scipy, sympy and matplotlib bring along are 45 MB of nothing that is used here.
+    local packages
+    packages=$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+    find "$packages"/{numpy,scipy,sympy,matplotlib} -type d -name tests -prune -exec rm -rf {} + 2>/dev/null || true
+    # pvid itself, and tools/bench behind the installed packages, so that no module of tools/ hides one of theirs.
+    printf '%s\n' "$root/host/src" "$root/tools" >"$packages/pvid.pth"
     write_stamp "$venv/installed-$1" "$(requirements)"
 }
 
@@ -289,9 +295,9 @@ core_is_built() {
         ninja -C "$build/host" -n pvid_native 2>/dev/null | grep -q 'no work to do'
 }
 
-# prepare PROFILE: as above.
+# prepare PROFILE [more]: as above; "more" adds what parquet, mcap and campaigns need.
 prepare() {
-    local profile=$1 python_profile="pvid"
+    local profile=$1 python_profile=${2:-pvid}
     [[ $1 != test && $1 != long ]] || python_profile="test"
     if ! is_ours; then
         use_as_it_is "$python_profile"

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Writes tools/requirements.txt anew from host/pyproject.toml: run it after a change there, and for newer versions.
 
-First what the others are built with where there is no wheel, then every package that tools/pvid installs, then those
-that tools/test adds: each with its version and the hashes of its files, for Linux on any processor and Python 3.11 and
-later. Needs uv (`pip install uv`).
+First what the others are built with where there is no wheel, then every package that tools/pvid installs, then what it
+adds for parquet, mcap and campaigns, then what tools/test adds: each with its version and the hashes of its files, for
+Linux on any processor and Python 3.11 and later. Needs uv (`pip install uv`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ ROOT = Path(__file__).resolve().parents[1]
 PROJECT = ROOT / "host" / "pyproject.toml"
 LOCK = ROOT / "tools" / "requirements.txt"
 # Lines between which tools/bootstrap.sh takes what it installs at a time.
-USE, TESTS = "# to use pvid", "# for the tests alone"
-BUILDERS = ("flit-core", "setuptools")
+USE, MORE, TESTS = "# to use pvid", "# for parquet, mcap and campaigns", "# for the tests alone"
+USED_EXTRAS = ["models", "page", "plot", "serial"]
+MORE_EXTRAS = ["cluster", "mcap", "parquet"]
+BUILDERS = ("setuptools",)
 _WINDOWS = re.compile(r"os_name == 'nt'|sys_platform == 'win32'")
 HEADER = "# Written by tools/lock.py from host/pyproject.toml: do not edit.\n"
 
@@ -39,19 +41,28 @@ def pinned(block: str) -> str:
 
 
 def main() -> None:
-    everything = compiled(["campaign", "web", "test"], "--generate-hashes", "--upgrade")
+    everything = compiled([*USED_EXTRAS, *MORE_EXTRAS, "test"], "--generate-hashes", "--upgrade")
     blocks = [one for one in re.findall(r"(?m)^\S.*(?:\n .*)*\n", everything) if not _WINDOWS.search(one)]
     fixed = LOCK.with_suffix(".new")
     fixed.write_text(everything, encoding="utf-8")
     try:
-        needed = set(map(pinned, compiled(["campaign", "web"], "--constraint", str(fixed)).splitlines()))
+        first, second = (
+            set(map(pinned, compiled(extras, "--constraint", str(fixed)).splitlines()))
+            for extras in (USED_EXTRAS, [*USED_EXTRAS, *MORE_EXTRAS])
+        )
     finally:
         fixed.unlink()
     builders = [block for block in blocks if block.startswith(tuple(f"{one}==" for one in BUILDERS))]
-    used = [block for block in blocks if pinned(block) in needed and block not in builders]
-    tests = [block for block in blocks if block not in builders and block not in used]
-    LOCK.write_text("".join([HEADER, *builders, f"{USE}\n", *used, f"{TESTS}\n", *tests]), encoding="utf-8")
-    print(f"{LOCK.relative_to(ROOT)}: {len(builders)} + {len(used)} packages, {len(tests)} more for the tests")
+    rest = [block for block in blocks if block not in builders]
+    used = [block for block in rest if pinned(block) in first]
+    more = [block for block in rest if pinned(block) in second - first]
+    tests = [block for block in rest if pinned(block) not in second]
+    parts = [HEADER, *builders, f"{USE}\n", *used, f"{MORE}\n", *more, f"{TESTS}\n", *tests]
+    LOCK.write_text("".join(parts), encoding="utf-8")
+    counts = (
+        f"{len(builders)} + {len(used)} packages, {len(more)} for parquet, mcap and campaigns, {len(tests)} for tests"
+    )
+    print(f"{LOCK.relative_to(ROOT)}: {counts}")
 
 
 main()

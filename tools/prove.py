@@ -41,6 +41,7 @@ INCLUDES = " ".join(
     )
 )
 PAGE = ROOT / "host" / "docs" / "proofs.md"
+GENERATED = ROOT / "build" / "proofs"  # of this run: the design of the weak engine
 LONGEST = 3600  # seconds: many times what the slowest needs on a machine that is busy
 
 
@@ -266,7 +267,13 @@ PROOFS = (
         "fingerprint_q31",
         "any configuration of both forms, tables of any extent that fits; `pvid_fnv_estimator_q31`, any state",
         (
-            *("src/keep/fingerprint_q31.c", "src/keep/fnv_q31.c", "src/keep/fnv.c"),
+            *(
+                "src/keep/fingerprint_q31.c",
+                "src/keep/fingerprint_parts_q31.c",
+                "src/keep/fingerprint_tables.c",
+                "src/keep/fnv_q31.c",
+                "src/keep/fnv.c",
+            ),
             "models/kapitza/kapitza_weak_q31.c",
         ),
         ("-eva-auto-loop-unroll", "20"),
@@ -314,6 +321,22 @@ PROOFS = (
         ),
     ),
     Proof(
+        "fourier_front_q31",
+        "the weak engine's front end, the pendulum's design: any counts within full scale, three times round the line",
+        ("src/number/integer_q31.c",),
+        ("-eva-min-loop-unroll", "60"),
+        taken=("pvid_fourier_count_q31",),
+    ),
+    Proof(
+        "fourier_sums_q31",
+        "the same design: any jets within their reach through a half, its channels, any sums of them, a joined window",
+        (
+            *("src/fourier/values_q31.c", "src/fourier/sums_q31.c", "src/number/integer_q31.c"),
+            *("src/number/scaled_q31.c", "src/number/elementary_q31.c"),
+        ),
+        ("-eva-min-loop-unroll", "100"),
+    ),
+    Proof(
         "snapshot",
         "two slots with any bytes in them, any lengths and identities; sealing one",
         ("src/keep/snapshot.c", "src/keep/crc32.c", "src/keep/fnv.c"),
@@ -321,16 +344,20 @@ PROOFS = (
     ),
     Proof(
         "snapshot_q31",
-        "states of both forms saved into any room, any bytes of any length restored; their pointers stay",
+        "states of all forms saved into any room, any bytes of any length restored; their pointers stay",
         (
+            "src/keep/snapshot_fourier_q31.c",
             "src/keep/snapshot_strong_q31.c",
             "src/keep/snapshot_weak_q31.c",
             "src/keep/snapshot.c",
             "src/keep/crc32.c",
             "src/keep/fnv.c",
         ),
-        ("-eva-min-loop-unroll", "3", "-eva-auto-loop-unroll", "50"),
-        taken=("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31"),
+        ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
+        taken=(
+            *("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31", "pvid_fingerprint_fourier_q31"),
+            *("pvid_fingerprint_fourier_model_q31", "pvid_fingerprint_fourier_design_q31"),
+        ),
     ),
     Proof(
         "receiver",
@@ -374,10 +401,29 @@ def unexplained(proof: Proof, said: str) -> list[str]:
     return fresh + [f"explained, but not found: {known}" for known in stale]
 
 
+def engine_design(folder: Path) -> None:
+    """Writes engine_design_q31.h: the generated functions and tables of the pendulum that tests/twin plays, and the
+    reach of its jets."""
+    sys.path.insert(0, str(ROOT / "tests" / "twin"))
+    from fourier_q31 import rig
+
+    from pvid.codegen.files_fourier_q31 import source
+
+    one = rig("kapitza", 3000)
+    text = source(one.fixed, one.parameters, one.design, "engine")
+    reach = re.search(r"limits\[\d+\] = (\{[^}]*\})", text)
+    assert reach is not None, "the generated function refuses no input"
+    lines = [text, f"static const int32_t engine_reach[] = {reach[1]};", ""]
+    (folder / "engine_design_q31.h").write_text("\n".join(lines), encoding="utf-8")
+
+
+def program_of(proof: Proof) -> Path:
+    return ROOT / "tests" / "proofs" / f"prove_{proof.name}.c"
+
+
 def command_of(proof: Proof) -> list[str]:
-    program = ROOT / "tests" / "proofs" / f"prove_{proof.name}.c"
-    files = [str(program), *(str(ROOT / "firmware" / source) for source in proof.sources)]
-    cpp = f"-cpp-extra-args={INCLUDES} -DPVID_PLAIN_NAMES"  # contracts and options name functions
+    files = [str(program_of(proof)), *(str(ROOT / "firmware" / source) for source in proof.sources)]
+    cpp = f"-cpp-extra-args={INCLUDES} -I'{GENERATED}' -DPVID_PLAIN_NAMES"  # contracts and options name functions
     return ["frama-c", "-machdep", "gcc_x86_64", cpp, "-warn-signed-downcast", *files]
 
 
@@ -443,6 +489,9 @@ def main() -> int:
     missing = [package for tool, package in packages.items() if shutil.which(tool) is None]
     if missing:
         raise SystemExit(f"missing: {' '.join(missing)} (Debian's names); ./tools/test installs them")
+    if any("engine_design_q31.h" in program_of(proof).read_text(encoding="utf-8") for proof in chosen):
+        GENERATED.mkdir(parents=True, exist_ok=True)
+        engine_design(GENERATED)
     with ThreadPoolExecutor(2) as pool:
         results = list(zip(chosen, pool.map(prove, chosen), strict=True))
     for proof, result in results:

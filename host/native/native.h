@@ -7,6 +7,7 @@
 #include "pvid/crc32.h"
 #include "replay.h"
 #include "replay_q31.h"
+#include "replay_refine.h"
 
 /* The link's C side for the tests of pvid.link: bytes in, frames and counters out, flat.
  *

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "pvid/fourier.h"
+#include "pvid/snapshot_fourier.h"
 #include "replay.h"
 
 /* Steps an initialised identifier through samples[ticks][samples]. */

@@ -11,7 +11,7 @@ from campaign_rigs import RIG
 
 from bench.campaign import judge as judging
 from bench.campaign import table
-from bench.campaign.judge import COLUMNS, Judgement, Record, identify_rig, judge
+from bench.campaign.judge import COLUMNS, Judgement, Record, identify_by_engine, identify_rig, judge
 from bench.campaign.truth import SimulatedRig, rig_file
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
@@ -144,6 +144,26 @@ def test_publications_of_a_run_end_in_its_answer(native: Native) -> None:
             assert publications.p[-1, at] == result.value[name]
             # the verdict over the whole run (pvid.run.verdict) can only widen the standard errors
             assert publications.se[-1, at] <= result.se[name] * (1 + 1e-5)
+
+
+def test_the_weak_engine_answers_a_rig_and_is_judged_like_the_own_form() -> None:
+    """The standard rig with full equations: small angles bias it by less than the standard errors contain."""
+    from pvid.sim.pendulum import simulate
+
+    rig = replace(simulated(), run=simulate(duration=15.0, seed=2).run)
+    record, result = identify_by_engine(rig)
+    assert result is not None and result.publications.t[-1] <= rig.run.t[-1]
+    assert flags(record) >= {"published", "answered", "within_5"} and not record["warned"]
+    assert len(result.publications.t) == record["publications"]
+    for name in NAMES:
+        assert record[name] == result.values[name].value
+    assert record["publications_wrong"] == 0
+
+
+def test_a_run_that_the_engine_does_not_answer_is_a_record() -> None:
+    still = simulated()
+    record, result = identify_by_engine(still)
+    assert result is None and "same value in all 100 samples" in str(record["reason"])
 
 
 def test_a_refusal_is_a_record_with_its_sentence(native: Native, monkeypatch: pytest.MonkeyPatch) -> None:

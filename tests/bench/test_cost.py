@@ -35,8 +35,9 @@ def gcc_major() -> str:
     return done.stdout.split(".")[0].strip()
 
 
-def test_the_estimators_whole_step_is_cheaper_than_recursive_least_squares(costs: dict[str, int]) -> None:
-    assert costs["estimator"] < costs["rls"]
+def test_a_tick_of_the_strong_form_is_cheaper_than_a_row_of_recursive_least_squares(costs: dict[str, int]) -> None:
+    """Exact projection at every row is cheaper on a Cortex-M4F only, which has twice the registers."""
+    assert costs["staged"] < costs["tick"] < min(costs["rls"], costs["ud"])
 
 
 def test_no_stage_exceeds_its_budget(costs: dict[str, int], budget: Budget) -> None:

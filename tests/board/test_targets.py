@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 
 from pvid.base.errors import PvidError
-from pvid.board import replay_image, sizes
+from pvid.board import mechanism_image, replay_image, sizes
 from pvid.board.boards import BOARDS, run
 from pvid.board.replay_image import (
     REPORT_EVERY,
@@ -24,6 +24,7 @@ from pvid.board.replay_image import (
     twin_hashes,
 )
 from pvid.core.native import Native
+from pvid.models.registry import DEFAULT
 
 FORMS_AND_CORES = [(form, core) for form in ("strong", "weak") for core in ("f32", "q31")]
 LONG = ("mps2-an386", "virt-rv32imac")
@@ -32,16 +33,17 @@ TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s
 Measured = dict[sizes.Configuration, tuple[sizes.Footprint, ReplayReport]]
 
 
-STRONG_ON = ("mps2-an386", "microbit", "virt-rv32imac")  # a processor with an FPU and two without
+FEW = ("mps2-an386", "microbit", "virt-rv32imac")  # a processor with an FPU and two without
+ON_ALL = {("weak", "q31"), (sizes.ENGINE, "f32")}  # the others run on FEW in the short form
 
 
 @pytest.fixture(scope="module")
 def measured(request: pytest.FixtureRequest) -> Measured:
-    """Configurations of `pvid sizes`, built and run: in the long form all, else the strong form on three boards."""
+    """Configurations of `pvid sizes`, built and run: in the long form all."""
     return {
-        configuration: sizes.measure(configuration)
-        for configuration in sizes.CONFIGURATIONS
-        if request.config.getoption("--long") or configuration.form == "weak" or configuration.board.name in STRONG_ON
+        one: sizes.measure(one)
+        for one in sizes.CONFIGURATIONS
+        if request.config.getoption("--long") or (one.form, one.core) in ON_ALL or one.board.name in FEW
     }
 
 
@@ -75,11 +77,23 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
         if (configuration.form, configuration.core) == (form, core):
             assert_same_hashes(report, standard_run(form, sizes.TICKS, core), native)
             boards.add(configuration.board.name)
-    assert boards == {one.board.name for one in measured if (one.form, one.core) == (form, core)}
-    assert boards >= set(STRONG_ON)
-    if form == "weak":
+    assert boards >= set(FEW)
+    if (form, core) in ON_ALL:
         avrs = {name for name, runs in sizes.ON_AVR.items() if (form, core) in runs}
         assert boards == {board.name for board in BOARDS.values() if board.toolchain != "avr"} | avrs
+
+
+def test_the_engine_s_pendulum_on_every_board_has_the_bits_of_the_twin(measured: Measured) -> None:
+    replay = mechanism_image.mechanism_run(DEFAULT)
+    expected = mechanism_image.twin_hashes(replay)
+    boards = set()
+    for configuration, (_, report) in measured.items():
+        if configuration.form == sizes.ENGINE:
+            assert report.ticks == len(replay.counts)
+            assert report.hash == int(expected[-1]), configuration.name
+            assert report.hashes == {tick: int(expected[tick - 1]) for tick in report.hashes}, configuration.name
+            boards.add(configuration.board.name)
+    assert boards == {board.name for board in BOARDS.values() if board.toolchain != "avr"}
 
 
 @pytest.mark.long

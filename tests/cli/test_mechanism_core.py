@@ -1,4 +1,4 @@
-"""`identify --core f32` and `compare` of described mechanisms, from the recording to the printed answer."""
+"""`identify --core f32|q31` and `compare` of described mechanisms, from the recording to the printed answer."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -17,9 +18,9 @@ from pvid.cli.main import commands
 from pvid.cli.mechanism import recording_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run.engine_design import config_for_recording
+from pvid.run.engine_design import config_to_identify
 from pvid.run.mechanism import identify_mechanism
-from pvid.run.mechanism_f32 import identify_in_c
+from pvid.run.mechanism_core import identify_in_c
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig
 from pvid.twin.fourier import FourierTwin
@@ -42,12 +43,14 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return paths
 
 
-@pytest.mark.parametrize("name", ["rigid_body", "dc_motor"])
-def test_the_core_identifies_a_recording_as_the_oracle_does(name: str, recorded: dict[str, Path]) -> None:
-    core = json.loads(pvid("identify", recorded[name], "--core", "f32", "--json").stdout)
+@pytest.mark.parametrize(("name", "arithmetic"), [("rigid_body", "f32"), ("dc_motor", "f32"), ("dc_motor", "q31")])
+def test_the_core_identifies_a_recording_as_the_oracle_does(
+    name: str, arithmetic: str, recorded: dict[str, Path]
+) -> None:
+    core = json.loads(pvid("identify", recorded[name], "--core", arithmetic, "--json").stdout)
     oracle = json.loads(pvid("identify", recorded[name], "--json").stdout)
     assert set(oracle) < set(core)  # the same keys, and the core's own
-    assert core["core"] == "f32" and oracle["core"] == "f64"
+    assert core["core"] == arithmetic and oracle["core"] == "f64"
     assert core["identified"] and core["reason"] == "updated" and 0.5 < core["chi2"] < 2
     assert oracle["reasons"].items() <= core["reasons"].items()
     truth = simulated_rig(name).truth
@@ -98,10 +101,10 @@ def test_where_the_core_publishes_nothing_the_values_are_null(
     """Standard errors of a millionth are the limit of publication."""
 
     def strict(*given: Any) -> FourierConfig:
-        config = config_for_recording(*given)
+        config = config_to_identify(*given)
         return replace(config, trust=replace(config.trust, se_max=1e-6))
 
-    monkeypatch.setattr("pvid.run.mechanism_f32.config_for_recording", strict)
+    monkeypatch.setattr("pvid.run.mechanism_core.config_to_identify", strict)
     answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--json")
     shown = json.loads(answer.stdout)
     assert answer.return_value == NOTHING_IDENTIFIED and not shown["identified"]
@@ -111,8 +114,9 @@ def test_where_the_core_publishes_nothing_the_values_are_null(
 
 
 def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    answer = pvid("compare", recorded["dc_motor"])
-    assert answer.return_value == DONE and "equal" in answer.stdout and "6000" in answer.stdout
+    answer = pvid("compare", recorded["dc_motor"], "--core", "all")
+    assert answer.return_value == DONE and answer.stdout.count("equal") == 2 and "6000" in answer.stdout
+    assert "f32" in answer.stdout and "q31" in answer.stdout
     changed = "pvid.run.mechanism_compare.FourierTwin"
     monkeypatch.setattr(changed, lambda config: FourierTwin(replace(config, iterations=2)))
     answer = pvid("compare", recorded["dc_motor"])
@@ -123,9 +127,8 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
 @pytest.mark.parametrize(
     ("command", "arguments", "sentence"),
     [
-        ("identify", ("--core", "q31"), "--core q31: dc_motor is identified in float64, or in float32 by --core f32"),
+        ("identify", ("--law", "stationary"), "--law stationary: dc_motor is identified in float64, or in C by"),
         ("identify", ("--core", "f32", "--form", "strong"), "--form strong: dc_motor is identified in float64"),
-        ("compare", ("--core", "q31"), "--core q31: dc_motor is compared in float32 by the weak form"),
         ("compare", ("--on", "stream-host"), "--on stream-host: dc_motor is compared in float32"),
         ("compare", ("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is compared in float32"),
     ],
@@ -145,3 +148,57 @@ def test_without_a_compiler_there_is_one_sentence(
     monkeypatch.delenv("CC", raising=False)
     with pytest.raises(PvidError, match="--core f32: .* needs a C compiler"):
         pvid("identify", recorded["rigid_body"], "--core", "f32")
+
+
+def test_the_pendulum_s_own_rig_file_goes_through_the_engine(tmp_path: Path) -> None:
+    """--form fourier: columns, resolution, guess and gains come from the rig file, and the keys stay."""
+    run = tmp_path / "run.csv"
+    assert pvid("simulate", run, "--duration", "15", "--seed", "2").return_value == DONE
+    engine = json.loads(pvid("identify", run, "--form", "fourier", "--json").stdout)
+    own = json.loads(pvid("identify", run, "--json").stdout)
+    assert engine["identified"] and engine["core"] == "f32" and engine["samples"] == own["ticks"] == 15_000
+    assert list(engine["parameters"]) == list(own["parameters"]) == ["g", "l2", "rho2", "w", "d1", "d2", "c"]
+    for name, one in engine["parameters"].items():
+        assert engine[name] == one and one["unit"] == own[name]["unit"]
+        apart = abs(one["value"] - own[name]["value"])
+        assert apart < 3 * np.hypot(one["se"], own[name]["se"]), name
+    # Small angles are neglected: the largest is about 0.1 rad.
+    assert 0.003 < engine["w"]["se"] / engine["w"]["value"] < 0.02
+    assert pvid("compare", run, "--form", "fourier").return_value == DONE
+
+
+def test_design_and_tune_show_the_engine_s_design_for_a_recording(recorded: dict[str, Path]) -> None:
+    run = recorded["rigid_body"]
+    design = json.loads(pvid("design", "--model", "rigid_body", "--run", run, "--json").stdout)
+    core = json.loads(pvid("identify", run, "--core", "f32", "--json").stdout)
+    assert design["identified"] and design["functions"] == core["functions"]
+    assert design["window_s"] == pytest.approx(core["window_s"]) and design["decimation"] == core["decimation"]
+    for name, one in design["parameters"].items():
+        found = core["parameters"][name]
+        assert one["unit"] == found["unit"] and abs(one["value"] - found["value"]) < 5 * found["se"]
+        assert 0.2 < one["se"] / found["se_noise"] < 5
+    tuned = pvid("tune", run)
+    assert tuned.return_value == DONE and "analysis" in tuned.stdout and "C core" in tuned.stdout
+    assert f"{design['window_s']:.4g}" in tuned.stdout
+
+
+def test_design_of_a_shipped_rig_needs_no_run() -> None:
+    done = pvid("design", "--model", "rigid_body")
+    assert done.return_value == DONE and "Ixx [kg*m^2]" in done.stdout and "test functions: " in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (
+            ("design", "--model", "rigid_body", "--duration", "5"),
+            "--tone, --release and --duration are for the pendulum",
+        ),
+        (("tune", "{run}", "-o", "x.toml"), "-o: nothing is written for a described mechanism"),
+    ],
+)
+def test_options_of_the_pendulum_s_design_are_refused(
+    arguments: tuple[str, ...], sentence: str, recorded: dict[str, Path]
+) -> None:
+    with pytest.raises(PvidError, match=sentence):
+        pvid(*(one.format(run=recorded["rigid_body"]) for one in arguments))

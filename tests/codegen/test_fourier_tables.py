@@ -17,7 +17,7 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.reversals import averaged
 from pvid.settings.fourier import NONE, Source
-from pvid.setup.fourier import design_tables, for_engine
+from pvid.setup.fourier import config_of, design_tables, for_engine
 
 Complex = npt.NDArray[np.complex128]
 
@@ -163,9 +163,29 @@ def test_every_entry_of_the_noise_counts() -> None:
     assert len({(one.power, one.a, one.b) for one in form.config.design.noise}) == len(shares) > 10
 
 
-def test_overlapping_windows_share_half_of_the_noise_at_most() -> None:
+def test_overlapping_windows_inflate_variances_by_less_than_two() -> None:
+    """2 for windows that all see the same motion; measured on the run less, where the motion is another in each."""
     for name in NAMES:
-        assert 1.5 < weak_form(name).config.design.overlap < 2.001
+        assert 1.2 < weak_form(name).config.design.overlap < 2.001
+
+
+def test_a_recording_limits_its_samples() -> None:
+    """Ranges of all, and a least motion of the pivot, whose derivative the rows need; no other mechanism has one."""
+    for name in ("kapitza", "dc_motor"):
+        form = weak_form(name)
+        config = config_of(form.config.design, 1000.0, form.rows.compiled.parameters, run=form.run)
+        assert config.range is not None and form.config.range is None
+        largest = [float(np.max(np.abs(form.run[one]))) for one in form.model.sample_names]
+        assert (config.range >= 1.49 * np.array(largest)).all()
+        if name == "dc_motor":
+            assert config.drive_min is None
+            continue
+        signal = form.rows.compiled.bare.signal("y")
+        assert config.drive_min is not None
+        assert dict(zip(form.model.sample_names, config.drive_min, strict=True)) == {
+            "y": np.float32(4 * signal.sd),
+            "phi": 0.0,
+        }
 
 
 def test_integrals_have_the_channels_that_shift_them() -> None:

@@ -147,12 +147,12 @@ def test_bad_snapshot_changes_nothing(name: str, native: Native) -> None:
     identifier = made(native, name)
     image = snapshot.save(identifier)
     before = identifier.state_bytes
-    for place in (*range(0, 28, 4), 28, len(image) // 2, len(image) - 5, len(image) - 1):
+    for place in (*range(0, 36, 4), 36, len(image) // 2, len(image) - 5, len(image) - 1):
         for bit in (1, 128):
             damaged = image[:place] + bytes([image[place] ^ bit]) + image[place + 1 :]
             assert snapshot.restore(identifier, damaged) is not SnapshotStatus.RESTORED, place
-    for length in (0, 3, 27, 31, 32, len(image) // 2, len(image) - 1):
-        status = SnapshotStatus.NONE if length < 32 else SnapshotStatus.CUT_SHORT
+    for length in (0, 3, 35, 39, 40, len(image) // 2, len(image) - 1):
+        status = SnapshotStatus.NONE if length < 40 else SnapshotStatus.CUT_SHORT
         assert snapshot.restore(identifier, image[:length]) is status
     sealed = image[:8] + b"\x00\x00\x00\x7f" + image[12:-4]
     other = sealed + zlib.crc32(sealed).to_bytes(4, "little")

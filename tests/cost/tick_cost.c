@@ -11,6 +11,7 @@
 #include "ekf_f32.h"
 #include "pvid/pvid.h"
 #include "rls_f32.h"
+#include "ud_f32.h"
 #include "weak_rig.h"
 
 static uint32_t generator = 1u;
@@ -40,26 +41,41 @@ static float derivatives_phi[SAMPLES][PVID_ORDERS], derivatives_u[SAMPLES][3];
 static float rows[SAMPLES][PVID_KAPITZA_STRONG_THETA], row_y[SAMPLES];
 
 static pvid_strong_f32 identifier;
-static pvid_strong_f32 smoothing; /* the same behind the longest window of a Savitzky-Golay bank */
-static pvid_estimator_f32 newton; /* feedback_hz = 0: a Gauss-Newton step at every tick */
+static pvid_strong_f32 exact;     /* all sums projected at every row: the paper's law literally */
+static pvid_strong_f32 staged;    /* a solve at every eighth row */
+static pvid_strong_f32 smoothing; /* behind a Savitzky-Golay bank of 315 samples in blocks of nine */
 static rls_f32 rls;
+static ud_f32 ud;
 static ekf_f32 kalman;
 
-/* Five-point differences among zeros: what a bank of LONGEST points a side costs, with rows that stay those above. */
-#define LONGEST ((PVID_MAX_WINDOW - 1) / 2)
-static float long_bank[PVID_ORDERS * LONGEST];
+/* Five-point differences among zeros: what the bank costs, with rows that stay those above. */
+#define POINTS 17
+#define BLOCK 9
+static float long_bank[PVID_ORDERS * POINTS];
 
-static void prepare_smoothing(pvid_strong_config_f32 config)
+static void start(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
+{
+    if (pvid_strong_init_f32(self, config) != PVID_OK) {
+        exit(2);
+    }
+}
+
+static void prepare_variants(pvid_strong_config_f32 config)
 {
     for (uint32_t order = 0; order < PVID_ORDERS; order++) {
         for (uint32_t i = 0; i < 2u; i++) {
-            long_bank[(order * LONGEST) + i] = pvid_five_points_f32[(2u * order) + i];
+            long_bank[(order * POINTS) + i] = pvid_five_points_f32[(2u * order) + i];
         }
     }
-    config.bank = (pvid_fir_bank_f32){.half = LONGEST, .stride = 1, .weights = long_bank};
-    if (pvid_strong_init_f32(&smoothing, &config) != PVID_OK) {
-        exit(2);
-    }
+    start(&identifier, &config);
+    config.exact_every = 1;
+    start(&exact, &config);
+    config.exact_every = 0;
+    config.estimator.divider = 8;
+    start(&staged, &config);
+    config.estimator.divider = 1;
+    config.bank = (pvid_fir_bank_f32){.half = POINTS, .stride = BLOCK, .block = BLOCK, .weights = long_bank};
+    start(&smoothing, &config);
 }
 
 /* The filter's u is a second difference of the nearest samples, its other taps 0: they cost the same. */
@@ -112,18 +128,10 @@ static void prepare(void)
     config.estimator.row_sd = 1000.0f;
     config.estimator.feedback_hz = 10.0f;
     config.estimator.forgetting_s = 10.0f;
-    if (pvid_strong_init_f32(&identifier, &config) != PVID_OK) {
-        exit(2);
-    }
-    prepare_smoothing(config);
+    prepare_variants(config);
     prepare_kalman();
-    config.estimator.model = &pvid_kapitza_strong_f32;
-    config.estimator.update_rate_hz = config.sample_rate_hz;
-    config.estimator.feedback_hz = 0.0f;
-    if (pvid_estimator_init_f32(&newton, &config.estimator) != PVID_OK) {
-        exit(2);
-    }
     rls_init_f32(&rls, 0.9999f, 1.0e6f);
+    ud_init_f32(&ud, 0.9999f, 1.0e6f);
     weak_rig_prepare(noise);
 }
 
@@ -134,14 +142,6 @@ static void nothing(uint32_t i)
     sink = rows[i][0];
 }
 
-static void differentiator(uint32_t i)
-{
-    float d[PVID_ORDERS];
-    (void)pvid_differentiator_step_f32(&identifier.phi, phi_samples[i], d);
-    (void)pvid_differentiator_step_f32(&identifier.y, y_samples[i], d);
-    sink = d[0];
-}
-
 static void row(uint32_t i)
 {
     float n[PVID_KAPITZA_STRONG_THETA];
@@ -150,36 +150,19 @@ static void row(uint32_t i)
     sink = y + n[0];
 }
 
-static void add(uint32_t i)
-{
-    (void)pvid_estimator_add_f32(&identifier.estimator, rows[i], row_y[i]);
-    sink = rows[i][0];
-}
-
 static void estimator(uint32_t i)
 {
-    sink = (float)pvid_estimator_step_f32(&identifier.estimator, rows[i], row_y[i]);
+    sink = (float)pvid_strong_row_step_f32(&identifier, derivatives_phi[i], derivatives_u[i]);
 }
 
-static void gauss_newton(uint32_t i)
+static void exact_tick(uint32_t i)
 {
-    sink = (float)pvid_estimator_step_f32(&newton, rows[i], row_y[i]);
+    sink = (float)pvid_strong_step_f32(&exact, phi_samples[i], y_samples[i]);
 }
 
-static void read_sums(uint32_t i)
+static void staged_tick(uint32_t i)
 {
-    float sums[PVID_MAX_SUMS];
-    pvid_information_read_f32(&identifier.estimator.information, sums);
-    sink = sums[i % 4u];
-}
-
-static void project(uint32_t i)
-{
-    float s[PVID_MAX_P][PVID_MAX_P];
-    float f[PVID_MAX_P];
-    const float *m = identifier.estimator.information.high;
-    pvid_kapitza_strong_f32.project(identifier.estimator.p, m, &m[45], s, f);
-    sink = s[0][0] + f[i % 3u];
+    sink = (float)pvid_strong_step_f32(&staged, phi_samples[i], y_samples[i]);
 }
 
 static void tick(uint32_t i)
@@ -201,7 +184,7 @@ static void kalman_tick(uint32_t i)
 static void assess(uint32_t i)
 {
     pvid_estimate_f32 estimate;
-    pvid_estimator_assess_f32(&identifier.estimator, &estimate);
+    pvid_strong_assess_f32(&identifier, &estimate);
     sink = estimate.se[i % 3u];
 }
 
@@ -209,6 +192,12 @@ static void rls_step(uint32_t i)
 {
     rls_step_f32(&rls, rows[i], row_y[i]);
     sink = rls.theta[0];
+}
+
+static void ud_step(uint32_t i)
+{
+    ud_step_f32(&ud, rows[i], row_y[i]);
+    sink = ud.theta[0];
 }
 
 /* Whole periods of WEAK_RIG_PERIOD ticks make a mean. */
@@ -223,18 +212,16 @@ static const struct {
     void (*run)(uint32_t i);
 } stages[] = {
     {"nothing", nothing},
-    {"differentiator", differentiator},
     {"row", row},
-    {"add", add},
-    {"read", read_sums},
-    {"project", project},
-    {"tick", tick},
     {"estimator", estimator},
-    {"assess", assess},
-    {"rls", rls_step},
-    {"gauss-newton", gauss_newton},
-    {"weak", weak},
+    {"tick", tick},
+    {"exact", exact_tick},
+    {"staged", staged_tick},
     {"smoothing", smoothing_tick},
+    {"assess", assess},
+    {"weak", weak},
+    {"rls", rls_step},
+    {"ud", ud_step},
     {"kalman", kalman_tick},
 };
 
@@ -249,8 +236,8 @@ int main(int argc, char **argv)
         (void)pvid_strong_step_f32(&identifier, phi_samples[i], y_samples[i]);
         (void)pvid_strong_step_f32(&smoothing, phi_samples[i], y_samples[i]);
         (void)ekf_sample_f32(&kalman, phi_samples[i], y_samples[i]);
-        (void)pvid_estimator_step_f32(&identifier.estimator, rows[i], row_y[i]);
-        (void)pvid_estimator_step_f32(&newton, rows[i], row_y[i]);
+        (void)pvid_strong_step_f32(&exact, phi_samples[i], y_samples[i]);
+        (void)pvid_strong_step_f32(&staged, phi_samples[i], y_samples[i]);
     }
     for (uint32_t s = 0; s < sizeof stages / sizeof stages[0]; s++) {
         if (strcmp(argv[1], stages[s].name) == 0) {

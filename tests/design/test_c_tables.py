@@ -74,7 +74,7 @@ def test_the_command_prints_and_checks(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "pvid", "tables", "--form", "fir", "--points", "21"]
     command += ["--degree", "6", "--name", "sg21"]
     header = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert ".half = 10, .stride = 1, .weights = sg21" in header
+    assert ".half = 10, .stride = 1, .block = 1, .weights = sg21" in header
     path = tmp_path / "sg21.h"
     path.write_text(header, encoding="utf-8")
     assert subprocess.run([*command, "--check", str(path)], capture_output=True, check=False).returncode == 0

@@ -310,7 +310,7 @@ static void configure_strong(bool sound)
     static const pvid_strong_config_f32 fresh = {.sample_rate_hz = 1000.0f, .l1 = 0.3f};
     pvid_strong_config_f32 *config = &strong.config;
     *config = fresh;
-    config->bank = (pvid_fir_bank_f32){2, 20, pvid_five_points_f32};
+    config->bank = (pvid_fir_bank_f32){.half = 2, .stride = 20, .weights = pvid_five_points_f32};
     config->estimator = pvid_estimator_defaults_f32;
     for (size_t i = 0; i < 3u; i++) {
         config->estimator.start[i] = starts[i];
@@ -322,7 +322,10 @@ static void configure_strong(bool sound)
     config->estimator.feedback_hz = one_in(2) ? 10.0f : 0.0f;
     config->estimator.forgetting_s = one_in(3) ? 3.0f : 0.0f;
     config->estimator.law = (pvid_law)below(2);
-    config->estimator.divider = (uint16_t)(1u + below(5));
+    config->estimator.divider = (uint16_t)(one_in(3) ? (4u * below(17)) + 4u : 1u + below(5));
+    config->estimator.dead_zone = one_in(5) ? 3.0f : 0.0f;
+    config->exact_every = (uint16_t)below(10);
+    config->bank.block = (uint16_t)below(6);
     config->drive_min = one_in(2) ? 0.1f : 0.0f;
     config->gate.sigmas = one_in(2) ? 6.0f : 0.0f;
     if (sound) {
@@ -376,11 +379,16 @@ static void freeze_strong(bool frozen)
 
 static void check_strong(bool published)
 {
-    check_p_f32(&strong.self.estimator);
+    const pvid_strong_estimator_f32 *estimator = &strong.self.estimator;
+    for (size_t i = 0; i < PVID_KAPITZA_P; i++) {
+        require(isfinite(estimator->p[i]) && (estimator->p[i] >= estimator->lower[i]) &&
+                    (estimator->p[i] <= estimator->upper[i]),
+                "p within its bounds");
+    }
     if (published && one_in(50)) {
         pvid_estimate_f32 estimate;
         pvid_estimate_f32 copy;
-        pvid_estimator_assess_f32(&strong.self.estimator, &estimate);
+        pvid_strong_assess_f32(&strong.self, &estimate);
         check_estimate_f32(&estimate, 3);
         pvid_publication_put_f32(&strong.shared, &estimate);
         require(pvid_publication_read_f32(&strong.shared, &copy, NULL) && (memcmp(&copy, &estimate, sizeof copy) == 0),

@@ -12,9 +12,10 @@ from pvid.oracle import strong as oracle
 from pvid.rig.file import Core, RigFile
 from pvid.run.identify import identify
 from pvid.settings.enums import Law, Reason
-from pvid.settings.f32 import EstimatorConfig
-from pvid.setup.f32 import bank_of, estimator_config, strong_config
+from pvid.settings.f32 import GateConfig
+from pvid.setup.f32 import strong_config
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
+from pvid.twin.kapitza.strong import regressors
 from pvid.twin.strong import StrongTwin
 
 TRUTH = STANDARD_PENDULUM.linear
@@ -23,40 +24,33 @@ STRONG = replace(STANDARD, identifier=replace(STANDARD.identifier, form="strong"
 
 
 @pytest.fixture(scope="module")
-def exact_rows(native: Native) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the standard rig from exact derivatives: N [40001, 11], Y, float32."""
-    exact = simulate(truth="linear").exact
-    assert exact is not None
-    return native.strong_rows(exact.phi, exact.u)
+def exact() -> tuple[np.ndarray, np.ndarray]:
+    """Exact derivatives of the standard rig: phi [40001, 5] and u [40001, 3]."""
+    found = simulate(truth="linear").exact
+    assert found is not None
+    return found.phi, found.u
 
 
-def settings(start: np.ndarray, **changes: object) -> EstimatorConfig:
-    return replace(estimator_config(STRONG, bank_of(STRONG, 1000.0), start), **changes)  # type: ignore[arg-type]
+def errors_of(native: Native, exact: tuple[np.ndarray, np.ndarray], seed: int, law: Law, exact_every: int) -> float:
+    """Largest relative error of the final p from a start."""
+    config = replace(strong_config(STRONG, 1000.0, standard_start(seed)), exact_every=exact_every)
+    config = replace(config, estimator=replace(config.estimator, law=law), gate=GateConfig())
+    record = native.of_derivatives(config).run(*exact, sums=False, hashes=False)
+    return float(np.abs(record.p[-1] / TRUTH - 1).max())
 
 
+@pytest.mark.parametrize("exact_every", [1, 8])
 def test_exact_derivatives_stationary_law_reaches_a_hundredth_of_a_percent_from_all_starts(
-    native: Native, exact_rows: tuple[np.ndarray, np.ndarray]
+    native: Native, exact: tuple[np.ndarray, np.ndarray], exact_every: int
 ) -> None:
-    n, y = exact_rows
-    errors = []
-    for seed in range(40):
-        core = native.estimator(settings(standard_start(seed), law=Law.STATIONARY), 1000.0)
-        record = core.run(n, y, sums=False, hashes=False)
-        errors.append(np.abs(record.p[-1] / TRUTH - 1).max())
-    assert max(errors) < 1e-4
+    assert max(errors_of(native, exact, seed, Law.STATIONARY, exact_every) for seed in range(40)) < 1e-4
 
 
 def test_exact_derivatives_pseudovelocity_law_stops_short_of_it(
-    native: Native, exact_rows: tuple[np.ndarray, np.ndarray]
+    native: Native, exact: tuple[np.ndarray, np.ndarray]
 ) -> None:
     """theory.md 4: (5) alone leaves F where the early steps put it; `pvid bench laws` prints the whole table."""
-    n, y = exact_rows
-    reached = 0
-    for seed in range(40):
-        core = native.estimator(settings(standard_start(seed), law=Law.PSEUDOVELOCITY), 1000.0)
-        record = core.run(n, y, sums=False, hashes=False)
-        reached += np.abs(record.p[-1] / TRUTH - 1).max() < 1e-4
-    assert reached <= 10
+    assert sum(errors_of(native, exact, seed, Law.PSEUDOVELOCITY, 0) < 1e-4 for seed in range(40)) <= 10
 
 
 def test_twenty_bit_sensor_savitzky_golay_within_a_tenth_of_a_percent_in_w(native: Native) -> None:
@@ -75,7 +69,8 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
     """
     run = standard_20_bits.run
     config = strong_config(STRONG, 1000.0, standard_start(3))
-    n32, y32, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    rows, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    n32, y32 = regressors(rows)
     ready = row_reason == Reason.ACCUMULATED
     n, y = n32[ready].astype(np.float64), y32[ready].astype(np.float64)
     n = n * oracle.BINOMIAL
@@ -97,7 +92,8 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standar
     identifier = native.identifier(config)
     identifier.run(run.phi, run.y, sums=False, hashes=False)
     last = identifier.assess()
-    n32, y32, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    rows, row_reason = StrongTwin(config).rows(run.phi, run.y)
+    n32, y32 = regressors(rows)
     ready = row_reason == Reason.ACCUMULATED
     n = n32[ready].astype(np.float64) * oracle.BINOMIAL
     y = y32[ready].astype(np.float64)

@@ -75,7 +75,10 @@ def test_settings_come_before_the_file() -> None:
         ("[model]\nname='x'\n[known]\ng='9'", "known.g must be a number, not '9'"),
         ("[model]\nname='x'\n[known]\ng=nan", "known.g must be a number, not 'nan'"),
         ("[model]\nname='x'\n[sensor]\nphi=3", "phi must be a table"),
-        ("[model]\nname='x'\n[sensor.phi]\nbits=3", "'bits' is not a key: resolution, noise and gain_sd are"),
+        (
+            "[model]\nname='x'\n[sensor.phi]\nbits=3",
+            "'bits' is not a key: resolution, noise, gain_sd and neglected are",
+        ),
         ("[model]\nname='x'\n[sensor.phi]\nnoise=-3", "sensor.phi.noise must not be negative"),
         ("model = 3", "model must be a table"),
         ("[model", "is not TOML"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import socket
 import subprocess
@@ -216,14 +217,17 @@ def requests_of(browser: webdriver.Chrome) -> list[str]:
 
 
 def drawn(browser: webdriver.Chrome, plot: str) -> list[dict[str, Any]]:
-    """What Plotly holds of a plot: points of each curve, and the length of its path on the screen."""
+    """What uPlot holds of a plot: the last value and the points of each curve, its label, pixels with ink."""
     script = """
-        const div = document.getElementById(arguments[0]);
-        if (!div) { return []; }  // not made yet
-        const paths = [...div.querySelectorAll(".scatterlayer .js-line")];
-        return (div.data ?? []).map((one, i) => ({
-            last: one.y.at(-1), until: one.x.at(-1), points: one.y.filter((y) => y !== null).length,
-            title: div.layout.title.text, path: (paths[i]?.getAttribute("d") ?? "").length}));
+        const plot = plots.get(arguments[0]);
+        if (!plot || !plot.chart) { return []; }  // not made yet
+        const [t, ...curves] = plot.chart.data, canvas = plot.chart.ctx.canvas;
+        const pixels = plot.chart.ctx.getImageData(0, 0, canvas.width, canvas.height).data;
+        let inked = 0;
+        for (let i = 3; i < pixels.length; i += 4) { inked += pixels[i] > 0; }
+        return curves.map((x) => ({
+            last: x.at(-1), until: t.at(-1), points: x.filter((one) => one !== null && one !== undefined).length,
+            title: plot.spec.label, inked}));
     """
     return list(browser.execute_script(script, plot))
 
@@ -245,7 +249,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
         until(lambda: drawn(browser, "signal0")[0]["until"] > first["signal0"][0]["until"] + 3)
         for plot in PLOTS:
             now = drawn(browser, plot)
-            assert all(one["path"] > 10 for one in now), plot  # a straight line is "M0,165L510,165"
+            assert all(one["inked"] > 1000 for one in now), plot
             assert now[-1]["until"] > first[plot][-1]["until"], plot
         assert browser.execute_script("return received.textContent") != before
         assert drawn(browser, "parameter0")[0]["title"].startswith("w, ")  # the log has no rig file
@@ -253,7 +257,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
         assert "board -> out.pvlog" in words and "samples per second" in words and "nothing" in words
         assert browser.execute_script("return alarm.hidden") is True
         asked = requests_of(browser)
-        assert any(one.endswith("/plotly.min.js") for one in asked)
+        assert any(one.endswith("/uplot.js") for one in asked)
         assert all(one.startswith((f"http://{at}/", "data:", "blob:")) for one in asked), set(asked)
         assert browser.get_log("browser") == []  # type: ignore[no-untyped-call]
         logger.send_signal(signal.SIGINT)
@@ -269,6 +273,82 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
     assert list(reader) and reader.account.lost_share == 0
 
 
+@pytest.fixture(scope="module")
+def finished(sent: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log whose recording has ended."""
+    path = tmp_path_factory.mktemp("finished") / "a.pvlog"
+    writer = LogWriter(path, rig=field_board.rig().text())
+    writer.begin("a port", None)
+    writer.take(b"".join(sent))
+    writer.close()
+    return path
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (1280, 800), (1920, 1080)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_finished_log_fits_every_screen_and_scheme(
+    tmp_path: Path, finished: Path, width: int, height: int, scheme: str
+) -> None:
+    with page("127.0.0.1:0", finished, "a.pvlog") as address, chromium(tmp_path / "chromium", width, height) as browser:
+        media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+        until(lambda: _answers(address))
+        browser.get(address)
+        until(lambda: all(drawn(browser, plot) for plot in PLOTS))
+        until(lambda: len(drawn(browser, "signal0")) == 2)  # what the estimate predicts, beside what was measured
+        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        tile = browser.find_element("css selector", ".tile b")
+        assert tile.text.startswith("9.5") and tile.location["y"] < height / 3
+        back = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
+        assert (sum(map(int, re.findall(r"\d+", back)[:3])) < 200) == (scheme == "dark")
+        table = browser.execute_script("return asCsv(plots.get('parameter0'))").splitlines()
+        assert table[0] == '"t [s]","estimate","−2 s.e.","+2 s.e."' and len(table) == 1 + TICKS // 100
+        browser.find_element("id", "pause").click()
+        assert browser.execute_script("return paused") is True
+        assert browser.get_log("browser") == []  # type: ignore[no-untyped-call]
+
+
+def test_state_of_a_log_names_withheld_windows_and_what_the_estimate_predicts(finished: Path) -> None:
+    log = finished.read_bytes()
+    state = LiveState(finished, "")
+    state.take(log)
+    first = json.loads(state.as_json())
+    assert "modelled" not in first["motion"][0] and first["modelled"] == ""
+    assert first["marks"]["t"] and not any(first["marks"]["rejected"])
+    assert all(t < 6 for t in first["marks"]["t"])
+    assert [row["symbol"] for row in first["parameters"] if row["large"]] == ["g*", "l2", "rho2"]
+    then = until(lambda: (now := json.loads(state.as_json())) and now["modelled"] and now)
+    assert then["modelled"].startswith("R² 0.99")
+    measured, modelled = (np.array(then["motion"][0][name], float) for name in ("x", "modelled"))
+    there = np.isfinite(modelled)
+    assert there.sum() > 0.5 * there.size and np.std((measured - modelled)[there]) < 0.1 * np.std(measured)
+
+
+def test_view_refuses_what_is_no_log(tmp_path: Path) -> None:
+    path = tmp_path / "a.pvlog"
+    for content, sentence in ((None, "No such file"), (b"t,phi,y\n0,0,0\n" * 100, "a.pvlog")):
+        if content is not None:
+            path.write_bytes(content)
+        with pytest.raises((PvidError, OSError), match=sentence):
+            CliRunner().invoke(commands, ["view", str(path)], standalone_mode=False, catch_exceptions=False)
+
+
+def test_view_serves_a_log_until_it_is_interrupted(finished: Path) -> None:
+    command = [sys.executable, "-m", "pvid", "view", str(finished), "--web", "127.0.0.1:0"]
+    program = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert program.stdout is not None
+    line = program.stdout.readline()
+    until(lambda: f"{TICKS} samples" in received(line.split()[0]))
+    program.send_signal(signal.SIGINT)
+    assert program.wait(20) == 0
+
+
+def test_ports_lists_the_emulated_boards() -> None:
+    listed = CliRunner().invoke(commands, ["ports"], standalone_mode=False, catch_exceptions=False).output
+    assert all(name in listed for name in ("mps2-an386", "microbit", "stream-host"))
+
+
 def test_browsers_that_never_read_their_answers_cost_the_log_nothing(tmp_path: Path, sent: list[bytes]) -> None:
     """Twenty connections that ask and do not listen, while the log grows; another one is served all the same."""
     writer = LogWriter(tmp_path / "a.pvlog")
@@ -277,7 +357,7 @@ def test_browsers_that_never_read_their_answers_cost_the_log_nothing(tmp_path: P
         port = int(address.rstrip("/").rsplit(":", 1)[1])
         deaf = [socket.create_connection(("127.0.0.1", port)) for _ in range(20)]
         for one in deaf:
-            one.sendall(200 * f"GET /plotly.min.js HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+            one.sendall(200 * f"GET /uplot.js HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
         writer.begin("a port", None)
         began = time.monotonic()
         for frame in sent:

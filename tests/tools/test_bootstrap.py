@@ -126,7 +126,9 @@ def test_every_package_that_is_installed_has_its_version_and_hashes() -> None:
     assert "://" not in LOCK
 
 
-def test_the_tests_packages_are_not_installed_without_tests() -> None:
-    used, tests = LOCK.split("# for the tests alone\n")
-    assert "pytest==" in tests and "pytest==" not in used
+def test_large_packages_are_installed_for_what_needs_them_alone() -> None:
+    rest, tests = LOCK.split("# for the tests alone\n")
+    used, more = rest.split("# for parquet, mcap and campaigns\n")
+    assert "pytest==" in tests and "pytest==" not in rest
+    assert all(f"{name}==" in more and f"{name}==" not in used for name in ("pyarrow", "mcap", "distributed"))
     assert used.index("setuptools==") < used.index("# to use pvid\n") < used.index("numpy==")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+from collections.abc import Sequence
 from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.files_fourier_q31 import configuration
-from pvid.codegen.files_fourier_q31 import source as tables_source
+from pvid.codegen import files_fourier_q31
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
 from pvid.codegen.fourier_twin import fourier_model_of
@@ -30,7 +30,7 @@ from pvid.setup.fourier import design_tables, for_engine
 from pvid.setup.fourier_q31 import config_of_q31, row_formats
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.q31.fourier_front import jets
+from pvid.twin.q31.fourier_front import FrontTicks, jets
 from pvid.twin.q31.fourier_values import steps
 from pvid.twin.q31.scaled import Scaled
 
@@ -107,7 +107,11 @@ class Rig:
     def oracle_sums(self) -> dict[int, Float]:
         """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
         functions = self.oracle_design.test_functions
-        sums = self.record.sums(functions)
+        # The oracle's first step is at the third sample or later; the engine's may be at the first one.
+        missing = max(2 - FrontTicks.of(self.design).lead, 0)
+        padded = {name: np.concatenate([x[:1]] * missing + [x]) for name, x in self.exact.items()}
+        record = record_of(self.compiled, padded, self.oracle_design) if missing else self.record
+        sums = record.sums(functions)
         out = {}
         first = 0
         for row in self.record.channels.rows:
@@ -150,11 +154,13 @@ _DRIVER = """
 
 #include "fourier/collect_q31.h"
 #include "fourier/columns_q31.h"
-#include "fourier/direction_q31.h"
+#include "fourier/mirror_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/white_q31.h"
 
-extern const pvid_fourier_design_q31 rig_design_q31;
+extern const pvid_fourier_config_q31 *const rig_config;
+#define rig_config_q31 (*rig_config)
+#define rig_design_q31 (*rig_config->design)
 unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[]);
 
 /* S_h of the windows of a run, channel by channel; returns their number. */
@@ -164,7 +170,8 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
     const pvid_fourier_model_q31 *model = rig_design_q31.model;
     const unsigned harmonics = (rig_design_q31.functions / 2u) + (rig_design_q31.power / 2u) + 1u;
     unsigned windows = 0;
-    pvid_fourier_collect_init_q31(&self, &rig_design_q31);
+    static const int32_t offset[PVID_MAX_SAMPLES] = {0};
+    pvid_fourier_collect_init_q31(&self, &rig_design_q31, offset);
     for (unsigned k = 0; k < ticks; k++) {
         const pvid_fourier_tick tick = pvid_fourier_collect_step_q31(&self, &counts[k * model->samples]);
         outcome[k] = (uint8_t)tick;
@@ -181,7 +188,6 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
     return windows;
 }
 
-extern const pvid_fourier_config_q31 rig_config_q31;
 int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
              uint8_t exponent[], uint8_t reason[], unsigned ticks);
 
@@ -216,16 +222,18 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     const pvid_fourier_design_q31 *design = &rig_design_q31;
     const pvid_fourier_kind *own = &design->model->kind[kind];
     const size_t harmonics = pvid_fourier_harmonics_q31(design);
-    const size_t rows = pvid_fourier_rows_q31(design);
+    const size_t rows = design->functions;
     const size_t used = own->thetas + 1u;
     const size_t count = used + own->nuisances;
     uint64_t whole[PVID_MAX_COLUMNS];
-    unsigned live = 0;
-    size_t term = own->first;
+    size_t live = 0;
     for (size_t c = 0; c < design->model->channels; c++) {
         for (size_t h = 0; h < harmonics; h++) {
-            sums.s[c][h][0] = *window++;
-            sums.s[c][h][1] = *window++;
+            for (size_t part = 0; part < 2u; part++) {
+                const int32_t one = *window++;
+                sums.s[c][h][part] = one;
+                sums.bits[c] = ((h + part == 0u) ? 0u : sums.bits[c]) | (uint32_t)((one < 0) ? -one : one);
+            }
         }
     }
     pvid_fourier_white_init_q31(&white, design);
@@ -233,36 +241,32 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     pvid_fourier_white_spectrum_q31(&white, design, (uint8_t)kind, 0, harmonics);
     const pvid_scaled_q31 least = pvid_fourier_white_floor_q31(&white, design);
     pvid_fourier_white_invert_q31(&white, least, 0, harmonics);
-    for (size_t k = 0; k < pvid_fourier_basis_stages_q31(design); k++) {
-        pvid_fourier_white_basis_q31(&white, design, k);
+    for (size_t k = 0; k < pvid_fourier_mirrors_q31(design); k++) {
+        pvid_fourier_white_mirror_q31(&white, design, k);
+    }
+    pvid_fourier_columns_begin_q31(&made, design, kind, &sums);
+    for (size_t h = 0; h < harmonics; h++) {
+        pvid_fourier_columns_take_q31(&made, design, kind, &white, &sums, h);
     }
     for (size_t j = 0; j < count; j++) {
-        size_t end = term;
-        while ((end < own->end) && (design->model->term[end].column == j)) {
-            end++;
-        }
-        for (size_t part = 0; part < pvid_fourier_column_parts_q31(&white); part++) {
-            pvid_fourier_columns_make_q31(&made, design, &white, &sums, j, term, end, part);
-        }
-        term = end;
-        for (size_t k = 0; k < design->power / 2u; k++) {
-            pvid_fourier_white_remove_q31(&white, design, k, made.x[j]);
-        }
-        whole[j] = pvid_fourier_columns_square_q31(design, made.x[j]);
+        pvid_fourier_columns_end_q31(&made, design, &white, j);
+        whole[j] = pvid_fourier_columns_square_q31(rows, made.x[j]);
     }
     for (size_t j = used; j < count; j++) {
-        live += pvid_fourier_columns_keep_q31(design, whole[j], made.x[j]) ? 1u : 0u;
+        int32_t *mirror = &made.x[j][live];
+        const bool kept = pvid_fourier_columns_keep_q31(whole[j], rows - live, mirror);
         for (size_t i = 0; i < count; i++) {
-            if ((i < used) || (i > j)) {
-                pvid_fourier_take_off_q31(made.x[j], 0, rows, made.x[i]);
+            if (kept && ((i < used) || (i > j))) {
+                pvid_fourier_mirror_q31(mirror, rows - live, &made.x[i][live]);
             }
         }
+        live += kept ? 1u : 0u;
     }
     for (size_t j = 0; j < used; j++) {
         memcpy(&x[j * rows], made.x[j], rows * sizeof x[0]);
         exponent[j] = made.exponent[j];
     }
-    return live;
+    return (unsigned)live;
 }
 """
 SIZES = (
@@ -293,13 +297,13 @@ _OPTIONS = (
 
 
 class Core:
-    """The C of the engine, compiled once; signed overflow ends the program."""
+    """The C of the engine with `more` sources, compiled once; signed overflow ends the program."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, more: Sequence[Path] = ()) -> None:
         self.folder = folder
         (folder / "driver.c").write_text(_DRIVER, encoding="utf-8")
         rooms = ("fourier", "number", "solve", "judge")
-        core = [str(one) for one in sources_of("q31") if one.parent.name in rooms]
+        core = [str(one) for one in (*(own for own in sources_of("q31") if own.parent.name in rooms), *more)]
         self._run([*_OPTIONS, "-c", *core, str(folder / "driver.c")])
         self.libraries: dict[str, ctypes.CDLL] = {}
 
@@ -308,8 +312,17 @@ class Core:
 
     def library(self, one: Rig, config: FourierConfigQ31 | None = None) -> ctypes.CDLL:
         """With the tables of a rig, and this configuration or its own."""
-        tables = tables_source(one.fixed, one.parameters, one.design, "rig")
-        text = tables + "\n\n" + configuration(config or one.config, "rig")
+        name, own = one.made.name, config or one.config
+        header = files_fourier_q31.header(one.fixed, {"PVID_MAX_P": 3}, "a test")
+        (self.folder / f"{name}_weak_q31.h").write_text(header, encoding="utf-8")
+        text = "\n".join(
+            [
+                files_fourier_q31.source(one.fixed, one.parameters, "a test"),
+                files_fourier_q31.design_header(own, name, {"PVID_MAX_P": 3}, "a test", []),
+                "extern const pvid_fourier_config_q31 *const rig_config;",
+                f"const pvid_fourier_config_q31 *const rig_config = &{name}_config_q31;",
+            ]
+        )
         if text not in self.libraries:
             name = f"{one.name}_{len(self.libraries)}"
             code = self.folder / f"{name}.tables.c"
@@ -341,7 +354,7 @@ class Core:
         count = design.model.kind[kind].thetas + 1
         given = np.ascontiguousarray(np.stack([theta.m, theta.e], axis=-1), np.int32)
         sums = np.ascontiguousarray(window, np.int32)
-        x, exponent = np.zeros((count, design.rows), np.int32), np.zeros(count, np.int32)
+        x, exponent = np.zeros((count, design.functions), np.int32), np.zeros(count, np.int32)
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, sums, x, exponent)]
         live = self.library(one).columns(kind, *pointers)
         return x.astype(np.int64), exponent.astype(np.int64), int(live)

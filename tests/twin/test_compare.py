@@ -13,14 +13,11 @@ from pvid.core.sources import INCLUDES, core_sources, source
 from pvid.settings.bounds import SIZES
 
 MUTANTS = {
-    "kapitza_solve_f32.c": (
-        "p, 0, part * dp[0], &solution->bounded)",
-        "p, 0, 1.0000001f * (part * dp[0]), &solution->bounded)",
-    ),
-    "kapitza_sums_f32.c": ("four_d2 = 4.0f * d2;", "four_d2 = 4.0000005f * d2;"),
-    "information_f32.c": (
-        "*low = (kept_high - (total - part)) + (kept_low - part);",
-        "*low = 0.0f * part;",
+    "strong_f32.c": ("= {g[0] * e, g[1] * e,", "= {1.0000001f * (g[0] * e), g[1] * e,"),
+    "kapitza_estimator_f32.c": ("self->prior[a] = ratio * ratio;", "self->prior[a] = 1.0000001f * (ratio * ratio);"),
+    "kapitza_sums_f32.c": (
+        "self->low[i] = (kept_high - (total - part)) + (kept_low - part);",
+        "self->low[i] = 0.0f * part;",
     ),
 }
 

@@ -16,6 +16,7 @@
 #define TICKS 5000
 
 static const float starts[4] = {31.0f, 8.0f, 5.0f, 0.0f};
+static const float derivatives[PVID_ORDERS] = {0.0f};
 
 static pvid_weak_f32 weak;
 static pvid_strong_f32 strong;
@@ -55,6 +56,7 @@ static void call_all(pvid_weak_f32 *one, pvid_strong_f32 *other, pvid_weak_q31 *
     for (int i = 0; i < TICKS; i++) {
         assert_int_equal(pvid_weak_step_f32(one, 0.01f, 0.001f), PVID_NOT_READY);
         assert_int_equal(pvid_strong_step_f32(other, 0.01f, 0.001f), PVID_NOT_READY);
+        assert_int_equal(pvid_strong_row_step_f32(other, derivatives, starts), PVID_NOT_READY);
         assert_int_equal(pvid_weak_step_q31(third, 1, 2), PVID_NOT_READY);
         assert_int_equal(pvid_strong_step_q31(fourth, 1, 2), PVID_NOT_READY);
     }
@@ -69,15 +71,18 @@ static void call_all(pvid_weak_f32 *one, pvid_strong_f32 *other, pvid_weak_q31 *
 
     pvid_estimate_f32 estimate;
     pvid_estimate_q31 estimate_q31;
+    float sums[PVID_STRONG_SUMS] = {0.0f};
+    pvid_strong_read_sums_f32(other, sums);
+    assert_float_equal(sums[0], 0.0f, 0.0f);
     const pvid_estimate_f32 none = {.kappa = 0.0f};
     const pvid_estimate_q31 none_q31 = {.kappa = 0};
     memset(&estimate, 0x5A, sizeof estimate);
     memset(&estimate_q31, 0x5A, sizeof estimate_q31);
-    pvid_estimator_assess_f32((other == NULL) ? NULL : &other->estimator, &estimate);
+    pvid_strong_assess_f32(other, &estimate);
     pvid_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, &estimate_q31);
     assert_memory_equal(&estimate, &none, sizeof none);
     assert_memory_equal(&estimate_q31, &none_q31, sizeof none_q31);
-    pvid_estimator_assess_f32((other == NULL) ? NULL : &other->estimator, NULL);
+    pvid_strong_assess_f32(other, NULL);
     pvid_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, NULL);
 
     memset(image, 0, sizeof image);
@@ -131,12 +136,14 @@ static void init_refuses_null(void **state)
     assert_int_equal(pvid_gate_init_q31(NULL, &strong_unit.gate, 1u, (pvid_scaled_q31){0, 0}), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_f32(NULL, &config.trust, &weak.estimator), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_q31(NULL, &weak_unit.trust, &weak_q31.estimator), PVID_BAD_POINTER);
+    static pvid_estimator_f32 estimator;
+    static pvid_differentiator_f32 differentiator;
     static pvid_differentiator_q31 bank;
     static pvid_gate_f32 gate;
     static pvid_gate_q31 gate_q31;
-    assert_int_equal(pvid_estimator_init_f32(&strong.estimator, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_estimator_init_f32(&estimator, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_estimator_init_q31(&strong_q31.estimator, NULL), PVID_BAD_POINTER);
-    assert_int_equal(pvid_differentiator_init_f32(&strong.phi, NULL, 1.0f), PVID_BAD_POINTER);
+    assert_int_equal(pvid_differentiator_init_f32(&differentiator, NULL, 1.0f), PVID_BAD_POINTER);
     assert_int_equal(pvid_differentiator_init_q31(&bank, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_gate_init_f32(&gate, NULL, 1.0f, 1.0f, 1.0f), PVID_BAD_POINTER);
     assert_int_equal(pvid_gate_init_q31(&gate_q31, NULL, 1u, (pvid_scaled_q31){0, 0}), PVID_BAD_POINTER);

@@ -207,10 +207,8 @@ static void snapshot_of_another_object_names_its_kind(void **state)
         size_t at;
         pvid_snapshot_status status;
     } field[] = {
-        {8, PVID_SNAPSHOT_OTHER_VERSION},
-        {12, PVID_SNAPSHOT_OTHER_KIND},
-        {16, PVID_SNAPSHOT_OTHER_LAYOUT},
-        {20, PVID_SNAPSHOT_OTHER_CONFIG},
+        {8, PVID_SNAPSHOT_OTHER_VERSION}, {12, PVID_SNAPSHOT_OTHER_KIND},   {16, PVID_SNAPSHOT_OTHER_LAYOUT},
+        {20, PVID_SNAPSHOT_OTHER_MODEL},  {24, PVID_SNAPSHOT_OTHER_DESIGN}, {28, PVID_SNAPSHOT_OTHER_CONFIG},
     };
     const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);

@@ -437,28 +437,6 @@ static void a_solve_in_stages_has_the_bits_of_one_go(void **state)
     assert_int_equal(whole.counters.updates, 210);
 }
 
-static void a_strong_model_is_solved_in_one_stage(void **state)
-{
-    (void)state;
-    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
-    pvid_estimator_f32 estimator;
-    static pvid_estimator_solve_f32 solve;
-    config.model = &pvid_kapitza_strong_f32;
-    for (int i = 0; i < 3; i++) {
-        config.start[i] = 5.0f;
-        config.start_sd[i] = 1.0f;
-        config.lower[i] = 0.1f;
-        config.upper[i] = 100.0f;
-    }
-    config.row_sd = 1.0f;
-    config.update_rate_hz = 1000.0f;
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &config), PVID_OK);
-    assert_int_equal(pvid_estimator_stages_f32(&estimator, true), 1);
-    pvid_estimator_begin_f32(&estimator, &solve, true);
-    assert_true(pvid_estimator_advance_f32(&estimator, &solve));
-    assert_int_equal(solve.reason, PVID_HELD_NOT_EXCITED);
-}
-
 static void a_row_counts_for_its_weight(void **state)
 {
     (void)state;
@@ -494,7 +472,6 @@ int main(void)
         cmocka_unit_test(products_by_pattern_are_those_of_whole_matrices),
         cmocka_unit_test(the_jacobians_are_the_derivatives_of_theta),
         cmocka_unit_test(a_solve_in_stages_has_the_bits_of_one_go),
-        cmocka_unit_test(a_strong_model_is_solved_in_one_stage),
         cmocka_unit_test(a_row_counts_for_its_weight),
     };
     return cmocka_run_group_tests(tests, prepare, NULL);

@@ -71,6 +71,8 @@ TABLES = (
     ("laws", "laws", "Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."),
     ("strong", "strong", "Errors of the strong form by encoder resolution and differentiator."),
     ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
+    ("pendulum", "pendulum", "The pendulum through the weak engine, beside its own weak form: errors over 80 seeds."),
+    ("refine", "refine", "The refinement behind the weak form: errors beside the Cramer-Rao bound, 80 seeds."),
     ("tune", "tuning", "Errors against the truth with the default settings and with those that `tune` picks."),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
 )
@@ -256,7 +258,10 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
 @click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7; 10^6 held out.")
 @click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
 @click.option(
-    "--columns", "columns", multiple=True, help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, peers."
+    "--columns",
+    "columns",
+    multiple=True,
+    help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, engine, peers.",
 )
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")

@@ -17,17 +17,16 @@ from pvid.base.errors import PvidError
 from pvid.core.sources import INCLUDES, ROOT, sources_of
 
 STAGES = {
-    "differentiator": "two channels, five points, orders 0 to 4",
-    "row": "Y and N from the derivatives",
-    "add": "checks, innovation, sums of M, B, yy",
-    "project": "C^T M C and C^T (B - M theta)",
-    "estimator": "the estimator's whole step: add, project, factor, solve, move p",
-    "gauss-newton": "the same with feedback_hz = 0, which needs no innovation",
-    "tick": "samples in, parameters out",
+    "row": "Y and N[11] from the derivatives",
+    "estimator": "strong form from derivatives: row, gate, verdict, sums, a solve, exact at every eighth row",
+    "tick": "the same from samples, five points",
+    "exact": "samples in, five points, a solve from all sums at every row: the paper's law literally",
+    "staged": "samples in, five points, a solve at every eighth row in stages",
+    "smoothing": "as tick, behind a Savitzky-Golay bank of 315 samples in blocks of nine",
     "assess": "standard errors and kappa (only when published)",
     "weak": "weak form, samples in, parameters out: mean over its windows (K = 10, 1 kHz)",
-    "smoothing": "strong form behind two Savitzky-Golay banks of 321 points, samples in, parameters out",
     "rls": "plain packed RLS of the same 11 parameters",
+    "ud": "recursive least squares of the same 11 parameters in U-D form",
     "kalman": "extended Kalman filter of 7 states, u by 71 taps, samples in, parameters out",
 }
 
@@ -35,7 +34,7 @@ _TICKS = 2496  # a multiple of the fold's block of 64 ticks
 _WEAK_TICKS = 3 * PERIOD
 
 
-RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32)
+RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32); U-D has as many
 
 
 def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: Sequence[str] = ()) -> Path:
@@ -66,7 +65,8 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: 
 _SIZES = """#include <stdio.h>
 #include "pvid/pvid.h"
 int main(void) {
-    printf("%zu %zu %zu", sizeof(pvid_estimator_f32), sizeof(pvid_strong_f32), sizeof(pvid_weak_f32));
+    printf("%zu %zu ", sizeof(pvid_estimator_f32), sizeof(pvid_strong_estimator_f32));
+    printf("%zu %zu", sizeof(pvid_strong_f32), sizeof(pvid_weak_f32));
     return 0;
 }
 """
@@ -78,9 +78,10 @@ def state_bytes(folder: Path) -> dict[str, int]:
     source.write_text(_SIZES, encoding="utf-8")
     subprocess.run(["gcc", "-std=c99", *INCLUDES, str(source), "-o", str(binary)], check=True)
     printed = subprocess.run([str(binary)], capture_output=True, text=True, check=True).stdout
-    estimator, strong, weak = map(int, printed.split())
+    estimator, own, strong, weak = map(int, printed.split())
     return {
         "estimator (two-level sums, counters, settings)": estimator,
+        "strong-estimator, of the strong form": own,
         "strong form, windows of 321 samples": strong,
         "weak form": weak,
         "plain packed RLS of 11 parameters": RLS_STATE_BYTES,

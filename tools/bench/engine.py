@@ -107,7 +107,7 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] | None = No
         own = replace(config.estimator, start=np.clip(start, config.estimator.lower, config.estimator.upper))
         core = fourier_native(compiled, tables).identifier_of(replace(config, estimator=own))
         record = core.run_samples(samples_of(config, run), sums=False, hashes=False)
-        used = core.counters["rows"] // ((design.functions + design.power) * rows.kinds)
+        used = core.counters["rows"] // (design.functions * rows.kinds)
         fit = batch(rows.only(slice(0, used)) if used else rows, start, equation_error=False)
         p, size = record.p[-1].astype(np.float64), size_of(simulation)
         engine.append((p - simulation.truth) / size)

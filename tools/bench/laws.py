@@ -11,13 +11,13 @@ import numpy.typing as npt
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.settings.enums import Law
-from pvid.settings.f32 import EstimatorConfig
-from pvid.setup.f32 import bank_of, estimator_config
+from pvid.settings.f32 import StrongConfig
+from pvid.setup.f32 import strong_config
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_start
 
 STANDARD_SAMPLE_RATE = 1000.0  # Hz
 
-Float32 = npt.NDArray[np.float32]
+Float = npt.NDArray[np.float64]
 
 RUNS = 40
 PRIORS = (1e3, 1e4, 3e4, 1e5, 3e5, 1e6)  # row_sd [rad/s^8]: H0 = (row_sd / start_sd)^2
@@ -37,24 +37,23 @@ HEADER = (
 )
 
 
-def exact_rows(native: Native) -> tuple[Float32, Float32]:
-    """Rows of the standard rig from exact derivatives: N [ticks, 11], Y [ticks]."""
+def exact_derivatives() -> tuple[Float, Float]:
+    """Exact derivatives of the standard rig: phi [ticks, 5] and u [ticks, 3]."""
     exact = simulate(truth="linear").exact
     assert exact is not None  # the linear truth always has it
-    return native.strong_rows(exact.phi, exact.u)
+    return exact.phi, exact.u
 
 
-def _settings(start: npt.ArrayLike, **changes: object) -> EstimatorConfig:
+def _settings(start: npt.ArrayLike, **changes: object) -> StrongConfig:
     rig = RigFile.standard()
-    rig = replace(rig, identifier=replace(rig.identifier, form="strong", kappa_min=0.0))
-    config = estimator_config(rig, bank_of(rig, STANDARD_SAMPLE_RATE), start)
-    return replace(config, **changes)  # type: ignore[arg-type]
+    rig = replace(rig, identifier=replace(rig.identifier, form="strong", kappa_min=0.0, outlier_gate=0.0))
+    config = replace(strong_config(rig, STANDARD_SAMPLE_RATE, start), exact_every=1)
+    return replace(config, estimator=replace(config.estimator, **changes))  # type: ignore[arg-type]
 
 
 def run_law(
     native: Native,
-    n: Float32,
-    y: Float32,
+    exact: tuple[Float, Float],
     starts: npt.NDArray[np.float64],
     labels: tuple[str, str, str],
     changes: dict[str, object],
@@ -64,8 +63,8 @@ def run_law(
     truth = STANDARD_PENDULUM.linear
     last, settled = [], []
     for one in starts:
-        core = native.estimator(_settings(one, **changes), STANDARD_SAMPLE_RATE)
-        record = core.run(n, y, sums=False, hashes=False)
+        core = native.of_derivatives(_settings(one, **changes))
+        record = core.run(*exact, sums=False, hashes=False)
         error = np.abs(record.p / truth - 1).max(axis=1)
         outside = np.flatnonzero(error > 0.01)
         last.append(error[-1])
@@ -84,7 +83,7 @@ def run_law(
 
 def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:
     """All rows: both laws from +-50 %, over priors and feedback rates, then by the size of the start's error."""
-    n, y = exact_rows(native)
+    exact = exact_derivatives()
     truth = STANDARD_PENDULUM.linear
     anywhere = np.array([standard_start(seed) for seed in range(RUNS)])
     jobs: list[tuple[npt.NDArray[np.float64], str, str, str, dict[str, object]]] = []
@@ -106,7 +105,7 @@ def laws_table(native: Native, progress: Callable[[int], None] = lambda _: None)
         jobs.append((starts, "stationary", "feedback 10/s", off, {"law": Law.STATIONARY, "feedback_hz": 10.0}))
     for done, (starts, law, setting, off, changes) in enumerate(jobs):
         progress(done)
-        yield run_law(native, n, y, starts, (law, setting, off), changes)
+        yield run_law(native, exact, starts, (law, setting, off), changes)
 
 
 STEPS = len(PRIORS) + len(FEEDBACKS_HZ) + 1 + 2 * len(START_ERRORS)

@@ -144,8 +144,8 @@
 #error "PVID_MAX_SAMPLES must lie in 1..32"
 #endif
 
-/* Numbers in the ring of signals: signals times (2 half + decimation), half that of the longest filter. RAM: 4 bytes
- * each. */
+/* Numbers in the front end's line: signals times (4 half + 5), half that of the longest compensator [steps]; in the
+ * fixed-point core signals times (2 half + decimation), half that of the longest filter [ticks]. RAM: 4 bytes each. */
 #ifndef PVID_MAX_RING
 #define PVID_MAX_RING 256
 #endif

@@ -68,15 +68,19 @@ typedef struct {
     void (*prepare)(const float jet[], float out[]);
     /* From jets, runs and signs: the gains, then the integrands. */
     void (*values)(const float in[], float out[]);
+    /* From the gains of a step, I^1 and I^2 of each integrand, and the time since the start of its half [s]: the values
+     * of the channels that are summed. */
+    void (*form)(const float gain[], const float integral[], float t, float channel[]);
     const pvid_model_f32 *model; /* theta and C of all kinds */
 } pvid_fourier_model_f32;
 
 /* ---- the design: tables for a rig ---- */
 
-/* Filter that gives a jet at a step: of even order x + sum_i w_i ((x_+i - x) + (x_-i - x)), without the leading x if
+/* Compensator: gives a jet at a step from the block sums x of its signal (src/fourier/fourier_front_f32.c), with D = 1
+ * from the signal: of even order x + sum_i w_i ((x_+i - x) + (x_-i - x)), without the leading x if
  * the order is above 0; of odd order sum_i w_i (x_+i - x_-i), i = 1..half. */
 typedef struct {
-    uint16_t half;        /* 0: the sample itself */
+    uint16_t half;        /* steps on either side; 0: x itself */
     const float *weights; /* [half], outwards, per second^order */
 } pvid_fourier_filter_f32;
 
@@ -97,9 +101,9 @@ typedef struct {
     uint8_t power;      /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation; /* D, ticks a step, 1..PVID_MAX_DECIMATION */
     uint16_t hop;       /* steps of half a window, a multiple of 4; H < hop */
-    const pvid_fourier_filter_f32 *filter; /* [jets] */
-    const float *circle;                   /* [2 hop] cos(pi j / hop) */
-    const pvid_fourier_noise_f32 *noise;   /* [n_noise] */
+    const pvid_fourier_filter_f32 *compensator; /* [jets] */
+    const float *circle;                        /* [2 hop] cos(pi j / hop) */
+    const pvid_fourier_noise_f32 *noise;        /* [n_noise] */
     uint16_t n_noise;
     const uint8_t *error_order;  /* [kinds] order of the derivative of white noise that the equation's own error is */
     const float *error_variance; /* [kinds] variance of that noise at a step, >= 0; 0: the sensors explain the rows */
@@ -116,7 +120,8 @@ typedef struct {
     const float *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, >= 0;
                                NULL: no check */
     bool compensation;      /* corrects the bias by the sensors' noise (errors in variables) */
-    uint8_t iterations;     /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3 */
+    uint8_t iterations;     /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 1, the next window
+                               goes on from there */
     pvid_estimator_config_f32 estimator; /* row_sd 1: rows are in standard deviations. init sets model, update_rate_hz,
                                             row_weight and correlation */
     pvid_trust_config_f32 trust;         /* conditions of publication */

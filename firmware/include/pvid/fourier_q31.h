@@ -7,10 +7,10 @@
  *
  *   counts         x less the offset, |x| <= full_scale <= 2^24
  *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1)
- *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times signals, rounded twice
- *   integrals      exact int64 in dt/24 (once) and dt^2/48 (twice), that of 1 in dt/2; rounded to int32
- *   channels       int32 within +-2^28
- *   sums           of four steps exact (16-bit cosine times 29 bits), then shifted to int32 and added
+ *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
+ *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
+ * twice integrals      exact int64 in dt/24 (once) and dt^2/48 (twice), that of 1 in dt/2; rounded to int32 channels
+ * int32 within +-2^28 sums           of four steps exact (16-bit cosine times 29 bits), then shifted to int32 and added
  *   S_h            int32, with the window's own start of every integral
  */
 #ifndef PVID_FOURIER_Q31_H
@@ -74,11 +74,11 @@ typedef struct {
     int32_t multiplier; /* > 0 */
 } pvid_fourier_rescale_q31;
 
-/* Filter that gives a jet at a step, as pvid_fourier_filter_f32, of order 0 with the leading x 2^bits. */
+/* Compensator that gives a jet at a step from the block sums at the steps around it (host/docs/firmware.md): of order 0
+ * with the leading x 2^bits. */
 typedef struct {
-    uint16_t half;                     /* 0: the signal itself */
-    uint8_t bits;                      /* of the leading x, 0..31 */
-    bool is_wide;                      /* false: a weight times the largest pair of signals fits 32 bits */
+    uint16_t half;                     /* 0: the block sum itself */
+    uint8_t bits;                      /* of the leading x, 0..30 */
     pvid_fourier_rescale_q31 rescale;  /* from the sum to the jet */
     const PVID_TABLE int32_t *weights; /* [half], outwards */
 } pvid_fourier_filter_q31;
@@ -115,6 +115,7 @@ typedef struct {
     uint8_t sum_shift;         /* of four steps' products 2^-14 before they are added, 1..30 */
     uint16_t hop;              /* steps of half a window, a multiple of 4; H < hop */
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
+    const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
     const pvid_fourier_filter_q31 *filter; /* [jets] */
     const pvid_fourier_rescale_q31 *run;   /* [runs] from twice the sum over the steps to the input of `values` */
     const int32_t *sign_width;             /* [signs] of the soft sign, in the format of its argument; 0: the mean of
@@ -122,7 +123,7 @@ typedef struct {
     const pvid_fourier_integral_q31 *integral; /* [integrands] */
     const pvid_fourier_format_q31 *format;     /* [channels] */
     const PVID_TABLE int16_t *circle;          /* [2 hop] 32767 cos(pi j / hop) */
-    const pvid_scaled_q31 *factor; /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
+    const pvid_scaled_q31 *factor; /* of each term, of (h/H)^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_fourier_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;
     const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
@@ -134,10 +135,11 @@ typedef struct {
 
 typedef struct {
     const pvid_fourier_design_q31 *design; /* must outlive the identifier, with its tables */
-    const int32_t *offset;                 /* [samples] reading of each sensor at 0 [counts] */
+    const int32_t *offset;                 /* [samples] reading of each sensor at 0, within +-2^30 [counts] */
     const int32_t *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, 0..2^24
                                  [counts]; NULL: no check */
-    uint8_t iterations;       /* Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3 */
+    uint8_t iterations;       /* most Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3. There is no
+                                 other one behind a step below 0.8 % */
     pvid_estimator_config_q31 estimator; /* row_sd 2^(8 + y_bits): rows are in standard deviations. init sets model and
                                             row_weight */
     pvid_trust_config_q31 trust;         /* conditions of publication */

@@ -17,8 +17,8 @@
  * kinds. Every row has the same variance, so rows of different units are divided by their standard deviations.
  *
  * Optional functions: `accumulate` if entries of M repeat (fewer sums than n_theta (n_theta + 1) / 2); `project`
- * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set; `take_row` may
- * be added to them. `noise` enables the noise check (noise_margin of estimator.h).
+ * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set. `noise` enables
+ * the noise check (noise_margin of estimator.h).
  */
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
@@ -34,7 +34,6 @@ extern "C" {
 #endif
 
 typedef struct pvid_model_f32 pvid_model_f32;
-typedef struct pvid_estimator_f32 pvid_estimator_f32; /* estimator.h */
 
 struct pvid_model_f32 {
     uint8_t n_theta; /* entries of theta and N, 1..PVID_MAX_THETA */
@@ -70,11 +69,6 @@ struct pvid_model_f32 {
     void (*noise)(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P]);
     /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
     float (*innovate)(const float p[], const float n[], float y, float gradient[]);
-    /* pvid_estimator_step_f32 in one call, or pvid_estimator_add_f32 for a row that does not end a group, with the same
-     * bits; e and gradient are innovate's results at p while g < 1. It saves storing and reloading sums and S where a
-     * solve follows every row. NULL: the estimator adds and solves one after the other. */
-    pvid_reason (*take_row)(pvid_estimator_f32 *estimator, const float n[], float y, float e, const float gradient[],
-                            bool ends_group);
 };
 
 #ifdef __cplusplus

@@ -11,6 +11,7 @@
 #include "pvid/differentiator_q31.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/fnv_q31.h"
+#include "pvid/fourier_q31.h"
 #include "pvid/gate_q31.h"
 #include "pvid/mechanism_q31.h"
 #include "pvid/misfit_q31.h"

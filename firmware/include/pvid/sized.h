@@ -139,9 +139,32 @@
 #define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
 #define pvid_snapshot_restore_weak_q31 PVID_SIZED(pvid_snapshot_restore_weak_q31)
 
+/* refine.h */
+#define pvid_refine_init_f32 PVID_SIZED(pvid_refine_init_f32)
+#define pvid_refine_step_f32 PVID_SIZED(pvid_refine_step_f32)
+#define pvid_refine_latest_f32 PVID_SIZED(pvid_refine_latest_f32)
+#define pvid_refine_read_f32 PVID_SIZED(pvid_refine_read_f32)
+#define pvid_refine_gap_f32 PVID_SIZED(pvid_refine_gap_f32)
+#define pvid_refine_freeze_f32 PVID_SIZED(pvid_refine_freeze_f32)
+
+/* fnv_refine.h */
+#define pvid_fnv_refine_f32 PVID_SIZED(pvid_fnv_refine_f32)
+
+/* snapshot_fourier.h */
+#define pvid_snapshot_save_fourier_f32 PVID_SIZED(pvid_snapshot_save_fourier_f32)
+#define pvid_snapshot_restore_fourier_f32 PVID_SIZED(pvid_snapshot_restore_fourier_f32)
+
+/* snapshot_fourier_q31.h */
+#define pvid_snapshot_save_fourier_q31 PVID_SIZED(pvid_snapshot_save_fourier_q31)
+#define pvid_snapshot_restore_fourier_q31 PVID_SIZED(pvid_snapshot_restore_fourier_q31)
+
 /* strong.h */
 #define pvid_strong_init_f32 PVID_SIZED(pvid_strong_init_f32)
 #define pvid_strong_step_f32 PVID_SIZED(pvid_strong_step_f32)
+#define pvid_strong_row_step_f32 PVID_SIZED(pvid_strong_row_step_f32)
+#define pvid_strong_assess_f32 PVID_SIZED(pvid_strong_assess_f32)
+#define pvid_strong_read_sums_f32 PVID_SIZED(pvid_strong_read_sums_f32)
+#define pvid_fnv_strong_f32 PVID_SIZED(pvid_fnv_strong_f32)
 #define pvid_strong_gap_f32 PVID_SIZED(pvid_strong_gap_f32)
 #define pvid_strong_freeze_f32 PVID_SIZED(pvid_strong_freeze_f32)
 

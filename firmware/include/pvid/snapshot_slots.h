@@ -19,10 +19,12 @@ typedef enum {
     PVID_SNAPSHOT_OTHER_KIND,    /* of another form or core */
     PVID_SNAPSHOT_OTHER_LAYOUT,  /* of a build with other sizes, pointers or byte order */
     PVID_SNAPSHOT_OTHER_CONFIG,  /* of another configuration, or of other tables */
-    PVID_SNAPSHOT_NOT_READY      /* the identifier was not initialised with config, or a pointer is NULL */
+    PVID_SNAPSHOT_NOT_READY,     /* the identifier was not initialised with config, or a pointer is NULL */
+    PVID_SNAPSHOT_OTHER_MODEL,   /* of another compiled model */
+    PVID_SNAPSHOT_OTHER_DESIGN   /* of another design: sizes, filters, tables */
 } pvid_snapshot_status;
 
-#define PVID_SNAPSHOT_HEADER 28u
+#define PVID_SNAPSHOT_HEADER 36u
 
 /* Size of a snapshot [bytes]: the upper limit of its kind. */
 #define PVID_SNAPSHOT_BYTES(object) (PVID_SNAPSHOT_HEADER + (object) + 4u)

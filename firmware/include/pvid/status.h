@@ -41,7 +41,7 @@ typedef enum {
     PVID_BAD_GATE_PATIENCE, /* not finite or outside 0..1e12 s */
     PVID_BAD_DEAD_ZONE,     /* not finite or outside 0..100 */
     PVID_BAD_HALF,          /* of a bank: below 2, or a window over PVID_MAX_WINDOW for every stride */
-    PVID_BAD_STRIDE,        /* of a bank: 0, or a window over PVID_MAX_WINDOW */
+    PVID_BAD_STRIDE,        /* of a bank: 0, or a window with its block over PVID_MAX_WINDOW */
     PVID_BAD_CENTRE,        /* of a q31 bank: outside 1..2^30 */
     PVID_BAD_TAPS,          /* of a design: even, or outside 5..PVID_MAX_TAPS */
     PVID_BAD_DECIMATION,    /* of a design: outside 1..PVID_MAX_DECIMATION */
@@ -74,8 +74,11 @@ typedef enum {
     PVID_HELD_OUT_OF_RANGE,   /* window dropped: the angle exceeded the range of the equations */
     PVID_MISFIT, /* p was updated, but the residuals exceed the sensors' noise: the model does not fit the mechanism */
     PVID_HELD_FROZEN, /* row or window not used: the identifier is frozen */
-    PVID_NOT_READY    /* not initialised, init refused, NULL instead of an object, or a kind of rows that the model does
+    PVID_NOT_READY,   /* not initialised, init refused, NULL instead of an object, or a kind of rows that the model does
                          not have: nothing was done */
+    PVID_HELD_SEARCHING, /* refinement: no block fits the equations yet */
+    PVID_HELD_BLOCK,     /* refinement: the block does not fit, or contradicts the blocks before it */
+    PVID_HELD_DISAGREES  /* refinement: the estimate differs from the weak form's by more than the errors of both */
 } pvid_reason;
 
 /* The law by which an estimator moves p; see estimator.h. */

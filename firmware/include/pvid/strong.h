@@ -1,8 +1,16 @@
 /* pvid/strong.h - identifies a pendulum by the paper's strong form in float32: samples in, parameters out.
  *
- * Two differentiators (phi and y_A, same bank, same delay), the row of the strong form, the estimator: one row and
- * one solve per tick. The angle is differentiated four times, which needs a sensor of about 20 bits; weak.h needs
- * 14.
+ * A bank of derivative filters for phi and y_A, the row of the strong form, the estimator of estimator.h for its three
+ * parameters. The angle is differentiated four times, which needs a sensor of about 20 bits; weak.h needs 14.
+ *
+ * How often p is solved for, and at what cost, follows from two fields (instructions a tick in the mean and of the
+ * longest tick: host/docs/benchmarks/cost.md):
+ *
+ *   divider 1, exact_every 1: S = C^T M C and F from all sums at every row; the paper's law (5) literally
+ *   divider 1, exact_every 8: a solve at every row; S and F come from all sums at every eighth row, between them each
+ *                             row adds its gradient's square to S, and F is the row's own innovation
+ *   divider 8:                a solve every eighth row; its projection, its solve and the folding of the sums have
+ *                             rows of their own (any multiple of 4 from 8 to 64)
  *
  *   static pvid_strong_f32 identifier;
  *   pvid_strong_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .bank = ...,
@@ -31,13 +39,17 @@ typedef struct {
     float l1;             /* length of rod 1 [m], > 0 */
     float drive_min; /* least rms of u = y_A''/l1 over the last second [1/s^2], >= 0: with less drive no row is used.
                         Choose ten times the noise of u. 0: every row is used */
-    pvid_fir_bank_f32 bank;              /* filters of both channels; the weights must outlive the identifier */
-    pvid_gate_config_f32 gate;           /* outlier gate on the innovation of a row */
-    pvid_estimator_config_f32 estimator; /* init sets model and update_rate_hz */
+    pvid_fir_bank_f32 bank;    /* filters of both channels; the weights must outlive the identifier */
+    pvid_gate_config_f32 gate; /* outlier gate on the innovation of a row */
+    uint16_t exact_every;      /* rows from one exact projection to the next if divider is 1, 1..255; 0: 8, with the law
+                                  pseudovelocity or a dead zone 1 */
+    pvid_estimator_config_f32
+        estimator; /* model and update_rate_hz are not used; noise_margin and row_weight neither */
 } pvid_strong_config_f32;
 
 /* State: detail/strong_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_strong_f32 pvid_strong_f32;
+typedef struct pvid_strong_estimator_f32 pvid_strong_estimator_f32;
 
 /* Initialises `self`. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or
@@ -53,6 +65,19 @@ pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config
  *   - PVID_MISFIT instead of PVID_UPDATED during the alarm of misfit.h: do not trust the estimate,
  *   - else the estimator's reason. */
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y);
+
+/* The same for a row from derivatives of your own: phi, phi', .. phi'''' [rad/s^k] and u = y_A''/l1, u', u'' [1/s^2 ..]
+ * of the same instant. The windows and the drive are not used. Returns the reasons of a row. */
+pvid_reason pvid_strong_row_step_f32(pvid_strong_f32 *self, const float phi[PVID_ORDERS], const float u[3]);
+
+/* Standard errors, kappa and residual of the present p, as pvid_estimator_assess_f32. Cost: about two solves. */
+void pvid_strong_assess_f32(const pvid_strong_f32 *self, pvid_estimate_f32 *estimate);
+
+/* Writes the values of the sums of M, B, Y^2 and the weight, sums[58], without the rows of an unfinished block. */
+void pvid_strong_read_sums_f32(const pvid_strong_f32 *self, float sums[]);
+
+/* The running hash of fnv.h for this estimator: continues hash after a tick with this reason. */
+uint32_t pvid_fnv_strong_f32(uint32_t hash, const pvid_strong_estimator_f32 *estimator, pvid_reason reason);
 
 /* Call this when samples are missing: the windows restart, all other state is kept. */
 void pvid_strong_gap_f32(pvid_strong_f32 *self);

@@ -1,20 +1,19 @@
-/* The strong form's functions of model.h. Private to the core. */
+/* The 58 sums of the strong form (theory.md 2): added to in blocks of four rows and folded into the second level.
+ * Private to the core. */
 #ifndef PVID_KAPITZA_SUMS_F32_H
 #define PVID_KAPITZA_SUMS_F32_H
 
-#include "pvid/kapitza.h"
+#include <stddef.h>
 
-#define PVID_KAPITZA_STRONG_MOMENTS 45
+#include "pvid/detail/strong_state.h"
 
-/* `accumulate` and `project`. */
-void pvid_kapitza_accumulate_f32(const float n[], float y, const float high[], float low[], float sums[]);
-float pvid_kapitza_project_f32(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[]);
+/* Adds PVID_STRONG_ROWS rows. Cost: 10 operations a sum. */
+void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 rows[restrict], float low[restrict]);
 
-/* `accumulate`, whatever the sums are then. */
-void pvid_kapitza_add_f32(const float n[], float y, const float high[], float low[]);
+/* Folds the sums first..end-1 into the second level, after forgetting (information.h). */
+void pvid_kapitza_fold_f32(pvid_strong_sums_f32 *self, size_t first, size_t end);
 
-/* Both in one, without the returned number, with the same bits: no sum is written out and read again. */
-void pvid_kapitza_absorb_f32(const float p[restrict], const float n[restrict], float y, const float high[restrict],
-                             float low[restrict], float s[restrict][PVID_MAX_P], float f[restrict]);
+/* The values high + low of all sums. */
+void pvid_kapitza_read_f32(const pvid_strong_sums_f32 *self, float sums[PVID_STRONG_SUMS]);
 
 #endif

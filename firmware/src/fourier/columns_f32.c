@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 /* A column of a test function chi is sum_k chi psi of terms factor D^m[channel] with the derivatives moved to chi. It
@@ -5,18 +6,20 @@
  *
  *   sum over terms  factor (-1)^m (i omega_h)^m S_h[channel]  =  a_h + i b_h,
  *
- * the same for all columns: white_f32.c. */
+ * the same for all columns: white_f32.c. Here they are in standard deviations. */
 #include "fourier/columns_f32.h"
+
+#include "solve/products_f32.h"
 
 #define SKIP 1.0e-6f
 
 void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const pvid_fourier_term_f32 *term,
-                                  size_t harmonics, float omega, const float window[][2][PVID_MAX_HARMONICS],
-                                  float sum[2][PVID_MAX_HARMONICS])
+                                  const pvid_fourier_white_f32 *white, const float window[][2][PVID_MAX_HARMONICS],
+                                  float part[])
 {
     if (design->model->channel[term->channel].gain == PVID_FOURIER_NONE) {
         /* the sums of 1: 2 hop at h = 0, where only order 0 counts */
-        sum[0][0] += (term->order == 0u) ? (term->factor * (2.0f * (float)design->hop)) : 0.0f;
+        part[0] += (term->order == 0u) ? (white->scale[0] * (term->factor * (2.0f * (float)design->hop))) : 0.0f;
         return;
     }
     /* (-i omega)^m: 1, -i omega, -omega^2, i omega^3, omega^4, ... */
@@ -26,29 +29,25 @@ void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const p
     const float *im = window[term->channel][turned ? 0u : 1u];
     const float sign = negative ? -term->factor : term->factor;
     const float of_re = turned ? -sign : sign;
-    for (size_t h = 0; h < harmonics; h++) {
-        const float rate = (float)h * omega;
-        float power = 1.0f;
-        for (size_t i = 0; i < term->order; i++) {
-            power *= rate;
+    const size_t cosines = white->cosines;
+    float *imaginary = &part[cosines - 1u];
+    const size_t sines = white->parts - cosines;
+    for (size_t h = 0; h < cosines; h++) {
+        const float rate = (float)h * white->omega;
+        float weight = white->scale[h];
+        for (size_t i = term->order; i > 0u; i--) {
+            weight *= rate;
         }
-        sum[0][h] += (of_re * power) * re[h];
-        sum[1][h] += (sign * power) * im[h];
+        part[h] += (of_re * weight) * re[h];
+        if ((h > 0u) && (h <= sines)) {
+            imaginary[h] += (sign * weight) * im[h];
+        }
     }
-}
-
-float pvid_fourier_columns_square_f32(size_t rows, const float x[])
-{
-    float square = 0.0f;
-    for (size_t k = 0; k < rows; k++) {
-        square += x[k] * x[k];
-    }
-    return square;
 }
 
 bool pvid_fourier_columns_keep_f32(size_t rows, const float nuisance[], float whole, float *inverse)
 {
-    const float left = pvid_fourier_columns_square_f32(rows, nuisance);
+    const float left = pvid_product_f32(nuisance, nuisance, rows);
     const bool kept = (left >= 1.17549435e-38f) && (left <= 3.4e38f) && (left > (SKIP * whole));
     *inverse = kept ? (1.0f / left) : 0.0f;
     return kept;
@@ -56,11 +55,7 @@ bool pvid_fourier_columns_keep_f32(size_t rows, const float nuisance[], float wh
 
 void pvid_fourier_columns_project_f32(size_t rows, const float nuisance[], float inverse, float column[])
 {
-    float along = 0.0f;
-    for (size_t k = 0; k < rows; k++) {
-        along += nuisance[k] * column[k];
-    }
-    along *= inverse;
+    const float along = pvid_product_f32(nuisance, column, rows) * inverse;
     for (size_t k = 0; k < rows; k++) {
         column[k] -= along * nuisance[k];
     }

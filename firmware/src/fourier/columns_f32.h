@@ -7,17 +7,14 @@
 
 #include "pvid/fourier.h"
 
-/* sum += factor (-1)^order (i omega_h)^order S_h of a term, real and imaginary parts. */
+/* part += factor (-1)^order (i omega_h)^order S_h of a term over the standard deviation, real and imaginary parts. */
 void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const pvid_fourier_term_f32 *term,
-                                  size_t harmonics, float omega, const float window[][2][PVID_MAX_HARMONICS],
-                                  float sum[2][PVID_MAX_HARMONICS]);
+                                  const pvid_fourier_white_f32 *white, const float window[][2][PVID_MAX_HARMONICS],
+                                  float part[]);
 
 /* A nuisance after those before it have been taken off: keeps 1 / its square, or 0 if less than 1e-6 of `whole`, its
  * square before that, remains. Returns whether it is kept. */
 bool pvid_fourier_columns_keep_f32(size_t rows, const float nuisance[], float whole, float *inverse);
-
-/* x^T x */
-float pvid_fourier_columns_square_f32(size_t rows, const float x[]);
 
 /* Takes a nuisance off a column. */
 void pvid_fourier_columns_project_f32(size_t rows, const float nuisance[], float inverse, float column[]);

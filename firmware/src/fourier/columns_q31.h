@@ -7,23 +7,28 @@
 
 #include "pvid/fourier_q31.h"
 
-/* Parts of making a column. */
-static inline size_t pvid_fourier_column_parts_q31(const pvid_fourier_white_q31 *white)
-{
-    return (size_t)white->cosines + 2u;
-}
+/* Begins the columns of a kind: all entries 0. */
+void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
+                                    const pvid_fourier_window_q31 *window);
 
-/* The next part of making column `place` of a kind in standard deviations, from its terms first..end-1 and the sums of
- * the window; parts count from 0. */
-void pvid_fourier_columns_make_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
+/* Adds harmonic h of the window's sums, over its standard deviation, to the K + n parts of all columns. */
+void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
                                    const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
-                                   size_t place, size_t first, size_t end, size_t part);
+                                   size_t h);
 
-/* sum x^2 2^-16, in the column's own unit. */
-uint64_t pvid_fourier_columns_square_q31(const pvid_fourier_design_q31 *design, const int32_t x[]);
+/* Behind all harmonics: the K white rows of a column. */
+void pvid_fourier_columns_end_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design,
+                                  const pvid_fourier_white_q31 *white, size_t place);
 
-/* A nuisance after those before it have been taken off becomes a unit vector; 0 if less than 2^-20 of `whole`, its
- * square before that, remains. Returns whether it is kept. */
-bool pvid_fourier_columns_keep_q31(const pvid_fourier_design_q31 *design, uint64_t whole, int32_t x[]);
+/* sum x^2 2^-16, in the column's own unit, |x| < 2^31. */
+uint64_t pvid_fourier_columns_square_q31(size_t n, const int32_t x[]);
+
+/* A nuisance [n] without those before it becomes a reflection that leaves of it its first entry alone; 0, no
+ * reflection, if less than 2^-20 of `whole`, its square before that, remains. Returns whether it is kept. */
+bool pvid_fourier_columns_keep_q31(uint64_t whole, size_t n, int32_t x[]);
+
+/* The first n entries of a column in a format of the rows, saturated. */
+void pvid_fourier_columns_format_q31(pvid_fourier_columns_q31 *self, size_t place, size_t first, size_t last,
+                                     int32_t bits);
 
 #endif

@@ -7,9 +7,9 @@
 
 #include "fourier/fourier_finish_f32.h"
 #include "fourier/fourier_front_f32.h"
-#include "fourier/fourier_schedule.h"
 #include "fourier/fourier_step_f32.h"
 #include "fourier/sums_f32.h"
+#include "fourier/ticks_f32.h"
 #include "fourier/valid_f32.h"
 #include "fourier/watch_f32.h"
 #include "fourier/white_f32.h"
@@ -18,7 +18,10 @@
 #include "number/finite_f32.h"
 #include "number/init.h"
 #include "number/unroll.h"
-#include "number/unroll.h"
+
+/* No reasons of a tick: there is work; the channels of a step are to be formed. */
+#define BUSY 255u
+#define FORM 254u
 
 static inline bool all_finite(const float values[], size_t n)
 {
@@ -51,11 +54,10 @@ static pvid_status init_estimator(pvid_fourier_f32 *self, const pvid_fourier_con
         nuisances += (float)model->kind[i].nuisances;
     }
     const float functions = (float)design->functions * (float)model->kinds;
-    const float rows = (float)pvid_fourier_rows(design) * (float)model->kinds;
     pvid_estimator_config_f32 estimator = config->estimator;
     estimator.model = model->model;
     estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)design->hop);
-    estimator.row_weight = (functions - nuisances) / rows;
+    estimator.row_weight = (functions - nuisances) / functions;
     estimator.correlation = design->overlap;
     return pvid_estimator_init_f32(&self->estimator, &estimator);
 }
@@ -70,11 +72,11 @@ static uint8_t summed_channels(const pvid_fourier_model_f32 *model)
     return channels;
 }
 
-/* Steps from a sample to the last step that contains it: that of the newest half of the filter, and the next two. */
+/* Steps from a sample to the last step that contains it: its own block and the next, the compensator, two more before
+ * the channels; signals of several samples. */
 static uint16_t delay_of(const pvid_fourier_design_f32 *design)
 {
-    const uint32_t ticks = (2u * (uint32_t)pvid_fourier_front_half_f32(design)) + 4u;
-    return (uint16_t)((ticks / design->decimation) + 4u);
+    return (uint16_t)((2u * pvid_fourier_front_half_f32(design)) + 8u);
 }
 
 /* Returns whether init has accepted a configuration. */
@@ -85,14 +87,29 @@ static inline bool is_ready(const pvid_fourier_f32 *self)
     return ready;
 }
 
+/* Reason of a tick without anything else to report. */
+static inline pvid_reason idle(const pvid_fourier_f32 *self)
+{
+    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+}
+
+/* What a tick without a step does from now on. */
+static void rest(pvid_fourier_f32 *self)
+{
+    const bool busy =
+        pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics) || pvid_fourier_finish_is_busy_f32(&self->finish);
+    self->rest = busy ? BUSY : (uint8_t)idle(self);
+}
+
 static void restart(pvid_fourier_f32 *self)
 {
-    pvid_fourier_front_reset_f32(&self->front, self->design);
+    pvid_fourier_front_reset_f32(&self->front);
     pvid_fourier_step_reset_f32(&self->history);
     pvid_fourier_sums_reset_f32(&self->sums, self->harmonics);
     pvid_fourier_watch_reset_f32(&self->watch);
     pvid_fourier_finish_skip_f32(&self->finish);
     self->warm = false;
+    rest(self);
 }
 
 static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
@@ -134,11 +151,12 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     pvid_fourier_step_init_f32(&self->history,
                                (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
-    const uint32_t free_ticks = pvid_fourier_free_ticks(
-        design->decimation, pvid_fourier_job_ticks(design->decimation, pvid_fourier_front_pairs_f32(design)));
-    self->items_per_tick = pvid_fourier_items_per_tick(free_ticks, self->harmonics);
+    self->watches = (config->range != NULL) || (config->drive_min != NULL);
+    self->plain = (self->front.plain && (config->range == NULL)) ? design->model->samples : 0u;
+    const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
+    self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
     self->stages_per_tick =
-        pvid_fourier_stages_per_tick(pvid_fourier_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
+        pvid_fourier_stages_f32(pvid_fourier_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
     if (self->stages_per_tick == 0u) {
         return PVID_BAD_ITERATIONS;
     }
@@ -184,19 +202,11 @@ static pvid_reason drop_reason(pvid_fourier_f32 *self)
     return PVID_ACCUMULATED;
 }
 
-/* A step: its channels to the present block. If it completes a window that is dropped, returns the reason; else
+/* Behind the channels of a step, the block's end; if they complete a window that is dropped, returns the reason; else
  * PVID_ACCUMULATED. */
-PVID_SELDOM static pvid_reason next_step(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason end_half(pvid_fourier_f32 *self)
 {
-    const pvid_fourier_design_f32 *design = self->design;
-    const uint16_t index = self->sums.index;
-    const size_t half = self->sums.half;
-    if (!pvid_fourier_step_take_f32(&self->history, design, self->channels, self->dt, self->front.jet_value, index,
-                                    pvid_fourier_sums_place_f32(&self->sums))) {
-        return PVID_ACCUMULATED;
-    }
-    pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
-    if (!pvid_fourier_sums_count_f32(&self->sums, design->hop) || (self->sums.halves < 2u)) {
+    if (self->sums.halves < 2u) {
         return PVID_ACCUMULATED;
     }
     self->warm = true;
@@ -207,6 +217,25 @@ PVID_SELDOM static pvid_reason next_step(pvid_fourier_f32 *self, const float sam
         pvid_fourier_finish_skip_f32(&self->finish);
     }
     return reason;
+}
+
+/* The channels of a step to the present block. */
+PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    const uint16_t index = self->sums.index;
+    const size_t half = self->sums.half;
+    pvid_reason dropped = PVID_ACCUMULATED;
+    if (pvid_fourier_step_take_f32(&self->history, design, self->dt, index, pvid_fourier_sums_place_f32(&self->sums))) {
+        if (self->watches) {
+            pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
+        }
+        if (pvid_fourier_sums_count_f32(&self->sums, design->hop)) {
+            dropped = end_half(self);
+        }
+    }
+    rest(self);
+    return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
 }
 
 /* Harmonics of the last block; a window that is joined begins. */
@@ -236,37 +265,78 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
 }
 
 /* Work on the sums, else on the last whole window. */
-static inline void work(pvid_fourier_f32 *self, pvid_reason *reason)
+PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
 {
+    pvid_reason reason = idle(self);
     if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
         advance_sums(self);
-    } else if (pvid_fourier_finish_is_busy_f32(&self->finish)) {
-        advance_finish(self, reason);
     } else {
-        /* free */
+        advance_finish(self, &reason);
     }
+    rest(self);
+    return reason;
 }
 
-pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
+/* The last tick of a block. */
+PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sample[])
+{
+    const uint8_t decimation = self->front.decimation;
+    const bool steps =
+        pvid_fourier_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
+    if (steps && (decimation >= PVID_FOURIER_TWO_TICKS)) {
+        self->rest = FORM;
+        return idle(self);
+    }
+    const pvid_reason formed = steps ? form(self, sample) : idle(self);
+    if ((decimation > 1u) || (self->rest != BUSY)) {
+        return formed;
+    }
+    const pvid_reason worked = work(self);
+    return (formed == idle(self)) ? worked : formed;
+}
+
+/* A tick with something to do. */
+static inline pvid_reason due(pvid_fourier_f32 *self, const float sample[])
+{
+    return (self->rest == BUSY) ? work(self) : form(self, sample);
+}
+
+/* A tick whose samples need more than to be added. */
+PVID_SELDOM static pvid_reason other_tick(pvid_fourier_f32 *self, const float sample[])
 {
     if (!is_ready(self) || (sample == NULL)) {
         return PVID_NOT_READY;
     }
-    const pvid_fourier_design_f32 *design = self->design;
-    if (!all_finite(sample, design->model->samples)) {
+    const pvid_fourier_model_f32 *model = self->design->model;
+    if (!all_finite(sample, model->samples)) {
         return reject(self);
     }
     if (self->watch.range != NULL) {
-        pvid_fourier_watch_sample_f32(&self->watch, design->model->samples, sample);
+        pvid_fourier_watch_sample_f32(&self->watch, model->samples, sample);
     }
-    const bool steps = pvid_fourier_front_step_f32(&self->front, design, sample);
-    const pvid_reason dropped = steps ? next_step(self, sample) : PVID_ACCUMULATED;
-    const bool works = (self->front.wait <= self->front.work_wait) || !self->front.begun;
-    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    if ((works && !steps) || (design->decimation == 1u)) {
-        work(self, &reason);
+    pvid_fourier_front_derive_f32(&self->front, model, sample);
+    self->front.wait--;
+    if (self->front.wait == 0u) {
+        return end_block(self, sample);
     }
-    return (dropped != PVID_ACCUMULATED) ? dropped : reason;
+    return (self->rest >= FORM) ? due(self, sample) : (pvid_reason)self->rest;
+}
+
+pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
+{
+    const uint32_t plain = (self != NULL) ? self->plain : 0u;
+    if ((plain == 0u) || (sample == NULL)) {
+        return other_tick(self, sample);
+    }
+    if (!pvid_fourier_front_add_f32(&self->front, plain, sample)) {
+        return reject(self);
+    }
+    self->front.wait--;
+    if (self->front.wait == 0u) {
+        return end_block(self, sample);
+    }
+    const uint32_t rested = self->rest;
+    return (rested >= FORM) ? due(self, sample) : (pvid_reason)rested;
 }
 
 const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self)

@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 #include "fourier/fourier_finish_f32.h"
@@ -7,9 +8,12 @@
 #include <string.h>
 
 #include "fourier/columns_f32.h"
+#include "fourier/noise_f32.h"
 #include "fourier/scores_f32.h"
 #include "fourier/white_f32.h"
 #include "number/count.h"
+#include "solve/information_f32.h"
+#include "solve/products_f32.h"
 #include "solve/staged_f32.h"
 
 enum {
@@ -17,12 +21,14 @@ enum {
     STAGE_WEIGH,    /* c_j from a few entries of the noise table */
     STAGE_SPECTRUM, /* D_h */
     STAGE_BASIS,    /* directions that the test functions leave out: white_f32.c */
-    STAGE_COLUMN,   /* for each column: its terms, then n/2 times one direction of each family off it */
+    STAGE_SHARE,    /* a few parts' share of R^-1; only if that is needed */
+    STAGE_NOISE,  /* a few entries of the noise table: information of the noise alone; nothing if that is not checked */
+    STAGE_COLUMN, /* for each column: its terms, then its real and its imaginary parts to rows */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
-    STAGE_RESIDUAL, /* a few rows of e; at the end the gate accepts or rejects the kind */
-    STAGE_SHARE,    /* a few rows' share of R^-1; only if that is needed */
-    STAGE_PULL,     /* g from a few entries of the noise table */
-    STAGE_ADD,      /* K + n times: a row to the estimator */
+    STAGE_RESIDUAL, /* a few rows of e */
+    STAGE_SQUARES,  /* of a few columns; at the end the estimator and the gate accept or reject the kind */
+    STAGE_PULL,     /* g from a few entries of the noise table; only if the share is needed */
+    STAGE_ADD,      /* a few products of columns to the estimator */
     /* for the window */
     STAGE_SCORE,   /* C^T (sum N e + g) */
     STAGE_SOLVE,   /* `iterations` solves, several stages each */
@@ -33,11 +39,11 @@ enum {
     STAGE_IDLE = PVID_FOURIER_IDLE
 };
 
-/* Entries of the noise table, and products of the residuals, in a stage. */
+/* Entries of the noise table, and products of the residuals and of columns, in a stage. */
 #define ENTRIES_PER_STAGE 8u
-#define PRODUCTS_PER_STAGE 48u
+#define PRODUCTS_PER_STAGE 36u
 
-/* Rows whose share a stage forms. */
+/* Parts whose share a stage forms. */
 #define SHARES_PER_STAGE 4u
 
 /* Windows in the average of the gate's scale, which is relative to the weights of the rows and at least 1. */
@@ -80,7 +86,9 @@ pvid_status pvid_fourier_finish_init_f32(pvid_fourier_finish_f32 *self, const pv
 static void begin_kind(pvid_fourier_finish_f32 *self)
 {
     self->index = 0;
-    self->part = 0;
+    self->phase = 0;
+    self->other = 0;
+    self->moment = 0;
     self->live = 0;
     self->rss = 0.0f;
     self->stage = STAGE_WEIGH;
@@ -128,48 +136,109 @@ static bool weigh_stage(pvid_fourier_f32 *self)
     return end < self->design->n_noise;
 }
 
+/* S is compared with the information of the sensors' noise. */
+static bool checks_noise(const pvid_fourier_f32 *self)
+{
+    return (self->estimator.settings.noise_margin > 0.0f) && (self->design->n_noise > 0u);
+}
+
+/* Weight of a window's rows. */
+static float rows_of(const pvid_fourier_f32 *self)
+{
+    return ((float)self->design->functions * (float)self->design->model->kinds) *
+           self->estimator.information.row_weight;
+}
+
+/* The noise's information is in the place of the covariance of the assessment, which comes later. */
+static bool noise_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_design_f32 *design = self->design;
+    if (!checks_noise(self)) {
+        return false;
+    }
+    if ((finish->index == 0u) && (finish->kind == 0u)) {
+        memset(finish->candidate.covariance, 0, sizeof finish->candidate.covariance);
+    }
+    float bound[PVID_MAX_POWER];
+    float c[PVID_MAX_THETA * PVID_MAX_P];
+    const float *share = finish->white.share;
+    if (!finish->shares) {
+        pvid_fourier_noise_shares_f32(&finish->white, design, bound);
+        share = bound;
+    }
+    design->model->model->jacobian(self->estimator.p, c);
+    const size_t end = (size_t)finish->index + PVID_FOURIER_NOISE_ENTRIES;
+    const size_t last = (end < design->n_noise) ? end : design->n_noise;
+    for (size_t i = finish->index; i < last; i++) {
+        if (design->noise[i].kind == finish->kind) {
+            pvid_fourier_noise_add_f32(design, &design->noise[i], finish->theta, share, rows_of(self), c,
+                                       finish->candidate.covariance);
+        }
+    }
+    finish->index = (uint16_t)last;
+    return last < design->n_noise;
+}
+
 static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_fourier_white_basis_f32(&finish->white, self->design, finish->index);
+    pvid_fourier_white_basis_f32(&finish->white, finish->index, finish->part, finish->leverage);
     finish->index++;
     return finish->index < pvid_fourier_basis_stages(self->design);
 }
 
-/* Terms of the present column; then the column without one direction of each family after the other. */
-static bool column_stage(pvid_fourier_f32 *self)
+static bool share_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const size_t parts = pvid_fourier_parts(self->design);
+    const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
+    const size_t last = (end < parts) ? end : parts;
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->leverage, finish->index, last);
+    finish->index = (uint16_t)last;
+    return last < parts;
+}
+
+/* Terms of the present column. */
+static void gather_column(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_design_f32 *design = self->design;
-    const pvid_fourier_kind *kind = kind_of(self);
-    float *column = finish->column[finish->index];
-    if (finish->part == 0u) {
-        if ((finish->index == 0u) && (finish->theta == 0u)) {
-            finish->term = 0;
-        }
-        memset(finish->sum, 0, sizeof finish->sum);
-        const pvid_fourier_term_f32 *term = design->model->term;
-        const uint16_t end = kind->end;
-        uint16_t place = finish->term;
-        for (; (place < end) && (term[place].column == finish->index); place++) {
-            pvid_fourier_columns_add_f32(design, &term[place], self->harmonics, finish->white.omega,
-                                         (const float (*)[2][PVID_MAX_HARMONICS])self->window, finish->sum);
-        }
-        finish->term = place;
-        finish->part = 1;
+    const pvid_fourier_term_f32 *term = design->model->term;
+    const uint16_t end = kind_of(self)->end;
+    uint16_t place = finish->term;
+    memset(finish->part, 0, finish->white.parts * sizeof finish->part[0]);
+    for (; (place < end) && (term[place].column == finish->index); place++) {
+        pvid_fourier_columns_add_f32(design, &term[place], &finish->white,
+                                     (const float (*)[2][PVID_MAX_HARMONICS])self->window, finish->part);
+    }
+    finish->term = place;
+}
+
+/* The present column: its parts, then the rows of one family after the other. */
+static bool column_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const pvid_fourier_white_f32 *white = &finish->white;
+    if (finish->phase == 0u) {
+        gather_column(self);
+        finish->phase = 1;
         return true;
     }
-    if (finish->part == 1u) {
-        pvid_fourier_white_scale_f32(&finish->white, design, (const float (*)[PVID_MAX_HARMONICS])finish->sum, column);
-    }
-    pvid_fourier_white_remove_f32(&finish->white, design, finish->part - 1u, column);
-    if (finish->part < design->power / 2u) {
-        finish->part++;
+    const size_t family = (size_t)finish->phase - 1u;
+    const size_t vectors = white->vectors;
+    const size_t cosines = white->cosines;
+    const size_t rows = (family == 0u) ? (cosines - vectors) : ((white->parts - cosines) - vectors);
+    pvid_fourier_white_reflect_f32(white, family, finish->part);
+    memcpy(&finish->column[finish->index][(family == 0u) ? 0u : (cosines - vectors)],
+           &finish->part[((family == 0u) ? 0u : cosines) + vectors], rows * sizeof(float));
+    if (family == 0u) {
+        finish->phase = 2;
         return true;
     }
-    finish->part = 0;
+    finish->phase = 0;
     finish->index++;
-    return finish->index < columns_of(kind);
+    return finish->index < columns_of(kind_of(self));
 }
 
 /* Of each nuisance in order: part 0 its inverse square, then the columns without it, those of theta, Y and the
@@ -178,86 +247,88 @@ static bool project_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
-    const size_t rows = pvid_fourier_rows(self->design);
+    const size_t rows = self->design->functions;
     const size_t first = (size_t)kind->thetas + 1u;
     const size_t nuisance = first + finish->index;
     if (finish->index >= kind->nuisances) {
         return false;
     }
-    if (finish->part == 0u) {
+    if (finish->phase == 0u) {
         if (finish->index == 0u) {
             for (size_t i = first; i < columns_of(kind); i++) {
-                finish->own[i] = pvid_fourier_columns_square_f32(rows, finish->column[i]);
+                finish->own[i] = pvid_product_f32(finish->column[i], finish->column[i], rows);
             }
         }
         const bool kept = pvid_fourier_columns_keep_f32(rows, finish->column[nuisance], finish->own[nuisance],
                                                         &finish->own[nuisance]);
         finish->live = (uint8_t)(finish->live + (kept ? 1u : 0u));
-        finish->part = 1;
+        finish->phase = 1;
         return true;
     }
-    const size_t place = finish->part - 1u;
+    const size_t place = finish->phase - 1u;
     const size_t column = (place < first) ? place : (place + finish->index + 1u);
     pvid_fourier_columns_project_f32(rows, finish->column[nuisance], finish->own[nuisance], finish->column[column]);
-    finish->part++;
-    if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
-        finish->part = 0;
+    finish->phase++;
+    if (finish->phase > (first + kind->nuisances) - (finish->index + 1u)) {
+        finish->phase = 0;
         finish->index++;
     }
     return finish->index < kind->nuisances;
 }
 
-/* x -= a y */
-static inline void subtract(float a, const float *restrict y, size_t n, float *restrict x)
-{
-    for (size_t i = 0; i < n; i++) {
-        x[i] -= a * y[i];
-    }
-}
-
 /* Rows whose residuals a stage forms. */
 static size_t rows_per_stage(const pvid_fourier_kind *kind)
 {
-    return PRODUCTS_PER_STAGE / (kind->thetas + 1u); /* at least 1: PVID_MAX_COLUMNS is at most 48 */
+    return (kind->thetas < PRODUCTS_PER_STAGE) ? (PRODUCTS_PER_STAGE / (kind->thetas + 1u)) : 1u;
 }
 
+/* Products of columns that a stage forms. */
+static size_t products_per_stage(const pvid_fourier_design_f32 *design)
+{
+    return (design->functions < PRODUCTS_PER_STAGE) ? (PRODUCTS_PER_STAGE / design->functions) : 1u;
+}
+
+/* e, in the place of Y */
 static bool residual_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
     const float *theta = &self->estimator.theta[finish->theta];
-    const size_t rows = pvid_fourier_rows(self->design);
+    const size_t rows = self->design->functions;
     const size_t end = (size_t)finish->index + rows_per_stage(kind);
     const size_t last = (end < rows) ? end : rows;
-    const size_t first = finish->index;
-    memcpy(&finish->row[first], &finish->column[kind->thetas][first], (last - first) * sizeof(float));
-    for (size_t j = 0; j < kind->thetas; j++) {
-        subtract(theta[j], &finish->column[j][first], last - first, &finish->row[first]);
-    }
+    float *e = finish->column[kind->thetas];
     float rss = finish->rss;
-    for (size_t k = first; k < last; k++) {
-        rss += finish->row[k] * finish->row[k];
+    for (size_t k = finish->index; k < last; k++) {
+        float left = e[k];
+        for (size_t j = 0; j < kind->thetas; j++) {
+            left -= theta[j] * finish->column[j][k];
+        }
+        e[k] = left;
+        rss += left * left;
     }
     finish->rss = rss;
     finish->index = (uint16_t)last;
     return last < rows;
 }
 
+static bool squares_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    const size_t thetas = kind_of(self)->thetas;
+    const size_t end = (size_t)finish->index + products_per_stage(self->design);
+    const size_t last = (end < thetas) ? end : thetas;
+    for (size_t j = finish->index; j < last; j++) {
+        finish->own[j] = pvid_product_f32(finish->column[j], finish->column[j], self->design->functions);
+    }
+    finish->index = (uint16_t)last;
+    return last < thetas;
+}
+
 /* Test functions less nuisances: the dimensions that the rows of the kind span. */
 static float freedom_of(const pvid_fourier_f32 *self)
 {
     return (float)self->design->functions - (float)self->finish.live;
-}
-
-static bool share_stage(pvid_fourier_f32 *self)
-{
-    pvid_fourier_finish_f32 *finish = &self->finish;
-    const size_t rows = pvid_fourier_rows(self->design);
-    const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
-    const size_t last = (end < rows) ? end : rows;
-    pvid_fourier_white_share_f32(&finish->white, self->design, finish->index, last);
-    finish->index = (uint16_t)last;
-    return last < rows;
 }
 
 static bool pull_stage(pvid_fourier_f32 *self)
@@ -286,34 +357,59 @@ static bool pull_stage(pvid_fourier_f32 *self)
     return false;
 }
 
-static bool add_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+/* Products of column `index` with those behind it, the last of them e: a row of M without its diagonal, and an entry of
+ * b. */
+static bool add_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    const pvid_fourier_kind *kind = kind_of(self);
-    const size_t k = finish->index;
-    const float e = finish->row[k];
-    float *score = &finish->score[finish->theta];
-    float n[PVID_MAX_THETA];
-    for (size_t j = 0; j < kind->thetas; j++) {
-        n[j] = finish->column[j][k];
-        score[j] += n[j] * e;
+    const size_t thetas = kind_of(self)->thetas;
+    const size_t rows = self->design->functions;
+    float *low = self->estimator.information.low;
+    pvid_block block;
+    pvid_information_block_f32(self->estimator.model, finish->theta, &block);
+    for (size_t left = products_per_stage(self->design); left > 0u; left--) {
+        const size_t i = finish->index;
+        if (finish->other == 0u) {
+            low[block.moment + finish->moment] += finish->own[i];
+            finish->moment++;
+            finish->other = (uint8_t)(i + 1u);
+        }
+        const float product = pvid_product_f32(finish->column[i], finish->column[finish->other], rows);
+        if (finish->other < thetas) {
+            low[block.moment + finish->moment] += product;
+            finish->moment++;
+            finish->other++;
+            continue;
+        }
+        low[(size_t)self->estimator.model->n_moments + finish->theta + i] += product;
+        finish->gradient[i] = product;
+        finish->score[finish->theta + i] += product;
+        finish->other = 0;
+        finish->index++;
+        if (finish->index == thetas) {
+            pvid_products_end_f32(&self->estimator, &block, finish->gradient, finish->rss, (uint32_t)rows);
+            return false;
+        }
     }
-    const pvid_reason added =
-        pvid_estimator_add_kind_f32(&self->estimator, finish->kind, n, finish->column[kind->thetas][k]);
-    if (added != PVID_ACCUMULATED) {
-        *reason = added;
-    }
-    finish->index++;
-    return finish->index < pvid_fourier_rows(self->design);
+    return true;
 }
 
 /* ---- steps of p and verdict ---- */
+
+static void begin_solve(pvid_fourier_f32 *self, bool ends_group)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_estimator_begin_f32(&self->estimator, &finish->solve, ends_group);
+    if (checks_noise(self)) {
+        finish->solve.noise = (const float (*)[PVID_MAX_P])finish->candidate.covariance;
+    }
+}
 
 static void begin_solves(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     pvid_estimator_set_expected_f32(&self->estimator, finish->expected / (float)finish->used);
-    pvid_estimator_begin_f32(&self->estimator, &finish->solve, true);
+    begin_solve(self, true);
     finish->solve.fallback = pvid_trust_fallback_f32(&self->trust);
 }
 
@@ -330,7 +426,7 @@ static bool solve_stage(pvid_fourier_f32 *self)
     if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED)) {
         return false;
     }
-    pvid_estimator_begin_f32(&self->estimator, &finish->solve, false);
+    begin_solve(self, false);
     return true;
 }
 
@@ -342,10 +438,9 @@ static bool cluster_stage(pvid_fourier_f32 *self)
     const size_t n_p = self->estimator.model->n_p;
     const size_t a = finish->index;
     const float wide = finish->solve.variance * self->estimator.settings.correlation;
-    const float rows = ((float)pvid_fourier_rows(self->design) * (float)self->design->model->kinds) *
-                       self->estimator.information.row_weight;
-    const float variance = pvid_fourier_scores_variance_f32(
-        &finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance, wide, estimate->weight / rows);
+    const float variance =
+        pvid_fourier_scores_variance_f32(&finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance,
+                                         wide, estimate->weight / rows_of(self));
     /* NaN fails the comparison */
     if ((variance > (estimate->se[a] * estimate->se[a])) && (variance <= VARIANCE_MAX)) {
         estimate->se[a] = sqrtf(variance);
@@ -377,15 +472,21 @@ static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 
 /* ---- the order of the stages ---- */
 
-/* Behind the residuals: the gate. Returns the next stage. */
+/* Behind the squares: the estimator and the gate. Returns the next stage. */
 static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const float freedom = freedom_of(self);
+    const pvid_reason accepted =
+        pvid_products_accept_f32(&self->estimator, kind_of(self)->thetas, finish->own, finish->rss);
+    if (accepted != PVID_ACCUMULATED) {
+        *reason = accepted;
+        return STAGE_SCORE; /* that is, the next kind */
+    }
     if (!pvid_gate_passes_f32(&finish->gate[finish->kind], finish->rss / freedom)) {
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         *reason = PVID_REJECTED_OUTLIER;
-        return STAGE_SCORE; /* that is, the next kind */
+        return STAGE_SCORE;
     }
     if (finish->used == 0u) {
         const float factor = pvid_trust_fade_factor_f32(&self->trust);
@@ -399,7 +500,7 @@ static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
     if (!finish->shares) {
         finish->expected += 1.0f;
     }
-    return finish->shares ? (uint8_t)STAGE_SHARE : (uint8_t)STAGE_ADD;
+    return finish->shares ? (uint8_t)STAGE_PULL : (uint8_t)STAGE_ADD;
 }
 
 /* Behind a kind: the next kind, or the solves; nothing if no kind has been added. */
@@ -424,7 +525,9 @@ static void end_kind(pvid_fourier_f32 *self)
 static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     switch (self->finish.stage) {
-    case STAGE_RESIDUAL:
+    case STAGE_BASIS:
+        return self->finish.shares ? (uint8_t)STAGE_SHARE : (uint8_t)STAGE_NOISE;
+    case STAGE_SQUARES:
         return gated(self, reason);
     case STAGE_JUDGE:
         return STAGE_IDLE;
@@ -438,7 +541,7 @@ static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
     pvid_fourier_finish_f32 *finish = &self->finish;
     finish->stage = stage_after(self, reason);
     finish->index = 0;
-    finish->part = 0;
+    finish->phase = 0;
     if (finish->stage == (uint8_t)STAGE_SCORE) {
         end_kind(self);
     } else if (finish->stage == (uint8_t)STAGE_SOLVE) {
@@ -461,8 +564,14 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
     case STAGE_SPECTRUM:
         pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind, self->harmonics);
         break;
+    case STAGE_NOISE:
+        repeat = noise_stage(self);
+        break;
     case STAGE_BASIS:
         repeat = basis_stage(self);
+        break;
+    case STAGE_SHARE:
+        repeat = share_stage(self);
         break;
     case STAGE_COLUMN:
         repeat = column_stage(self);
@@ -473,14 +582,14 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
     case STAGE_RESIDUAL:
         repeat = residual_stage(self);
         break;
-    case STAGE_SHARE:
-        repeat = share_stage(self);
+    case STAGE_SQUARES:
+        repeat = squares_stage(self);
         break;
     case STAGE_PULL:
         repeat = pull_stage(self);
         break;
     case STAGE_ADD:
-        repeat = add_stage(self, reason);
+        repeat = add_stage(self);
         break;
     case STAGE_SCORE:
         pvid_fourier_scores_take_f32(&finish->scores, &self->estimator, finish->score);
@@ -519,16 +628,19 @@ static uint32_t parts_of(uint32_t all, uint32_t each)
 static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
 {
     const pvid_fourier_design_f32 *design = self->design;
-    const uint32_t rows = (uint32_t)pvid_fourier_rows(design);
     const uint32_t columns = (uint32_t)columns_of(kind);
+    const uint32_t thetas = kind->thetas;
     const uint32_t entries = parts_of(design->n_noise, ENTRIES_PER_STAGE);
     const uint32_t nuisances = kind->nuisances;
+    const uint32_t products = (uint32_t)products_per_stage(design);
     /* nuisance i: its square, then all columns but itself and those before it */
     const uint32_t project = (nuisances > 0u) ? ((nuisances * columns) - ((nuisances * (nuisances - 1u)) / 2u)) : 1u;
-    uint32_t stages = entries + 1u + (uint32_t)pvid_fourier_basis_stages(design) + project;
-    stages += (columns * ((design->power / 2u) + 1u)) + parts_of(rows, (uint32_t)rows_per_stage(kind)) + rows;
+    const uint32_t noise = checks_noise(self) ? parts_of(design->n_noise, PVID_FOURIER_NOISE_ENTRIES) : 1u;
+    uint32_t stages = entries + 1u + noise + (uint32_t)pvid_fourier_basis_stages(design) + (3u * columns) + project;
+    stages += parts_of(design->functions, (uint32_t)rows_per_stage(kind)) + parts_of(thetas, products);
+    stages += parts_of((thetas * (thetas + 1u)) / 2u, products);
     if (self->finish.shares) {
-        stages += parts_of(rows, SHARES_PER_STAGE) + entries;
+        stages += parts_of((uint32_t)pvid_fourier_parts(design), SHARES_PER_STAGE) + entries;
     }
     return stages;
 }

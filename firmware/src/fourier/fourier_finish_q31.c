@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "fourier/columns_q31.h"
-#include "fourier/direction_q31.h"
+#include "fourier/mirror_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/white_q31.h"
 #include "number/count.h"
@@ -18,22 +18,28 @@ enum {
     STAGE_WEIGH,    /* c_j from a few entries of the noise table */
     STAGE_SPECTRUM, /* D_h, a few harmonics at a time */
     STAGE_INVERT,   /* 1 / sqrt(D_h), a harmonic at a time */
-    STAGE_BASIS,    /* directions that the test functions leave out */
-    STAGE_COLUMN,   /* for each column: its parts, then n/2 times one direction of each family off it */
+    STAGE_MIRROR,   /* n reflections that leave the white rows */
+    STAGE_COLUMN,   /* columns: they begin; each harmonic of all; the white rows of each */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
-    STAGE_RESIDUAL, /* a few rows of e; at the end the gate accepts or rejects the kind */
+    STAGE_FORMAT,   /* for theta's columns and Y: their format */
+    STAGE_RESIDUAL, /* a few rows of e, in place of Y; at the end the gate accepts or rejects the kind */
     STAGE_FADE,     /* before the first rows of the window: the factor of a renewal on the sums, in parts */
-    STAGE_ADD,      /* K + n times: a row to the estimator */
+    STAGE_ADD,      /* K times, less the nuisances: a row to the estimator */
     /* for the window */
     STAGE_SOLVE,  /* `iterations` solves, several stages each */
     STAGE_ASSESS, /* several stages */
     STAGE_JUDGE,  /* trust_q31.h publishes the estimate or holds it */
-    STAGE_IDLE
+    STAGE_IDLE = PVID_FOURIER_IDLE_Q31
 };
 
 #define ENTRIES_PER_STAGE 4u
 #define HARMONICS_PER_STAGE 2u
+#define ROOTS_PER_STAGE 4u
 #define RESIDUALS_PER_STAGE 2u
+
+/* Relative step of p behind which there is no other one on the same sums: 2^-7, Q22. The next is below the square of
+ * that. */
+#define SMALL_STEP ((int64_t)1 << 15)
 
 /* Windows in the average of the gate's scale, which is relative to the sensors' noise and at least 1. */
 #define GATE_MEMORY 4u
@@ -67,18 +73,13 @@ pvid_status pvid_fourier_finish_init_q31(pvid_fourier_finish_q31 *self, const pv
     memcpy(self->n_bits, config->estimator.n_bits, sizeof self->n_bits);
     self->y_bits = config->estimator.y_bits;
     self->expected = pvid_scaled_of_q31(sd * sd, -2 * PVID_ROW_SD_BITS);
-    pvid_fourier_white_init_q31(&self->white, design);
     self->stage = STAGE_IDLE;
     return PVID_OK;
 }
 
-bool pvid_fourier_finish_is_busy_q31(const pvid_fourier_finish_q31 *self)
+static void begin_kind(pvid_fourier_finish_q31 *self, const pvid_fourier_design_q31 *design)
 {
-    return self->stage != (uint8_t)STAGE_IDLE;
-}
-
-static void begin_kind(pvid_fourier_finish_q31 *self)
-{
+    pvid_fourier_white_init_q31(&self->work.rows.white, design);
     self->index = 0;
     self->part = 0;
     self->live = 0;
@@ -87,14 +88,14 @@ static void begin_kind(pvid_fourier_finish_q31 *self)
     self->stage = STAGE_WEIGH;
 }
 
-void pvid_fourier_finish_begin_q31(pvid_fourier_finish_q31 *self)
+void pvid_fourier_finish_begin_q31(pvid_fourier_finish_q31 *self, const pvid_fourier_design_q31 *design)
 {
     self->kind = 0;
     self->theta = 0;
     self->used = 0;
     self->iteration = 0;
     self->free = 0;
-    begin_kind(self);
+    begin_kind(self, design);
 }
 
 /* ---- rows of a kind; each returns whether there is more of the stage ---- */
@@ -107,10 +108,11 @@ static bool weigh_stage(pvid_fourier_q31 *self)
     if (finish->index == 0u) {
         for (size_t j = 0; j < kind_of(self)->thetas; j++) {
             const size_t i = finish->theta + j;
-            finish->of_theta[j] = pvid_scaled_of_q31(estimator->theta[i], -(int32_t)estimator->theta_bits[i]);
+            finish->work.rows.of_theta[j] = pvid_scaled_of_q31(estimator->theta[i], -(int32_t)estimator->theta_bits[i]);
         }
     }
-    pvid_fourier_white_weigh_q31(&finish->white, self->design, finish->kind, finish->of_theta, finish->index, end);
+    pvid_fourier_white_weigh_q31(&finish->work.rows.white, self->design, finish->kind, finish->work.rows.of_theta,
+                                 finish->index, end);
     finish->index = (uint16_t)end;
     return end < self->design->n_noise;
 }
@@ -118,12 +120,12 @@ static bool weigh_stage(pvid_fourier_q31 *self)
 static bool spectrum_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    const size_t harmonics = finish->white.cosines;
+    const size_t harmonics = finish->work.rows.white.cosines;
     const size_t end = lesser((size_t)finish->index + HARMONICS_PER_STAGE, harmonics);
-    pvid_fourier_white_spectrum_q31(&finish->white, self->design, finish->kind, finish->index, end);
+    pvid_fourier_white_spectrum_q31(&finish->work.rows.white, self->design, finish->kind, finish->index, end);
     finish->index = (uint16_t)end;
     if (end == harmonics) {
-        finish->least = pvid_fourier_white_floor_q31(&finish->white, self->design);
+        finish->work.rows.least = pvid_fourier_white_floor_q31(&finish->work.rows.white, self->design);
     }
     return end < harmonics;
 }
@@ -131,17 +133,19 @@ static bool spectrum_stage(pvid_fourier_q31 *self)
 static bool invert_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    pvid_fourier_white_invert_q31(&finish->white, finish->least, finish->index, (size_t)finish->index + 1u);
-    finish->index++;
-    return finish->index < finish->white.cosines;
+    const size_t harmonics = finish->work.rows.white.cosines;
+    const size_t end = lesser((size_t)finish->index + ROOTS_PER_STAGE, harmonics);
+    pvid_fourier_white_invert_q31(&finish->work.rows.white, finish->work.rows.least, finish->index, end);
+    finish->index = (uint16_t)end;
+    return end < harmonics;
 }
 
-static bool basis_stage(pvid_fourier_q31 *self)
+static bool mirror_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    pvid_fourier_white_basis_q31(&finish->white, self->design, finish->index);
+    pvid_fourier_white_mirror_q31(&finish->work.rows.white, self->design, finish->index);
     finish->index++;
-    return finish->index < pvid_fourier_basis_stages_q31(self->design);
+    return finish->index < pvid_fourier_mirrors_q31(self->design);
 }
 
 static bool column_stage(pvid_fourier_q31 *self)
@@ -149,38 +153,26 @@ static bool column_stage(pvid_fourier_q31 *self)
     pvid_fourier_finish_q31 *finish = &self->finish;
     const pvid_fourier_design_q31 *design = self->design;
     const pvid_fourier_kind *kind = kind_of(self);
-    const pvid_fourier_term_q31 *term = design->model->term;
-    const size_t parts = pvid_fourier_column_parts_q31(&finish->white);
-    const size_t place = finish->index;
-    if ((place == 0u) && (finish->part == 0u)) {
-        finish->term = kind->first;
-    }
-    if (finish->part < parts) {
-        size_t end = finish->term;
-        while ((end < kind->end) && (term[end].column == place)) {
-            end++;
+    const size_t harmonics = finish->work.rows.white.cosines;
+    if (finish->index == 0u) {
+        pvid_fourier_columns_begin_q31(&finish->work.rows.columns, design, finish->kind, &self->collect.window);
+    } else if (finish->index <= harmonics) {
+        pvid_fourier_columns_take_q31(&finish->work.rows.columns, design, finish->kind, &finish->work.rows.white,
+                                      &self->collect.window, (size_t)finish->index - 1u);
+    } else {
+        const size_t place = finish->index - (harmonics + 1u);
+        pvid_fourier_columns_end_q31(&finish->work.rows.columns, design, &finish->work.rows.white, place);
+        if (place > kind->thetas) {
+            finish->work.rows.whole[place - kind->thetas - 1u] =
+                pvid_fourier_columns_square_q31(design->functions, finish->work.rows.columns.x[place]);
         }
-        pvid_fourier_columns_make_q31(&finish->columns, design, &finish->white, &self->collect.window, place,
-                                      finish->term, end, finish->part);
-        finish->part++;
-        if (finish->part == parts) {
-            finish->term = (uint16_t)end;
-        }
-        return true;
     }
-    pvid_fourier_white_remove_q31(&finish->white, design, finish->part - parts, finish->columns.x[place]);
-    finish->part++;
-    if (finish->part < (parts + (design->power / 2u))) {
-        return true;
-    }
-    finish->whole[place] = pvid_fourier_columns_square_q31(design, finish->columns.x[place]);
-    finish->part = 0;
     finish->index++;
-    return finish->index < columns_of(kind);
+    return finish->index <= (harmonics + columns_of(kind));
 }
 
-/* Of each nuisance in order: part 0 its direction, then the columns without it, those of theta, Y and the nuisances
- * behind it. */
+/* Of each nuisance in order: part 0 its reflection, then the columns without it, those of theta, Y and the nuisances
+ * behind it: what is left of it would be the first of their rows that are left. */
 static bool project_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
@@ -190,59 +182,67 @@ static bool project_stage(pvid_fourier_q31 *self)
     if (finish->index >= kind->nuisances) {
         return false;
     }
-    int32_t *direction = finish->columns.x[nuisance];
+    const size_t begin = finish->live;
+    const size_t rows = self->design->functions - begin;
+    int32_t *mirror = &finish->work.rows.columns.x[nuisance][begin];
     if (finish->part == 0u) {
-        const bool kept = pvid_fourier_columns_keep_q31(self->design, finish->whole[nuisance], direction);
-        finish->live = (uint8_t)(finish->live + (kept ? 1u : 0u));
+        finish->kept = pvid_fourier_columns_keep_q31(finish->work.rows.whole[finish->index], rows, mirror);
         finish->part = 1;
         return true;
     }
     const size_t place = finish->part - 1u;
     const size_t column = (place < first) ? place : (place + finish->index + 1u);
-    pvid_fourier_take_off_q31(direction, 0, pvid_fourier_rows_q31(self->design), finish->columns.x[column]);
+    if (finish->kept) {
+        pvid_fourier_mirror_q31(mirror, rows, &finish->work.rows.columns.x[column][begin]);
+    }
     finish->part++;
     if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
+        finish->live = (uint8_t)(finish->live + (finish->kept ? 1u : 0u));
         finish->part = 0;
         finish->index++;
     }
     return finish->index < kind->nuisances;
 }
 
-/* An entry of a white column in a format of the rows. */
-static int32_t entry_of(const pvid_fourier_columns_q31 *columns, size_t place, size_t row, int32_t bits)
+static bool format_stage(pvid_fourier_q31 *self)
 {
-    const int32_t shift = -((int32_t)columns->exponent[place] + bits);
-    return (int32_t)pvid_clamp_q31(pvid_scale_q31(columns->x[place][row], shift), INT32_MAX);
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const size_t place = finish->index;
+    const size_t thetas = kind_of(self)->thetas;
+    const int32_t bits = (place < thetas) ? finish->n_bits[finish->theta + place] : finish->y_bits;
+    pvid_fourier_columns_format_q31(&finish->work.rows.columns, place, finish->live, self->design->functions, bits);
+    finish->index++;
+    return finish->index <= thetas;
 }
 
-/* Row k of the kind; returns Y. */
-static int32_t row_of(const pvid_fourier_q31 *self, size_t k, int32_t n[PVID_MAX_THETA_Q31])
+/* The columns of theta in row k of the kind. */
+static void row_of(const pvid_fourier_q31 *self, size_t k, int32_t n[PVID_MAX_THETA_Q31])
 {
-    const pvid_fourier_finish_q31 *finish = &self->finish;
     const size_t thetas = kind_of(self)->thetas;
     for (size_t j = 0; j < thetas; j++) {
-        n[j] = entry_of(&finish->columns, j, k, finish->n_bits[finish->theta + j]);
+        n[j] = self->finish.work.rows.columns.x[j][k];
     }
-    return entry_of(&finish->columns, thetas, k, finish->y_bits);
 }
 
 static bool residual_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    const size_t rows = pvid_fourier_rows_q31(self->design);
-    const size_t last = lesser((size_t)finish->index + RESIDUALS_PER_STAGE, rows);
+    const size_t first = (size_t)finish->live + finish->index;
+    const size_t rows = self->design->functions;
+    const size_t last = lesser(first + RESIDUALS_PER_STAGE, rows);
+    int32_t *y = finish->work.rows.columns.x[kind_of(self)->thetas];
     pvid_block block;
     pvid_information_block_q31(self->estimator.model, finish->theta, &block);
-    for (size_t k = finish->index; k < last; k++) {
+    for (size_t k = first; k < last; k++) {
         int32_t n[PVID_MAX_THETA_Q31];
         int64_t e;
-        const int32_t y = row_of(self, k, n);
-        const bool fits = pvid_estimator_innovation_q31(&self->estimator, &block, n, y, &e);
-        const int64_t within = pvid_clamp_q31(e, PVID_ROW_LIMIT_Q31);
+        row_of(self, k, n);
+        const bool fits = pvid_estimator_innovation_q31(&self->estimator, &block, n, y[k], &e);
+        y[k] = (int32_t)pvid_clamp_q31(e, PVID_ROW_LIMIT_Q31);
         finish->saturated = finish->saturated || !fits;
-        finish->rss = pvid_clamp_q31(finish->rss + (within * within), PVID_WIDE);
+        finish->rss = pvid_clamp_q31(finish->rss + pvid_square_q31(y[k]), PVID_WIDE);
     }
-    finish->index = (uint16_t)last;
+    finish->index = (uint16_t)(last - finish->live);
     return last < rows;
 }
 
@@ -253,7 +253,7 @@ static pvid_scaled_q31 variance_ratio_of(const pvid_fourier_finish_q31 *self, in
     return pvid_scaled_over_q31(pvid_scaled_of_q31(rss, 0), expected);
 }
 
-/* Test functions less nuisances: the dimensions that the rows of the kind span; at least 1. */
+/* Rows of the kind: test functions less nuisances; at least 1. */
 static int64_t freedom_of(const pvid_fourier_q31 *self)
 {
     const int64_t freedom = (int64_t)self->design->functions - (int64_t)self->finish.live;
@@ -285,19 +285,24 @@ static bool fade_stage(pvid_fourier_q31 *self)
     return finish->index < PVID_INFORMATION_END_PARTS;
 }
 
+/* A row, whose e is in the place of Y; none of a kind in which one does not fit. */
 static bool add_stage(pvid_fourier_q31 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    int32_t n[PVID_MAX_THETA_Q31];
-    const int32_t y = row_of(self, finish->index, n);
-    /* INT32_MAX: beyond the limit of a row */
-    const pvid_reason added =
-        pvid_estimator_add_kind_q31(&self->estimator, finish->kind, n, finish->saturated ? INT32_MAX : y);
-    if (added != PVID_ACCUMULATED) {
-        *reason = added;
+    const size_t k = (size_t)finish->live + finish->index;
+    if (finish->saturated) {
+        pvid_count_up(&self->estimator.counters.rejected_saturated);
+        *reason = PVID_REJECTED_SATURATED;
+    } else {
+        const int32_t e = finish->work.rows.columns.x[kind_of(self)->thetas][k];
+        int32_t n[PVID_MAX_THETA_Q31];
+        pvid_block block;
+        row_of(self, k, n);
+        pvid_information_block_q31(self->estimator.model, finish->theta, &block);
+        pvid_estimator_add_row_q31(&self->estimator, &block, n, e, pvid_square_q31(e));
     }
     finish->index++;
-    return finish->index < pvid_fourier_rows_q31(self->design);
+    return (k + 1u) < self->design->functions;
 }
 
 /* ---- steps of p and verdict ---- */
@@ -307,28 +312,29 @@ static void begin_solves(pvid_fourier_q31 *self)
     pvid_fourier_finish_q31 *finish = &self->finish;
     const int32_t *fallback = pvid_trust_fallback_q31(&self->trust);
     pvid_estimator_set_expected_q31(&self->estimator, finish->expected);
-    pvid_estimator_begin_q31(&self->estimator, &finish->solve, true);
-    finish->rss = finish->solve.group_rss;
+    pvid_estimator_begin_q31(&self->estimator, &finish->work.solve, true);
+    finish->rss = finish->work.solve.group_rss;
     if (fallback != NULL) {
-        finish->solve.has_fallback = true;
-        memcpy(finish->solve.fallback, fallback, sizeof finish->solve.fallback);
+        finish->work.solve.has_fallback = true;
+        memcpy(finish->work.solve.fallback, fallback, sizeof finish->work.solve.fallback);
     }
 }
 
 static bool solve_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    if (!pvid_estimator_advance_q31(&self->estimator, &finish->solve)) {
+    if (!pvid_estimator_advance_q31(&self->estimator, &finish->work.solve)) {
         return true;
     }
     finish->iteration++;
-    finish->reason = finish->solve.reason;
-    finish->size = finish->solve.size;
-    /* ACCUMULATED: the divider allows no solve after this window */
-    if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED)) {
+    finish->reason = finish->work.solve.reason;
+    finish->size = finish->work.solve.size;
+    /* the divider may allow no solve after this window; another step would change less than the sensors' noise does */
+    if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED) ||
+        (finish->size <= SMALL_STEP)) {
         return false;
     }
-    pvid_estimator_begin_q31(&self->estimator, &finish->solve, false);
+    pvid_estimator_begin_q31(&self->estimator, &finish->work.solve, false);
     return true;
 }
 
@@ -336,9 +342,9 @@ static void judge_stage(pvid_fourier_q31 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     const pvid_scaled_q31 ratio = variance_ratio_of(finish, finish->rss, finish->free);
-    *reason =
-        pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size, finish->solve.above_noise,
-                             pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
+    *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
+                                   finish->work.solve.above_noise,
+                                   pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
 }
 
 /* ---- the order of the stages ---- */
@@ -350,7 +356,7 @@ static void end_kind(pvid_fourier_q31 *self)
     finish->theta = (uint8_t)(finish->theta + kind_of(self)->thetas);
     finish->kind++;
     if (finish->kind < self->design->model->kinds) {
-        begin_kind(finish);
+        begin_kind(finish, self->design);
     } else if (finish->used > 0u) {
         finish->stage = STAGE_SOLVE;
         begin_solves(self);
@@ -373,14 +379,17 @@ static bool advance_kind(pvid_fourier_q31 *self, pvid_reason *reason)
     case STAGE_INVERT:
         more = invert_stage(self);
         break;
-    case STAGE_BASIS:
-        more = basis_stage(self);
+    case STAGE_MIRROR:
+        more = mirror_stage(self);
         break;
     case STAGE_COLUMN:
         more = column_stage(self);
         break;
     case STAGE_PROJECT:
         more = project_stage(self);
+        break;
+    case STAGE_FORMAT:
+        more = format_stage(self);
         break;
     case STAGE_RESIDUAL:
         more = residual_stage(self);
@@ -423,11 +432,11 @@ void pvid_fourier_finish_step_q31(pvid_fourier_q31 *self, pvid_reason *reason)
     case STAGE_SOLVE:
         if (!solve_stage(self)) {
             finish->stage = STAGE_ASSESS;
-            pvid_estimator_begin_assessment_q31(&self->estimator, &finish->solve, &finish->candidate);
+            pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve, &finish->candidate);
         }
         break;
     case STAGE_ASSESS:
-        if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->solve, &finish->candidate)) {
+        if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->work.solve, &finish->candidate)) {
             finish->stage = STAGE_JUDGE;
         }
         break;
@@ -452,16 +461,15 @@ static uint32_t stages_of_kind(const pvid_fourier_q31 *self, const pvid_fourier_
 {
     const pvid_fourier_design_q31 *design = self->design;
     const size_t harmonics = pvid_fourier_harmonics_q31(design);
-    const size_t rows = pvid_fourier_rows_q31(design);
-    const size_t column = pvid_fourier_column_parts_q31(&self->finish.white) + (design->power / 2u);
+    const size_t rows = design->functions;
     size_t project = (kind->nuisances == 0u) ? 1u : 0u;
     for (size_t i = 0; i < kind->nuisances; i++) {
         project += ((size_t)kind->thetas + 1u + kind->nuisances) - i;
     }
     return stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
-           (uint32_t)harmonics + (uint32_t)pvid_fourier_basis_stages_q31(design) +
-           (uint32_t)(columns_of(kind) * column) + (uint32_t)project + stages_of(rows, RESIDUALS_PER_STAGE) +
-           PVID_INFORMATION_END_PARTS + (uint32_t)rows;
+           stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_fourier_mirrors_q31(design) +
+           (uint32_t)(1u + harmonics + columns_of(kind)) + (uint32_t)project + kind->thetas + 1u +
+           stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows;
 }
 
 uint32_t pvid_fourier_finish_stages_q31(const pvid_fourier_q31 *self)

@@ -12,10 +12,16 @@
 pvid_status pvid_fourier_finish_init_q31(pvid_fourier_finish_q31 *self, const pvid_fourier_config_q31 *config);
 
 /* Begins a window at the estimator's present p. */
-void pvid_fourier_finish_begin_q31(pvid_fourier_finish_q31 *self);
+void pvid_fourier_finish_begin_q31(pvid_fourier_finish_q31 *self, const pvid_fourier_design_q31 *design);
+
+/* The stage behind the last one. */
+#define PVID_FOURIER_IDLE_Q31 13u
 
 /* Whether a window is being processed. */
-bool pvid_fourier_finish_is_busy_q31(const pvid_fourier_finish_q31 *self);
+static inline bool pvid_fourier_finish_is_busy_q31(const pvid_fourier_finish_q31 *self)
+{
+    return self->stage != PVID_FOURIER_IDLE_Q31;
+}
 
 /* Runs one stage. Sets *reason if a row is rejected, if the gate rejects the rows of a kind, or at the last stage. */
 void pvid_fourier_finish_step_q31(pvid_fourier_q31 *self, pvid_reason *reason);

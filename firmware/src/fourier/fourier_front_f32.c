@@ -4,13 +4,17 @@
  * x_(k-1)). With a held signal k is the tick before the present one. Before the first sample since a restart all were
  * equal to it.
  *
+ * A block of D ticks gives one output of each signal, the mean with weights 1, 2, .., D, .., 2, 1 about the block's
+ * first tick: with  a += x,  b += a  from 0 in every block, (b + D a' - b') / D^2, a' and b' those of the block before.
+ * No sum lasts longer than a block, so that rounding does not add up.
+ *
  * A jet is x + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x above 0) or sum_i w_i
- * (x_(+i) - x_(-i)) of odd order, i = 1..half, added outwards from the instant of the step. */
+ * (x_(+i) - x_(-i)) of odd order, i = 1..half, added outwards from the instant of the step; x are outputs. They stand
+ * twice in the line, one length apart: so the last ones are always contiguous. */
 #include "fourier/fourier_front_f32.h"
 
-#include <stddef.h>
+#include <string.h>
 
-#include "fourier/fourier_schedule.h"
 #include "number/unroll.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
@@ -20,81 +24,89 @@
 #define LAST 1u
 #define NEXT 2u
 
-static size_t minimum(size_t a, size_t b)
-{
-    return (a < b) ? a : b;
-}
-
 uint16_t pvid_fourier_front_half_f32(const pvid_fourier_design_f32 *design)
 {
     uint16_t half = 0;
     for (size_t i = 0; i < design->model->jets; i++) {
-        half = (design->filter[i].half > half) ? design->filter[i].half : half;
+        half = (design->compensator[i].half > half) ? design->compensator[i].half : half;
     }
     return half;
 }
 
-uint32_t pvid_fourier_front_pairs_f32(const pvid_fourier_design_f32 *design)
+uint32_t pvid_fourier_front_length_f32(const pvid_fourier_design_f32 *design)
 {
-    uint32_t pairs = 0;
-    for (size_t i = 0; i < design->model->jets; i++) {
-        pairs += design->filter[i].half;
+    const uint32_t steps = (2u * (uint32_t)pvid_fourier_front_half_f32(design)) + 1u;
+    return (uint32_t)design->model->signals * (3u + (2u * steps));
+}
+
+static uint8_t needs_of(const pvid_fourier_model_f32 *model)
+{
+    uint8_t needs = NOTHING;
+    for (size_t i = 0; i < model->signals; i++) {
+        const uint8_t source = model->signal[i].source;
+        if (source == (uint8_t)PVID_SIGNAL_HELD) {
+            needs = NEXT;
+        } else if ((source == (uint8_t)PVID_SIGNAL_JUMP) && (needs == NOTHING)) {
+            needs = LAST;
+        } else {
+            /* the sample itself */
+        }
     }
-    return pairs;
+    return needs;
 }
 
 void pvid_fourier_front_init_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,
                                  float sample_rate_hz)
 {
     const pvid_fourier_model_f32 *model = design->model;
-    const uint32_t pairs = pvid_fourier_front_pairs_f32(design);
-    self->needs = NOTHING;
+    const float ticks = (float)design->decimation;
+    self->needs = needs_of(model);
+    self->signals = model->signals;
+    self->plain = (self->needs == NOTHING) && (model->signals == model->samples);
     for (size_t i = 0; i < model->signals; i++) {
-        const uint8_t source = model->signal[i].source;
-        if (source == (uint8_t)PVID_SIGNAL_HELD) {
-            self->needs = NEXT;
-        } else if ((source == (uint8_t)PVID_SIGNAL_JUMP) && (self->needs == NOTHING)) {
-            self->needs = LAST;
-        } else {
-            /* the sample itself */
-        }
+        self->plain = self->plain && (model->signal[i].sample == i);
     }
-    const uint32_t ticks = pvid_fourier_job_ticks(design->decimation, pairs);
+    self->decimation = design->decimation;
     self->half = pvid_fourier_front_half_f32(design);
-    self->length = (uint16_t)((2u * self->half) + design->decimation);
-    self->pairs_per_tick = (uint16_t)((pairs + (ticks - 1u)) / ticks);
-    self->step_wait = (uint16_t)((uint32_t)design->decimation - pvid_fourier_step_place(design->decimation, ticks));
-    self->work_wait = (uint16_t)((uint32_t)design->decimation - pvid_fourier_work_place(design->decimation, ticks));
+    self->ticks = ticks;
+    self->scale = 1.0f / (ticks * ticks);
     self->jump_scale = 1.0f / (12.0f * sample_rate_hz);
-    pvid_fourier_front_reset_f32(self, design);
+    pvid_fourier_front_reset_f32(self);
+}
+
+/* Outputs before those of the first step: the first block has none before it; and signals of several samples are right
+ * from the second tick on. */
+static uint16_t lost(const pvid_fourier_front_f32 *self)
+{
+    if (self->decimation > 1u) {
+        return 1;
+    }
+    return (uint16_t)(((self->needs != NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
 }
 
 uint16_t pvid_fourier_front_lead_f32(const pvid_fourier_front_f32 *self)
 {
-    /* two ticks at least: signals of several samples are right there */
-    return (self->half > 2u) ? self->half : 2u;
+    return (uint16_t)((uint32_t)self->decimation * ((uint32_t)lost(self) + self->half));
 }
 
-void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
+void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self)
 {
     self->head = 0;
-    self->seen = 0;
-    self->begun = false;
-    self->busy = false;
-    self->jet = design->model->jets;
-    self->wait = (uint16_t)(self->half + pvid_fourier_front_lead_f32(self) + 1u);
+    self->seen = false;
+    self->missing = (uint16_t)(lost(self) + (2u * self->half) + 1u);
+    self->wait = self->decimation;
+    memset(self->line, 0, 3u * (size_t)self->signals * sizeof self->line[0]);
 }
 
 /* The samples before: all equal to the first one since a restart. */
 static void remember(pvid_fourier_front_f32 *self, size_t samples, const float sample[])
 {
-    const bool first = self->seen == 0u;
     for (size_t i = 0; i < samples; i++) {
-        self->before[2][i] = first ? sample[i] : self->before[1][i];
-        self->before[1][i] = first ? sample[i] : self->before[0][i];
+        self->before[2][i] = self->seen ? self->before[1][i] : sample[i];
+        self->before[1][i] = self->seen ? self->before[0][i] : sample[i];
         self->before[0][i] = sample[i];
     }
-    self->seen = 1;
+    self->seen = true;
 }
 
 /* A signal of the tick before, from the next sample and the three before it. */
@@ -115,145 +127,85 @@ static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier
                                                          : x;
 }
 
-/* Signals that need samples of other ticks. Returns false if there are none: the next sample is missing. */
-PVID_SELDOM static bool place_derived(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
-                                      const float sample[], float place[])
+PVID_SELDOM void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
+                                               const float sample[])
 {
-    const bool first = self->seen == 0u;
+    const bool first = !self->seen;
     if (first) {
         remember(self, model->samples, sample);
     }
-    const bool any = !first || (self->needs < NEXT);
-    for (size_t i = 0; any && (i < model->signals); i++) {
-        const pvid_fourier_signal *signal = &model->signal[i];
-        const float x = sample[signal->sample];
-        place[i] = (self->needs == NEXT) ? held_signal(self, signal, x) : plain_signal(self, signal, x);
-    }
-    remember(self, model->samples, sample);
-    return any;
-}
-
-/* Writes the signals of a tick to the ring. Returns false if there are none. */
-static inline bool store(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model, const float sample[])
-{
-    float *place = &self->ring[(size_t)self->head * model->signals];
-    if (self->needs != NOTHING) {
-        if (!place_derived(self, model, sample, place)) {
-            return false;
-        }
+    if (first && (self->needs == NEXT)) {
+        self->wait++; /* the next sample is missing */
     } else {
         for (size_t i = 0; i < model->signals; i++) {
-            place[i] = sample[model->signal[i].sample];
+            const pvid_fourier_signal *signal = &model->signal[i];
+            const float x = sample[signal->sample];
+            float *sums = &self->line[2u * i];
+            sums[0] += (self->needs == NEXT) ? held_signal(self, signal, x) : plain_signal(self, signal, x);
+            sums[1] += sums[0];
         }
     }
-    self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
-    return true;
+    if (self->needs != NOTHING) {
+        remember(self, model->samples, sample);
+    }
 }
 
-/* Begins the next jet of the job: those with half 0 are complete at once. */
-static void begin_jet(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
+/* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
+static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order, const float *x, size_t stride)
+{
+    const float *weight = filter->weights;
+    const float *end = &weight[filter->half];
+    const float *after = x;
+    const float *before = x;
+    const float centre = *x;
+    float sum = 0.0f;
+    if ((order % 2u) != 0u) {
+        while (weight != end) {
+            after += stride;
+            before -= stride;
+            sum += *weight * (*after - *before);
+            weight++;
+        }
+        return sum;
+    }
+    while (weight != end) {
+        after += stride;
+        before -= stride;
+        sum += *weight * ((*after - centre) + (*before - centre));
+        weight++;
+    }
+    return (order == 0u) ? (centre + sum) : sum;
+}
+
+bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[])
 {
     const pvid_fourier_model_f32 *model = design->model;
-    const float *instant = &self->ring[(size_t)self->centre * model->signals];
-    while ((self->jet < model->jets) && (design->filter[self->jet].half == 0u)) {
-        self->jet_value[self->jet] = instant[model->jet[self->jet].signal];
-        self->jet++;
+    const size_t signals = self->signals;
+    const size_t length = (2u * (size_t)self->half) + 1u;
+    float *sums = self->line;
+    float *carry = &sums[2u * signals];
+    float *outputs = &carry[signals];
+    float *place = &outputs[self->head * signals];
+    for (size_t i = 0; i < signals; i++) {
+        const float once = sums[0];
+        const float twice = sums[1];
+        const float output = self->scale * (twice + carry[i]);
+        carry[i] = (self->ticks * once) - twice;
+        sums[0] = 0.0f;
+        sums[1] = 0.0f;
+        sums += 2;
+        place[i] = output;
+        place[(length * signals) + i] = output;
     }
-    self->pair = 0;
-    self->newer = self->centre;
-    self->older = self->centre;
-    self->sum = 0.0f;
-}
-
-PVID_SELDOM static void begin_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
-{
-    /* the newest signals are before head, the instant `half` before those */
-    const uint16_t back = (uint16_t)(self->half + 1u);
-    self->centre = (uint16_t)((self->head >= back) ? (self->head - back) : ((self->head + self->length) - back));
-    self->wait = design->decimation;
-    self->begun = true;
-    self->busy = true;
-    self->jet = 0;
-    begin_jet(self, design);
-}
-
-/* Pairs of a filter of even order, outwards; x: the signal at the instant. */
-static inline float add_even(const float *weight, const float *after, const float *before, size_t stride, size_t pairs,
-                             float x, float sum)
-{
-    for (size_t i = 0; i < pairs; i++) {
-        sum += weight[i] * ((*after - x) + (*before - x));
-        after += stride;
-        before -= stride;
-    }
-    return sum;
-}
-
-/* Of odd order. */
-static inline float add_odd(const float *weight, const float *after, const float *before, size_t stride, size_t pairs,
-                            float sum)
-{
-    for (size_t i = 0; i < pairs; i++) {
-        sum += weight[i] * (*after - *before);
-        after += stride;
-        before -= stride;
-    }
-    return sum;
-}
-
-/* Up to `left` pairs of the present jet that are contiguous in the ring. Returns their number. */
-static size_t add_pairs(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, size_t left)
-{
-    const pvid_fourier_filter_f32 *filter = &design->filter[self->jet];
-    const pvid_fourier_jet *jet = &design->model->jet[self->jet];
-    const size_t stride = design->model->signals;
-    const size_t newer = (self->newer + 1u == self->length) ? 0u : (self->newer + 1u);
-    const size_t older = (self->older == 0u) ? (self->length - 1u) : (self->older - 1u);
-    const size_t room = minimum(self->length - newer, older + 1u);
-    const size_t pairs = minimum(minimum(left, (size_t)filter->half - self->pair), room);
-    const float *weight = &filter->weights[self->pair];
-    const float *after = &self->ring[(newer * stride) + jet->signal];
-    const float *before = &self->ring[(older * stride) + jet->signal];
-    const float x = self->ring[(self->centre * stride) + jet->signal];
-    const float sum = ((jet->order % 2u) != 0u) ? add_odd(weight, after, before, stride, pairs, self->sum)
-                                                : add_even(weight, after, before, stride, pairs, x, self->sum);
-    self->pair = (uint16_t)(self->pair + pairs);
-    if (self->pair == filter->half) {
-        self->jet_value[self->jet] = (jet->order == 0u) ? (x + sum) : sum;
-        self->jet++;
-        begin_jet(self, design);
-    } else {
-        self->sum = sum;
-        self->newer = (uint16_t)(newer + (pairs - 1u));
-        self->older = (uint16_t)(older - (pairs - 1u));
-    }
-    return pairs;
-}
-
-/* A part of the job. */
-PVID_SELDOM static void advance_job(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design)
-{
-    const size_t jets = design->model->jets;
-    size_t left = self->pairs_per_tick;
-    for (size_t runs = left; (runs > 0u) && (left > 0u) && (self->jet < jets); runs--) { /* each has a pair at least */
-        left -= add_pairs(self, design, left);
-    }
-    self->busy = self->jet < jets;
-}
-
-bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,
-                                 const float sample[])
-{
-    if (!store(self, design->model, sample)) {
+    self->wait = self->decimation;
+    self->head = (uint16_t)((self->head + 1u == length) ? 0u : (self->head + 1u));
+    if (self->missing > 1u) {
+        self->missing--;
         return false;
     }
-    const uint16_t wait = (uint16_t)(self->wait - 1u);
-    self->wait = wait;
-    if (wait == 0u) {
-        begin_job(self, design);
+    const float *centre = &outputs[((size_t)self->head + self->half) * signals];
+    for (size_t i = 0; i < model->jets; i++) {
+        jet[i] = jet_of(&design->compensator[i], model->jet[i].order, &centre[model->jet[i].signal], signals);
     }
-    if (self->busy) {
-        advance_job(self, design);
-    }
-    return (self->wait == self->step_wait) && self->begun;
+    return true;
 }

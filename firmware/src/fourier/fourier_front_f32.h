@@ -1,30 +1,56 @@
-/* Front end: from samples to signals, from the last signals to jets at a step. Private to the core. */
+/* Front end: from samples to signals, to their block sums, to jets at a step. Private to the core. */
 #ifndef PVID_FOURIER_FRONT_F32_H
 #define PVID_FOURIER_FRONT_F32_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
+#include "number/finite_f32.h"
 #include "pvid/fourier.h"
 
-/* Half of the longest filter of the jets. */
+/* Half of the longest compensator [steps]. */
 uint16_t pvid_fourier_front_half_f32(const pvid_fourier_design_f32 *design);
 
-/* Pairs of all filters of the jets. */
-uint32_t pvid_fourier_front_pairs_f32(const pvid_fourier_design_f32 *design);
+/* Numbers in the line: block sums of each signal, and the steps for the compensators, twice. */
+uint32_t pvid_fourier_front_length_f32(const pvid_fourier_design_f32 *design);
 
 /* Requires a valid design. */
 void pvid_fourier_front_init_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,
                                  float sample_rate_hz);
 
-/* Ticks from the first sample after a restart to the first step. */
+/* Ticks from the first sample after a restart to the instant of the first step. */
 uint16_t pvid_fourier_front_lead_f32(const pvid_fourier_front_f32 *self);
 
-/* Empty ring, no job. */
-void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design);
+/* An empty line. */
+void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self);
 
-/* Stores the finite samples of a tick and runs a part of the job. Returns true if this tick is that of a step: then
- * jet_value contains the step's jets. */
-bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,
-                                 const float sample[]);
+/* Adds the finite samples of a tick, where signals need samples of other ticks or are not one a sample. */
+void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
+                                   const float sample[]);
+
+/* At the end of a block: its outputs to the line. Returns true if the line is full: then `jet` contains the step's
+ * jets.
+ */
+bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[]);
+
+/* Adds this number of samples of a tick, at least 1, to the block. Returns false if one is not finite; the front end
+ * must then be reset. */
+static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[])
+{
+    float *sums = self->line;
+    const float *end = &sample[number];
+    do {
+        const float x = *sample;
+        if (!pvid_finite_f32(x)) {
+            return false;
+        }
+        const float once = sums[0] + x;
+        sums[0] = once;
+        sums[1] += once;
+        sample++;
+        sums += 2;
+    } while (sample != end);
+    return true;
+}
 
 #endif

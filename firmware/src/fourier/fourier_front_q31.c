@@ -2,21 +2,24 @@
  * With a held signal k is the tick before the present one. Before the first sample since a restart all were equal to
  * it.
  *
+ * A block of D ticks gives one output of each signal, the sum with weights 1, 2, .., D, .., 2, 1 about the block's
+ * first tick: with  a += x,  b += a  from 0 in every block, b + D a' - b', a' and b' those of the block before. It is
+ * exact: D^2 |x| fits an int32. It is then shifted to 28 bits.
+ *
  * A jet is the rescaled sum  x 2^bits + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x
- * above order 0) or  sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half. */
+ * above order 0) or  sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half; x are outputs. They stand twice in the
+ * line, one length apart: so the last ones are always contiguous. */
 #include "fourier/fourier_front_q31.h"
 
-#include <stddef.h>
+#include <string.h>
 
 #include "fourier/rescale_q31.h"
+#include "number/unroll.h"
 
-/* Pairs a tick, at least: fewer cost less than what a tick does for them beside. */
-#define LEAST_PAIRS 16u
-
-static size_t lesser(size_t a, size_t b)
-{
-    return (a < b) ? a : b;
-}
+/* Samples that the signals need beside those of their tick: none, the last one, or the next one and two before. */
+#define NOTHING 0u
+#define LAST 1u
+#define NEXT 2u
 
 uint16_t pvid_fourier_front_half_q31(const pvid_fourier_design_q31 *design)
 {
@@ -27,50 +30,66 @@ uint16_t pvid_fourier_front_half_q31(const pvid_fourier_design_q31 *design)
     return half;
 }
 
-static size_t pairs_of(const pvid_fourier_design_q31 *design)
+uint32_t pvid_fourier_front_length_q31(const pvid_fourier_design_q31 *design)
 {
-    size_t pairs = 0;
-    for (size_t i = 0; i < design->model->jets; i++) {
-        pairs += design->filter[i].half;
+    const uint32_t steps = (2u * (uint32_t)pvid_fourier_front_half_q31(design)) + 1u;
+    return (uint32_t)design->model->signals * (3u + (2u * steps));
+}
+
+static uint8_t needs_of(const pvid_fourier_model_q31 *model)
+{
+    uint8_t needs = NOTHING;
+    for (size_t i = 0; i < model->signals; i++) {
+        const uint8_t source = model->signal[i].source;
+        if (source == (uint8_t)PVID_SIGNAL_HELD) {
+            needs = NEXT;
+        } else if ((source == (uint8_t)PVID_SIGNAL_JUMP) && (needs == NOTHING)) {
+            needs = LAST;
+        } else {
+            /* the sample itself */
+        }
     }
-    return pairs;
+    return needs;
 }
 
-static size_t pairs_per_tick(const pvid_fourier_design_q31 *design)
-{
-    const size_t ticks = (design->decimation > 1u) ? ((size_t)design->decimation / 2u) : 1u;
-    const size_t each = (pairs_of(design) + (ticks - 1u)) / ticks;
-    return (each > LEAST_PAIRS) ? each : LEAST_PAIRS;
-}
-
-uint32_t pvid_fourier_front_job_q31(const pvid_fourier_design_q31 *design)
-{
-    const size_t each = pairs_per_tick(design);
-    const size_t ticks = (pairs_of(design) + (each - 1u)) / each;
-    return (uint32_t)((ticks > 0u) ? ticks : 1u);
-}
-
-void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design)
+void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
+                                 const int32_t offset[])
 {
     const pvid_fourier_model_q31 *model = design->model;
-    self->plain = true;
-    self->held = false;
+    self->needs = needs_of(model);
+    self->plain = (self->needs == NOTHING) && (model->signals == model->samples);
     for (size_t i = 0; i < model->signals; i++) {
-        self->plain = self->plain && (model->signal[i].source == (uint8_t)PVID_SIGNAL_SAMPLED);
-        self->held = self->held || (model->signal[i].source == (uint8_t)PVID_SIGNAL_HELD);
+        self->plain = self->plain && (model->signal[i].sample == i);
     }
+    self->offset = offset;
+    self->signals = model->signals;
+    self->decimation = design->decimation;
     self->half = pvid_fourier_front_half_q31(design);
-    self->length = (uint16_t)((2u * self->half) + design->decimation);
-    self->pairs_per_tick = (uint16_t)pairs_per_tick(design);
-    pvid_fourier_front_reset_q31(self, design);
+    pvid_fourier_front_reset_q31(self);
 }
 
-void pvid_fourier_front_reset_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design)
+/* Outputs before those of the first step: the first block has none before it; and signals of several samples are right
+ * from the second tick on. */
+static uint16_t lost(const pvid_fourier_front_q31 *self)
+{
+    if (self->decimation > 1u) {
+        return 1;
+    }
+    return (uint16_t)(((self->needs != NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
+}
+
+uint16_t pvid_fourier_front_lead_q31(const pvid_fourier_front_q31 *self)
+{
+    return (uint16_t)((uint32_t)self->decimation * ((uint32_t)lost(self) + self->half));
+}
+
+void pvid_fourier_front_reset_q31(pvid_fourier_front_q31 *self)
 {
     self->head = 0;
     self->seen = false;
-    self->jet = design->model->jets;
-    self->wait = (uint16_t)(self->half + pvid_fourier_front_lead_q31(design) + 1u);
+    self->missing = (uint16_t)(lost(self) + (2u * self->half) + 1u);
+    self->wait = self->decimation;
+    memset(self->line, 0, 3u * (size_t)self->signals * sizeof self->line[0]);
 }
 
 /* The samples before: all equal to the first one since a restart. */
@@ -88,136 +107,93 @@ static void remember(pvid_fourier_front_q31 *self, size_t samples, const int32_t
 static int32_t signal_of(const pvid_fourier_front_q31 *self, pvid_fourier_signal signal, const int32_t counts[])
 {
     const size_t i = signal.sample;
-    const int32_t now = self->held ? self->before[0][i] : counts[i];
-    const int32_t last = self->held ? self->before[1][i] : self->before[0][i];
+    const bool held = self->needs == NEXT;
+    const int32_t now = held ? self->before[0][i] : counts[i];
+    const int32_t last = held ? self->before[1][i] : self->before[0][i];
     if (signal.source == (uint8_t)PVID_SIGNAL_HELD) {
         return (13 * (last + now)) - (self->before[2][i] + counts[i]);
     }
     return (signal.source == (uint8_t)PVID_SIGNAL_JUMP) ? (now - last) : now;
 }
 
-/* Writes the signals of a tick to the ring. Returns false if there are none: the next sample is missing. */
-static bool store(pvid_fourier_front_q31 *self, const pvid_fourier_model_q31 *model, const int32_t counts[])
+PVID_SELDOM bool pvid_fourier_front_derive_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
+                                               const int32_t reading[])
 {
-    const pvid_fourier_signal *signal = model->signal;
-    const size_t signals = model->signals;
-    int32_t *place = &self->ring[self->head * signals];
-    if (self->plain) {
-        for (size_t i = 0; i < signals; i++) {
-            place[i] = counts[signal[i].sample];
-        }
-    } else {
-        const bool any = self->seen || !self->held;
-        if (!self->seen) {
-            remember(self, model->samples, counts);
-        }
-        if (!any) {
+    const pvid_fourier_model_q31 *model = design->model;
+    const bool first = !self->seen;
+    int32_t counts[PVID_MAX_SAMPLES];
+    for (size_t i = 0; i < model->samples; i++) {
+        counts[i] = pvid_fourier_count_q31(reading[i], self->offset[i]);
+        if (!pvid_fourier_is_within_q31(counts[i], design->full_scale[i])) {
             return false;
         }
-        for (size_t i = 0; i < signals; i++) {
-            place[i] = signal_of(self, signal[i], counts);
-        }
+    }
+    if (first) {
         remember(self, model->samples, counts);
     }
-    self->head = (uint16_t)((self->head + 1u == self->length) ? 0u : (self->head + 1u));
+    if (first && (self->needs == NEXT)) {
+        self->wait++; /* the next sample is missing */
+    } else {
+        for (size_t i = 0; i < model->signals; i++) {
+            int32_t *sums = &self->line[2u * i];
+            sums[0] += signal_of(self, model->signal[i], counts);
+            sums[1] += sums[0];
+        }
+    }
+    if (self->needs != NOTHING) {
+        remember(self, model->samples, counts);
+    }
     return true;
 }
 
-/* Completes the present jet and every one behind it that needs no pairs. */
-static void complete(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design)
+/* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
+static int32_t jet_of(const pvid_fourier_filter_q31 *filter, uint8_t order, const int32_t *x, size_t stride)
+{
+    const PVID_TABLE int32_t *weight = filter->weights;
+    const int32_t *after = x;
+    const int32_t *before = x;
+    const int32_t centre = *x;
+    int64_t sum = (order == 0u) ? (centre * ((int64_t)1 << filter->bits)) : 0;
+    const bool odd = (order % 2u) != 0u;
+    for (size_t left = filter->half; left > 0u; left--) {
+        after += stride;
+        before -= stride;
+        sum += pvid_product_q31(*weight, odd ? (*after - *before) : ((*after + *before) - (2 * centre)));
+        weight++;
+    }
+    return pvid_fourier_rescaled_q31(sum, &filter->rescale);
+}
+
+bool pvid_fourier_front_step_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design, int32_t jet[])
 {
     const pvid_fourier_model_q31 *model = design->model;
-    const int32_t *instant = &self->ring[(size_t)self->centre * model->signals];
-    const uint8_t jets = model->jets;
-    uint8_t place = self->jet;
-    for (; (place < jets) && (self->pair == design->filter[place].half); place++) {
-        const pvid_fourier_filter_q31 *filter = &design->filter[place];
-        const pvid_fourier_jet jet = model->jet[place];
-        const int64_t x = (jet.order == 0u) ? instant[jet.signal] : 0;
-        const int64_t sum = self->sum + (x * ((int64_t)1 << filter->bits));
-        self->value[place] = pvid_fourier_rescaled_q31(sum, &filter->rescale);
-        self->pair = 0;
-        self->sum = 0;
+    const size_t signals = self->signals;
+    const size_t length = (2u * (size_t)self->half) + 1u;
+    int32_t *sums = self->line;
+    int32_t *carry = &sums[2u * signals];
+    int32_t *outputs = &carry[signals];
+    int32_t *place = &outputs[self->head * signals];
+    for (size_t i = 0; i < signals; i++) {
+        const int32_t once = sums[0];
+        const int32_t twice = sums[1];
+        const int32_t output = pvid_floor_shift_32_q31(twice + carry[i], design->down[i]);
+        carry[i] = ((int32_t)self->decimation * once) - twice;
+        sums[0] = 0;
+        sums[1] = 0;
+        sums += 2;
+        place[i] = output;
+        place[(length * signals) + i] = output;
     }
-    self->jet = place;
-}
-
-static void begin(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design)
-{
-    /* the newest signals are before head, the instant `half` before those */
-    const uint16_t back = (uint16_t)(self->half + 1u);
-    self->centre = (uint16_t)((self->head >= back) ? (self->head - back) : ((self->head + self->length) - back));
-    self->wait = design->decimation;
-    self->jet = 0;
-    self->pair = 0;
-    self->sum = 0;
-    complete(self, design);
-}
-
-/* A weight times a pair of signals. On a core without a long multiplication a product that fits 32 bits is shorter. */
-static inline int64_t product(bool is_wide, int32_t weight, int32_t pair)
-{
-#if defined(__ARM_ARCH_6M__)
-    return is_wide ? pvid_product_q31(weight, pair) : (int64_t)(weight * pair);
-#else
-    (void)is_wide;
-    return (int64_t)weight * pair;
-#endif
-}
-
-/* Up to `left` pairs of the present jet that are contiguous in the ring. Returns their number. */
-static size_t add_pairs(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design, size_t left)
-{
-    const pvid_fourier_filter_q31 *filter = &design->filter[self->jet];
-    const pvid_fourier_jet jet = design->model->jet[self->jet];
-    const size_t stride = design->model->signals;
-    const size_t length = self->length;
-    const size_t outwards = (size_t)self->pair + 1u;
-    const size_t ahead = self->centre + outwards;
-    const size_t newer = (ahead >= length) ? (ahead - length) : ahead;
-    const size_t older = (self->centre >= outwards) ? (self->centre - outwards) : ((self->centre + length) - outwards);
-    const size_t room = lesser(length - newer, older + 1u);
-    const size_t pairs = lesser(lesser(left, (size_t)filter->half - self->pair), room);
-    const PVID_TABLE int32_t *weight = &filter->weights[self->pair];
-    const int32_t *after = &self->ring[(newer * stride) + jet.signal];
-    const int32_t *before = &self->ring[(older * stride) + jet.signal];
-    int64_t sum = self->sum;
-    if ((jet.order % 2u) != 0u) {
-        for (size_t i = 0; i < pairs; i++) {
-            sum += product(filter->is_wide, weight[i], after[i * stride] - *before);
-            before -= stride;
-        }
-    } else {
-        const int32_t twice = 2 * self->ring[(self->centre * stride) + jet.signal];
-        for (size_t i = 0; i < pairs; i++) {
-            sum += product(filter->is_wide, weight[i], (after[i * stride] + *before) - twice);
-            before -= stride;
-        }
-    }
-    self->sum = sum;
-    self->pair = (uint16_t)(self->pair + pairs);
-    complete(self, design);
-    return pairs;
-}
-
-bool pvid_fourier_front_step_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
-                                 const int32_t counts[])
-{
-    const size_t jets = design->model->jets;
-    if (!store(self, design->model, counts)) {
+    self->wait = self->decimation;
+    self->head = (uint16_t)((self->head + 1u == length) ? 0u : (self->head + 1u));
+    if (self->missing > 1u) {
+        self->missing--;
         return false;
     }
-    self->wait--;
-    if (self->wait == 0u) {
-        begin(self, design);
-    } else if (self->jet == jets) {
-        return false;
-    } else {
-        /* the job goes on */
+    const int32_t *centre = &outputs[((size_t)self->head + self->half) * signals];
+    for (size_t i = 0; i < model->jets; i++) {
+        const pvid_fourier_jet one = model->jet[i];
+        jet[i] = jet_of(&design->filter[i], one.order, &centre[one.signal], signals);
     }
-    size_t left = self->pairs_per_tick;
-    for (size_t runs = left; (runs > 0u) && (left > 0u) && (self->jet < jets); runs--) { /* each has a pair at least */
-        left -= add_pairs(self, design, left);
-    }
-    return self->jet == jets;
+    return true;
 }

@@ -1,40 +1,74 @@
-/* Front end: from counts to signals, from the last signals to the jets of a step. Private to the core. */
+/* Front end: from counts to signals, to their block sums, to jets at a step. Private to the core. */
 #ifndef PVID_FOURIER_FRONT_Q31_H
 #define PVID_FOURIER_FRONT_Q31_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "pvid/fourier_q31.h"
 
-/* Half of the longest filter of the jets. */
+/* Half of the longest compensator of the jets [steps]. */
 uint16_t pvid_fourier_front_half_q31(const pvid_fourier_design_q31 *design);
 
-/* Ticks from the first sample to the first step: two at least, so that signals of several samples are right there. */
-static inline uint16_t pvid_fourier_front_lead_q31(const pvid_fourier_design_q31 *design)
+/* Numbers in the line: block sums of each signal, and the steps for the compensators, twice. */
+uint32_t pvid_fourier_front_length_q31(const pvid_fourier_design_q31 *design);
+
+/* Requires a valid design; offset as in the configuration. */
+void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
+                                 const int32_t offset[]);
+
+/* Ticks from the first sample after a restart to the instant of the first step. */
+uint16_t pvid_fourier_front_lead_q31(const pvid_fourier_front_q31 *self);
+
+/* An empty line. */
+void pvid_fourier_front_reset_q31(pvid_fourier_front_q31 *self);
+
+/* Adds the readings of a tick, where signals need those of other ticks or are not one a sample. Returns as
+ * pvid_fourier_front_add_q31. */
+bool pvid_fourier_front_derive_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
+                                   const int32_t reading[]);
+
+/* At the end of a block: its outputs to the line. Returns true if the line is full: then jet[] contains the step's
+ * jets. */
+bool pvid_fourier_front_step_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design, int32_t jet[]);
+
+/* A reading about its offset; |offset| <= 2^30, so that one beyond 2^31 stays beyond full scale. */
+static inline int32_t pvid_fourier_count_q31(int32_t reading, int32_t offset)
 {
-    const uint16_t half = pvid_fourier_front_half_q31(design);
-    return (half > 2u) ? half : 2u;
+    return (int32_t)((uint32_t)reading - (uint32_t)offset);
 }
 
-/* Ticks that a job takes: half of a block at most, but one at least. */
-uint32_t pvid_fourier_front_job_q31(const pvid_fourier_design_q31 *design);
-
-/* Requires a valid design. */
-void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design);
-
-/* Empty ring, no job. */
-void pvid_fourier_front_reset_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design);
-
-/* Stores the counts of a tick, each within its full scale, and runs a part of the job. Returns true if this completes
- * the job: then `value` contains the step's jets. */
-bool pvid_fourier_front_step_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
-                                 const int32_t counts[]);
-
-/* Whether a job is under way. */
-static inline bool pvid_fourier_front_is_busy_q31(const pvid_fourier_front_q31 *self,
-                                                  const pvid_fourier_design_q31 *design)
+/* Whether |count| <= full scale: 0..2 full scale without the sign. */
+static inline bool pvid_fourier_is_within_q31(int32_t count, int32_t full_scale)
 {
-    return self->jet < design->model->jets;
+    return ((uint32_t)count + (uint32_t)full_scale) <= (2u * (uint32_t)full_scale);
+}
+
+/* Adds the readings of a tick to the block. Returns false if one is beyond its full scale; the front end must then be
+ * reset. */
+static inline bool pvid_fourier_front_add_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
+                                              const int32_t reading[])
+{
+    if (!self->plain) {
+        return pvid_fourier_front_derive_q31(self, design, reading);
+    }
+    int32_t *sums = self->line;
+    const int32_t *full_scale = design->full_scale;
+    const int32_t *offset = self->offset;
+    for (uint32_t left = design->model->signals; left > 0u; left--) {
+        const int32_t x = pvid_fourier_count_q31(*reading, *offset);
+        if (!pvid_fourier_is_within_q31(x, *full_scale)) {
+            return false;
+        }
+        const int32_t once = sums[0] + x;
+        sums[0] = once;
+        sums[1] += once;
+        reading++;
+        offset++;
+        full_scale++;
+        sums += 2;
+    }
+    return true;
 }
 
 #endif

@@ -6,90 +6,23 @@
 #include "fourier/collect_q31.h"
 #include "fourier/fourier_finish_q31.h"
 #include "fourier/fourier_front_q31.h"
-#include "fourier/sums_q31.h"
+#include "fourier/valid_q31.h"
 #include "judge/publication.h"
 #include "number/count.h"
 #include "number/init.h"
 #include "number/integer_q31.h"
+#include "number/unroll.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
+#define OFFSET_LIMIT ((int32_t)1 << 30)
 #define STAGES_MAX 64u
-#define POWER_OF_ROW_WEIGHT 65536u /* 1 in Q16 */
+#define ONE_Q16 65536u
 
 static bool is_ready(const pvid_fourier_q31 *self)
 {
     const bool ready = (self != NULL) && (self->design != NULL);
     PVID_ASSERT(ready);
     return ready;
-}
-
-static pvid_status model_is_valid(const pvid_fourier_model_q31 *model)
-{
-    if ((model == NULL) || (model->signal == NULL) || (model->jet == NULL) || (model->channel == NULL) ||
-        (model->term == NULL) || (model->kind == NULL) || (model->values == NULL) || (model->model == NULL)) {
-        return PVID_BAD_MODEL;
-    }
-    const size_t inputs = (size_t)model->jets + model->runs + model->signs;
-    const bool fits = (model->samples >= 1u) && (model->samples <= PVID_MAX_SAMPLES) && (model->signals >= 1u) &&
-                      (model->jets >= 1u) && (inputs <= PVID_MAX_INPUTS) && (model->runs <= PVID_MAX_INTEGRANDS) &&
-                      (model->signs <= PVID_MAX_INTEGRANDS) && (model->integrands <= PVID_MAX_INTEGRANDS) &&
-                      (model->gains <= PVID_MAX_CHANNELS) && (model->channels >= 1u) &&
-                      (model->channels <= PVID_MAX_CHANNELS) && (model->kinds >= 1u) &&
-                      (model->kinds <= PVID_MAX_KINDS) &&
-                      ((model->prepare != NULL) || ((model->runs + model->signs) == 0u));
-    size_t thetas = 0;
-    bool columns = true;
-    for (size_t i = 0; fits && (i < model->kinds); i++) {
-        const pvid_fourier_kind *kind = &model->kind[i];
-        thetas += kind->thetas;
-        columns = columns && (((size_t)kind->thetas + 1u + kind->nuisances) <= PVID_MAX_COLUMNS);
-    }
-    const bool same_kinds = (model->model->n_kinds == model->kinds) || (model->kinds == 1u);
-    return (fits && columns && same_kinds && (thetas == model->model->n_theta)) ? PVID_OK : PVID_BAD_MODEL;
-}
-
-static pvid_status design_is_valid(const pvid_fourier_design_q31 *design)
-{
-    if ((design == NULL) || (design->full_scale == NULL) || (design->filter == NULL) || (design->format == NULL) ||
-        (design->factor == NULL) || (design->error_order == NULL) || (design->error_variance == NULL) ||
-        (design->circle == NULL) || ((design->noise == NULL) && (design->n_noise > 0u))) {
-        return PVID_BAD_DESIGN;
-    }
-    const pvid_status status = model_is_valid(design->model);
-    if (status != PVID_OK) {
-        return status;
-    }
-    const pvid_fourier_model_q31 *model = design->model;
-    if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS)) {
-        return PVID_BAD_FUNCTIONS;
-    }
-    if ((design->decimation < 1u) || (design->decimation > PVID_MAX_DECIMATION)) {
-        return PVID_BAD_DECIMATION;
-    }
-    const size_t harmonics = pvid_fourier_harmonics_q31(design);
-    if ((design->power < 2u) || ((design->power % 2u) != 0u) || (design->power > PVID_MAX_POWER) ||
-        (harmonics > PVID_MAX_HARMONICS)) {
-        return PVID_BAD_FUNCTIONS;
-    }
-    if ((design->hop < harmonics) || ((design->hop % 4u) != 0u) || (design->hop < 8u) || (design->hop > 4096u)) {
-        return PVID_BAD_WINDOW;
-    }
-    const size_t length = (2u * (size_t)pvid_fourier_front_half_q31(design)) + design->decimation;
-    if ((length * model->signals) > PVID_MAX_RING) {
-        return PVID_BAD_TAPS;
-    }
-    bool shifts = (design->sum_shift >= 1u) && (design->sum_shift <= 30u);
-    bool scales = true;
-    for (size_t i = 0; i < model->samples; i++) {
-        scales = scales && (design->full_scale[i] > 0) && (design->full_scale[i] <= COUNTS_LIMIT);
-    }
-    for (size_t i = 0; i < model->channels; i++) {
-        shifts = shifts && (design->format[i].value >= 1u);
-    }
-    if (!scales) {
-        return PVID_BAD_FULL_SCALE;
-    }
-    return shifts ? PVID_OK : PVID_BAD_SHIFT;
 }
 
 static void restart(pvid_fourier_q31 *self)
@@ -101,12 +34,17 @@ static void restart(pvid_fourier_q31 *self)
 static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config)
 {
     const pvid_fourier_design_q31 *design = config->design;
-    pvid_status status = design_is_valid(design);
+    pvid_status status = pvid_fourier_valid_q31(design);
     if (status != PVID_OK) {
         return status;
     }
     if (config->offset == NULL) {
         return PVID_BAD_DESIGN;
+    }
+    for (size_t i = 0; i < design->model->samples; i++) {
+        if ((config->offset[i] < -OFFSET_LIMIT) || (config->offset[i] > OFFSET_LIMIT)) {
+            return PVID_BAD_DESIGN;
+        }
     }
     for (size_t i = 0; (config->drive_min != NULL) && (i < design->model->samples); i++) {
         if ((config->drive_min[i] < 0) || (config->drive_min[i] > COUNTS_LIMIT)) {
@@ -116,9 +54,7 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
     memset(self, 0, sizeof *self);
     pvid_estimator_config_q31 estimator = config->estimator;
     estimator.model = design->model->model;
-    /* K + n rows span K dimensions */
-    estimator.row_weight =
-        (POWER_OF_ROW_WEIGHT * (uint32_t)design->functions) / ((uint32_t)design->functions + design->power);
+    estimator.row_weight = ONE_Q16;
     status = pvid_estimator_init_q31(&self->estimator, &estimator);
     if (status != PVID_OK) {
         return status;
@@ -135,10 +71,10 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
         return PVID_BAD_ITERATIONS;
     }
     self->design = design;
-    self->offset = config->offset;
     self->drive_min = config->drive_min;
+    self->driven = config->drive_min == NULL;
     self->iterations = (uint8_t)((self->estimator.settings.gain < PVID_ONE_Q30) ? 1u : config->iterations);
-    pvid_fourier_collect_init_q31(&self->collect, design);
+    pvid_fourier_collect_init_q31(&self->collect, design, config->offset);
     const uint32_t ticks = pvid_fourier_free_ticks_q31(design);
     const uint32_t stages = pvid_fourier_finish_stages_q31(self);
     const uint32_t each = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
@@ -153,12 +89,13 @@ pvid_status pvid_fourier_init_q31(pvid_fourier_q31 *self, const pvid_fourier_con
 }
 
 /* The counts of the tick in which the channels of step `index` of a half were made. */
-static void watch_drive(pvid_fourier_drive_q31 *self, size_t samples, size_t half, bool begins, const int32_t counts[])
+static void watch_drive(pvid_fourier_q31 *self, size_t half, bool begins, const int32_t reading[])
 {
-    for (size_t i = 0; i < samples; i++) {
-        const int64_t x = counts[i];
-        self->sum[half][i] = (begins ? 0 : self->sum[half][i]) + x;
-        self->square[half][i] = (begins ? 0 : self->square[half][i]) + (x * x);
+    pvid_fourier_drive_q31 *drive = &self->drive;
+    for (size_t i = 0; i < self->design->model->samples; i++) {
+        const int32_t x = pvid_fourier_count_q31(reading[i], self->collect.front.offset[i]);
+        drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
+        drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_square_q31(x);
     }
 }
 
@@ -191,22 +128,44 @@ static pvid_reason hand_over(pvid_fourier_q31 *self)
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
-    pvid_fourier_finish_begin_q31(&self->finish);
+    pvid_fourier_finish_begin_q31(&self->finish, self->design);
     return PVID_ACCUMULATED;
 }
 
-static void advance_finish(pvid_fourier_q31 *self, pvid_reason *reason)
-{
-    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_fourier_finish_is_busy_q31(&self->finish); i++) {
-        pvid_fourier_finish_step_q31(self, reason);
-    }
-}
-
-static pvid_reason reject(pvid_fourier_q31 *self)
+PVID_SELDOM static pvid_reason reject(pvid_fourier_q31 *self)
 {
     restart(self);
     pvid_count_up(&self->estimator.counters.rejected_saturated);
     return PVID_REJECTED_SATURATED;
+}
+
+static pvid_reason idle_reason(const pvid_fourier_q31 *self)
+{
+    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+}
+
+PVID_SELDOM static pvid_reason advance_finish(pvid_fourier_q31 *self)
+{
+    pvid_reason reason = idle_reason(self);
+    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_fourier_finish_is_busy_q31(&self->finish); i++) {
+        pvid_fourier_finish_step_q31(self, &reason);
+    }
+    return reason;
+}
+
+/* The last tick of a step. */
+PVID_SELDOM static pvid_fourier_tick end_step(pvid_fourier_q31 *self, const int32_t reading[])
+{
+    const uint16_t index = self->collect.values.index;
+    const uint8_t half = self->collect.values.half;
+    const pvid_fourier_tick tick = pvid_fourier_collect_end_q31(&self->collect);
+    if ((tick != PVID_FOURIER_REJECTED) && (self->drive_min != NULL) && (self->collect.values.index != index)) {
+        watch_drive(self, half, index == 0u, reading);
+        if (self->collect.values.index == 0u) { /* the half is complete */
+            self->driven = is_driven(self);
+        }
+    }
+    return tick;
 }
 
 pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[])
@@ -214,32 +173,28 @@ pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[
     if (!is_ready(self) || (reading == NULL)) {
         return PVID_NOT_READY;
     }
-    const size_t samples = self->design->model->samples;
-    const uint16_t index = self->collect.values.index;
-    const uint8_t half = self->collect.values.half;
-    int32_t counts[PVID_MAX_SAMPLES];
-    for (size_t i = 0; i < samples; i++) {
-        /* beyond full scale it stays beyond it */
-        counts[i] = (int32_t)pvid_clamp_q31((int64_t)reading[i] - self->offset[i], 2 * (int64_t)COUNTS_LIMIT);
-    }
-    const pvid_fourier_tick tick = pvid_fourier_collect_step_q31(&self->collect, counts);
-    if (tick == PVID_FOURIER_REJECTED) {
+    pvid_fourier_collect_q31 *collect = &self->collect;
+    if (!pvid_fourier_front_add_q31(&collect->front, self->design, reading)) {
         return reject(self);
     }
-    if ((self->collect.values.index != index) || (self->collect.values.half != half)) {
-        watch_drive(&self->drive, samples, half, index == 0u, counts);
-        if (self->collect.values.index == 0u) { /* the half is complete */
-            self->driven = is_driven(self);
-        }
-    }
-    pvid_reason reason = self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-    if (tick == PVID_FOURIER_WINDOW) {
-        const pvid_reason dropped = hand_over(self);
-        reason = dropped;
-    } else if (tick == PVID_FOURIER_FREE) {
-        advance_finish(self, &reason);
+    pvid_fourier_tick tick = PVID_FOURIER_FREE;
+    collect->front.wait--;
+    if (collect->front.wait == 0u) {
+        tick = end_step(self, reading);
+    } else if (collect->sums.left > 0u) {
+        tick = pvid_fourier_collect_work_q31(collect);
     } else {
-        /* the tick is full */
+        /* free */
+    }
+    pvid_reason reason = idle_reason(self);
+    if (tick == PVID_FOURIER_REJECTED) {
+        reason = reject(self);
+    } else if (tick == PVID_FOURIER_WINDOW) {
+        reason = hand_over(self);
+    } else if ((tick == PVID_FOURIER_FREE) && pvid_fourier_finish_is_busy_q31(&self->finish)) {
+        reason = advance_finish(self);
+    } else {
+        /* the tick is full, or there is nothing to do */
     }
     return reason;
 }

@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 /* Signs need the arguments of both neighbours, and an integral the next step's integrand. So with the jets of step k
@@ -77,15 +78,18 @@ static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float d
     const float part = dt / 24.0f;
     const float half = 0.5f * dt;
     const float end = (dt * dt) / 12.0f;
+    const size_t known = self->known;
+    float *integral = self->integral;
     for (size_t i = 0; i < integrands; i++) {
         const float last = self->f[0][i];
+        const float f = now[i];
         float once = 0.0f;
         float twice = 0.0f;
-        if (self->known > 2u) {
-            const float before = (self->known > 3u) ? self->f[1][i] : ((2.0f * last) - now[i]);
-            const float rise = part * (((-before + (13.0f * last)) + (13.0f * now[i])) - next[i]);
-            once = self->once[i] + rise;
-            twice = self->twice[i] + ((half * (self->once[i] + once)) - (end * (now[i] - last)));
+        if (known > 2u) {
+            const float before = (known > 3u) ? self->f[1][i] : ((2.0f * last) - f);
+            const float rise = part * (((-before + (13.0f * last)) + (13.0f * f)) - next[i]);
+            once = integral[0] + rise;
+            twice = integral[1] + ((half * (integral[0] + once)) - (end * (f - last)));
         }
         if (begins) {
             self->edge[0][i] = once;
@@ -93,60 +97,36 @@ static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float d
             once = 0.0f;
             twice = 0.0f;
         }
-        self->once[i] = once;
-        self->twice[i] = twice;
+        integral[0] = once;
+        integral[1] = twice;
+        integral += 2;
         self->f[1][i] = last;
-        self->f[0][i] = now[i];
+        self->f[0][i] = f;
     }
 }
 
-/* Values of the channels at a step with these gains, at this time since the start of its half. */
-static inline void find_channels(const pvid_fourier_history_f32 *self, const pvid_fourier_model_f32 *model,
-                                 size_t channels, float t, const float gain[], float channel[])
-{
-    for (size_t c = 0; c < channels; c++) {
-        const pvid_fourier_channel *one = &model->channel[c];
-        if (one->gain != PVID_FOURIER_NONE) {
-            float value = gain[one->gain];
-            if (one->fold == 1u) {
-                value *= (one->integrand == PVID_FOURIER_NONE) ? t : self->once[one->integrand];
-            } else if (one->fold == 2u) {
-                value *= (one->integrand == PVID_FOURIER_NONE) ? (0.5f * (t * t)) : self->twice[one->integrand];
-            } else {
-                /* the gain alone */
-            }
-            channel[c] = value;
-        }
-    }
-}
-
-static inline void copy(size_t n, const float *restrict from, float *restrict to)
-{
-    for (size_t i = 0; i < n; i++) {
-        to[i] = from[i];
-    }
-}
-
-bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                                float dt, const float jet[], uint16_t index, float channel[])
+bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, float dt,
+                                uint16_t index, float channel[])
 {
     const pvid_fourier_model_f32 *model = design->model;
     float arguments[PVID_MAX_INPUTS] = {0.0f}; /* of the newest step: derivatives of the runs, then arguments of sgn */
     const float *v = &arguments[model->runs];
     const bool complete = self->known > 1u;
+    float *newest = self->inputs[self->newest];
+    self->newest ^= 1u;
+    float *before = self->inputs[self->newest];
     if (model->prepare != NULL) {
-        model->prepare(jet, arguments);
+        model->prepare(newest, arguments);
     }
     if (self->known > 0u) {
-        find_signs(self, design, v, &self->now[model->jets + model->runs]);
+        find_signs(self, design, v, &before[model->jets + model->runs]);
         const float *now = self->out[self->latest];
         self->latest ^= 1u;
         float *next = self->out[self->latest];
-        model->values(self->now, next);
+        model->values(before, next);
         if (complete) {
             integrate(self, model->integrands, dt, index == 0u, &now[model->gains], &next[model->gains]);
-            const float t = dt * (float)index;
-            find_channels(self, model, channels, t, now, channel);
+            model->form(now, self->integral, dt * (float)index, channel);
         }
         move_runs(self, model->runs, 0.5f * dt, arguments);
     } else if (!self->ran) {
@@ -157,11 +137,14 @@ bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fouri
     } else {
         /* a gap: the runs stay */
     }
-    copy(model->signs, self->v[0], self->v[1]);
-    copy(model->signs, v, self->v[0]);
-    copy(model->runs, arguments, self->rate);
-    copy(model->jets, jet, self->now);
-    copy(model->runs, self->run, &self->now[model->jets]);
+    for (size_t i = 0; i < model->signs; i++) {
+        self->v[1][i] = self->v[0][i];
+        self->v[0][i] = v[i];
+    }
+    for (size_t i = 0; i < model->runs; i++) {
+        self->rate[i] = arguments[i];
+        newest[model->jets + i] = self->run[i];
+    }
     self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
     return complete;
 }

@@ -13,10 +13,10 @@ void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, float lead);
 /* No step is known; the integrals since the start of the run are kept. */
 void pvid_fourier_step_reset_f32(pvid_fourier_history_f32 *self);
 
-/* Takes the jets of a step. Returns true if the channels of the step two before it are known from now on, and writes
- * their values. channels: that are summed; dt: between steps [s]; index:
- * of that step in its half window. */
-bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                                float dt, const float jet[], uint16_t index, float channel[]);
+/* Takes the jets of a step, which are in inputs[newest]. Returns true if the channels of the step two before it are
+ * known from now on, and writes their values. channels: that are summed; dt: between steps [s]; index: of that step in
+ * its half window. */
+bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, float dt,
+                                uint16_t index, float channel[]);
 
 #endif

@@ -1,7 +1,5 @@
 #include "fourier/sums_q31.h"
 
-#include <string.h>
-
 #include "fourier/values_q31.h"
 #include "number/integer_q31.h"
 #include "number/unroll.h"
@@ -11,10 +9,10 @@
 
 enum { RE = 0, IM = 1 };
 
-void pvid_fourier_sums_reset_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design)
+void pvid_fourier_sums_reset_q31(pvid_fourier_sums_q31 *self)
 {
     self->filling = 0;
-    self->slice = pvid_fourier_harmonics_q31(design);
+    self->left = 0;
     self->halves = 0;
 }
 
@@ -24,88 +22,82 @@ void pvid_fourier_sums_next_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_
     if ((index % (uint16_t)BLOCK) != (BLOCK - 1u)) {
         return;
     }
+    const bool last = index + 1u == design->hop;
+    const uint8_t harmonics = pvid_fourier_harmonics_q31(design);
     self->filling ^= 1u;
-    self->slice = 0;
+    self->item = 0;
+    self->angle = 0;
     self->target = half;
     self->start = (uint16_t)(index - (BLOCK - 1u));
-    self->last = index + 1u == design->hop;
-    self->joins = self->last && (self->halves > 0u);
-    if (self->last) {
+    self->joins = last && (self->halves > 0u);
+    self->left = (uint8_t)(self->joins ? (2u * harmonics) : harmonics);
+    if (last) {
         self->halves = (uint8_t)((self->halves < 2u) ? (self->halves + 1u) : 2u);
     }
 }
 
-/* Two sums of four products of 16 by 29 bits, 2^-14 of them rounded down, which fit 32 bits. */
+/* A sum of four products of 16 by 29 bits, 2^-14 of it rounded down, which fits 32 bits. */
 #if defined(__ARM_ARCH_6M__)
 /* Without a long multiplication: x = high 2^14 + low; four products of each fit 32 bits. */
-static inline void add_products(const int32_t cosine[BLOCK], const int32_t sine[BLOCK], const int32_t *x,
-                                int32_t sum[2])
+static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
 {
-    int32_t high_re = 0;
-    int32_t high_im = 0;
-    int32_t low_re = 0;
-    int32_t low_im = 0;
+    int32_t high = 0;
+    int32_t low = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
         const int32_t one = x[j * PVID_MAX_CHANNELS];
-        const int32_t high = pvid_floor_shift_32_q31(one, DOWN);
-        const int32_t low = (int32_t)((uint32_t)one & 0x3FFFu);
-        high_re += cosine[j] * high;
-        high_im += sine[j] * high;
-        low_re += cosine[j] * low;
-        low_im += sine[j] * low;
+        high += factor[j] * pvid_floor_shift_32_q31(one, DOWN);
+        low += factor[j] * (int32_t)((uint32_t)one & 0x3FFFu);
     }
-    sum[RE] = high_re + pvid_floor_shift_32_q31(low_re, DOWN);
-    sum[IM] = high_im + pvid_floor_shift_32_q31(low_im, DOWN);
+    return high + pvid_floor_shift_32_q31(low, DOWN);
 }
 #else
-static inline void add_products(const int32_t cosine[BLOCK], const int32_t sine[BLOCK], const int32_t *x,
-                                int32_t sum[2])
+static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
 {
-    int64_t re = 0;
-    int64_t im = 0;
+    int64_t sum = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
-        const int32_t one = x[j * PVID_MAX_CHANNELS];
-        re += (int64_t)cosine[j] * one;
-        im += (int64_t)sine[j] * one;
+        sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
     }
-    sum[RE] = (int32_t)pvid_floor_shift_q31(re, DOWN);
-    sum[IM] = (int32_t)pvid_floor_shift_q31(im, DOWN);
+    return (int32_t)pvid_floor_shift_q31(sum, DOWN);
 }
 #endif
 
-/* x 2^-s rounded half up, s >= 1. */
-static inline int32_t rounded(int32_t x, uint32_t s)
+/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded half up, or
+ * begins these with them. */
+static void add_products(const int32_t factor[BLOCK], const int32_t *x, size_t channels, uint32_t shift, bool begins,
+                         int32_t *sum)
 {
-    return pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(x, s - 1u) + 1, 1);
+    const int32_t c[BLOCK] = {factor[0], factor[1], factor[2], factor[3]};
+    for (size_t left = channels; left > 0u; left--) {
+        const int32_t half = pvid_floor_shift_32_q31(products(c, x), shift - 1u);
+        *sum = (begins ? 0 : *sum) + pvid_floor_shift_32_q31(half + 1, 1);
+        sum += 2;
+        x++;
+    }
 }
 
-/* The block to the sums of harmonic h. */
+/* The block to the sums of harmonic h, whose first step is at `angle` of the circle. */
 static void add_block(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design, size_t h)
 {
     const size_t summed = pvid_fourier_summed_q31(design->model);
     const size_t turn = 2u * (size_t)design->hop;
-    int32_t (*block)[PVID_MAX_CHANNELS] = self->block[self->filling ^ 1u];
-    int32_t (*sum)[2] = self->sum[self->target][h];
+    const size_t three_quarters = turn - ((size_t)design->hop / 2u);
+    const int32_t *x = &self->block[self->filling ^ 1u][0][0];
+    int32_t *sum = &self->sum[self->target][h][0][0];
     int32_t cosine[BLOCK];
     int32_t sine[BLOCK];
-    size_t place = (h * self->start) % turn;
+    size_t place = self->angle;
     for (size_t j = 0; j < BLOCK; j++) {
-        const size_t quarter = place + (turn - ((size_t)design->hop / 2u));
+        const size_t quarter = place + three_quarters;
         cosine[j] = design->circle[place];
         sine[j] = design->circle[(quarter >= turn) ? (quarter - turn) : quarter];
         place = (place + h >= turn) ? ((place + h) - turn) : (place + h);
     }
-    if (self->start == 0u) {
-        memset(sum, 0, summed * sizeof sum[0]);
-    }
-    for (size_t k = 0; k < summed; k++) {
-        int32_t part[2];
-        add_products(cosine, sine, &block[0][k], part);
-        sum[k][RE] += rounded(part[RE], design->sum_shift);
-        sum[k][IM] += rounded(part[IM], design->sum_shift);
-    }
+    add_products(cosine, x, summed, design->sum_shift, self->start == 0u, &sum[RE]);
+    add_products(sine, x, summed, design->sum_shift, self->start == 0u, &sum[IM]);
+    const size_t next = (size_t)self->angle + self->start;
+    self->angle = (uint16_t)((next >= turn) ? (next - turn) : next);
 }
 
 /* The end of the first half's integrals of a channel: I^n, n = 1 or 2, that of 1 in the unit of the channel. */
@@ -121,6 +113,12 @@ static int32_t edge_of(const pvid_fourier_values_q31 *values, const pvid_fourier
     return values->edge[first][n - 1u][channel->integrand];
 }
 
+/* I^n at the end of the first half times B_h. */
+static inline int64_t shifted(int32_t end, int32_t b, uint32_t shift)
+{
+    return pvid_floor_shift_q31(pvid_product_q31(end, b), shift);
+}
+
 /* S_h = A_h + (-1)^h B_h; the integrals of B are shifted to the start of A: by I^fold, and by I^1 t where fold is 2. */
 static void join(const pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design,
                  const pvid_fourier_values_q31 *values, size_t h, pvid_fourier_window_q31 *window)
@@ -130,38 +128,42 @@ static void join(const pvid_fourier_sums_q31 *self, const pvid_fourier_design_q3
     const int32_t (*a)[2] = self->sum[first][h];
     const int32_t (*b)[2] = self->sum[self->target][h];
     const size_t summed = pvid_fourier_summed_q31(model);
+    const bool even = (h % 2u) == 0u;
     for (size_t k = 0; k < summed; k++) {
         const pvid_fourier_channel *channel = &model->channel[k];
         const pvid_fourier_format_q31 format = design->format[k];
+        const bool folds = channel->fold > 0u;
+        const bool ramps = channel->fold > 1u;
+        const int32_t end = folds ? edge_of(values, channel, first, channel->fold, design->hop) : 0;
+        const int32_t once = ramps ? edge_of(values, channel, first, 1, design->hop) : 0;
+        uint32_t bits = (h == 0u) ? 0u : window->bits[k];
         for (size_t part = 0; part < 2u; part++) {
-            const int64_t own =
-                ((h % 2u) == 0u) ? ((int64_t)a[k][part] + b[k][part]) : ((int64_t)a[k][part] - b[k][part]);
-            int64_t shift = 0;
-            if (channel->fold > 0u) {
-                const int32_t end = edge_of(values, channel, first, channel->fold, design->hop);
-                shift += pvid_round_shift_q31(pvid_product_q31(end, b[channel->plain][part]), format.plain);
-            }
-            if (channel->fold > 1u) {
-                const int32_t end = edge_of(values, channel, first, 1, design->hop);
-                shift += pvid_round_shift_q31(pvid_product_q31(end, b[channel->ramp][part]), format.ramp);
-            }
-            const int64_t total = pvid_round_shift_q31(own, format.own) + (((h % 2u) == 0u) ? shift : -shift);
-            window->s[k][h][part] = (int32_t)total;
+            const int32_t other = b[k][part];
+            int64_t shift = folds ? shifted(end, b[channel->plain][part], format.plain) : 0;
+            shift += ramps ? shifted(once, b[channel->ramp][part], format.ramp) : 0;
+            const int32_t own = pvid_floor_shift_32_q31(a[k][part] + (even ? other : -other), format.own);
+            const int32_t total = (int32_t)pvid_clamp_q31(own + (even ? shift : -shift), PVID_ONE_Q30);
+            window->s[k][h][part] = total;
+            bits |= (uint32_t)((total < 0) ? -total : total);
         }
+        window->bits[k] = bits;
     }
     if (summed < model->channels) { /* a constant */
         window->s[summed][h][RE] = (h == 0u) ? (2 * (int32_t)design->hop) : 0;
         window->s[summed][h][IM] = 0;
+        window->bits[summed] = 2u * (uint32_t)design->hop;
     }
 }
 
-void pvid_fourier_sums_slice_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design,
-                                 const pvid_fourier_values_q31 *values, pvid_fourier_window_q31 *window)
+void pvid_fourier_sums_item_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design,
+                                const pvid_fourier_values_q31 *values, pvid_fourier_window_q31 *window)
 {
-    const size_t h = self->slice;
-    add_block(self, design, h);
-    if (self->joins) {
-        join(self, design, values, h, window);
+    const uint8_t harmonics = pvid_fourier_harmonics_q31(design);
+    if (self->item < harmonics) {
+        add_block(self, design, self->item);
+    } else {
+        join(self, design, values, (size_t)self->item - harmonics, window);
     }
-    self->slice++;
+    self->item++;
+    self->left--;
 }

@@ -14,7 +14,7 @@ static inline uint8_t pvid_fourier_harmonics_q31(const pvid_fourier_design_q31 *
 }
 
 /* No block, no half. */
-void pvid_fourier_sums_reset_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design);
+void pvid_fourier_sums_reset_q31(pvid_fourier_sums_q31 *self);
 
 /* Where the channels of the next step go: step `index` of a half. */
 static inline int32_t *pvid_fourier_sums_place_q31(pvid_fourier_sums_q31 *self, uint16_t index)
@@ -27,16 +27,9 @@ static inline int32_t *pvid_fourier_sums_place_q31(pvid_fourier_sums_q31 *self, 
 void pvid_fourier_sums_next_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design, uint16_t index,
                                 uint8_t half);
 
-/* Whether a block is being added. */
-static inline bool pvid_fourier_sums_are_busy_q31(const pvid_fourier_sums_q31 *self,
-                                                  const pvid_fourier_design_q31 *design)
-{
-    return self->slice < pvid_fourier_harmonics_q31(design);
-}
-
-/* Adds the block to the sums of the next harmonic. Where it completes a window the two halves are joined; where it is
- * the first block of a half the sums begin anew. */
-void pvid_fourier_sums_slice_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design,
-                                 const pvid_fourier_values_q31 *values, pvid_fourier_window_q31 *window);
+/* The next of `left` items: the block is added to the sums of a harmonic, each in turn, then where it completes a
+ * window the halves are joined, each harmonic in turn. With the first block of a half its sums begin anew. */
+void pvid_fourier_sums_item_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31 *design,
+                                const pvid_fourier_values_q31 *values, pvid_fourier_window_q31 *window);
 
 #endif

@@ -32,7 +32,7 @@ static bool tables_are_given(const pvid_fourier_model_f32 *model)
 {
     const bool prepares = ((uint32_t)model->runs + model->signs) > 0u;
     return (model->signal != NULL) && (model->jet != NULL) && (model->channel != NULL) && (model->term != NULL) &&
-           (model->kind != NULL) && (model->values != NULL) && (model->model != NULL) &&
+           (model->kind != NULL) && (model->values != NULL) && (model->form != NULL) && (model->model != NULL) &&
            (!prepares || (model->prepare != NULL));
 }
 
@@ -121,7 +121,7 @@ static bool kinds_are_valid(const pvid_fourier_design_f32 *design)
 static bool filters_are_valid(const pvid_fourier_design_f32 *design)
 {
     for (size_t i = 0; i < design->model->jets; i++) {
-        const pvid_fourier_filter_f32 *filter = &design->filter[i];
+        const pvid_fourier_filter_f32 *filter = &design->compensator[i];
         const bool none = (filter->half == 0u) && (design->model->jet[i].order == 0u);
         const bool some = (filter->half > 0u) && (filter->half <= PVID_MAX_RING) && (filter->weights != NULL) &&
                           all_within(filter->weights, filter->half, -3.4e38f);
@@ -196,7 +196,7 @@ pvid_status pvid_fourier_valid_f32(const pvid_fourier_design_f32 *design)
     if (!pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
         return PVID_BAD_OVERLAP;
     }
-    const bool given = (design->filter != NULL) && (design->circle != NULL) && (design->error_order != NULL) &&
+    const bool given = (design->compensator != NULL) && (design->circle != NULL) && (design->error_order != NULL) &&
                        (design->error_variance != NULL) && ((design->noise != NULL) || (design->n_noise == 0u)) &&
                        ((design->sign_width != NULL) || (design->model->signs == 0u));
     if (!given || !filters_are_valid(design) || !all_within(design->circle, 2u * (size_t)design->hop, -1.0f) ||
@@ -206,8 +206,7 @@ pvid_status pvid_fourier_valid_f32(const pvid_fourier_design_f32 *design)
     if (!kinds_are_valid(design)) {
         return PVID_BAD_MODEL;
     }
-    const size_t length = (2u * (size_t)pvid_fourier_front_half_f32(design)) + design->decimation;
-    if (length * design->model->signals > PVID_MAX_RING) {
+    if (pvid_fourier_front_length_f32(design) > PVID_MAX_RING) {
         return PVID_BAD_TAPS;
     }
     return noise_is_valid(design) ? PVID_OK : PVID_BAD_DESIGN;

@@ -78,8 +78,17 @@ static void take_newest(pvid_fourier_values_q31 *self, const pvid_fourier_design
         self->v[1][i] = self->v[0][i];
         self->v[0][i] = newest[model->runs + i];
     }
-    memcpy(self->now, jet, model->jets * sizeof jet[0]);
+    for (size_t i = 0; i < model->jets; i++) {
+        self->now[i] = jet[i];
+    }
     self->ran = true;
+}
+
+/* x 2^-s rounded half up, s >= 1, within 2^30, beyond which the tables of the design tool let nothing. */
+static inline int32_t rounded(int64_t x, uint32_t s)
+{
+    const int64_t twice = pvid_clamp_q31(pvid_floor_shift_q31(x, s - 1u), INT32_MAX - 1);
+    return pvid_floor_shift_32_q31((int32_t)twice + 1, 1);
 }
 
 /* Integrals at the step before that of the integrands f; at the first step of a half they begin anew. */
@@ -98,8 +107,8 @@ static void integrate(pvid_fourier_values_q31 *self, const pvid_fourier_design_q
             twice = self->twice[i] + ((self->once[i] + once) - (4 * (now - last)));
         }
         if (self->index == 0u) {
-            self->edge[ended][0][i] = (int32_t)pvid_round_shift_q31(once, shift.once);
-            self->edge[ended][1][i] = (int32_t)pvid_round_shift_q31(twice, shift.twice);
+            self->edge[ended][0][i] = rounded(once, shift.once);
+            self->edge[ended][1][i] = rounded(twice, shift.twice);
             once = 0;
             twice = 0;
         }
@@ -118,8 +127,8 @@ static int32_t integral_of(const pvid_fourier_values_q31 *self, const pvid_fouri
     if (i == PVID_FOURIER_NONE) {
         return first ? (2 * steps) : (24 * steps * steps);
     }
-    return (int32_t)(first ? pvid_round_shift_q31(self->once[i], design->integral[i].once)
-                           : pvid_round_shift_q31(self->twice[i], design->integral[i].twice));
+    return first ? rounded(self->once[i], design->integral[i].once)
+                 : rounded(self->twice[i], design->integral[i].twice);
 }
 
 static void write_channels(const pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design,
@@ -130,12 +139,15 @@ static void write_channels(const pvid_fourier_values_q31 *self, const pvid_fouri
         const pvid_fourier_channel *one = &design->model->channel[k];
         const int32_t gain = self->gain[one->gain];
         const uint32_t shift = design->format[k].value;
-        if (one->fold == 0u) { /* |gain| <= 2^30: its shift is 2 at least */
-            channel[k] = pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(gain, shift - 1u) + 1, 1);
+        int32_t value = 0;
+        if (one->fold == 0u) {
+            value = rounded(gain, shift);
         } else {
-            const int64_t value = pvid_product_q31(gain, integral_of(self, design, one));
-            channel[k] = (int32_t)pvid_round_shift_q31(value, shift);
+            value = rounded(pvid_product_q31(gain, integral_of(self, design, one)), shift);
         }
+        channel[k] = (value > PVID_FOURIER_LIMIT_Q31)
+                         ? PVID_FOURIER_LIMIT_Q31
+                         : ((value < -PVID_FOURIER_LIMIT_Q31) ? -PVID_FOURIER_LIMIT_Q31 : value);
     }
 }
 
@@ -143,8 +155,8 @@ pvid_fourier_outcome pvid_fourier_values_step_q31(pvid_fourier_values_q31 *self,
                                                   const int32_t jet[], int32_t channel[])
 {
     const pvid_fourier_model_q31 *model = design->model;
-    int32_t newest[2 * PVID_MAX_INTEGRANDS] = {0};
-    int32_t out[PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS] = {0};
+    int32_t newest[2 * PVID_MAX_INTEGRANDS]; /* `prepare` and `values` write all that is read */
+    int32_t out[PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS];
     if ((model->prepare != NULL) && !model->prepare(jet, newest)) {
         return PVID_FOURIER_BEYOND;
     }
@@ -158,11 +170,17 @@ pvid_fourier_outcome pvid_fourier_values_step_q31(pvid_fourier_values_q31 *self,
         if (complete) {
             integrate(self, design, f);
             write_channels(self, design, channel);
-            memcpy(self->f[2], self->f[1], sizeof self->f[2]);
-            memcpy(self->f[1], self->f[0], sizeof self->f[1]);
+            for (size_t i = 0; i < model->integrands; i++) {
+                self->f[2][i] = self->f[1][i];
+                self->f[1][i] = self->f[0][i];
+            }
         }
-        memcpy(self->gain, out, model->gains * sizeof out[0]);
-        memcpy(self->f[0], f, model->integrands * sizeof f[0]);
+        for (size_t i = 0; i < model->gains; i++) {
+            self->gain[i] = out[i];
+        }
+        for (size_t i = 0; i < model->integrands; i++) {
+            self->f[0][i] = f[i];
+        }
     }
     take_newest(self, design, jet, newest);
     self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);

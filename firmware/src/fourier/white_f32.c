@@ -1,3 +1,4 @@
+#include "number/short_loops.h"
 #include "number/uncontracted.h"
 
 /* The sums S_h of a kind's residual Y - sum theta_j N_j have independent noise in their real and imaginary parts, of
@@ -13,8 +14,9 @@
  *
  *   h^(2 k) / sqrt(D_h) of the real parts,   h^(2 k + 1) / sqrt(D_h) of the imaginary parts,   k = 0..n/2 - 1,
  *
- * are the white rows, up to a rotation: K + n entries that span K dimensions. With u_k those directions made
- * orthonormal
+ * are the white rows, up to a rotation. n/2 reflections of each family turn these directions into its first n/2 parts;
+ * what is behind them are K white rows. A direction is (h/H)^2 times the one before, made orthogonal to those before it
+ * by their reflections; u_k are the directions made orthonormal, the reflections of the first parts' unit vectors.
  *
  *   Q_j = tr(R^-1 dR/dc_j) = sum over the parts of W_h omega_h^(2 j) (1 - sum_k u_kh^2) / D_h
  */
@@ -33,6 +35,8 @@ void pvid_fourier_white_init_f32(pvid_fourier_white_f32 *self, const pvid_fourie
 {
     const size_t half = design->power / 2u;
     self->cosines = (uint8_t)((design->functions / 2u) + half + 1u);
+    self->parts = (uint8_t)(design->functions + design->power);
+    self->vectors = (uint8_t)half;
     self->omega = TURN / (2.0f * ((float)design->hop * dt));
     self->powers = 1;
     for (size_t i = 0; i < design->n_noise; i++) {
@@ -96,87 +100,109 @@ void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fo
     }
 }
 
-static size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t row)
+static size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t part)
 {
-    return (row < self->cosines) ? row : ((row + 1u) - self->cosines);
+    return (part < self->cosines) ? part : ((part + 1u) - self->cosines);
 }
 
-static inline float product(const float *x, const float *y, size_t first, size_t last)
+/* First part of a family, and the place behind its last one. */
+static size_t family_first(const pvid_fourier_white_f32 *self, size_t family)
 {
-    float sum = 0.0f;
-    for (size_t i = first; i < last; i++) {
-        sum += x[i] * y[i];
+    return (family == 0u) ? 0u : self->cosines;
+}
+
+static size_t family_end(const pvid_fourier_white_f32 *self, size_t family)
+{
+    return (family == 0u) ? self->cosines : self->parts;
+}
+
+/* x -= v (v^T x) from `first` to `end` - 1 */
+static inline void reflect(const float *restrict v, size_t first, size_t end, float *restrict x)
+{
+    float along = 0.0f;
+    for (size_t i = first; i < end; i++) {
+        along += v[i] * x[i];
     }
-    return sum;
-}
-
-/* x -= a y */
-static inline void subtract(float a, const float *restrict y, size_t first, size_t last, float *restrict x)
-{
-    for (size_t i = first; i < last; i++) {
-        x[i] -= a * y[i];
-    }
-}
-
-void pvid_fourier_white_remove_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
-                                   size_t place, float column[])
-{
-    const size_t rows = pvid_fourier_rows(design);
-    const float *u = self->basis[place];
-    subtract(product(u, column, 0, self->cosines), u, 0, self->cosines, column);
-    subtract(product(u, column, self->cosines, rows), u, self->cosines, rows, column);
-}
-
-static void normalise(float x[], size_t first, size_t last)
-{
-    const float inverse = 1.0f / sqrtf(product(x, x, first, last));
-    for (size_t i = first; i < last; i++) {
-        x[i] *= inverse;
+    for (size_t i = first; i < end; i++) {
+        x[i] -= along * v[i];
     }
 }
 
-/* Vector k takes 2 k + 1 stages: it begins as (h/H)^2 times the one before; each of those before is taken off twice. */
-void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, size_t stage)
+void pvid_fourier_white_reflect_f32(const pvid_fourier_white_f32 *self, size_t family, float x[])
 {
-    const size_t rows = pvid_fourier_rows(design);
+    const size_t first = family_first(self, family);
+    const size_t end = family_end(self, family);
+    for (size_t k = 0; k < self->vectors; k++) {
+        reflect(self->reflection[k], first + k, end, x);
+    }
+}
+
+/* v with v^T v = 2, such that x - v (v^T x) has nothing behind its first entry. */
+static void form(const float *restrict x, size_t first, size_t end, float *restrict v)
+{
+    float square = 0.0f;
+    for (size_t i = first; i < end; i++) {
+        square += x[i] * x[i];
+    }
+    const float size = sqrtf(square);
+    const float head = x[first];
+    const bool negative = head < 0.0f;
+    const float scale = 1.0f / sqrtf(size * (size + (negative ? -head : head)));
+    for (size_t i = first; i < end; i++) {
+        v[i] = x[i] * scale;
+    }
+    v[first] = (negative ? (head - size) : (head + size)) * scale;
+}
+
+/* The direction k before its reflections; u: the direction before it. */
+static void begin_direction(const pvid_fourier_white_f32 *self, size_t k, float u[])
+{
     const float highest = (float)(self->cosines - 1u);
-    size_t k = 0;
-    for (size_t next = 1; (next < (PVID_MAX_POWER / 2u)) && ((next * next) <= stage); next++) {
-        k = next;
-    }
-    const size_t part = stage - (k * k);
-    float *u = self->basis[k];
-    if (part == 0u) {
-        for (size_t i = 0; i < rows; i++) {
-            const size_t h = harmonic_of(self, i);
-            const float x = (float)h / highest;
-            const float first = (i < self->cosines) ? self->scale[h] : (x * self->scale[h]);
-            u[i] = (k == 0u) ? first : ((x * x) * self->basis[k - 1u][i]);
-        }
-    } else {
-        pvid_fourier_white_remove_f32(self, design, (part - 1u) % k, u);
-    }
-    if (part == (2u * k)) {
-        normalise(u, 0, self->cosines);
-        normalise(u, self->cosines, rows);
-    }
-}
-
-void pvid_fourier_white_scale_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
-                                  const float sum[2][PVID_MAX_HARMONICS], float column[])
-{
-    const size_t rows = pvid_fourier_rows(design);
-    for (size_t i = 0; i < self->cosines; i++) {
-        column[i] = self->scale[i] * sum[0][i];
-    }
-    for (size_t i = self->cosines; i < rows; i++) {
+    for (size_t i = 0; i < self->parts; i++) {
         const size_t h = harmonic_of(self, i);
-        column[i] = self->scale[h] * sum[1][h];
+        const float x = (float)h / highest;
+        const float first = (i < self->cosines) ? self->scale[h] : (x * self->scale[h]);
+        u[i] = (k == 0u) ? first : ((x * x) * u[i]);
     }
 }
 
-void pvid_fourier_white_share_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, size_t first,
-                                  size_t last)
+/* Direction k takes 2 k + 2 stages: it begins, is reflected as those before, and gives a reflection of its own; then
+ * the unit vector of its first part is reflected back, the last reflection first. */
+void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, size_t stage, float u[], float leverage[])
+{
+    size_t k = 0;
+    size_t part = stage;
+    while (part >= (2u * k) + 2u) {
+        part -= (2u * k) + 2u;
+        k++;
+    }
+    if (part == 0u) {
+        begin_direction(self, k, u);
+    }
+    for (size_t family = 0; family < 2u; family++) {
+        const size_t first = family_first(self, family);
+        const size_t end = family_end(self, family);
+        if (part < k) {
+            reflect(self->reflection[part], first + part, end, u);
+        } else if (part == k) {
+            form(u, first + k, end, self->reflection[k]);
+            for (size_t i = first; i < end; i++) {
+                u[i] = (i == first + k) ? 1.0f : 0.0f;
+            }
+        } else {
+            const size_t back = (2u * k) + 1u - part;
+            reflect(self->reflection[back], first + back, end, u);
+        }
+    }
+    if (part == (2u * k) + 1u) {
+        for (size_t i = 0; i < self->parts; i++) {
+            leverage[i] = ((k == 0u) ? 0.0f : leverage[i]) + (u[i] * u[i]);
+        }
+    }
+}
+
+void pvid_fourier_white_share_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
+                                  const float leverage[], size_t first, size_t last)
 {
     if (first == 0u) {
         memset(self->share, 0, sizeof self->share);
@@ -185,11 +211,7 @@ void pvid_fourier_white_share_f32(pvid_fourier_white_f32 *self, const pvid_fouri
         const size_t h = harmonic_of(self, i);
         const float rate = (float)h * self->omega;
         const float square = rate * rate;
-        float left = 1.0f;
-        for (size_t k = 0; k < design->power / 2u; k++) {
-            left -= self->basis[k][i] * self->basis[k][i];
-        }
-        float weight = samples_of(design, h) * (left * (self->scale[h] * self->scale[h]));
+        float weight = samples_of(design, h) * ((1.0f - leverage[i]) * (self->scale[h] * self->scale[h]));
         for (size_t j = 0; j < self->powers; j++) {
             self->share[j] += weight;
             weight *= square;

@@ -8,8 +8,9 @@
 
 #include "pvid/fourier.h"
 
-/* Rows of a window, K + n: real parts of the harmonics 0.., then imaginary parts of the harmonics 1.. */
-static inline size_t pvid_fourier_rows(const pvid_fourier_design_f32 *design)
+/* Parts of the sums of a window that its rows are made of, K + n: real parts of the harmonics 0.., then imaginary parts
+ * of the harmonics 1... */
+static inline size_t pvid_fourier_parts(const pvid_fourier_design_f32 *design)
 {
     return (size_t)design->functions + design->power;
 }
@@ -18,7 +19,7 @@ static inline size_t pvid_fourier_rows(const pvid_fourier_design_f32 *design)
 static inline size_t pvid_fourier_basis_stages(const pvid_fourier_design_f32 *design)
 {
     const size_t vectors = design->power / 2u;
-    return vectors * vectors;
+    return vectors * (vectors + 1u);
 }
 
 /* Requires a valid design. dt: between steps [s]. */
@@ -32,20 +33,16 @@ void pvid_fourier_white_weigh_f32(pvid_fourier_white_f32 *self, const pvid_fouri
 void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, uint8_t kind,
                                      uint8_t harmonics);
 
-/* The next of the basis' stages, counted from 0. */
-void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, size_t stage);
+/* The next of the basis' stages, counted from 0; u, leverage [parts] are kept from stage to stage: the present
+ * direction, and sum_k u_k^2. */
+void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, size_t stage, float u[], float leverage[]);
 
-/* A column in standard deviations from its sums, real and imaginary parts. */
-void pvid_fourier_white_scale_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
-                                  const float sum[2][PVID_MAX_HARMONICS], float column[]);
+/* Reflects the parts of a family, 0: real, 1: imaginary; its rows are behind the first n/2. */
+void pvid_fourier_white_reflect_f32(const pvid_fourier_white_f32 *self, size_t family, float x[]);
 
-/* Takes the vectors of this place in the basis, one of each family, off a column. */
-void pvid_fourier_white_remove_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
-                                   size_t place, float column[]);
-
-/* The share of rows first..last-1 in Q_j. */
-void pvid_fourier_white_share_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, size_t first,
-                                  size_t last);
+/* The share of parts first..last-1 in Q_j. */
+void pvid_fourier_white_share_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,
+                                  const float leverage[], size_t first, size_t last);
 
 /* g += 1/2 sum_j dc_j/dtheta Q_j by entries first..last-1 of the noise table. */
 void pvid_fourier_white_pull_f32(const pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,

@@ -2,13 +2,16 @@
  *
  *   D_h = W_h sum_j c_j h^(2 j),   W_0 = 2 hop, else hop,   c_j = sum factor theta_a theta_b  (theta_Y = -1)
  *
- * with the equation's own error as a part of c_m. A D_h below 2^-20 of the mean counts as that much: the entries of a
- * column over their standard deviations then fit a block of 27 bits. */
+ * with the equation's own error as a part of c_m. A D_h below 2^-20 of the mean counts as that much.
+ *
+ * The test functions leave out the polynomials in h below degree n, over the standard deviations: even ones among the
+ * real parts, odd ones among the imaginary parts. n/2 reflections for each family turn these into the first n/2 rows,
+ * and the K other rows are what remains: white, K of them, no covariance. */
 #include "fourier/white_q31.h"
 
 #include <stdbool.h>
 
-#include "fourier/direction_q31.h"
+#include "fourier/mirror_q31.h"
 #include "fourier/sums_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
@@ -21,6 +24,7 @@ static const pvid_scaled_q31 none = {0, 0};
 void pvid_fourier_white_init_q31(pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design)
 {
     self->cosines = pvid_fourier_harmonics_q31(design);
+    self->rate = PVID_ONE_Q30 / ((int32_t)self->cosines - 1);
     self->powers = 1;
     for (size_t i = 0; i < design->n_noise; i++) {
         const uint8_t powers = (uint8_t)(design->noise[i].power + 1u);
@@ -91,73 +95,73 @@ pvid_scaled_q31 pvid_fourier_white_floor_q31(const pvid_fourier_white_q31 *self,
 void pvid_fourier_white_invert_q31(pvid_fourier_white_q31 *self, pvid_scaled_q31 least, size_t first, size_t last)
 {
     for (size_t h = first; h < last; h++) {
-        const bool is_less = pvid_scaled_minus_q31(self->scale[h], least).m < 0;
-        const pvid_scaled_q31 variance = is_less ? least : self->scale[h];
-        const pvid_root_q31 root = pvid_root_of_q31(variance.m, variance.e);
-        self->scale[h] = pvid_scaled_over_q31(pvid_scaled_of_q31(1, 0), pvid_scaled_of_q31(root.r, root.e));
+        const bool is_less = pvid_scaled_exceeds_q31(least, self->scale[h]);
+        self->scale[h] = pvid_fourier_inverse_root_q31(is_less ? least : self->scale[h]);
     }
+    if (last < self->cosines) {
+        return;
+    }
+    int32_t largest = self->scale[0].e;
+    for (size_t h = 1; h < last; h++) {
+        largest = (self->scale[h].e > largest) ? self->scale[h].e : largest;
+    }
+    for (size_t h = 0; h < last; h++) {
+        const int32_t below = largest - self->scale[h].e;
+        self->scale[h].m = (below < 31) ? pvid_floor_shift_32_q31(self->scale[h].m, (uint32_t)below) : 0;
+    }
+    self->exponent = largest;
+}
+
+/* The vector of place k before the reflections of those before it: h^(2 k) / sqrt(D_h), or h times that, in units of
+ * the highest harmonic. */
+static void begin_vector(const pvid_fourier_white_q31 *self, size_t k, size_t first, size_t n, int32_t x[])
+{
+    const size_t order = (2u * k) + ((first > 0u) ? 1u : 0u);
+    for (size_t i = 0; i < n; i++) {
+        const size_t h = first + i;
+        int32_t weight = self->scale[h].m;
+        for (size_t m = 0; m < order; m++) {
+            weight = (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight, (int32_t)h * self->rate), 30);
+        }
+        x[i] = weight;
+    }
+}
+
+/* Reflects a column of one family by its vectors before `count`. */
+static void reflect(const pvid_fourier_white_q31 *self, size_t place, size_t n, size_t count, int32_t x[])
+{
+    for (size_t k = 0; k < count; k++) {
+        pvid_fourier_mirror_q31(&self->mirror[k][place + k], n - k, &x[k]);
+    }
+}
+
+void pvid_fourier_white_mirror_q31(pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design, size_t place)
+{
+    const size_t vectors = design->power / 2u;
+    const bool is_sine = place >= vectors;
+    const size_t k = is_sine ? (place - vectors) : place;
+    const size_t first = is_sine ? self->cosines : 0u;
+    const size_t n = is_sine ? (pvid_fourier_sums_rows_q31(design) - self->cosines) : self->cosines;
+    int32_t *x = &self->mirror[k][first];
+    begin_vector(self, k, is_sine ? 1u : 0u, n, x);
+    (void)pvid_fourier_block_q31(n, x);
+    reflect(self, first, n, k, x);
+    (void)pvid_fourier_block_q31(n - k, &x[k]); /* what is left may be small */
+    pvid_fourier_mirror_of_q31(n - k, &x[k]);
 }
 
 void pvid_fourier_white_remove_q31(const pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design,
-                                   size_t place, int32_t column[])
+                                   int32_t column[])
 {
-    const size_t rows = pvid_fourier_rows_q31(design);
-    pvid_fourier_take_off_q31(self->basis[place], 0, self->cosines, column);
-    pvid_fourier_take_off_q31(self->basis[place], self->cosines, rows, column);
-}
-
-/* The vector of place k before what is taken off: of one family, in a block. */
-static void begin_vector(pvid_fourier_white_q31 *self, size_t k, size_t first, size_t last)
-{
-    int64_t wide[PVID_FOURIER_ROWS_Q31];
-    int32_t longest = INT32_MIN;
-    for (size_t i = first; i < last; i++) {
-        const int32_t e = self->scale[pvid_fourier_harmonic_q31(self, i)].e;
-        longest = (e > longest) ? e : longest;
+    const size_t cosines = self->cosines;
+    const size_t sines = pvid_fourier_sums_rows_q31(design) - cosines;
+    const size_t vectors = design->power / 2u;
+    reflect(self, 0, cosines, vectors, column);
+    reflect(self, cosines, sines, vectors, &column[cosines]);
+    for (size_t i = 0; i < (cosines - vectors); i++) {
+        column[i] = column[vectors + i];
     }
-    for (size_t i = first; i < last; i++) {
-        const int64_t h = (int64_t)pvid_fourier_harmonic_q31(self, i);
-        if (k > 0u) {
-            wide[i] = h * h * self->basis[k - 1u][i];
-        } else {
-            const pvid_scaled_q31 scale = self->scale[h];
-            const int64_t x = (first == 0u) ? scale.m : (h * scale.m);
-            wide[i] = pvid_scale_q31(x * 65536, longest - scale.e);
-        }
-    }
-    (void)pvid_fourier_block_q31(wide, first, last, self->basis[k]);
-}
-
-/* To a block again: what is left may be small. */
-static void fill(int32_t u[], size_t first, size_t last)
-{
-    int64_t wide[PVID_FOURIER_ROWS_Q31];
-    for (size_t i = first; i < last; i++) {
-        wide[i] = u[i];
-    }
-    (void)pvid_fourier_block_q31(wide, first, last, u);
-}
-
-/* Vector k takes 2 k + 1 stages: it begins as h^2 times the one before; each of those before is taken off twice. */
-void pvid_fourier_white_basis_q31(pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design, size_t stage)
-{
-    const size_t rows = pvid_fourier_rows_q31(design);
-    size_t k = 0;
-    for (size_t next = 1; (next < (PVID_MAX_POWER / 2u)) && ((next * next) <= stage); next++) {
-        k = next;
-    }
-    const size_t part = stage - (k * k);
-    int32_t *u = self->basis[k];
-    if (part == 0u) {
-        begin_vector(self, k, 0, self->cosines);
-        begin_vector(self, k, self->cosines, rows);
-    } else {
-        pvid_fourier_white_remove_q31(self, design, (part - 1u) % k, u);
-        fill(u, 0, self->cosines);
-        fill(u, self->cosines, rows);
-    }
-    if (part == (2u * k)) {
-        pvid_fourier_normalise_q31(0, self->cosines, u);
-        pvid_fourier_normalise_q31(self->cosines, rows, u);
+    for (size_t i = vectors; i < sines; i++) {
+        column[(cosines - (2u * vectors)) + i] = column[cosines + i];
     }
 }

@@ -6,23 +6,10 @@
 
 #include "pvid/fourier_q31.h"
 
-/* Rows of a window, K + n: real parts of the harmonics 0.., then imaginary parts of the harmonics 1.. */
-static inline size_t pvid_fourier_rows_q31(const pvid_fourier_design_q31 *design)
+/* Parts of the sums of a window, K + n: real parts of the harmonics 0.., then imaginary parts of the harmonics 1.. */
+static inline size_t pvid_fourier_sums_rows_q31(const pvid_fourier_design_q31 *design)
 {
     return (size_t)design->functions + design->power;
-}
-
-/* Harmonic of a row. */
-static inline size_t pvid_fourier_harmonic_q31(const pvid_fourier_white_q31 *self, size_t row)
-{
-    return (row < self->cosines) ? row : ((row + 1u) - self->cosines);
-}
-
-/* Stages of the basis. */
-static inline size_t pvid_fourier_basis_stages_q31(const pvid_fourier_design_q31 *design)
-{
-    const size_t vectors = design->power / 2u;
-    return vectors * vectors;
 }
 
 /* Requires a valid design. */
@@ -39,14 +26,20 @@ void pvid_fourier_white_spectrum_q31(pvid_fourier_white_q31 *self, const pvid_fo
 /* The least D_h: 2^-20 of the mean of all. */
 pvid_scaled_q31 pvid_fourier_white_floor_q31(const pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design);
 
-/* 1 / sqrt(D_h) in place of D_h, of harmonics first..last-1. */
+/* 1 / sqrt(D_h) in place of D_h, of harmonics first..last-1; those of all harmonics in a unit when the last is done. */
 void pvid_fourier_white_invert_q31(pvid_fourier_white_q31 *self, pvid_scaled_q31 least, size_t first, size_t last);
 
-/* The next of the basis' stages, counted from 0. */
-void pvid_fourier_white_basis_q31(pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design, size_t stage);
+/* Reflections of a kind: n. */
+static inline size_t pvid_fourier_mirrors_q31(const pvid_fourier_design_q31 *design)
+{
+    return design->power;
+}
 
-/* Takes the vectors of this place in the basis, one of each family, off a column. */
+/* Makes the reflection `place`, counted from 0: those of the real parts, then those of the imaginary parts. */
+void pvid_fourier_white_mirror_q31(pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design, size_t place);
+
+/* A column [K + n] of at most PVID_FOURIER_COLUMN_BITS_Q31 bits to its K white rows. */
 void pvid_fourier_white_remove_q31(const pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design,
-                                   size_t place, int32_t column[]);
+                                   int32_t column[]);
 
 #endif

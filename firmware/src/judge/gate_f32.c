@@ -1,14 +1,13 @@
 #include "number/uncontracted.h"
 
-#include "pvid/gate.h"
+#include "judge/gate_f32.h"
 
 #include <stddef.h>
 
 #include "number/finite_f32.h"
 
-#define GROWTH 9.21034f   /* ln 1e4: consecutive outliers multiply the scale by 1e4 within patience_s */
-#define WIDEST 1.0e3f     /* largest relative growth of the scale by one outlier */
-#define SCALE_MAX 1.0e30f /* largest scale [square of a residual]: far beyond any accepted row */
+#define GROWTH 9.21034f /* ln 1e4: consecutive outliers multiply the scale by 1e4 within patience_s */
+#define WIDEST 1.0e3f   /* largest relative growth of the scale by one outlier */
 
 pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *config, float rate_hz, float memory,
                                float floor)
@@ -39,17 +38,5 @@ pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *
 
 bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square)
 {
-    if (!(self->limit > 0.0f) || !pvid_finite_f32(square)) {
-        return true;
-    }
-    const bool warming_up = self->judged < self->memory;
-    const bool passes = warming_up || (square <= (self->limit * self->scale));
-    float scale = self->scale * self->widening;
-    if (passes) {
-        self->judged = warming_up ? (self->judged + 1.0f) : self->judged;
-        scale = self->scale + ((square - self->scale) / self->judged);
-    }
-    scale = (scale > self->floor) ? scale : self->floor;
-    self->scale = (scale < SCALE_MAX) ? scale : SCALE_MAX;
-    return passes;
+    return pvid_gate_judges_f32(self, square);
 }

@@ -40,7 +40,7 @@ bool pvid_misfit_judge_f32(pvid_misfit_f32 *self)
 {
     PVID_ASSERT(self != NULL);
     bool misfit = false;
-    if (!pvid_finite_f32(self->rss) || !pvid_finite_f32(self->signal)) {
+    if (!pvid_finite_f32(self->rss + self->signal)) {
         misfit = true;
     } else if (self->signal > 0.0f) {
         const float part = self->rss / self->signal;

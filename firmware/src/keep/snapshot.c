@@ -14,7 +14,17 @@
 #define BYTE_ORDER 0x01020304u
 
 /* Places of the header. */
-enum { AT_MAGIC = 0, AT_LENGTH = 4, AT_VERSION = 8, AT_KIND = 12, AT_LAYOUT = 16, AT_CONFIG = 20, AT_GENERATION = 24 };
+enum {
+    AT_MAGIC = 0,
+    AT_LENGTH = 4,
+    AT_VERSION = 8,
+    AT_KIND = 12,
+    AT_LAYOUT = 16,
+    AT_MODEL = 20,
+    AT_DESIGN = 24,
+    AT_CONFIG = 28,
+    AT_GENERATION = 32
+};
 
 /* Complete and undamaged, of any identity. */
 static pvid_snapshot_status soundness(const uint8_t image[], size_t length)
@@ -50,6 +60,12 @@ static pvid_snapshot_status inspect(const uint8_t image[], size_t length, const 
     if (pvid_get_u32(&image[AT_LAYOUT]) != identity->layout) {
         return PVID_SNAPSHOT_OTHER_LAYOUT;
     }
+    if (pvid_get_u32(&image[AT_MODEL]) != identity->model) {
+        return PVID_SNAPSHOT_OTHER_MODEL;
+    }
+    if (pvid_get_u32(&image[AT_DESIGN]) != identity->design) {
+        return PVID_SNAPSHOT_OTHER_DESIGN;
+    }
     if ((pvid_get_u32(&image[AT_CONFIG]) != identity->config) ||
         (pvid_get_u32(&image[AT_LENGTH]) != PVID_SNAPSHOT_BYTES(identity->bytes))) {
         return PVID_SNAPSHOT_OTHER_CONFIG;
@@ -64,7 +80,7 @@ static void put_pointers(uint8_t copy[], const pvid_snapshot_shape *shape)
 {
     for (size_t i = 0; i < shape->n_pointers; i++) {
         const void *pointer;
-        uint8_t *place = &copy[shape->pointers[i]];
+        uint8_t *place = &copy[shape->pointers[i].place];
         memcpy(&pointer, place, sizeof pointer);
         memset(place, 0, sizeof pointer);
         place[0] = (pointer != NULL) ? 1u : 0u;
@@ -75,11 +91,23 @@ static void take_all_but_pointers(uint8_t object[], const uint8_t copy[], const 
 {
     size_t from = 0;
     for (size_t i = 0; i < shape->n_pointers; i++) {
-        const size_t place = (size_t)shape->pointers[i];
+        const size_t place = (size_t)shape->pointers[i].place;
         memcpy(&object[from], &copy[from], place - from);
         from = place + sizeof(void *);
     }
     memcpy(&object[from], &copy[from], shape->bytes - from);
+}
+
+/* Pointers into the object point into this one, where they were not NULL. */
+static void point_into(uint8_t object[], const uint8_t copy[], const pvid_snapshot_shape *shape)
+{
+    for (size_t i = 0; i < shape->n_pointers; i++) {
+        const pvid_snapshot_pointer *one = &shape->pointers[i];
+        if (one->target != PVID_SNAPSHOT_OF_INIT) {
+            const void *pointer = (copy[one->place] != 0u) ? &object[one->target] : NULL;
+            memcpy(&object[one->place], &pointer, sizeof pointer);
+        }
+    }
 }
 
 /* Adds header and checksum to the bytes at PVID_SNAPSHOT_HEADER; returns the length of the snapshot. */
@@ -91,6 +119,8 @@ static size_t seal(uint8_t image[], const pvid_snapshot_identity *identity, uint
     pvid_put_u32(&image[AT_VERSION], VERSION);
     pvid_put_u32(&image[AT_KIND], (uint32_t)identity->kind);
     pvid_put_u32(&image[AT_LAYOUT], identity->layout);
+    pvid_put_u32(&image[AT_MODEL], identity->model);
+    pvid_put_u32(&image[AT_DESIGN], identity->design);
     pvid_put_u32(&image[AT_CONFIG], identity->config);
     pvid_put_u32(&image[AT_GENERATION], generation);
     pvid_put_u32(&image[sealed], pvid_crc32(0u, image, sealed));
@@ -119,6 +149,7 @@ pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length,
     if (status == PVID_SNAPSHOT_RESTORED) {
         const uint8_t *copy = &image[PVID_SNAPSHOT_HEADER];
         take_all_but_pointers(object, copy, shape);
+        point_into(object, copy, shape);
         if (behind != NULL) {
             memcpy(behind, &copy[shape->bytes], identity->bytes - shape->bytes);
         }

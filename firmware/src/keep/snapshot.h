@@ -12,21 +12,34 @@ typedef enum {
     PVID_SNAPSHOT_KIND_STRONG_F32 = 1,
     PVID_SNAPSHOT_KIND_WEAK_F32 = 2,
     PVID_SNAPSHOT_KIND_WEAK_Q31 = 3,
-    PVID_SNAPSHOT_KIND_STRONG_Q31 = 4
+    PVID_SNAPSHOT_KIND_STRONG_Q31 = 4,
+    PVID_SNAPSHOT_KIND_FOURIER_F32 = 5,
+    PVID_SNAPSHOT_KIND_FOURIER_Q31 = 6
 } pvid_snapshot_kind;
 
 /* Identity of a snapshot: only a snapshot with the same identity is restored. */
 typedef struct {
     pvid_snapshot_kind kind;
     uint32_t layout; /* hash of sizes and places */
+    uint32_t model;  /* hash of the compiled model; 0: it belongs to the kind */
+    uint32_t design; /* hash of the design's tables; 0: they belong to the configuration */
     uint32_t config; /* hash of the configuration */
     size_t bytes;    /* of the object and of the memory saved after it */
 } pvid_snapshot_identity;
 
-/* Size of an object, and the offsets of its pointers, ascending. */
+/* A pointer in an object. One into the object itself is NULL or points to `target`; any other keeps the value of init.
+ */
+typedef struct {
+    uint32_t place;  /* offset in the object */
+    uint32_t target; /* offset that it points to, or PVID_SNAPSHOT_OF_INIT */
+} pvid_snapshot_pointer;
+
+#define PVID_SNAPSHOT_OF_INIT UINT32_MAX
+
+/* Size of an object, and its pointers by ascending places. */
 typedef struct {
     size_t bytes;
-    const uint32_t *pointers; /* [n_pointers] */
+    const pvid_snapshot_pointer *pointers; /* [n_pointers] */
     size_t n_pointers;
 } pvid_snapshot_shape;
 
@@ -35,7 +48,7 @@ typedef struct {
 size_t pvid_snapshot_save(uint8_t image[], size_t room, const pvid_snapshot_identity *identity, uint32_t generation,
                           const void *object, const pvid_snapshot_shape *shape, const void *behind);
 
-/* Restores both if image[] contains an undamaged snapshot of this identity; pointers keep their values. */
+/* Restores both if image[] contains an undamaged snapshot of this identity. */
 pvid_snapshot_status pvid_snapshot_restore(const uint8_t image[], size_t length, const pvid_snapshot_identity *identity,
                                            uint8_t object[], const pvid_snapshot_shape *shape, void *behind);
 

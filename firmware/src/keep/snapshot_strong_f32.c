@@ -12,25 +12,24 @@
 static const uint32_t layout[] = {
     sizeof(pvid_strong_f32),
     sizeof(void *),
-    PLACE(phi.rate_power),
-    PLACE(phi.history),
-    PLACE(y),
+    PLACE(window.phi_scale),
+    PLACE(window.five_points),
+    PLACE(window.samples),
     PLACE(drive),
     PLACE(misfit),
     PLACE(misfit.block),
     PLACE(estimator),
-    PLACE(estimator.information.low),
-    PLACE(estimator.p),
-    PLACE(estimator.innovation),
-    PLACE(estimator.settings.gain),
+    PLACE(estimator.row_variance),
+    PLACE(estimator.divider),
+    PLACE(estimator.mixes),
     PLACE(estimator.counters),
+    PLACE(estimator.block),
+    PLACE(estimator.sums),
+    PLACE(estimator.sums.low),
     PVID_MAX_WINDOW,
-    PVID_MAX_P,
-    PVID_MAX_THETA,
-    PVID_MAX_MOMENTS,
 };
 
-static const uint32_t pointers[] = {PLACE(phi.bank.weights), PLACE(y.bank.weights), PLACE(estimator.model)};
+static const pvid_snapshot_pointer pointers[] = {{PLACE(window.bank.weights), PVID_SNAPSHOT_OF_INIT}};
 static const pvid_snapshot_shape shape = {sizeof(pvid_strong_f32), pointers, sizeof pointers / sizeof pointers[0]};
 
 static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)
@@ -47,7 +46,7 @@ static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)
 /* Whether init has accepted a configuration. */
 static bool is_ready(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config, const uint8_t image[])
 {
-    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->estimator.model != NULL);
+    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->window.length != 0u);
     PVID_ASSERT(ready);
     return ready;
 }

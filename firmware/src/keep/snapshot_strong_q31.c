@@ -26,7 +26,7 @@ static const uint32_t layout[] = {
     PVID_MAX_P,
 };
 
-static const uint32_t pointers[] = {PLACE(differentiator.bank.weights)};
+static const pvid_snapshot_pointer pointers[] = {{PLACE(differentiator.bank.weights), PVID_SNAPSHOT_OF_INIT}};
 static const pvid_snapshot_shape shape = {sizeof(pvid_strong_q31), pointers, sizeof pointers / sizeof pointers[0]};
 
 static pvid_snapshot_identity identity_of(const pvid_strong_config_q31 *config)

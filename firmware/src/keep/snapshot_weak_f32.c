@@ -53,15 +53,16 @@ static bool has_angle(const pvid_weak_config_f32 *config)
     return config->full_angle || config->friction;
 }
 
-static const uint32_t pointers[] = {
-    PLACE(design),
-    PLACE(angle),
-    PLACE(front.smooth),
-    PLACE(front.second),
-    PLACE(finish.angle),
-    PLACE(finish.solve.fallback),
-    PLACE(finish.solve.estimate),
-    PLACE(estimator.model),
+static const pvid_snapshot_pointer pointers[] = {
+    {PLACE(design), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(angle), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(front.smooth), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(front.second), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(finish.angle), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(finish.solve.fallback), PLACE(trust.estimate.p)},
+    {PLACE(finish.solve.noise), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(finish.solve.estimate), PLACE(finish.candidate)},
+    {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
 };
 static const pvid_snapshot_shape shape = {sizeof(pvid_weak_f32), pointers, sizeof pointers / sizeof pointers[0]};
 
@@ -105,13 +106,8 @@ pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const p
     pvid_weak_angle_f32 *behind = has_angle(config) ? self->angle : NULL;
     const pvid_snapshot_status status =
         pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, behind);
-    if (status == PVID_SNAPSHOT_RESTORED) { /* pointers into the object point into it again */
-        pvid_weak_finish_f32 *finish = &self->finish;
-        finish->angle = pvid_snapshot_had_pointer(image, PLACE(finish.angle)) ? self->angle : NULL;
-        finish->solve.fallback =
-            pvid_snapshot_had_pointer(image, PLACE(finish.solve.fallback)) ? self->trust.estimate.p : NULL;
-        finish->solve.estimate =
-            pvid_snapshot_had_pointer(image, PLACE(finish.solve.estimate)) ? &finish->candidate : NULL;
+    if (status == PVID_SNAPSHOT_RESTORED) {
+        self->finish.angle = pvid_snapshot_had_pointer(image, PLACE(finish.angle)) ? self->angle : NULL;
     }
     return status;
 }

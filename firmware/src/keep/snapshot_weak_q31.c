@@ -39,7 +39,10 @@ static const uint32_t layout[] = {
     PVID_MAX_FUNCTIONS,
 };
 
-static const uint32_t pointers[] = {PLACE(design), PLACE(estimator.model)};
+static const pvid_snapshot_pointer pointers[] = {
+    {PLACE(design), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
+};
 static const pvid_snapshot_shape shape = {sizeof(pvid_weak_q31), pointers, sizeof pointers / sizeof pointers[0]};
 
 static pvid_snapshot_identity identity_of(const pvid_weak_config_q31 *config)

@@ -6,8 +6,9 @@
 
 static inline void pvid_count_up(uint32_t *counter)
 {
-    if (*counter < UINT32_MAX) {
-        (*counter)++;
+    const uint32_t next = *counter + 1u;
+    if (next != 0u) {
+        *counter = next;
     }
 }
 

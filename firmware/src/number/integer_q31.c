@@ -68,31 +68,44 @@ uint32_t pvid_bit_length_q31(uint64_t x)
 }
 #endif
 
-/* Digit by digit, in base 4: `rest` is the remainder of x, `root` the digits found, shifted along. The first half
- * of the digits depends on the upper half of x only. */
-uint32_t pvid_square_root_q31(uint64_t x)
+/* The root of 32 bits, digit by digit in base 4; *rest is what it leaves. */
+static uint32_t upper_root_of(uint32_t x, uint32_t *rest)
 {
-    uint32_t upper_rest = (uint32_t)(x >> 32);
-    uint32_t upper_root = 0;
+    uint32_t left = x;
+    uint32_t root = 0;
     for (uint32_t digit = (uint32_t)1 << 30; digit > 0u; digit >>= 2) {
-        const uint32_t trial = upper_root + digit;
-        upper_root >>= 1;
-        if (upper_rest >= trial) {
-            upper_rest -= trial;
-            upper_root += digit;
-        }
-    }
-    uint64_t rest = ((uint64_t)upper_rest << 32) | (x & 0xFFFFFFFFu);
-    uint64_t root = (uint64_t)upper_root << 32;
-    for (uint64_t digit = (uint64_t)1 << 30; digit > 0u; digit >>= 2) {
-        const uint64_t trial = root + digit;
+        const uint32_t trial = root + digit;
         root >>= 1;
-        if (rest >= trial) {
-            rest -= trial;
+        if (left >= trial) {
+            left -= trial;
             root += digit;
         }
     }
-    return (uint32_t)root;
+    *rest = left;
+    return root;
+}
+
+/* The upper half of the digits from the upper half of x 4^up, of 63 or 64 bits; the lower half is the quotient of what
+ * that leaves and twice the root, or one less (P. Zimmermann, Karatsuba Square Root, INRIA 1999). */
+uint32_t pvid_square_root_q31(uint64_t x)
+{
+    if (x == 0u) {
+        return 0;
+    }
+    const uint32_t up = (64u - pvid_bit_length_q31(x)) / 2u;
+    const uint64_t all = x << (2u * up);
+    const uint32_t low = (uint32_t)(all & 0xFFFFFFFFu);
+    uint32_t rest;
+    const uint32_t upper = upper_root_of((uint32_t)(all >> 32), &rest); /* 2^15 or more, rest <= 2 upper */
+    /* (rest 2^16 + the next digits) / (2 upper): half of both fits 32 bits */
+    const uint32_t half = (rest << 15) | (low >> 17);
+    const uint32_t quotient = half / upper;
+    const uint32_t left = half - (quotient * upper);
+    const uint64_t square = (uint64_t)quotient * quotient;
+    const uint64_t remains = ((uint64_t)left << 17) | (low & 0x1FFFFu);
+    const uint32_t lower = ((quotient > 0u) && (square > remains)) ? (quotient - 1u) : quotient;
+    const uint32_t root = (upper << 16) | ((lower < 0xFFFFu) ? lower : 0xFFFFu);
+    return root >> up;
 }
 
 pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x)

@@ -62,22 +62,19 @@ static inline uint64_t pvid_magnitude_q31(int64_t x)
     return (x < 0) ? (uint64_t)-x : (uint64_t)x;
 }
 
-/* Number of bits of x: 0 for 0, 64 for 2^63 and above. One instruction counts zeros on cores that have it. */
+/* Number of bits of x: 0 for 0, 64 for 2^63 and above. */
 #if defined(__ARM_FEATURE_CLZ) && defined(__GNUC__)
-static inline uint32_t pvid_bit_length_q31(uint64_t x)
+static inline uint32_t pvid_bit_length_q31(uint64_t x) /* one instruction counts leading zeros */
 {
     const uint32_t high = (uint32_t)(x >> 32);
-    const uint32_t low = (uint32_t)(x & 0xFFFFFFFFu);
-    if (high != 0u) {
-        return 64u - (uint32_t)__builtin_clz(high);
-    }
-    return (low != 0u) ? (32u - (uint32_t)__builtin_clz(low)) : 0u;
+    const uint32_t rest = (high != 0u) ? high : (uint32_t)(x & 0xFFFFFFFFu);
+    return (rest == 0u) ? 0u : (((high != 0u) ? 64u : 32u) - (uint32_t)__builtin_clz(rest));
 }
 #else
 uint32_t pvid_bit_length_q31(uint64_t x);
 #endif
 
-/* Greatest r with r^2 <= x, x <= 2^62. 32 turns. */
+/* Greatest r with r^2 <= x, x <= 2^62. */
 uint32_t pvid_square_root_q31(uint64_t x);
 
 /* The reciprocal of 1 <= x < 2^31; m is short of the quotient by less than 2. */

@@ -1,10 +1,10 @@
-/* The engine of models with their own `project`, and the parts shared with their `take_row`. Private to the core. */
+/* The engine of models with their own `project`. Private to the core. */
 #ifndef PVID_DIRECT_F32_H
 #define PVID_DIRECT_F32_H
 
 #include "solve/state_f32.h"
 
-/* `take_row` of model.h, for a model without one. */
+/* Adds a row and, if it ends a group and one is due, solves. e, gradient: of `innovate`, while g < 1. */
 pvid_reason pvid_direct_take_row_f32(pvid_estimator_f32 *self, const float n[], float y, float e,
                                      const float gradient[], bool ends_group);
 

@@ -15,6 +15,7 @@
 #include "solve/kinds.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
+#include "solve/settings_f32.h"
 #include "solve/state_f32.h"
 #include "solve/staged_f32.h"
 
@@ -39,29 +40,9 @@ static bool model_is_valid(const pvid_model_f32 *model)
            (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
            ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
-           ((model->take_row == NULL) || (model->project != NULL)) &&
            ((model->accumulate != NULL)
                 ? (model->n_kinds <= 1u)
                 : (model->n_moments == pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end)));
-}
-
-static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config)
-{
-    for (size_t i = 0; i < config->model->n_p; i++) {
-        const float lower = config->lower[i];
-        const float upper = config->upper[i];
-        if (!pvid_finite_f32(lower) || !pvid_finite_f32(upper) || !(lower < upper) ||
-            (pvid_is_positive_f32(config->model, i) && !(lower > 0.0f))) {
-            return PVID_BAD_BOUNDS;
-        }
-        if (!pvid_within_f32(config->start[i], lower, upper)) {
-            return PVID_BAD_START;
-        }
-        if (!pvid_within_f32(config->start_sd[i], 1.0e-12f, 1.0e12f)) {
-            return PVID_BAD_START_SD;
-        }
-    }
-    return PVID_OK;
 }
 
 /* The engine of a model. */
@@ -72,58 +53,19 @@ static uint8_t engine_of(const pvid_model_f32 *model)
 
 static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
 {
-    if (!model_is_valid(config->model)) {
+    const pvid_model_f32 *model = config->model;
+    if (!model_is_valid(model)) {
         return PVID_BAD_MODEL;
     }
-    const pvid_status parameters = parameters_are_valid(config);
-    if (parameters != PVID_OK) {
-        return parameters;
+    const pvid_status status = pvid_settings_are_valid_f32(config, model->n_p, model->positive, config->update_rate_hz);
+    if (status != PVID_OK) {
+        return status;
     }
-    if (!pvid_within_f32(config->row_sd, 1.0e-12f, 1.0e12f)) {
-        return PVID_BAD_ROW_SD;
-    }
-    if (!pvid_within_f32(config->update_rate_hz, 1.0e-6f, 1.0e6f)) {
-        return PVID_BAD_UPDATE_RATE;
-    }
-    const float groups = config->forgetting_s * config->update_rate_hz;
-    if (!pvid_within_f32(config->forgetting_s, 0.0f, 1.0e12f) || ((config->forgetting_s > 0.0f) && (groups < 4.0f))) {
-        return PVID_BAD_FORGETTING;
-    }
-    if (!pvid_within_f32(config->feedback_hz, 0.0f, 1.0e12f)) {
-        return PVID_BAD_FEEDBACK;
-    }
-    if (!pvid_within_f32(config->correlation, 1.0f, 1.0e6f)) {
-        return PVID_BAD_CORRELATION;
-    }
-    if (!pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ||
-        ((engine_of(config->model) == PVID_ENGINE_DIRECT) && (config->row_weight < 1.0f))) {
-        return PVID_BAD_ROW_WEIGHT;
-    }
-    if (!pvid_within_f32(config->step_limit, 1.0e-6f, 0.9f)) {
-        return PVID_BAD_STEP_LIMIT;
-    }
-    if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
-        return PVID_BAD_KAPPA_MIN;
-    }
-    if (!pvid_within_f32(config->noise_margin, 0.0f, 1.0e6f)) {
-        return PVID_BAD_NOISE_MARGIN;
-    }
-    if (!pvid_within_f32(config->dead_zone, 0.0f, 100.0f)) {
-        return PVID_BAD_DEAD_ZONE;
-    }
-    if ((config->law != PVID_LAW_STATIONARY) && (config->law != PVID_LAW_PSEUDOVELOCITY)) {
-        return PVID_BAD_LAW;
-    }
-    return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
-}
-
-static float feedback_gain(const pvid_estimator_config_f32 *config)
-{
-    if (config->law == PVID_LAW_PSEUDOVELOCITY) {
-        return 0.0f;
-    }
-    const float gain = (config->feedback_hz * (float)config->divider) / config->update_rate_hz;
-    return ((config->feedback_hz > 0.0f) && (gain < 1.0f)) ? gain : 1.0f;
+    const bool weighted = config->row_weight < 1.0f;
+    return (!pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ||
+            ((engine_of(model) == PVID_ENGINE_DIRECT) && weighted))
+               ? PVID_BAD_ROW_WEIGHT
+               : PVID_OK;
 }
 
 static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
@@ -146,7 +88,7 @@ static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config
     }
     config->model->theta(self->p, self->theta);
     self->settings.row_variance = config->row_sd * config->row_sd;
-    self->settings.gain = feedback_gain(config);
+    self->settings.gain = pvid_settings_gain_f32(config, config->update_rate_hz, (float)config->divider);
     self->settings.correlation = config->correlation;
     self->settings.step_limit = config->step_limit;
     self->settings.kappa_min = config->kappa_min;
@@ -188,8 +130,7 @@ PVID_ALWAYS_INLINE pvid_reason take_row(pvid_estimator_f32 *self, const float n[
     const pvid_model_f32 *model = self->model;
     float gradient[PVID_MAX_P] = {0};
     const float e = (self->settings.gain < 1.0f) ? model->innovate(self->p, n, y, gradient) : 0.0f;
-    return (model->take_row != NULL) ? model->take_row(self, n, y, e, gradient, ends_group)
-                                     : pvid_direct_take_row_f32(self, n, y, e, gradient, ends_group);
+    return pvid_direct_take_row_f32(self, n, y, e, gradient, ends_group);
 }
 
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y)

@@ -5,17 +5,7 @@
 #include <stddef.h>
 
 #include "number/unroll.h"
-
-/* exp(-x), 0 <= x <= 4, by the series of exp(x): the core has no libm but sqrtf. Accurate to a few
- * ulp; called once, in init. */
-static float decay(float x)
-{
-    float sum = 1.0f;
-    for (size_t k = 24; k > 0u; k--) {
-        sum = 1.0f + ((x / (float)k) * sum);
-    }
-    return 1.0f / sum;
-}
+#include "solve/settings_f32.h"
 
 /* Most groups of rows between folds. Long enough to be cheap; short enough that `low` keeps 17 bits of a group's
  * terms and that forgetting is smooth (a sixteenth of its time constant). */
@@ -34,7 +24,7 @@ void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 
         if (forgetting_groups < 16.0f * (float)BLOCK_MAX) {
             self->block = (uint16_t)((forgetting_groups < 32.0f) ? 1.0f : (forgetting_groups / 16.0f));
         }
-        self->retention = decay((float)self->block / forgetting_groups);
+        self->retention = pvid_settings_decay_f32((float)self->block / forgetting_groups);
     }
     for (size_t i = 0; i < PVID_MAX_SUMS; i++) {
         self->high[i] = 0.0f;

@@ -149,9 +149,13 @@ static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_sol
     const bool judging = solve->estimate != NULL;
     solve->variance = judging ? pvid_assess_variance_f32(&solve->system, settings) : settings->row_variance;
     solve->above_noise = true;
-    if ((self->model->noise != NULL) && (settings->noise_margin > 0.0f)) {
+    if (((self->model->noise != NULL) || (solve->noise != NULL)) && (settings->noise_margin > 0.0f)) {
         float noise[PVID_MAX_P][PVID_MAX_P];
-        self->model->noise(self->p, self->noise, noise);
+        if (solve->noise != NULL) {
+            memcpy(noise, solve->noise, sizeof noise);
+        } else {
+            self->model->noise(self->p, self->noise, noise);
+        }
         solve->above_noise = pvid_assess_above_noise_f32(&solve->system, settings, solve->variance, noise);
     }
 }
@@ -285,6 +289,7 @@ static void reset_solve(pvid_estimator_solve_f32 *solve)
     solve->ends_group = false;
     solve->in_dead_zone = false;
     solve->fallback = NULL;
+    solve->noise = NULL;
     solve->estimate = NULL;
 }
 

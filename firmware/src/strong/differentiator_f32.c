@@ -17,11 +17,20 @@ const float pvid_five_points_f32[PVID_ORDERS * 2] = {
     -4.0f,         1.0f,          /* order 4 */
 };
 
-static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
+uint32_t pvid_fir_places_f32(const pvid_fir_bank_f32 *bank)
+{
+    const uint32_t points = (2u * (uint32_t)bank->half * bank->stride) + 1u;
+    return (bank->block > 1u) ? (points + bank->block + PVID_BLOCK_SUMS) : points;
+}
+
+pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, float sample_rate_hz)
 {
     const pvid_status window = pvid_fir_window(bank->half, bank->stride);
     if (window != PVID_OK) {
         return window;
+    }
+    if (pvid_fir_places_f32(bank) > PVID_MAX_WINDOW) {
+        return PVID_BAD_STRIDE;
     }
     if (bank->weights == NULL) {
         return PVID_BAD_BANK;
@@ -31,28 +40,31 @@ static pvid_status bank_is_valid(const pvid_fir_bank_f32 *bank)
             return PVID_BAD_BANK;
         }
     }
-    return PVID_OK;
+    return pvid_within_f32(sample_rate_hz, 1.0e-3f, 1.0e6f) ? PVID_OK : PVID_BAD_SAMPLE_RATE;
+}
+
+void pvid_fir_take_bank_f32(pvid_fir_bank_f32 *own, const pvid_fir_bank_f32 *bank)
+{
+    /* One by one: the padding of a copied struct would be that of the caller's, and end in snapshots. */
+    own->half = bank->half;
+    own->stride = bank->stride;
+    own->block = (bank->block > 1u) ? bank->block : 1u;
+    own->weights = bank->weights;
 }
 
 static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank, float sample_rate_hz)
 {
-    const pvid_status status = bank_is_valid(bank);
+    const pvid_status status = pvid_fir_bank_is_valid_f32(bank, sample_rate_hz);
     if (status != PVID_OK) {
         return status;
     }
-    if (!pvid_within_f32(sample_rate_hz, 1.0e-3f, 1.0e6f)) {
-        return PVID_BAD_SAMPLE_RATE;
-    }
-    /* One by one: the padding of a copied struct would be that of the caller's, and end in snapshots. */
-    self->bank.half = bank->half;
-    self->bank.stride = bank->stride;
-    self->bank.weights = bank->weights;
+    pvid_fir_take_bank_f32(&self->bank, bank);
     self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);
     const float rate = sample_rate_hz / (float)bank->stride;
-    float power = 1.0f;
-    for (size_t i = 0; i < (PVID_ORDERS - 1u); i++) {
+    float power = 1.0f / (float)self->bank.block;
+    for (size_t i = 0; i < PVID_ORDERS; i++) {
+        self->scale[i] = power;
         power *= rate;
-        self->rate_power[i] = power;
     }
     pvid_differentiator_reset_f32(self);
     return PVID_OK;
@@ -67,9 +79,11 @@ pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pv
 
 void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 {
+    const uint32_t places = pvid_fir_places_f32(&self->bank);
     self->head = 0;
-    self->filled = 0;
-    for (size_t i = 0; i < self->length; i++) {
+    self->at = 0;
+    self->missing = (uint16_t)(self->length + self->bank.block - 1u);
+    for (size_t i = 0; i < places; i++) {
         self->history[i] = 0.0f;
     }
 }
@@ -83,7 +97,7 @@ bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, f
     }
     const size_t half = self->bank.half;
     const float *weight = self->bank.weights;
-    pvid_fir_walk walk = pvid_fir_centre_f32(self);
+    pvid_fir_walk walk = pvid_fir_centre_f32(self->bank.stride, self->length, self->head);
     const float middle = self->history[walk.newer];
     pvid_fir_outwards(&walk);
     pvid_fir_sums_f32 sums =

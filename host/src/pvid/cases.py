@@ -123,7 +123,7 @@ class Case(ABC):
         exact: the smallest sizes that suffice, for a board with little memory.
         """
         if self.form == "strong":
-            return {"PVID_MAX_WINDOW": str(max(config.bank.window, 5))}
+            return {"PVID_MAX_WINDOW": str(max(config.bank.memory, 5))}
         design = config.design
         bounds = raised_bounds(design)
         if exact:
@@ -141,19 +141,16 @@ class Case(ABC):
         return int(ticks - max((ticks - settled) // period, 1) * period)
 
     @property
-    def _estimator(self) -> str:
-        """The name of its estimator in C: the strong form in fixed point has its own."""
-        return f"{DEFAULT}_estimator" if (self.form, self.core) == ("strong", "q31") else "estimator"
-
-    @property
     def hash_function(self) -> str:
-        """The C function that continues a hash with its estimator."""
-        return f"pvid_fnv_{self._estimator}_{self.core}"
+        """The function in C that continues the running hash over the estimator: the strong forms have their own."""
+        own = {"f32": "strong", "q31": f"{DEFAULT}_estimator"}[self.core] if self.form == "strong" else "estimator"
+        return f"pvid_fnv_{own}_{self.core}"
 
     @property
     def assess_function(self) -> str:
-        """The C function that assesses its estimator."""
-        return f"pvid_{self._estimator}_assess_{self.core}"
+        """The function in C that assesses the estimator."""
+        own = f"{DEFAULT}_estimator" if (self.form, self.core) == ("strong", "q31") else "estimator"
+        return f"pvid_{own}_assess_{self.core}"
 
     # ---- samples
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from bench.campaign.judge import Record, identify_rig
+from bench.campaign.judge import Record, identify_by_engine, identify_rig
 from bench.campaign.population import Population
 from bench.campaign.store import Store, code_version, core_version
 from bench.campaign.truth import GENERATOR, kept_rig, simulate_rig
@@ -30,6 +30,8 @@ _WORKERS_S = 30  # until a running scheduler must have a worker
 class Campaign:
     """What is run: rigs 0 to `rigs` - 1 of a seed, identified by a core, tuned before or not.
 
+    `engine`: from the description of the mechanism, by the weak engine.
+
     `cache`: a folder that keeps the simulated runs; None: they are simulated anew.
     """
 
@@ -38,12 +40,22 @@ class Campaign:
     seed: int = 1
     core: Core = "f32"
     tuned: bool = False
+    engine: bool = False
     cache: Path | None = None
 
     @property
     def key(self) -> str:
         """What a record depends on beside the rig's index: population, settings, code."""
-        parts = (self.population.hash, GENERATOR, self.seed, self.core, self.tuned, code_version(), core_version())
+        parts = (
+            self.population.hash,
+            GENERATOR,
+            self.seed,
+            self.core,
+            self.tuned,
+            self.engine,
+            code_version(),
+            core_version(),
+        )
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
@@ -101,6 +113,8 @@ def _work(rig: int, *, campaign: Campaign, code: str) -> Record:
         simulated = simulate_rig(native, campaign.population, campaign.seed, rig)
     else:
         simulated = kept_rig(native, campaign.population, campaign.seed, rig, campaign.cache)
+    if campaign.engine:
+        return identify_by_engine(simulated)[0]
     return identify_rig(native, simulated, campaign.core, tuned=campaign.tuned)[0]
 
 

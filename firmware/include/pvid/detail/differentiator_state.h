@@ -7,11 +7,12 @@
 /* Only the functions of differentiator.h write to it. */
 struct pvid_differentiator_f32 {
     pvid_fir_bank_f32 bank;
-    float rate_power[PVID_ORDERS - 1]; /* rate^1..rate^4 [1/s^k] */
-    uint16_t length;                   /* samples in the window */
-    uint16_t head;                     /* place of the oldest sample */
-    uint16_t filled;                   /* samples since the reset, at most length */
-    float history[PVID_MAX_WINDOW];
+    float scale[PVID_ORDERS];       /* rate^0..rate^4 over the samples of a block [1/s^k] */
+    uint16_t length;                /* places of the ring */
+    uint16_t head;                  /* place of the oldest point */
+    uint16_t at;                    /* place of the oldest sample of a block */
+    uint16_t missing;               /* samples until the window is full */
+    float history[PVID_MAX_WINDOW]; /* the ring of points; behind it the sums of blocks (differentiator_f32.h) */
 };
 
 #endif

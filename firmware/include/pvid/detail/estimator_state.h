@@ -67,16 +67,18 @@ typedef struct {
 } pvid_cholesky_f32;
 
 /* A solve or an assessment in progress; the caller owns it. Read reason, size, group_rss and above_noise when it is
- * complete. The caller may set fallback after begin. */
+ * complete. The caller may set fallback and noise after begin. */
 struct pvid_estimator_solve_f32 {
     pvid_reason reason;
-    const float *fallback;       /* [n_p] value of p if no step is allowed; NULL: p is unchanged */
-    pvid_estimate_f32 *estimate; /* of an assessment; NULL for a solve */
-    float size;                  /* largest |dp/p| of the step before step_limit; 0 if p is held */
-    float group_rss;             /* sum of e^2 of the group's rows, each at the p of its tick */
-    float variance;              /* of a row: row_sd^2 in a solve, s^2 of the residuals in an assessment */
-    bool above_noise;            /* S contains more information than noise alone */
-    bool solvable;               /* of an assessment: S could be factored */
+    const float *fallback;            /* [n_p] value of p if no step is allowed; NULL: p is unchanged */
+    const float (*noise)[PVID_MAX_P]; /* information of noise alone that a solve's S must exceed noise_margin times: of
+                                         unit variance, per unit of weight, upper triangle; NULL: as the model says */
+    pvid_estimate_f32 *estimate;      /* of an assessment; NULL for a solve */
+    float size;                       /* largest |dp/p| of the step before step_limit; 0 if p is held */
+    float group_rss;                  /* sum of e^2 of the group's rows, each at the p of its tick */
+    float variance;                   /* of a row: row_sd^2 in a solve, s^2 of the residuals in an assessment */
+    bool above_noise;                 /* S contains more information than noise alone */
+    bool solvable;                    /* of an assessment: S could be factored */
     uint8_t stage;
     uint8_t index; /* of the row or column within the stage */
     uint8_t start; /* first non-zero of the present column of C */

@@ -7,49 +7,43 @@
 /* Steps that are added to the sums together. */
 #define PVID_FOURIER_BLOCK 4
 
-/* The front end: signals of the last samples, and the FIR job of the last complete step in slices. */
+/* The front end: block sums of the signals, and their outputs at the last steps. */
 typedef struct {
-    uint8_t needs;           /* samples of other ticks that the signals need; with the next one all signals are those of
-                                the tick before */
-    bool busy;               /* a job is in progress */
-    bool begun;              /* a job has begun since the restart */
-    uint8_t seen;            /* 1: there is a sample since the restart */
-    uint8_t jet;             /* being formed; jets: none */
-    uint16_t half;           /* of the longest filter */
-    uint16_t length;         /* places of the ring in use, 2 half + decimation: a job may last a whole block */
-    uint16_t pairs_per_tick; /* of the job */
-    uint16_t step_wait;      /* `wait` at the tick that forms the channels, behind the job */
-    uint16_t work_wait;      /* and from the first tick on that adds to the sums or runs stages */
-    uint16_t head;           /* place of the next signals */
-    uint16_t wait;           /* ticks until the next job begins */
-    uint16_t centre;         /* place of the job's instant */
-    uint16_t pair;           /* pairs of the present jet that are done */
-    uint16_t newer;          /* places of the last pair */
-    uint16_t older;
+    uint32_t wait;   /* ticks until the block is complete */
+    uint8_t signals; /* of the model */
+    bool plain;      /* signal i is sample i */
+    uint8_t needs;   /* samples of other ticks that the signals need; with the next one all signals are those of the
+                        tick before */
+    bool seen;       /* there is a sample since the restart, and `before` contains it */
+    uint8_t decimation;
+    uint16_t half;                     /* of the longest compensator [steps] */
+    uint16_t missing;                  /* outputs until the line is full, at least 1 */
+    uint16_t head;                     /* place of the next outputs */
+    float ticks;                       /* D */
+    float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
-    float sum;                         /* of the present jet */
-    float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first */
-    float jet_value[PVID_MAX_INPUTS];  /* of the job's instant */
-    float ring[PVID_MAX_RING];         /* [length][signals] */
+    float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
+    float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
+                                  twice */
 } pvid_fourier_front_f32;
 
 /* From the jets of a step to the values of its channels, two steps later. */
 typedef struct {
-    uint8_t known;                   /* steps since the restart, 0..4 */
-    uint8_t latest;                  /* place in `out` of the step before the last one */
-    bool ran;                        /* the runs have begun */
-    float lead;                      /* from a run's first sample to its first step [s] */
-    float now[PVID_MAX_INPUTS];      /* inputs of `values` at the last step but the newest */
-    float rate[PVID_MAX_INTEGRANDS]; /* derivatives of the runs there */
-    float v[2][PVID_MAX_INTEGRANDS]; /* arguments of sgn at that step and the one before it */
-    float run[PVID_MAX_INTEGRANDS];  /* integrals since the start of the run, and what rounding took off */
+    uint8_t known;  /* steps since the restart, 0..4 */
+    uint8_t latest; /* place in `out` of the step before the last one */
+    bool ran;       /* the runs have begun */
+    float lead;     /* from a run's first sample to its first step [s] */
+    uint8_t newest; /* place in `inputs` of the newest step; the other is of the last step before it */
+    float inputs[2][PVID_MAX_INPUTS]; /* of `values` */
+    float rate[PVID_MAX_INTEGRANDS];  /* derivatives of the runs there */
+    float v[2][PVID_MAX_INTEGRANDS];  /* arguments of sgn at that step and the one before it */
+    float run[PVID_MAX_INTEGRANDS];   /* integrals since the start of the run, and what rounding took off */
     float run_low[PVID_MAX_INTEGRANDS];
     float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
                                                               the next ones */
-    float f[2][PVID_MAX_INTEGRANDS]; /* integrands at the two steps before that one, latest first */
-    float once[PVID_MAX_INTEGRANDS]; /* I^1 and I^2 since the start of the half */
-    float twice[PVID_MAX_INTEGRANDS];
-    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the half before, at its end */
+    float f[2][PVID_MAX_INTEGRANDS];         /* integrands at the two steps before that one, latest first */
+    float integral[2 * PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of each since the start of the half */
+    float edge[2][PVID_MAX_INTEGRANDS];      /* I^1 and I^2 of the half before, at its end */
 } pvid_fourier_history_f32;
 
 /* What a half window has seen of a sample. */
@@ -86,19 +80,21 @@ typedef struct {
     float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_f32;
 
-/* Most rows of a window: parts of its sums. */
-#define PVID_FOURIER_ROWS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+/* Most parts of a window's sums that its rows are made of. */
+#define PVID_FOURIER_PARTS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
 
 /* The noise of a kind's rows: D_h, the directions that the test functions leave out, and what follows from the inverse.
  */
 typedef struct {
-    uint8_t cosines;                                    /* real parts; the other rows are imaginary parts */
-    uint8_t powers;                                     /* of omega^2 in use */
-    float omega;                                        /* 2 pi / T [rad/s] */
-    float weight[PVID_MAX_POWER];                       /* c_j of the sensors, variance at the power j of omega^2 */
-    float scale[PVID_MAX_HARMONICS];                    /* 1 / sqrt(D_h) */
-    float basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS]; /* orthonormal directions, one of each family in a row */
-    float share[PVID_MAX_POWER];                        /* Q_j = tr(R^-1 dR/dc_j) */
+    uint8_t cosines;                 /* real parts; the others are imaginary parts */
+    uint8_t parts;                   /* K + n */
+    uint8_t vectors;                 /* n/2: reflections of each family */
+    uint8_t powers;                  /* of omega^2 in use */
+    float omega;                     /* 2 pi / T [rad/s] */
+    float weight[PVID_MAX_POWER];    /* c_j of the sensors, variance at the power j of omega^2 */
+    float scale[PVID_MAX_HARMONICS]; /* 1 / sqrt(D_h) */
+    float reflection[PVID_MAX_POWER / 2][PVID_FOURIER_PARTS]; /* v of I - v v^T, one of each family in a row */
+    float share[PVID_MAX_POWER];                              /* Q_j = tr(R^-1 dR/dc_j) */
 } pvid_fourier_white_f32;
 
 /* Mean products of the windows' scores s = C^T (sum N e), of a window with itself and with the one before. */
@@ -119,26 +115,30 @@ typedef struct {
     bool shares; /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
     bool alone;  /* the next window has no neighbour before it */
     uint8_t stage;
-    uint8_t part; /* of a column's stages */
+    uint8_t phase; /* of a column's stages */
     uint8_t kind;
-    uint8_t theta;                    /* first one of the kind */
-    uint8_t used;                     /* kinds whose rows have been added */
-    uint8_t live;                     /* nuisances of the kind that are projected out */
-    uint8_t iteration;                /* solves done for this window */
-    uint16_t index;                   /* within the stage */
-    uint16_t term;                    /* next one of the kind */
-    pvid_reason reason;               /* of the last solve, then of the window */
-    float size;                       /* of the last step, relative */
-    float rss;                        /* of the kind's rows before the steps */
-    float expected;                   /* sum over the kinds of the rows' variance by the sensors alone */
-    float free;                       /* rows less nuisances of the kinds that were added */
-    float square;                     /* sum of squares of their residuals before the steps */
-    float own[PVID_MAX_COLUMNS];      /* square of each nuisance before projection, then inverse of what remains */
-    float pull[PVID_MAX_THETA];       /* g: what the sensors' noise takes from B */
-    float score[PVID_MAX_THETA];      /* sum N e + g of the window */
-    float sum[2][PVID_MAX_HARMONICS]; /* of the present column, real and imaginary parts */
-    float row[PVID_FOURIER_ROWS];     /* e of the kind's rows */
-    float column[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS]; /* white rows: theta's, Y, nuisances */
+    uint8_t theta;                      /* first one of the kind */
+    uint8_t used;                       /* kinds whose rows have been added */
+    uint8_t live;                       /* nuisances of the kind that are projected out */
+    uint8_t iteration;                  /* solves done for this window */
+    uint8_t other;                      /* column of the next product */
+    uint16_t index;                     /* within the stage */
+    uint16_t term;                      /* next one of the kind */
+    uint16_t moment;                    /* next one of the kind */
+    pvid_reason reason;                 /* of the last solve, then of the window */
+    float size;                         /* of the last step, relative */
+    float rss;                          /* of the kind's rows before the steps */
+    float expected;                     /* sum over the kinds of the rows' variance by the sensors alone */
+    float free;                         /* rows less nuisances of the kinds that were added */
+    float square;                       /* sum of squares of their residuals before the steps */
+    float own[PVID_MAX_COLUMNS];        /* square of each nuisance before projection, then inverse of what remains; then
+                                           squares of theta's columns */
+    float pull[PVID_MAX_THETA];         /* g: what the sensors' noise takes from B */
+    float score[PVID_MAX_THETA];        /* sum N e + g of the window */
+    float gradient[PVID_MAX_THETA];     /* sum N e of the kind */
+    float part[PVID_FOURIER_PARTS];     /* of a direction, then of the present column */
+    float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of the directions */
+    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
     pvid_gate_f32 gate[PVID_MAX_KINDS];
     pvid_fourier_white_f32 white;
     pvid_fourier_scores_f32 scores;
@@ -149,14 +149,18 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    float dt;          /* between steps [s] */
+    uint8_t plain; /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;  /* reason of a tick that only adds its samples; FORM: the channels of a step are due; BUSY: harmonics
+                      are to be added or joined, or a window is being processed */
+    bool warm;     /* a window has been complete since the restart */
+    bool frozen;   /* complete windows are dropped */
+    bool watches;  /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;
     uint8_t items_per_tick;  /* harmonics that a tick adds or joins */
     uint8_t stages_per_tick; /* stages of a whole window per tick */
-    bool warm;               /* a window has been complete since the restart */
-    bool frozen;             /* complete windows are dropped */
+    float dt;                /* between steps [s] */
     pvid_fourier_front_f32 front;
     pvid_fourier_history_f32 history;
     pvid_fourier_watch_f32 watch;

@@ -7,23 +7,20 @@
 /* Steps that are added to the sums together. */
 #define PVID_FOURIER_BLOCK_Q31 4
 
-/* The front end: signals of the last ticks, and the FIR job of the last complete step in slices. */
+/* The front end: the block sums of the signals, and their outputs at the last steps. */
 typedef struct {
-    bool plain;                          /* every signal is a sample */
-    bool held;                           /* a signal needs the next sample: all signals are those of the tick before */
-    bool seen;                           /* a sample since the restart */
-    uint8_t jet;                         /* being formed; jets: none */
-    uint16_t half;                       /* of the longest filter */
-    uint16_t length;                     /* places of the ring in use, 2 half + D: a job may last a whole block */
-    uint16_t pairs_per_tick;             /* such that a job lasts half a block at most */
-    uint16_t head;                       /* place of the next signals */
-    uint16_t wait;                       /* ticks until the next job begins */
-    uint16_t centre;                     /* place of the job's instant */
-    uint16_t pair;                       /* pairs of the present jet that are done */
-    int64_t sum;                         /* of the present jet */
+    bool plain;    /* signal i is sample i */
+    bool seen;     /* a sample since the restart */
+    uint8_t needs; /* samples beside those of a tick */
+    uint8_t signals;
+    uint8_t decimation;                  /* D */
+    uint16_t wait;                       /* ticks until the block ends */
+    uint16_t half;                       /* of the longest compensator */
+    uint16_t missing;                    /* outputs until there is a step, this one included */
+    uint16_t head;                       /* place of the next output */
+    const int32_t *offset;               /* of the configuration */
     int32_t before[3][PVID_MAX_SAMPLES]; /* counts of the last three ticks, latest first */
-    int32_t value[PVID_MAX_INPUTS];      /* jets of the job's instant */
-    int32_t ring[PVID_MAX_RING];         /* [length][signals] */
+    int32_t line[PVID_MAX_RING];         /* [signals][2] sums, [signals] of the block before, 2 [2 half + 1][signals] */
 } pvid_fourier_front_q31;
 
 /* From the jets of a step to the channels of the second one before it. */
@@ -47,47 +44,48 @@ typedef struct {
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
 typedef struct {
     uint8_t filling; /* block that fills, 0 or 1 */
-    uint8_t slice;   /* harmonics of the other block that are done; all: none is being added */
+    uint8_t left;    /* items until the other one is added and joined; 0: it is */
+    uint8_t item;    /* the next one */
     uint8_t target;  /* half to which it is added */
-    bool last;       /* it completes its half */
-    bool joins;      /* and this half completes a window */
+    bool joins;      /* it completes a window */
     uint8_t halves;  /* complete since the restart, 0..2 */
     uint16_t start;  /* of its first step in its half */
+    uint16_t angle;  /* of the next harmonic at this step */
     int32_t block[2][PVID_FOURIER_BLOCK_Q31][PVID_MAX_CHANNELS];
     int32_t sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_q31;
 
 /* S_h of a window, real and imaginary part. */
 typedef struct {
+    uint32_t bits[PVID_MAX_CHANNELS]; /* all of those of the magnitudes of a channel's sums */
     int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
 } pvid_fourier_window_q31;
 
-/* Most rows of a window: parts of its sums. */
+/* Most parts of the sums of a window: K + n. */
 #define PVID_FOURIER_ROWS_Q31 (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
 
-/* The noise of a kind's rows, and the directions that the test functions leave out. */
+/* The noise of a kind's sums, and the reflections that leave its white rows. */
 typedef struct {
-    uint8_t cosines;                                          /* real parts; the other rows are imaginary parts */
-    uint8_t powers;                                           /* of h^2 in use */
-    pvid_scaled_q31 weight[PVID_MAX_POWER];                   /* c_j of the sensors, variance at the power j of h^2 */
-    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                /* D_h, then 1 / sqrt(D_h) */
-    int32_t basis[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* orthonormal, one of each family in a row, Q30 */
+    uint8_t cosines;                                           /* real parts; the others are imaginary parts */
+    uint8_t powers;                                            /* of h^2 in use */
+    int32_t rate;                                              /* 1 / H, Q30 */
+    int32_t exponent;                                          /* of 1 / sqrt(D_h) */
+    pvid_scaled_q31 weight[PVID_MAX_POWER];                    /* c_j, variance at the power j of h^2 */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                 /* D_h, then m 2^exponent = 1 / sqrt(D_h) */
+    int32_t mirror[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
 } pvid_fourier_white_q31;
 
 /* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
 typedef struct {
+    uint8_t lift[PVID_MAX_CHANNELS]; /* bits that the sums of a channel are shifted up */
     int16_t exponent[PVID_MAX_COLUMNS];
-    int32_t top;                        /* greatest exponent of the weights of the present column */
-    int64_t sum[PVID_FOURIER_ROWS_Q31]; /* the present column while it is made */
     int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
 } pvid_fourier_columns_q31;
 
 /* From counts to the S_h of windows. */
 typedef struct {
     const pvid_fourier_design_q31 *design;
-    bool at_once;            /* D is small: a tick does all that is due */
-    bool due;                /* the jets of a step are complete, its channels are not made yet */
-    uint8_t slices_per_tick; /* harmonics to which a tick adds a block */
+    uint8_t items_per_tick; /* harmonics that a tick adds or joins */
     pvid_fourier_front_q31 front;
     pvid_fourier_values_q31 values;
     pvid_fourier_sums_q31 sums;
@@ -100,40 +98,50 @@ typedef struct {
     int64_t square[2][PVID_MAX_SAMPLES];
 } pvid_fourier_drive_q31;
 
+/* The rows of a kind while they are made. */
+typedef struct {
+    pvid_fourier_white_q31 white;
+    pvid_scaled_q31 least;                        /* D_h */
+    pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
+    uint64_t whole[PVID_MAX_COLUMNS];             /* square of each nuisance before those before it are off */
+    pvid_fourier_columns_q31 columns;
+} pvid_fourier_rows_q31;
+
+/* The rows of all kinds are in the estimator before the solves begin: they use the same memory.
+ * MISRA deviation: 19.2; what a stage reads, a stage of the same part has written. */
+typedef union {
+    pvid_fourier_rows_q31 rows;
+    pvid_estimator_solve_q31 solve;
+} pvid_fourier_work_q31;
+
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
     uint8_t stage;
     uint8_t kind;
-    uint8_t theta;                                /* first one of the kind */
-    uint8_t used;                                 /* kinds whose rows have been added */
-    uint8_t live;                                 /* nuisances of the kind that are projected out */
-    uint8_t iteration;                            /* solves done for this window */
-    uint8_t part;                                 /* of a column's stages */
-    bool saturated;                               /* a row of the kind does not fit: none of them is used */
-    uint16_t index;                               /* within the stage */
-    uint16_t term;                                /* first one of the present column */
-    uint16_t free;                                /* rows less nuisances of the kinds that were added */
-    pvid_reason reason;                           /* of the last solve, then of the window */
-    int64_t size;                                 /* of the last step, relative, Q22 */
-    int64_t rss;                                  /* of the kind's rows before the steps */
-    int32_t fade_factor;                          /* factor on the sums before this window's rows, Q31; 0: none */
-    pvid_scaled_q31 expected;                     /* variance of a row */
-    pvid_scaled_q31 least;                        /* D_h */
-    pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
-    uint64_t whole[PVID_MAX_COLUMNS];             /* square of each column before nuisances are projected out */
-    int8_t n_bits[PVID_MAX_THETA_Q31];            /* formats of the rows */
+    uint8_t theta;                     /* first one of the kind */
+    uint8_t used;                      /* kinds whose rows have been added */
+    uint8_t live;                      /* nuisances of the kind that are projected out */
+    uint8_t iteration;                 /* solves done for this window */
+    uint8_t part;                      /* of a column's stages */
+    bool kept;                         /* the present nuisance is */
+    bool saturated;                    /* a row of the kind does not fit: none of them is used */
+    uint16_t index;                    /* within the stage */
+    uint16_t free;                     /* rows less nuisances of the kinds that were added */
+    pvid_reason reason;                /* of the last solve, then of the window */
+    int64_t size;                      /* of the last step, relative, Q22 */
+    int64_t rss;                       /* of the kind's rows before the steps */
+    int32_t fade_factor;               /* factor on the sums before this window's rows, Q31; 0: none */
+    pvid_scaled_q31 expected;          /* variance of a row */
+    int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];
-    pvid_fourier_white_q31 white;
-    pvid_fourier_columns_q31 columns;
-    pvid_estimator_solve_q31 solve;
+    pvid_fourier_work_q31 work;
     pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_fourier_finish_q31;
 
 /* Only the functions of fourier_q31.h write to it. */
 struct pvid_fourier_q31 {
     const pvid_fourier_design_q31 *design;
-    const int32_t *offset;
     const int32_t *drive_min;
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */

@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
+import importlib
 import io
 import os
 import stat
 import sys
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from pvid.base.errors import PvidError
+
+fcntl: Any = None  # not on Windows
+with contextlib.suppress(ImportError):
+    fcntl = importlib.import_module("fcntl")
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -66,6 +70,8 @@ class _Output(_Watched):
 
 def _begin_of_file(descriptor: int) -> int | None:
     """Where in a regular file the output begins; None where it is none, or others may append to it, too."""
+    if fcntl is None:
+        return None
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode) or fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_APPEND:
             return None

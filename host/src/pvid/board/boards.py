@@ -14,12 +14,11 @@ from pathlib import Path
 from filelock import FileLock
 
 from pvid.base.errors import PvidError
-from pvid.base.user_cache import built_under
-from pvid.core.sources import ROOT
+from pvid.core.sources import ROOT, build_folder
 
-BUILD = built_under(ROOT / "build") / "targets"
+BUILD = build_folder() / "targets"
 SIMAVR_STDIO = BUILD / "simavr_stdio"
-COMPILED = built_under(ROOT / "build") / "cache" / "ccache"  # objects of all trees
+COMPILED = build_folder() / "cache" / "ccache"  # objects of all trees
 
 
 @dataclass(frozen=True)

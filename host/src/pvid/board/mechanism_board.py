@@ -298,8 +298,12 @@ def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> FourierConfig
 
     design = part("design")
     filters = tuple(FourierFilter(_array(one)) for one in design.pop("filter"))
+    at_steps = design.pop("compensator", None)
+    compensators = filters if at_steps is None else tuple(FourierFilter(_array(one)) for one in at_steps)
     noise = tuple(FourierNoise(kind, power, a, b, np.float32(x)) for kind, power, a, b, x in design.pop("noise"))
-    made = FourierDesign32(model=fourier_model_of(compiled), filter=filters, noise=noise, **arrays(design))
+    made = FourierDesign32(
+        model=fourier_model_of(compiled), filter=filters, compensator=compensators, noise=noise, **arrays(design)
+    )
     estimator = arrays(part("estimator"))
     own = {one.name: engine[one.name] for one in fields(FourierConfig) if one.name in engine}
     return FourierConfig(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -32,7 +33,7 @@ Float32 = npt.NDArray[np.float32]
 
 MISSING = int(np.iinfo(np.int32).min)  # marks a missing sample
 MADE_BY = "pvid.board.mechanism_image"
-_PERIODS = 3  # half windows whose ticks are counted
+PERIODS = 3  # half windows whose ticks are counted
 _COUNTS = 2**22  # of a signal without a resolution, over its largest value; a float holds such a count exactly
 
 
@@ -79,7 +80,7 @@ def mechanism_run(name: str, ticks: int | None = None) -> MechanismRun:
     compiled = mechanisms.compiled_of(name)
     config = config_for_simulated_rig(compiled)
     period = config.design.hop * config.design.decimation
-    wanted = config.ticks_needed + _PERIODS * period if ticks is None else ticks
+    wanted = config.ticks_needed + PERIODS * period if ticks is None else ticks
     samples = samples_of(config, RigSimulation.of(compiled, simulated_rig(compiled.name)).run())
     if len(samples) < wanted:
         raise PvidError(f"the run of {name} has {len(samples)} samples, too few for {wanted}")
@@ -172,13 +173,19 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
         raise PvidError(
             f"{target.name}: float32 has no bits of the twin on an AVR: its division differs at the extremes"
         )
-    files = files_of(run)
+    return build_with(
+        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), sizes_of_design(run.config.design)
+    )
+
+
+def build_with(target: Board, name: str, files: Mapping[str, str], sizes: Mapping[str, int]) -> tuple[Path, Path]:
+    """The same from generated files: name -> text."""
     stamp = zlib.crc32("".join(files.values()).encode())
-    name = f"{run.name}-fourier-f32-{len(run.counts)}-{stamp:08x}"
-    folder = BUILD / "runs" / name
+    whole = f"{name}-{stamp:08x}"
+    folder = BUILD / "runs" / whole
     for file, text in files.items():
         keep_header(folder, file, text)
     options = {"PVID_REPLAY_RUN": str(folder)}
-    options |= {macro: str(size) for macro, size in at_least(sizes_of_design(run.config.design)).items()}
-    tree = build(target, BUILD / f"{target.name}-{name}", options)
+    options |= {macro: str(size) for macro, size in at_least(sizes).items()}
+    tree = build(target, BUILD / f"{target.name}-{whole}", options)
     return tree / "apps" / "replay" / "replay.elf", tree

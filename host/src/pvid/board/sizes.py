@@ -11,7 +11,8 @@ from pathlib import Path
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
-from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
+from pvid.board.mechanism_image import MechanismRun, build_mechanism_image, mechanism_run
+from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image, fixed_run
 from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
 from pvid.board.stack_bound import stack_bound
 from pvid.models.registry import DEFAULT
@@ -47,7 +48,8 @@ class Configuration:
     @property
     def name(self) -> str:
         """Key of the budget."""
-        return f"{self.board.name} {self.form} {self.core}"
+        model = f" {self.model}" if self.form == ENGINE else ""
+        return f"{self.board.name} {self.form} {self.core}{model}"
 
 
 ENGINE = "fourier"
@@ -56,8 +58,9 @@ ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
 ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}
 
-CONFIGURATIONS = tuple(
-    Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)
+CONFIGURATIONS = (
+    *(Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)),
+    *(Configuration(board, ENGINE) for board in BOARDS.values() if board.name not in ON_AVR),
 )
 
 
@@ -96,7 +99,7 @@ def _bytes_of(map_text: str, name: str, source: str) -> int:
 
 
 _CORE = r"libpvid\.a\("
-_MODEL = r"_weak_f32\.c"  # what is generated of a mechanism
+_MODEL = r"_weak_(f32|q31)\.c"  # what is generated of a mechanism
 _ARITHMETIC = r"libgcc\.a\(|libm\.a\(|libc\.a\(|freestanding/"
 _CODE = r"\.text|\.s?rodata"
 
@@ -136,13 +139,18 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
 def _measure_engine(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     """The weak engine of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
     board = configuration.board
-    run = mechanism_run(configuration.model)
-    image, tree = build_mechanism_image(board, run)
+    run: MechanismRun | FixedRun
+    if configuration.core == "q31":
+        run = fixed_run(configuration.model)
+        image, tree = build_fixed_image(board, run)
+    else:
+        run = mechanism_run(configuration.model)
+        image, tree = build_mechanism_image(board, run)
     map_text = image.with_suffix(".map").read_text(encoding="utf-8")
     report = play(board, image, TIMEOUT_S)
     code = _bytes_of(map_text, _CODE, _CORE) + _bytes_of(map_text, r"\.text", _MODEL)
     tables = _bytes_of(map_text, r"\.s?rodata", _MODEL)
-    tables += _bytes_of(map_text, rf"\.s?rodata\.{run.name}_", r"replay")
+    tables += _bytes_of(map_text, rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.{run.name}_", r"replay")
     footprint = Footprint(
         text=code,
         arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),
@@ -157,10 +165,10 @@ def _measure_engine(configuration: Configuration) -> tuple[Footprint, ReplayRepo
     return footprint, report
 
 
-def configurations_on(boards: Sequence[Board], models: Sequence[str]) -> list[Configuration]:
-    """All forms and cores on some boards; with models the weak engine of each of them instead."""
+def configurations_on(boards: Sequence[Board], models: Sequence[str], core: str = "f32") -> list[Configuration]:
+    """All forms and cores on some boards; with models the weak engine of each of them in one arithmetic instead."""
     if models:
-        return [Configuration(board, ENGINE, "f32", model) for board in boards for model in models]
+        return [Configuration(board, ENGINE, core, model) for board in boards for model in models]
     return [one for one in CONFIGURATIONS if one.board in boards]
 
 

@@ -17,6 +17,8 @@ from pvid.cli.input import form_options, read_input, with_overrides
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
+from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.survey import fitted
 
 if TYPE_CHECKING:
@@ -59,12 +61,14 @@ def command(
     from pvid.board.compare_on import compare_here, compare_there
     from pvid.board.target import targets_of
 
-    described = mechanism_rig(run_path, rig_path, settings, model)
+    described: MechanismRig | RigFile | None = mechanism_rig(run_path, rig_path, settings, model)
+    if described is None and form == "fourier":
+        described = rig_for(run_path, rig_path, settings)
     if described is not None:
         from pvid.cli.mechanism import compare_recording  # loads SymPy
 
         given = {"core": core, "form": form, "law": law, "on": targets[0] if targets else None}
-        return _shown([compare_recording(run_path, described, columns, **given)])
+        return _shown(compare_recording(run_path, described, columns, **given))
     rig = with_overrides(rig_for(run_path, rig_path, settings), form=form)
     run = read_input(run_path, rig, columns)
     rig = fitted(rig, run)

@@ -16,6 +16,8 @@ from pvid.cli.result import identified, print_result, print_warning, write_figur
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
+from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.survey import fitted
@@ -62,7 +64,10 @@ def command(
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
     reported tick and at the end.
     """
-    described = mechanism_rig(run_path, rig_path, settings, model)
+    described: MechanismRig | RigFile | None = mechanism_rig(run_path, rig_path, settings, model)
+    if described is None and form == "fourier":
+        described = rig_for(run_path, rig_path, settings)
+        core = core or "f32"
     if described is not None:
         from pvid.cli.mechanism import identify_run  # loads SymPy
 

@@ -54,7 +54,10 @@ def columns_option(command: Command) -> Command:
 def form_options(function: Command) -> Command:
     for option in (
         click.option(
-            "--form", type=click.Choice(["weak", "strong"]), help="Form of the identifier; overrides the rig file."
+            "--form",
+            type=click.Choice(["weak", "strong", "fourier"]),
+            help="Form of the identifier; overrides the rig file. fourier: the weak engine of any mechanism, from the "
+            "pendulum's description.",
         ),
         click.option(
             "--law",

@@ -14,10 +14,10 @@ from importlib.util import find_spec
 
 import click
 
-from pvid import __version__
 from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.output import watch
+from pvid.base.version import __version__
 from pvid.base.wording import reason
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
@@ -30,6 +30,8 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
     },
     "Boards": {
         "log": "Record a board's samples and estimates.",
+        "ports": "List the serial ports of this machine and the emulated boards.",
+        "view": "Show a log on the live page.",
         "export": "Convert a log to csv, parquet, mcap or npz.",
         "sizes": "Measure flash, RAM, stack and instructions on every emulated board.",
     },
@@ -55,6 +57,18 @@ _ELSEWHERE = {
     "campaign": ("bench.campaign.command", "campaign"),
 }
 _IN_A_CLONE = ("bench", "campaign")
+# Packages that not every installation has, with the extra of pvid that brings them.
+_EXTRAS = {
+    "dask": "cluster",
+    "distributed": "cluster",
+    "matplotlib": "plot",
+    "mcap": "mcap",
+    "pyarrow": "parquet",
+    "serial": "serial",
+    "starlette": "page",
+    "sympy": "models",
+    "uvicorn": "page",
+}
 
 
 def main() -> None:
@@ -77,6 +91,12 @@ def main() -> None:
         code = BAD_INPUT
     except OSError as error:
         write_stderr(f"pvid: {'' if error.filename is None else f'{error.filename}: '}{reason(error)}")
+        code = BAD_INPUT
+    except ModuleNotFoundError as error:
+        extra = _EXTRAS.get((error.name or "").partition(".")[0])
+        if extra is None:
+            raise
+        write_stderr(f"pvid: this needs the Python package {error.name}: pip install 'pvid[{extra}]'")
         code = BAD_INPUT
     except MemoryError as error:
         detail = f" ({reason(error)})" if str(error) else ""

@@ -16,25 +16,33 @@ from pvid.base.console import DONE, NOTHING_IDENTIFIED, progress_bar, write_stde
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
-from pvid.cli.input import print_notes
+from pvid.cli.input import print_notes, read_input
 from pvid.log.rig import LOG_SUFFIX, recording_of_log
 from pvid.oracle.fourier.weights import Weights
 from pvid.rig.columns import parsed
+from pvid.rig.described import described
+from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
+from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
+from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 
 if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
-    from pvid.run.mechanism_f32 import CoreAnswer
+    from pvid.run.mechanism_core import CoreAnswer
 
-_IN_C = ("core", "f32")
-_POSSIBLE = (("core", "f64"), _IN_C, ("form", "weak"))
-_COMPARED = (_IN_C, ("form", "weak"))
+ENGINE = "fourier"  # as --form: the weak engine, for a mechanism that has a weak form of its own too
+_FORMS = (("form", "weak"), ("form", ENGINE))
+_IN_C = tuple(("core", name) for name in ENGINE_CORES)
+_POSSIBLE = (("core", "f64"), *_IN_C, *_FORMS)
+_COMPARED = (("core", "all"), *_IN_C, *_FORMS)
 
 
-def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Recording, CompiledModel]:
+def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
     """The longest stretch of a recording without a missing sample, and the model with the values of the rig."""
+    if isinstance(rig, RigFile):
+        return _recording_of_own(path, rig, columns)
     model = model_of(rig)
     if path.suffix == LOG_SUFFIX:
         if columns is not None:
@@ -50,9 +58,23 @@ def recording_of(path: Path, rig: MechanismRig, columns: str | None) -> tuple[Re
     return recording, model
 
 
+def _recording_of_own(path: Path, rig: RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
+    """The same of a mechanism that has a rig file of its own: its columns, its corrections, its resolution."""
+    run = read_input(path, rig, columns, whole=True)
+    found = resolved(rig, run)
+    notes = resolution_note(rig, found)
+    print_notes(notes)
+    signals = {one.name: getattr(run, one.name) for one in rig.mechanism.model.channels}
+    return Recording(run.t, signals, run.sample_rate, (*run.notes, *notes)), _model_of(found)
+
+
+def _model_of(rig: MechanismRig | RigFile) -> CompiledModel:
+    return model_of(described(rig) if isinstance(rig, RigFile) else rig)
+
+
 def identify_run(
     path: Path,
-    rig: MechanismRig,
+    rig: MechanismRig | RigFile,
     columns: str | None,
     *,
     as_json: bool,
@@ -67,23 +89,23 @@ def identify_run(
     weights : of the rows, as in pvid.oracle.fourier.identify
     only_in_c : options that the C core alone has, by name; a value is refused
     """
-    name = model_of(rig).name
+    name = _model_of(rig).name
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
-                f"--{option} {value}: {name} is identified in float64, or in float32 by --core f32, by the weak form; "
+                f"--{option} {value}: {name} is identified in float64, or in C by --core f32 or q31, by the weak form; "
                 f"omit --{option}"
             )
-    in_c = _IN_C in only_in_c.items()
+    in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
     if weights != "residuals" and in_c:
-        raise PvidError(f"--weights {weights} is for float64; omit --core f32")
+        raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
     answer = identify_mechanism(recording, model, weights)
     core: CoreAnswer | None = None
     if in_c:
-        from pvid.run.mechanism_f32 import identify_in_c
+        from pvid.run.mechanism_core import identify_in_c
 
-        core = identify_in_c(answer)
+        core = identify_in_c(answer, in_c.name)
     shown = core or answer
     if as_json:
         click.echo(json.dumps(shown.as_json()))
@@ -105,26 +127,33 @@ def identify_run(
     return DONE
 
 
-def compare_recording(path: Path, rig: MechanismRig, columns: str | None, **given: str | None) -> Outcome:
-    """The C core against its twin on a recording of a described mechanism.
+def compare_recording(
+    path: Path, rig: MechanismRig | RigFile, columns: str | None, **given: str | None
+) -> list[Outcome]:
+    """The C core against its twin on a recording of a described mechanism, in float32 by default.
 
     Parameters
     ----------
-    given : options, by name; a value that the weak engine in float32 does not have is refused
+    given : options, by name; a value that the weak engine does not have is refused
     """
     from pvid.run.mechanism_compare import compare_recording as compared
 
-    name = model_of(rig).name
+    name = _model_of(rig).name
     for option, value in given.items():
         if value is not None and (option, value) not in _COMPARED:
             raise PvidError(
-                f"--{option} {value}: {name} is compared in float32 by the weak form on this computer; omit --{option}"
+                f"--{option} {value}: {name} is compared in float32 or fixed point by the weak form on this computer; "
+                f"omit --{option}"
             )
     recording, model = recording_of(path, rig, columns)
-    with progress_bar("f32", len(recording)) as advance:
-        found = compared(model, recording, advance)
-    verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
-    return Outcome("host", "f32", "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict)
+    outcomes = []
+    chosen = given.get("core") or FLOAT.name
+    for core in [one.name for one in ENGINE_CORES.values() if chosen in (one.name, "all")]:
+        with progress_bar(core, len(recording)) as advance:
+            found = compared(model, recording, core, advance)
+        verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
+        outcomes.append(Outcome("host", core, "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict))
+    return outcomes
 
 
 def _print(answer: MechanismAnswer) -> None:
@@ -140,11 +169,11 @@ def _print(answer: MechanismAnswer) -> None:
 
 def _print_core(core: CoreAnswer) -> None:
     if core.identified:
-        _table(core.values, f"{core.oracle.model.title}: weak form, C in float32")
+        _table(core.values, f"{core.oracle.model.title}: weak form, C in {ENGINE_CORES[core.core].words}")
     misfit = "not judged" if core.misfit is None else f"{core.misfit:.2g}"
     click.echo(
         f"status {core.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
-        f"windows of {2 * core.config.hop_s:.3g} s; hash {core.hash:08x}"
+        f"windows of {2 * core.hop_s:.3g} s; hash {core.hash:08x}"
     )
 
 

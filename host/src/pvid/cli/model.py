@@ -18,6 +18,7 @@ from pvid.cli.input import columns_option
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.model.compiled import CompiledModel
     from pvid.rig.mechanism_file import MechanismRig
+    from pvid.rig.run import Recording
     from pvid.settings.fourier import FourierConfig
 
 _MODEL = click.argument("model", metavar="MODEL")
@@ -156,7 +157,7 @@ def build(
     In the CMakeLists.txt of your firmware: add_subdirectory(OUT) and target_link_libraries(my_firmware PRIVATE NAME).
 
     NAME_design_f32.h has the tables and settings of the weak form for the rig of --run, or for the shipped rig of a
-    shipped mechanism.
+    shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point.
     """
     from pvid.codegen import build as generated
     from pvid.codegen.reaches import Reaches
@@ -164,7 +165,7 @@ def build(
     compiled, rig = _of_rig(model, rig_path, run_path)
     design = _design_of(compiled, rig, model, run_path, columns, functions)
     limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
-    options = generated.Options(limits, _numbers(soft_signs, "--soft-sign"), strong, design)
+    soft = _numbers(soft_signs, "--soft-sign")
     given = [*(["--strong"] if strong else []), *(f"--soft-sign {one}" for one in soft_signs)]
     given += [f"--reach {one}" for one in reaches]
     usual = Reaches()
@@ -174,6 +175,11 @@ def build(
     given += [f"--run {run_path.name}"] if run_path is not None else []
     given += [f"--functions {functions}"] if functions is not None else []
     title = " ".join(["pvid model build", compiled.name, *given])
+    fixed_weak: dict[str, str] = {}
+    no_fixed_weak = None
+    if design is not None:
+        fixed_weak, no_fixed_weak = _fixed_weak(compiled, rig, run_path, columns, functions, soft, title)
+    options = generated.Options(limits, soft, strong, design, fixed_weak)
     if not only_check:
         for path in generated.build(compiled, out, title, options):
             click.echo(path)
@@ -183,7 +189,9 @@ def build(
         reason = generated.weak_refusal(compiled)
         if reason is not None:
             write_stderr(f"pvid: no weak form in C: {reason}")
-        elif design is None:
+        if no_fixed_weak is not None:
+            write_stderr(f"pvid: no weak form in fixed point: {no_fixed_weak}")
+        if reason is None and design is None:
             write_stderr("pvid: no design of a rig: give a recording of it with --run")
         return DONE
     try:
@@ -258,9 +266,6 @@ def _design_of(
 ) -> FourierConfig | None:
     from pvid.codegen.build import weak_refusal
     from pvid.models.mechanisms import names as names_of_shipped
-    from pvid.rig.columns import parsed
-    from pvid.rig.mechanism_file import channels_of
-    from pvid.rig.run import read_recording
     from pvid.run.engine_design import config_for_recording, config_for_simulated_rig
 
     if columns is not None and run_path is None:
@@ -268,15 +273,46 @@ def _design_of(
     if weak_refusal(compiled) is not None:
         return None
     if run_path is not None:
-        rate = None if rig is None else rig.sample_rate
-        recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
-        recording.refuse_damaged()
-        return config_for_recording(compiled, recording.whole(), functions)
+        return config_for_recording(compiled, _recorded(compiled, rig, run_path, columns), functions)
     if model in names_of_shipped():
         return config_for_simulated_rig(compiled, functions)
     if functions is not None:
         raise PvidError("--functions needs --run: there is no rig to make a design for")
     return None
+
+
+def _fixed_weak(
+    compiled: CompiledModel,
+    rig: MechanismRig | None,
+    run_path: Path | None,
+    columns: str | None,
+    functions: int | None,
+    soft_signs: dict[str, float],
+    title: str,
+) -> tuple[dict[str, str], str | None]:
+    """Files of the fixed-point weak form, or why there are none."""
+    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
+    from pvid.run.engine_files_q31 import files_of
+
+    try:
+        if run_path is None:
+            engine = engine_for_simulated_rig(compiled, functions, soft_signs)
+        else:
+            engine = engine_for_recording(compiled, _recorded(compiled, rig, run_path, columns), functions, soft_signs)
+    except PvidError as error:
+        return {}, str(error)
+    return files_of(engine, title), None
+
+
+def _recorded(compiled: CompiledModel, rig: MechanismRig | None, run_path: Path, columns: str | None) -> Recording:
+    from pvid.rig.columns import parsed
+    from pvid.rig.mechanism_file import channels_of
+    from pvid.rig.run import read_recording
+
+    rate = None if rig is None else rig.sample_rate
+    recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
+    recording.refuse_damaged()
+    return recording.whole()
 
 
 def _numbers(given: tuple[str, ...], option: str) -> dict[str, float]:

@@ -10,6 +10,7 @@ import click
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import UPDATE, markdown, put_table
+from pvid.settings.enums import Core
 
 
 @click.command(name="sizes")
@@ -23,6 +24,7 @@ from pvid.cli.page_table import UPDATE, markdown, put_table
 @click.option(
     "--model", "models", multiple=True, metavar="NAME", help="The weak engine of a mechanism; may be repeated."
 )
+@click.option("--core", type=click.Choice(["f32", "q31"]), help="Arithmetic of --model.  [default: f32]")
 @click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON.")
 @click.argument("targets", nargs=-1, metavar="[TARGET]...")
 @click.option("--profile", "profiled", metavar="BOARD", help="Count the instructions of a tick on BOARD by function.")
@@ -32,6 +34,7 @@ def command(
     check: Path | None,
     profiled: str | None,
     models: tuple[str, ...],
+    core: Core | None,
     as_json: bool,
     targets: tuple[str, ...],
 ) -> int:
@@ -39,13 +42,15 @@ def command(
     named as TARGET."""
     from pvid.board import boards, sizes
 
+    if core is not None and not models:
+        raise PvidError("--core is for --model: without it both are measured")
     if profiled is not None:
         if budget is not None or check is not None:
             raise PvidError("--profile has no budget: omit --budget and --check")
         from pvid.board import profile
 
         on = boards.board(profiled)
-        profiles = {name: profile.profile_mechanism(on, name) for name in models} or {
+        profiles = {name: profile.profile_mechanism(on, name, core or "f32") for name in models} or {
             form: profile.profile(on, form) for form in ("strong", "weak")
         }
         put_table(update, "profile", markdown(profile.HEADER, profile.table_rows(profiles)))
@@ -53,7 +58,7 @@ def command(
     if (targets or models) and (update is not None or budget is not None or check is not None):
         raise PvidError("--update, --budget and --check measure every board: name no TARGET and no --model")
     named = [boards.board(name) for name in targets] or list(boards.BOARDS.values())
-    chosen = sizes.configurations_on(named, models)
+    chosen = sizes.configurations_on(named, models, core or "f32")
     footprints = {}
     with progress_bar("boards", len(chosen)) as advance:
         for done, configuration in enumerate(chosen):

@@ -13,6 +13,7 @@ from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, read_input, rig_options
 from pvid.cli.result import identified, print_warning
 from pvid.core.native import Native
+from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
 from pvid.rig.file import rig_path_of
 from pvid.rig.sensor_steps import resolved
@@ -21,11 +22,17 @@ from pvid.run import answer
 
 @click.command(name="tune")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@click.option("--model", help="A mechanism of `pvid models` or a model file: designs of the weak engine for it.")
 @rig_options
 @columns_option
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Rig file to write.  [default: RUN-tuned.toml]")
 def command(
-    run_path: Path, rig_path: Path | None, settings: tuple[str, ...], columns: str | None, out: Path | None
+    run_path: Path,
+    model: str | None,
+    rig_path: Path | None,
+    settings: tuple[str, ...],
+    columns: str | None,
+    out: Path | None,
 ) -> int:
     """Chooses the weak form's settings for a recorded RUN: equations (full angles, friction), window, test functions,
     pass band, decimation, forgetting.
@@ -33,7 +40,21 @@ def command(
     Candidates are judged on held-out blocks of the run. The rig file's settings are kept unless others predict these
     blocks significantly better, or equally well with clearly smaller standard errors. A result of `identify` is never
     lost. Writes a rig file with all settings; `identify` with it gives the printed result.
+
+    With --model, or a rig file with [model]: the designs of the weak form that were tried for that mechanism, the best
+    first. `identify` chooses the best by itself, so no file is written.
     """
+    described = mechanism_rig(run_path, rig_path, settings, model)
+    if described is not None:
+        from pvid.cli.mechanism import recording_of  # loads SymPy
+        from pvid.cli.mechanism_design import print_tuning
+
+        if out is not None:
+            raise PvidError(
+                "-o: nothing is written for a described mechanism, whose design is chosen on each run; omit it"
+            )
+        recording, compiled = recording_of(run_path, described, columns)
+        return print_tuning(compiled, recording)
     from pvid.run.tune import STEPS, tune
     from pvid.run.tune_table import candidates_table
 

@@ -9,13 +9,24 @@ from pathlib import Path
 
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
-from pvid.codegen import files_design, files_f32, files_fourier, files_q31, files_strong, self_test, twin_file
+from pvid.codegen import (
+    files_design,
+    files_f32,
+    files_fourier,
+    files_q31,
+    files_refine,
+    files_strong,
+    refine_twin,
+    self_test,
+    twin_file,
+)
 from pvid.codegen.banner import banner
 from pvid.codegen.fixed_model import fixed_model
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches, reaches_of
+from pvid.codegen.refine import RefineFunctions, default_widths, has_skew, refine_functions_of
 from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
@@ -59,7 +70,7 @@ if({upper}_WEAK AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_weak_f32.c)
   target_sources({name} PRIVATE {name}_weak_f32.c)
 endif()
 
-# The generated functions against the bits of their twin: ctest.
+{fixed_weak}# The generated functions against the bits of their twin: ctest.
 option({upper}_TEST "Build the test of {name}" ${{PROJECT_IS_TOP_LEVEL}})
 if({upper}_TEST)
   enable_testing()
@@ -68,6 +79,15 @@ if({upper}_TEST)
   set_target_properties({name}_test PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
   add_test(NAME {name} COMMAND {name}_test)
 endif()
+"""
+
+_CMAKE_Q31 = """\
+# {name}_weak_q31.h, the same for pvid/fourier_q31.h, integers only, with the formats of a rig.
+option({upper}_WEAK_Q31 "Build the fixed-point weak form of {name}" OFF)
+if({upper}_WEAK_Q31 AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_weak_q31.c)
+  target_sources({name} PRIVATE {name}_weak_q31.c)
+endif()
+
 """
 
 
@@ -81,12 +101,14 @@ class Options:
     soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
     strong : the strong form as well, an identifier from derivatives of the signals
     design : of the weak form for a rig; None: no NAME_design_f32.h
+    fixed_weak : files of the fixed-point weak form for a rig, name -> text (pvid.run.engine_files_q31)
     """
 
     reaches: Reaches = field(default_factory=Reaches)
     soft_signs: Mapping[str, float] = field(default_factory=dict)
     strong: bool = False
     design: FourierConfig | None = None
+    fixed_weak: Mapping[str, str] = field(default_factory=dict)
 
 
 def files_of(compiled: CompiledModel, command: str, options: Options | None = None) -> dict[str, str]:
@@ -110,7 +132,8 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         fixed = fixed_model(functions, chosen.reaches)
         files[f"{name}_q31.h"] = files_q31.header(fixed, command)
         files[f"{name}_q31.c"] = files_q31.source(fixed, command)
-    apart = [f"{name}_test.c", f"{name}_weak_f32.c"]
+    apart = [f"{name}_test.c", f"{name}_weak_f32.c", f"{name}_weak_q31.c"]
+    files |= chosen.fixed_weak
     if weak_refusal(compiled) is None:
         files |= _weak_files(compiled, command, chosen)
     if chosen.strong:
@@ -118,11 +141,21 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         files[f"{name}_strong.h"] = files_strong.header(named, command)
         files[f"{name}_strong_f32.c"] = files_strong.source(named, command)
         apart.append(f"{name}_strong_f32.c")
+    if refine_refusal(compiled) is None:
+        refined = refine_functions(compiled, chosen)
+        files["pvid/refine_shape.h"] = files_refine.shape(refined, command)
+        files["refine_model_f32.h"] = files_refine.header(refined, command)
+        files[f"{name}_refine_twin.py"] = refine_twin.text(refined, command)
     files[f"{name}_twin.py"] = twin_file.text(functions, command, fixed)
     files[f"{name}_test.c"] = self_test.source(functions, command, fixed)
     sources = " ".join(one for one in files if one.endswith(".c") and one not in apart)
+    fixed_weak = _CMAKE_Q31.format(name=name, upper=name.upper()) if chosen.fixed_weak else ""
     files["CMakeLists.txt"] = _CMAKE.format(
-        banner="\n# ".join(banner(functions, command)), name=name, upper=name.upper(), sources=sources
+        banner="\n# ".join(banner(functions, command)),
+        name=name,
+        upper=name.upper(),
+        sources=sources,
+        fixed_weak=fixed_weak,
     )
     return files
 
@@ -139,6 +172,21 @@ def _weak_files(compiled: CompiledModel, command: str, options: Options) -> dict
         needed = sizes_of_design(design.design)
         files[f"{made.name}_design_f32.h"] = files_design.header(design, needed, command, compiled.title, names)
     return files
+
+
+def refine_functions(compiled: CompiledModel, options: Options | None = None) -> RefineFunctions:
+    """Of the refinement in float32, with the chosen widths of signs and those of the description."""
+    widths = {**default_widths(compiled), **(options or Options()).soft_signs}
+    return refine_functions_of(compiled, widths, has_skew(compiled))
+
+
+def refine_refusal(compiled: CompiledModel) -> str | None:
+    """Why a model gets no files for the refinement; None where it gets them."""
+    try:
+        files_refine.header(refine_functions(compiled), "")
+    except PvidError as error:
+        return str(error)
+    return None
 
 
 def weak_refusal(compiled: CompiledModel) -> str | None:
@@ -208,6 +256,7 @@ def build(
     directory.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, text in files.items():
+        (directory / name).parent.mkdir(exist_ok=True)
         with appearing(directory / name) as path:
             path.write_text(text, encoding="utf-8")
         paths.append(directory / name)

@@ -83,7 +83,7 @@ def _tables(design: FourierDesign32) -> list[str]:
     arrays: dict[bytes, str] = {}
     parts: list[str] = []
     filters: list[str] = []
-    for one, jet in zip(design.filter, design.model.jet, strict=True):
+    for one, jet in zip(design.compensator, design.model.jet, strict=True):
         if not one.half:
             filters.append("{0, NULL}")
             continue
@@ -117,7 +117,7 @@ def _design(design: FourierDesign32) -> str:
         "power": design.power,
         "decimation": design.decimation,
         "hop": design.hop,
-        "filter": f"{name}_filter",
+        "compensator": f"{name}_filter",
         "circle": f"{name}_circle",
         "noise": f"{name}_noise" if design.noise else "NULL",
         "n_noise": len(design.noise),

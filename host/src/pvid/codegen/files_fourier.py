@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -103,11 +104,42 @@ def source(made: FourierFunctions, model: FourierModel, command: str) -> str:
         UNCONTRACTED,
         includes_of(f"{name}_weak.h", functions_in(made), ("stddef.h",)),
         *(c_f32.function(_signature(one), one.program) for one in functions_in(made)),
+        _form(model),
         model_struct(own, "theta", "jacobian").replace("\nconst ", "\nstatic const ", 1),
         *_tables(model, upper),
         _struct(model, name, upper),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _form(model: FourierModel) -> str:
+    """The function that makes the channels of a step."""
+    square = "half_square"
+    lines = []
+    for place, one in enumerate(model.channel):
+        if one.gain == NONE:
+            continue
+        factors = [f"gain[{one.gain}]"]
+        if one.fold and one.integrand == NONE:
+            factors.append("t" if one.fold == 1 else square)
+        elif one.fold:
+            factors.append(f"integral[{2 * one.integrand + one.fold - 1}]")
+        lines.append(f"    channel[{place}] = {' * '.join(factors)};")
+    text = "\n".join(lines)
+    first = [f"    const float {square} = 0.5f * (t * t);"] if square in text else []
+    unused = [
+        f"    (void){name};" for name in ("integral", "t") if not re.search(rf"\b{name}\b", "\n".join([*first, text]))
+    ]
+    return "\n".join(
+        [
+            "static void form(const float gain[], const float integral[], float t, float channel[])",
+            "{",
+            *unused,
+            *first,
+            text,
+            "}",
+        ]
+    )
 
 
 def _signature(function: Function) -> str:
@@ -151,6 +183,7 @@ def _struct(model: FourierModel, name: str, upper: str) -> str:
             *(f"    .{one} = {one}," for one in ("signal", "jet", "channel", "term", "kind")),
             f"    .prepare = {'prepare' if model.prepare else 'NULL'},",
             "    .values = values,",
+            "    .form = form,",
             f"    .model = &{name}_weak_model_f32,",
             "};",
         ]

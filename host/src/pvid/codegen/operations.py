@@ -118,19 +118,32 @@ def program_of(
     PvidError
         For a symbol that is no argument, and for a function other than sin, cos, tan, sgn, abs and sqrt.
     """
-    builder = _Builder(arguments, widths or {})
+    builder = Builder(arguments, widths or {})
     results = tuple(builder.place_of(sp.sympify(one)) for one in expressions)
     return Program(tuple(names or map(str, arguments)), tuple(builder.values), results)
 
 
-class _Builder:
-    """The list as it grows; equal values share a place."""
+class Builder:
+    """The list as it grows; equal values share a place.
 
-    def __init__(self, arguments: Sequence[sp.Expr], widths: Mapping[str, float]) -> None:
+    `definitions` holds symbols that stand for expressions in arguments and other symbols; each is computed where it is
+    first needed. `fixed` are arguments that change seldom: in products what depends on them alone is one factor, with
+    its divisions, which a caller can compute ahead.
+    """
+
+    def __init__(
+        self,
+        arguments: Sequence[sp.Expr],
+        widths: Mapping[str, float],
+        definitions: Mapping[sp.Expr, sp.Expr] | None = None,
+        fixed: Iterable[sp.Symbol] = (),
+    ) -> None:
         self.values: list[Value] = []
         self._places: dict[Value, int] = {}
         self._arguments = {one: Argument(place) for place, one in enumerate(arguments)}
         self._widths = widths
+        self._definitions = definitions or {}
+        self._fixed = dict.fromkeys(fixed, True)
 
     def _put(self, value: Value) -> int:
         if value not in self._places:
@@ -147,6 +160,8 @@ class _Builder:
         """The place of its value."""
         if e in self._arguments:
             return self._put(self._arguments[e])
+        if e in self._definitions:
+            return self.place_of(self._definitions[e])
         if e.is_number:
             return self._put(Literal(exact(e)))
         if e.is_Symbol:
@@ -178,9 +193,14 @@ class _Builder:
         factor = exact(constant)
         if factor < 0:
             return self._do("neg", self.place_of(-e))
+        parts = sorted(sp.Mul.make_args(rest), key=sp.default_sort_key)
+        ahead = [one for one in parts if self._is_fixed(one)]
+        if ahead and len(ahead) < len(parts) and (len(ahead) > 1 or factor != 1 or not ahead[0].is_Symbol):
+            first = self.place_of(sp.Mul(constant, *ahead))
+            return self._do("*", first, self.place_of(sp.Mul(*[one for one in parts if one not in ahead])))
         above: list[int] = []
         below: list[int] = []
-        for one in sorted(sp.Mul.make_args(rest), key=sp.default_sort_key):
+        for one in parts:
             if one.is_Pow and one.exp.is_number and one.exp.is_negative:
                 below.append(self.place_of(one.base**-one.exp))
             else:
@@ -191,6 +211,16 @@ class _Builder:
             numerator = literal if numerator is None else self._do("*", literal, numerator)
         denominator = self._all(below)
         return numerator if denominator is None else self._do("/", numerator, denominator)
+
+    def _is_fixed(self, e: sp.Expr) -> bool:
+        """Whether it depends on fixed arguments alone; never where there are none."""
+        if e not in self._fixed:
+            if e in self._definitions:
+                self._fixed[e] = bool(self._fixed) and self._is_fixed(self._definitions[e])
+            else:
+                symbols = e.free_symbols if not e.is_Symbol else set()
+                self._fixed[e] = bool(symbols) and all(self._is_fixed(one) for one in symbols)
+        return self._fixed[e]
 
     def _all(self, factors: Sequence[int]) -> int | None:
         """Their product from the left."""

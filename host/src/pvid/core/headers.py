@@ -14,7 +14,7 @@ import numpy.typing as npt
 from cffi import FFI
 
 from pvid.base.errors import PvidError
-from pvid.core.sources import ROOT
+from pvid.core.sources import IS_CLONE, PACKAGE, ROOT
 
 HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the build makes with them
 
@@ -32,7 +32,8 @@ def default_library() -> Path:
 
 
 def _built() -> Path:
-    return ROOT / "build" / "host" / "host" / "native" / "libpvid_native.so"
+    folder = ROOT / "build" / "host" / "host" / "native" if IS_CLONE else PACKAGE
+    return folder / "libpvid_native.so"
 
 
 @dataclass

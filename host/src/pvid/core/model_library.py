@@ -9,26 +9,32 @@ import hashlib
 import os
 import subprocess
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
 from pvid.base.errors import PvidError
-from pvid.base.user_cache import built_under
 from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler
-from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, core_sources
+from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
+from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.enums import Core
 
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
 _ROOMS = ("number", "solve", "judge", "fourier", "keep")
-_NOT = ("_q31", "_strong_f32", "_weak_f32")  # ends of names that the weak engine does without
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"
 
 
-def model_library(name: str, texts: Mapping[str, str], sizes: Mapping[str, int]) -> Path:
+def model_library(
+    name: str,
+    texts: Mapping[str, str],
+    sizes: Mapping[str, int],
+    core: Core = "f32",
+    headers: Sequence[str] | None = None,
+) -> Path:
     """The shared library, beside it what cffi reads.
 
     Parameters
@@ -36,6 +42,8 @@ def model_library(name: str, texts: Mapping[str, str], sizes: Mapping[str, int])
     name : of the mechanism, for the file's name
     texts : file name -> generated C
     sizes : PVID_MAX_ macro -> value
+    core : arithmetic
+    headers : names of the texts that cffi reads; None: all headers
 
     Raises
     ------
@@ -45,11 +53,12 @@ def model_library(name: str, texts: Mapping[str, str], sizes: Mapping[str, int])
     compiler = host_compiler(_WHAT)
     definitions = [f"-D{macro}={size}" for macro, size in sorted(sizes.items())]
     key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
-    folder = built_under(ROOT / "build") / "cache" / "models" / f"{name}-{key.hexdigest()[:20]}"
+    folder = build_folder() / "cache" / "models" / f"{name}-{core}-{key.hexdigest()[:20]}"
     library = folder / f"lib{name}.so"
     if not library.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
-        _build(compiler, texts, definitions, library)
+        declared = headers or sorted(one for one in texts if one.endswith(".h"))
+        _build(compiler, texts, definitions, library, core, declared)
     return library
 
 
@@ -58,9 +67,12 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def _sources() -> list[Path]:
+def _sources(core: Core) -> list[Path]:
     rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in _ROOMS]
-    return [*(path for path in rooms if not path.stem.endswith(_NOT)), NATIVE / "replay_fourier.c"]
+    return [
+        *(path for path in rooms if not path.stem.endswith(ENGINE_CORES[core].without)),
+        NATIVE / f"{ENGINE_CORES[core].replay}.c",
+    ]
 
 
 @cache
@@ -74,7 +86,14 @@ def _core_hash() -> str:
     return whole.hexdigest()
 
 
-def _build(compiler: str, texts: Mapping[str, str], definitions: list[str], library: Path) -> None:
+def _build(
+    compiler: str,
+    texts: Mapping[str, str],
+    definitions: list[str],
+    library: Path,
+    core: Core,
+    headers: Sequence[str],
+) -> None:
     """Whole or not at all: several processes may build the same."""
     with tempfile.TemporaryDirectory(dir=library.parent.parent) as made:
         folder = Path(made) / "library"
@@ -84,9 +103,12 @@ def _build(compiler: str, texts: Mapping[str, str], definitions: list[str], libr
         options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}", f"-I{folder}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            objects = list(pool.map(lambda path: _object(compiler, options, path, Path(made)), [*code, *_sources()]))
+            objects = list(
+                pool.map(lambda path: _object(compiler, options, path, Path(made)), [*code, *_sources(core)])
+            )
         _run([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
-        (folder / HEADERS).write_text(_declarations(compiler, texts, options, Path(made)), encoding="utf-8")
+        declared = _declarations(compiler, headers, options, Path(made), core)
+        (folder / HEADERS).write_text(declared, encoding="utf-8")
         try:
             folder.rename(library.parent)
         except OSError:
@@ -100,15 +122,15 @@ def _object(compiler: str, options: list[str], source: Path, folder: Path) -> st
     return made
 
 
-def _declarations(compiler: str, texts: Mapping[str, str], options: list[str], folder: Path) -> str:
+def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, core: Core) -> str:
     """The headers, preprocessed: cffi knows the types of the standard ones."""
     empty = folder / "no_standard_headers"
     empty.mkdir()
     for name in _STANDARD:
         (empty / f"{name}.h").write_text("", encoding="utf-8")
-    own = [f'#include "{name}"' for name in sorted(texts) if name.endswith(".h")]
+    own = [f'#include "{name}"' for name in headers]
     top = folder / "native.h"
-    top.write_text("\n".join(['#include "replay_fourier.h"', *own, ""]), encoding="utf-8")
+    top.write_text("\n".join([f'#include "{ENGINE_CORES[core].replay}.h"', *own, ""]), encoding="utf-8")
     return _run([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.headers import Headers, Tables, default_library
+from pvid.core.headers import Filled, Headers, Tables, default_library
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Status
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.f32 import StrongConfig
 from pvid.settings.forms import FORMS
 from pvid.settings.kinds import Settings
 from pvid.settings.q31 import EstimatorConfigQ31, ScaleQ31
@@ -32,12 +32,11 @@ class _Arithmetic(NamedTuple):
     sums: type[np.generic]
     exponents: bool  # of the sums
     misfit_unit: float
-    n_sums: Callable[[Any], int]  # of pvid_information_<core>
 
 
 _ARITHMETIC: dict[Core, _Arithmetic] = {
-    "f32": _Arithmetic(np.float32, np.float32, False, 1.0, lambda sums: sums.n_moments + sums.n_theta + 2),
-    "q31": _Arithmetic(np.int32, np.int64, True, 2.0**-16, lambda sums: sums.n_sums),
+    "f32": _Arithmetic(np.float32, np.float32, False, 1.0),
+    "q31": _Arithmetic(np.int32, np.int64, True, 2.0**-16),
 }
 
 # Models of the fixed-point core by the lengths of p and theta.
@@ -89,10 +88,9 @@ class Native:
         """An initialised identifier of the configuration's form and core."""
         return Identifier(self, config)
 
-    def estimator(self, config: EstimatorConfig, update_rate: float) -> Stepper:
-        """An initialised float estimator of the strong form; its input are rows."""
-        model = self.headers.ffi.addressof(self.library, f"pvid_{DEFAULT}_strong_f32")
-        return Stepper(self, "estimator", "f32", config, replay="rows", model=model, update_rate_hz=update_rate)
+    def of_derivatives(self, config: StrongConfig) -> Stepper:
+        """An initialised identifier of the strong form in float32; its input are phi [ticks, 5] and u [ticks, 3]."""
+        return StrongStepper(self, "strong", "f32", config, replay="derivatives")
 
     def estimator_q31(self, config: EstimatorConfigQ31) -> Stepper:
         """An initialised fixed-point estimator on one of the core's models; its input are rows, one per group."""
@@ -182,7 +180,7 @@ class Stepper:
         self.core = core
         self._name = name
         self._replay = replay
-        self._filled = native.headers.filled(f"pvid_{self._configured or name}_config_{core}", config)
+        self._filled = self._filled_with(native, f"pvid_{self._configured or name}_config_{core}", config)
         for field, value in given.items():
             setattr(self.config_struct, field, value)
         self._hash = np.array([0x811C9DC5], np.uint32)
@@ -193,20 +191,22 @@ class Stepper:
         self._arithmetic = _ARITHMETIC[core]
         self.n_p, self._n_sums = self._sizes()
 
-    def _sizes(self) -> tuple[int, int]:
-        """Numbers of parameters and of sums."""
-        if self._is_kapitza_estimator:
-            return len(self.estimator.p), len(self.estimator.sums)
-        return int(self.estimator.model.n_p), self._arithmetic.n_sums(self.estimator.information)
-
-    @property
-    def _is_kapitza_estimator(self) -> bool:
-        """Whether the estimator is that of the fixed-point strong form, not the general one."""
-        return "model" not in dict(self.native.headers.ffi.typeof(self.estimator).fields)
+    def _filled_with(self, native: Native, kind: str, config: Any) -> Filled:
+        """The configuration in C."""
+        return native.headers.filled(kind, config)
 
     def _call(self, verb: str, *arguments: Any) -> Any:
         """Its function pvid_<name>_<verb>_<core>."""
         return getattr(self.native.library, f"pvid_{self._name}_{verb}_{self.core}")(self.state, *arguments)
+
+    def _sizes(self) -> tuple[int, int]:
+        """Number of parameters and of sums."""
+        estimator = self.estimator
+        if not hasattr(estimator, "model"):  # the strong form's own
+            return len(estimator.p), len(estimator.sums if self.core == "q31" else estimator.sums.low)
+        sums = estimator.information
+        n_sums = sums.n_sums if self.core == "q31" else sums.n_moments + sums.n_theta + 2
+        return int(estimator.model.n_p), int(n_sums)
 
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
@@ -309,10 +309,23 @@ class Stepper:
         """Standard errors and kappa at the present state: pvid_estimate_<core>, shape ()."""
         headers = self.native.headers
         out = np.empty((), self._estimate_type)
-        owner = f"{DEFAULT}_estimator" if self._is_kapitza_estimator else "estimator"
+        own = not hasattr(self.estimator, "model")
+        if own and self.core == "f32":
+            self.native.library.pvid_strong_assess_f32(self.state, headers.pointer(out))
+            return out
+        owner = f"{DEFAULT}_estimator" if own else "estimator"
         assess = getattr(self.native.library, f"pvid_{owner}_assess_{self.core}")
         assess(headers.ffi.addressof(self.estimator), headers.pointer(out))
         return out
+
+
+class StrongStepper(Stepper):
+    """The strong form's state in C, with its own estimator."""
+
+    @property
+    def estimator(self) -> Any:
+        """pvid_strong_estimator_f32 in it."""
+        return self.state.estimator
 
 
 class StrongEstimatorQ31(Stepper):

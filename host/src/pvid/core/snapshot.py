@@ -8,7 +8,7 @@ from pvid.core.native import Identifier, Native
 from pvid.settings.enums import SnapshotStatus
 
 # Header, checksum, and the storage of the angle's correction, which stands behind the object.
-ROOM_BESIDE_THE_OBJECT = 32 + 8192
+ROOM_BESIDE_THE_OBJECT = 40 + 8192
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pvid.base.user_cache import built_under
 from pvid.models.registry import DEFAULT
 
-ROOT = Path(__file__).resolve().parents[4]
+PACKAGE = Path(__file__).resolve().parents[1]
+_IN_WHEEL = PACKAGE / "sources"
+IS_CLONE = not _IN_WHEEL.is_dir()
+ROOT = PACKAGE.parents[2] if IS_CLONE else _IN_WHEEL
 FIRMWARE = ROOT / "firmware"
 SRC = FIRMWARE / "src"
 MODEL = FIRMWARE / "models" / DEFAULT  # the one that the library is built with
@@ -15,6 +19,11 @@ FOLDERS = (*PUBLIC_FOLDERS, SRC, MODEL)
 PUBLIC_INCLUDES = [f"-I{folder}" for folder in PUBLIC_FOLDERS]
 INCLUDES = [f"-I{folder}" for folder in FOLDERS]
 _CORES = ("_f32", "_q31")
+
+
+def build_folder() -> Path:
+    """Where something may be built: build/ of the clone, or the user's cache."""
+    return built_under(ROOT / "build") if IS_CLONE else built_under(Path("/nonexistent"))
 
 
 def core_sources(pattern: str = "*.c") -> list[Path]:

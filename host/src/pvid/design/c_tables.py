@@ -54,8 +54,8 @@ def bank_header(bank: FirBank, name: str, made_by: str) -> str:
         f"{bank.kind}, {2 * bank.half + 1} points {bank.stride} samples apart; exact on polynomials of degree "
         f"{bank.degree}.",
         "",
-        f"  .bank = {{.half = {bank.half}, .stride = {bank.stride}, .weights = {name}}}",
-        f"  needs PVID_MAX_WINDOW >= {bank.window}",
+        f"  .bank = {{.half = {bank.half}, .stride = {bank.stride}, .block = {bank.block}, .weights = {name}}}",
+        f"  needs PVID_MAX_WINDOW >= {bank.memory}",
     ]
     return _guarded(name, banner, [array])
 

@@ -41,12 +41,14 @@ class FirBank(Folded):
     stride : samples from point to point
     kind : the method of design
     degree : highest degree of the polynomials on which all five orders are exact
+    block : samples whose mean is a point
     """
 
     weights: Float
     stride: int
     kind: Kind
     degree: int
+    block: int = 1
 
     @property
     def weights32(self) -> npt.NDArray[np.float32]:
@@ -61,14 +63,16 @@ class FirBank(Folded):
         Shape [5, n - 2 delay]; column j belongs to sample j + delay.
         """
         samples = np.asarray(x, np.float64)
-        count = samples.size - 2 * self.delay
+        count = samples.size - self.window + 1
         if count <= 0:
             raise PvidError(f"{samples.size} samples do not fill the differentiator's window of {self.window}")
-        centre = samples[self.delay : self.delay + count]
+        points = np.convolve(samples, np.full(self.block, 1 / self.block), "valid") if self.block > 1 else samples
+        reach = self.half * self.stride
+        centre = points[reach : reach + count]
         out = np.zeros((ORDERS, count))
         for i in range(1, self.half + 1):
-            after = samples[self.delay + i * self.stride :][:count]
-            before = samples[self.delay - i * self.stride :][:count]
+            after = points[reach + i * self.stride :][:count]
+            before = points[reach - i * self.stride :][:count]
             q = (after - centre) + (before - centre)
             d = after - before
             for order in range(ORDERS):
@@ -102,14 +106,18 @@ def finite_difference(stride: int = 1) -> FirBank:
 
 
 @lru_cache(maxsize=64)
-def savitzky_golay(window: int, degree: int, stride: int = 1) -> FirBank:
+def savitzky_golay(window: int, degree: int, stride: int = 1, block: int = 1) -> FirBank:
     """Derivatives at the centre of the least-squares polynomial through the window's points.
+
+    With a block each point is the mean of `block` samples, and the polynomial is fitted to these means: exact on
+    polynomials of the degree, whatever the block, at the cost of a bank of `window` points.
 
     Parameters
     ----------
     window : points in the window, odd and above `degree`
     degree : of the polynomial, 4..12
     stride : samples from point to point
+    block : samples of a point, odd
 
     Notes
     -----
@@ -122,22 +130,26 @@ def savitzky_golay(window: int, degree: int, stride: int = 1) -> FirBank:
         raise PvidError(f"a Savitzky-Golay polynomial must have degree 4 to {MAX_DEGREE}, not {degree}")
     if window % 2 == 0 or window <= degree:
         raise PvidError(f"a Savitzky-Golay window must be odd and above the degree {degree}, not {window} points")
+    if block < 1 or block % 2 == 0:
+        raise PvidError(f"the block of a Savitzky-Golay window must be odd, not {block} samples")
     _require_window(window, stride)
     half = (window - 1) // 2
+    offsets = (np.arange(block) - (block - 1) / 2) / stride  # of a block's samples from its centre [points]
     weights = np.empty((ORDERS, half))
     for parity in (0, 1):
         degrees = list(range(parity, degree + 1, 2))
         points = np.arange(parity, half + 1)  # an odd polynomial vanishes at the centre
         # Each point but the centre stands for two.
         multiplicity = np.where(points == 0, 1.0, math.sqrt(2.0))
-        basis = legendre.legvander(points / half, degree)[:, degrees] * multiplicity[:, np.newaxis]
+        of_samples = legendre.legvander((points[:, np.newaxis] + offsets) / half, degree)[..., degrees]
+        basis = of_samples.mean(axis=1) * multiplicity[:, np.newaxis]
         q, r = np.linalg.qr(basis)
         for order in range(parity, ORDERS, 2):
             at_centre = np.array([_legendre_derivative(n, order) for n in degrees]) / float(half) ** order
             taps = q @ np.linalg.solve(r.T, at_centre) / multiplicity
             weights[order] = taps[points > 0]
     weights.setflags(write=False)
-    return FirBank(weights, stride, "savitzky-golay", degree)
+    return FirBank(weights, stride, "savitzky-golay", degree, block)
 
 
 def _legendre_derivative(degree: int, order: int) -> float:

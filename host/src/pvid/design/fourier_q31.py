@@ -7,13 +7,14 @@ quantity gets the finest format in which its bound fits its type, so that no sum
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.settings.fourier import NONE, FourierChannel, FourierDesign32, FourierJet, Source
+from pvid.settings.fourier import NONE, FourierChannel, FourierDesign32, FourierJet, FourierSignal, Source
 from pvid.settings.fourier_q31 import (
     FourierDesignQ31,
     FourierFilterQ31,
@@ -30,7 +31,7 @@ CIRCLE = 32767  # 1 in the table of cosines
 CHANNEL_BITS = 28  # of a channel
 DOWN = 14  # of a block's products, to 32 bits
 _WORD = 30  # bits of a rounded sum or integral: one is spare
-_WEIGHT_BITS = 13  # that a filter's largest weight has at least; with fewer in 32-bit products it gets wide ones
+_BLOCK_BITS = 28  # of a block sum: a pair of differences fits a word
 
 # Of each source: its largest integer in full scales, and its unit in counts.
 _REACH = {Source.SAMPLED: 1, Source.HELD: 28, Source.JUMP: 2}
@@ -85,6 +86,15 @@ class _Margins(dict[str, float]):
         self[name] = min(spare, self.get(name, spare))
 
 
+def most_counts(signals: Sequence[FourierSignal], samples: int, decimation: int) -> list[int]:
+    """Largest full scale of each sample whose block sums fit a word [samples]."""
+    found = [2**24] * samples
+    for one in signals:
+        room = math.floor((2**31 - 1) / (_REACH[one.source] * decimation**2))
+        found[one.sample] = min(found[one.sample], room)
+    return found
+
+
 def shift_to(most: float, bits: float) -> int:
     """Shift right, not negative, that brings |x| <= most to 2^bits at most."""
     return max(0, math.ceil(math.log2(most) - bits)) if most > 0 else 0
@@ -111,9 +121,10 @@ def fixed_design(
     if sizes.hop % BLOCK:
         raise PvidError(f"half a window has {sizes.hop} steps: the weak engine takes a multiple of {BLOCK}")
     dt = sizes.decimation / sensing.sample_rate
+    blocks = tuple(_Block(model, place, sizes.decimation, sensing, margins) for place in range(len(model.signal)))
     filters = tuple(
-        _filter(model, jet, np.asarray(one.weights, np.float64), bits, sensing, margins)
-        for jet, one, bits in zip(model.jet, sizes.filter, formats.jets, strict=True)
+        _filter(blocks[jet.signal], jet, np.asarray(one.weights, np.float64), bits, margins)
+        for jet, one, bits in zip(model.jet, sizes.compensator, formats.jets, strict=True)
     )
     runs = tuple(
         _run(reach, rate, bits, dt, margins)
@@ -127,11 +138,12 @@ def fixed_design(
         once = 28.0 * sizes.hop * most
         twice = 28.0 * sizes.hop**2 * most + 8.0 * sizes.hop * most
         margins.take("a double integral", twice, 62)
-        integral.append((shift_to(once, _WORD), shift_to(twice, _WORD)))
-    sum_shift = max(1, shift_to(sizes.hop * 2.0 ** (CHANNEL_BITS + 15 - DOWN) + sizes.hop, _WORD))
+        integral.append((max(1, shift_to(once, _WORD)), max(1, shift_to(twice, _WORD))))
+    sum_shift = max(1, shift_to(sizes.hop * (2.0 ** (CHANNEL_BITS + 15 - DOWN) + 2), _WORD - 1e-6))
     channels = _Channels(model, sizes.hop, sum_shift, formats, tuple(integral), margins)
     units = tuple(channels.unit(k, dt) for k in range(len(model.channel)))
     omega = math.pi / (sizes.hop * dt)
+    highest = sizes.functions // 2 + sizes.power // 2
     terms = zip(sizes.model.term, model.term, strict=True)
     return FourierDesignQ31(
         model=model,
@@ -141,6 +153,7 @@ def fixed_design(
         hop=sizes.hop,
         sum_shift=sum_shift,
         full_scale=sensing.full_scale,
+        down=tuple(one.down for one in blocks),
         filter=filters,
         run=runs,
         sign_width=widths,
@@ -148,7 +161,8 @@ def fixed_design(
         format=tuple(channels.format(k) for k in range(len(model.channel))),
         circle=np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * sizes.hop) / sizes.hop)).astype(np.int16),
         factor=tuple(
-            scaled_number(float(theirs.factor) * units[mine.channel] * omega**mine.order) for theirs, mine in terms
+            scaled_number(float(theirs.factor) * units[mine.channel] * (highest * omega) ** mine.order)
+            for theirs, mine in terms
         ),
         noise=tuple(
             FourierNoiseQ31(
@@ -190,39 +204,40 @@ def rescale_to(most: float, gain: float, name: str) -> Rescale:
     return Rescale(down, shift, multiplier)
 
 
-def _filter(
-    model: FourierModelQ31, jet: FourierJet, weights: Float, bits: int, sensing: Sensing, margins: _Margins
-) -> FourierFilterQ31:
-    signal = model.signal[jet.signal]
-    most = _REACH[signal.source] * sensing.full_scale[signal.sample]
-    unit = sensing.lsb[signal.sample]
-    if signal.source == Source.HELD:
-        unit /= 24
-    elif signal.source == Source.JUMP:
-        unit /= 12 * sensing.sample_rate
+class _Block:
+    """Block sums of a signal, shifted: bounds and unit."""
+
+    def __init__(
+        self, model: FourierModelQ31, place: int, decimation: int, sensing: Sensing, margins: _Margins
+    ) -> None:
+        signal = model.signal[place]
+        most = _REACH[signal.source] * sensing.full_scale[signal.sample] * decimation**2
+        margins.take(f"the sums of {decimation} samples of signal {place}", most, 31)
+        self.down = shift_to(most, _BLOCK_BITS)
+        self.most = most / 2.0**self.down + 1
+        self.unit = sensing.lsb[signal.sample] * 2.0**self.down / decimation**2
+        if signal.source == Source.HELD:
+            self.unit /= 24
+        elif signal.source == Source.JUMP:
+            self.unit /= 12 * sensing.sample_rate
+
+
+def _filter(block: _Block, jet: FourierJet, weights: Float, bits: int, margins: _Margins) -> FourierFilterQ31:
     name = f"jet {jet.order} of signal {jet.signal}"
-    margins.take(name, most, _WORD)
-    pair = (2 if jet.order % 2 else 4) * most
-    place = _WORD - math.ceil(math.log2(most))  # where there are no weights: as many bits as x leaves free
-    is_wide = False
+    pair = (2 if jet.order % 2 else 4) * block.most
+    place = _WORD - math.ceil(math.log2(block.most))  # where there are no weights: as many bits as x leaves free
     if weights.size:
-        largest = float(np.abs(weights).max())
-        place = math.floor(math.log2((2**31 - 1 - pair) / (largest * pair)))
-        is_wide = largest * 2.0**place < 2**_WEIGHT_BITS
-        if is_wide:
-            place = math.floor(math.log2((2**_WORD - 1) / largest))
-        if jet.order == 0:
-            place = min(place, 31)
+        room = min(2.0**_WORD / float(np.abs(weights).max()), 2.0**61 / (pair * float(np.abs(weights).sum())))
+        place = math.floor(math.log2(room))
+    if jet.order == 0:
+        place = min(place, _WORD)
     whole = np.rint(weights * 2.0**place).astype(np.int64)
-    correction = 1.0
-    if jet.order and weights.size:
-        # The slope's gain is exact whatever the rounding of the weights.
-        power = np.arange(1.0, weights.size + 1) ** jet.order
-        correction = float(np.sum(weights * power) * 2.0**place / np.sum(whole * power))
-    total = pair * float(np.abs(whole).sum()) + (most * 2.0**place if jet.order == 0 else 0.0)
+    total = pair * float(np.abs(whole).sum()) + (block.most * 2.0**place if jet.order == 0 else 0.0)
     margins.take(f"the sum of {name}", total, 62)
-    rescale = rescale_to(total, unit * correction * 2.0 ** (bits - place), name)
-    return FourierFilterQ31(whole.astype(np.int32), place if jet.order == 0 else 0, is_wide, rescale)
+    # A sum beyond an int32 of the jet's format saturates, as a jet beyond its reach: its upper bits are not needed.
+    gain = block.unit * 2.0 ** (bits - place)
+    rescale = rescale_to(min(total, 2.0**31 / gain), gain, name)
+    return FourierFilterQ31(whole.astype(np.int32), place if jet.order == 0 else 0, rescale)
 
 
 def _run(reach: float, rate_bits: int, bits: int, dt: float, margins: _Margins) -> Rescale:
@@ -272,7 +287,7 @@ class _Channels:
         return size / 2.0**self.sum_shift + self.hop
 
     def format(self, k: int) -> FourierFormatQ31:
-        """Its shifts; the sums with shifted integrals fit 31 bits."""
+        """Its shifts; the sums with shifted integrals fit 30 bits."""
         one = self.model.channel[k]
         value, own = self.value(k), 0
         while True:
@@ -285,8 +300,8 @@ class _Channels:
                 once, twice = self.integral[one.integrand] if one.integrand != NONE else (0, 0)
                 ramp = twice - once + value + own - self.value(one.ramp)
                 total += self.edge(one, 1) * self.half_sum(one.ramp) / 2.0**ramp + 1
-            if plain >= 0 and ramp >= 0 and total < 2**31 - 1:
-                self.margins.take("the sums of a window", total, 31)
+            if plain >= 0 and ramp >= 0 and total < 2**30:
+                self.margins.take("the sums of a window", total, 30)
                 return FourierFormatQ31(value, own, plain, ramp)
             own += 1
 

@@ -15,9 +15,9 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pvid import __version__
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
+from pvid.base.version import __version__
 from pvid.log.reader import LogReader
 from pvid.log.rig import hello_of_log
 from pvid.log.values import TABLE_NAMES, Column, Rows, Tables, Values

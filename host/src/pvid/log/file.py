@@ -30,8 +30,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pvid import __version__
 from pvid.base.errors import PvidError
+from pvid.base.version import __version__
 from pvid.base.wording import printable
 from pvid.link import frames as link
 from pvid.link.frames import Decoder, Frame, Message, Schema, readers, wire

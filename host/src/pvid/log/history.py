@@ -22,7 +22,7 @@ from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Names,
 from pvid.log.file import Segment
 from pvid.log.reader import Account, Record, Restart
 from pvid.log.values import UNKNOWN_RIG, Rows, Values
-from pvid.models.model import Mechanism, Model
+from pvid.models.model import Constants, Mechanism, Model
 
 Float = npt.NDArray[np.float64]
 
@@ -75,10 +75,11 @@ class Thinned(Generic[T]):
 
 @dataclass(eq=False)
 class _Point:
-    """An estimate; `row` are its time [s] and numbers once they have been computed."""
+    """An estimate; `row` are its time [s] and numbers once they have been computed, `reason` is its Reason.text."""
 
     record: Record
     row: tuple[float, ...] = ()
+    reason: str = ""
 
 
 class History:
@@ -117,6 +118,12 @@ class History:
         """The mechanism's."""
         self._work_off()
         return self._values.mechanism.model
+
+    @property
+    def constants(self) -> Constants | None:
+        """Those of the rig; None: they are not known."""
+        self._work_off()
+        return self._values.mechanism.constants
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -174,6 +181,15 @@ class History:
         self._work_off()
         at = 0 if name == "t" else 1 + self.numbers.index(name)
         return np.array([point.row[at] for point in self._estimates.rows if point.row], np.float64)
+
+    def withheld(self) -> list[tuple[float, str]]:
+        """Time [s] and reason (Reason.text) of each window in the history that was held or rejected."""
+        self._work_off()
+        return [
+            (point.row[0], point.reason)
+            for point in self._estimates.rows
+            if point.row and point.reason.startswith(("held", "rejected"))
+        ]
 
     def samples(self) -> Float:
         """The last `window_s` of t [s] and the channels: [1 + channels, n]."""
@@ -238,7 +254,7 @@ class History:
         t = float(self._since_began(rows.columns["log_time"])[0])
         self._newest = {name: float(rows.columns[name][0]) for name in self.numbers}
         self._reason = str(rows.columns["reason"][0])
-        point.row = (t, *self._newest.values())
+        point.row, point.reason = (t, *self._newest.values()), self._reason
 
 
 def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:

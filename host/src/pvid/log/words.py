@@ -25,6 +25,9 @@ _REASONS = {
     Reason.HELD_OUT_OF_RANGE: "the angle exceeded the range of the equations; the window was dropped",
     Reason.HELD_FROZEN: "frozen: new data are ignored",
     Reason.NOT_READY: "the identifier has no configuration, or refused it",
+    Reason.HELD_SEARCHING: "refinement: no block of samples fits the equations yet",
+    Reason.HELD_BLOCK: "refinement: the block does not fit the equations, or contradicts those before it",
+    Reason.HELD_DISAGREES: "refinement: it differs from the weak form by more than the errors of both",
     Reason.MISFIT: "the estimate was updated, but residuals exceed the sensors' noise: friction, large angles or "
     "another mechanism",
 }

@@ -30,6 +30,9 @@ class Signal:
     hold : "zoh": the value set at t_k holds until t_(k+1); "sampled": the value at t_k
     driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
     gain_sd : relative standard deviation of its gain; part of the standard errors, because a run seldom shows it
+    neglected
+        the equations are linearised: their relative error is up to this many times the square of the signal, from its
+        mean; part of the standard errors [1/unit^2]
     """
 
     jet: Jet
@@ -41,6 +44,7 @@ class Signal:
     hold: Literal["zoh", "sampled"] = "sampled"
     driven: bool = False
     gain_sd: float = 0.0
+    neglected: float = 0.0
 
     @property
     def name(self) -> str:
@@ -133,6 +137,47 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Extra:
+    """An unknown that the refinement has and the rows have not; it is additive and starts at 0.
+
+    Attributes
+    ----------
+    symbol : in the equations of the refinement
+    unit : as in "1/s"
+    sd : how far from 0 it can be [unit]
+    """
+
+    symbol: sp.Symbol
+    unit: str
+    sd: float
+
+    @property
+    def name(self) -> str:
+        """As in files."""
+        return str(self.symbol)
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What the refinement has instead of the equations of the rows.
+
+    Attributes
+    ----------
+    equations : expressions = 0 in jets of coordinates and inputs, p, extras, shapes, knowns; (): those of the rows
+    outputs : name of a sensor -> what it measures, in coordinates and parameters; others measure a coordinate
+    extras : further unknowns
+    shapes : symbols of the equations -> what they are in p; there are as many as unknowns that occur in nothing else
+    region : expressions in p that are positive wherever the mechanism is possible
+    """
+
+    equations: tuple[sp.Expr, ...] = ()
+    outputs: Mapping[str, sp.Expr] = field(default_factory=dict)
+    extras: tuple[Extra, ...] = ()
+    shapes: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    region: tuple[sp.Expr, ...] = ()
+
+
+@dataclass(frozen=True)
 class CompiledModel:
     """A mechanism ready to identify.
 
@@ -147,6 +192,7 @@ class CompiledModel:
         The rows contain its jets like those of a signal.
     equations : expressions = 0 as the user wrote them (in jets of signals and hidden), for the simulator
     hidden : unmeasured coordinates, and defined integrals, whose rates are among the equations
+    refinement : of the second stage
     """
 
     name: str
@@ -159,6 +205,7 @@ class CompiledModel:
     opaque: Mapping[Jet, sp.Expr] = field(default_factory=dict)
     equations: tuple[sp.Expr, ...] = ()
     hidden: tuple[Jet, ...] = ()
+    refinement: Refinement = field(default_factory=Refinement)
 
     @property
     def p(self) -> tuple[sp.Symbol, ...]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import sympy as sp
 
-from pvid.model.compiled import CompiledModel, Known, Output, Signal, Unknown
+from pvid.model.compiled import CompiledModel, Extra, Known, Output, Refinement, Signal, Unknown
 from pvid.model.compiler import rows_of
 from pvid.model.eliminate import Equation
 from pvid.model.mechanics import equations_of
@@ -39,6 +40,10 @@ class Model:
         self.defined: dict[Jet, sp.Expr] = {}
         self.equations: list[Equation] = []
         self._dimensions: dict[str, Dimension] = {}
+        self._coordinates: list[Jet] = []
+        self._extras: list[Extra] = []
+        self._shapes: dict[sp.Symbol, sp.Expr] = {}
+        self._refinement = Refinement()
 
     # ---- quantities
 
@@ -51,6 +56,7 @@ class Model:
         reach: float = 1.0,
         driven: bool = False,
         gain_sd: float | None = None,
+        neglected: float = 0.0,
     ) -> Jet:
         """A measured signal.
 
@@ -61,9 +67,14 @@ class Model:
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
         gain_sd : relative standard deviation of its gain, which most runs do not show; 0.01 if it is driven, else 0
+        neglected
+            of equations for small values: relative error over the square of the signal, from its mean [1/unit^2]; part
+            of the standard errors
         """
         if resolution < 0 or not math.isfinite(resolution):
             raise self._refused(f"{name}: resolution must not be negative")
+        if not 0 <= neglected < math.inf:
+            raise self._refused(f"{name}: neglected must be a number of at least 0, not {neglected}")
         if noise is None and resolution == 0:
             raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
         level = 0.5 if noise is None else noise
@@ -79,6 +90,7 @@ class Model:
                 float(reach),
                 driven=driven,
                 gain_sd=gain,
+                neglected=float(neglected),
             )
         )
         return jet
@@ -215,6 +227,56 @@ class Model:
         for one in found:
             self.equation(one)
 
+    # ---- refinement
+
+    def coordinate(self, name: str, unit: str) -> Jet:
+        """A coordinate of the refinement's own equations."""
+        jet = self._signal(name, unit, 1.0)
+        self._coordinates.append(jet)
+        return jet
+
+    def refined(self, name: str, unit: str, sd: float) -> sp.Symbol:
+        """An unknown of the refinement that the rows do not have: it starts at 0, within about sd [unit]."""
+        if not 0 < sd < math.inf:
+            raise self._refused(f"{name}: sd must be positive")
+        symbol = self._symbol(name, unit)
+        self._extras.append(Extra(symbol, unit, float(sd)))
+        return symbol
+
+    def shape(self, name: str, unit: str, expression: sp.Expr) -> sp.Symbol:
+        """A positive function of unknowns that the refinement's equations contain in place of these."""
+        value = rational(expression)
+        self._declared(value)
+        symbol = self._symbol(name, unit)
+        self._shapes[symbol] = value
+        self._agree(symbol - value, f"the shape {name}")
+        return symbol
+
+    def refine(
+        self,
+        equations: Sequence[sp.Expr] = (),
+        outputs: Mapping[Jet, sp.Expr] | None = None,
+        region: Sequence[sp.Expr] = (),
+    ) -> None:
+        """What the refinement has of its own.
+
+        Parameters
+        ----------
+        equations : = 0, in place of those of the rows: for example without the approximation of small angles
+        outputs : sensor -> what it measures, where that is no coordinate
+        region : expressions in the unknowns that are positive wherever the mechanism is possible
+        """
+        whole = tuple(rational(one) for one in equations)
+        for number, one in enumerate(whole):
+            self._agree(one, f"equation {number + 1} of the refinement")
+        found = {jet.of: rational(value) for jet, value in (outputs or {}).items()}
+        for jet, value in (outputs or {}).items():
+            self._agree(jet - rational(value), f"the refinement's output {jet}")
+        limits = tuple(rational(one) for one in region)
+        for one in limits:
+            self._declared(one)
+        self._refinement = Refinement(whole, found, region=limits)
+
     # ---- result
 
     def compiled(self, name: str = "") -> CompiledModel:
@@ -267,6 +329,7 @@ class Model:
             dict(self.defined),
             tuple(simulated),
             (*self.hidden, *integrals),
+            replace(self._refinement, extras=tuple(self._extras), shapes=dict(self._shapes)),
         )
 
     # ---- checks
@@ -293,7 +356,7 @@ class Model:
         self._dimensions[name] = self._unit(unit)
 
     def _jets(self) -> list[Jet]:
-        return [*(one.jet for one in self.signals), *self.hidden, *self.defined]
+        return [*(one.jet for one in self.signals), *self.hidden, *self.defined, *self._coordinates]
 
     def _signal(self, name: str, unit: str, reach: float) -> Jet:
         self._new(name, unit)
@@ -307,7 +370,8 @@ class Model:
 
     def _declared(self, expression: sp.Expr) -> None:
         own = {jet.of for jet in self._jets()}
-        symbols = {one.symbol for one in self.unknowns} | {one.symbol for one in self.knowns}
+        symbols = {one.symbol for one in self.unknowns} | {one.symbol for one in self.knowns} | set(self._shapes)
+        symbols |= {one.symbol for one in self._extras}
         for one in sorted(expression.free_symbols, key=str):
             if one in symbols or isinstance(one, Jet) and one.of in own:
                 continue

@@ -22,9 +22,10 @@ from pvid.model.signals import Integral, Jet, jets, sgn
 from pvid.model.strong import strong_form
 from pvid.oracle.fourier.channels import broadcast, running_integrals
 from pvid.oracle.fourier.errors import clustered_variance
-from pvid.oracle.fourier.front import filtered, of_hold, polynomial_weights, samples_of
+from pvid.oracle.fourier.front import filtered, of_hold, samples_of
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.fourier.polynomials import polynomial_weights
 from pvid.oracle.fourier.solve import inverse, solved
 
 _STEP_LIMIT = 0.3  # of log p, or of p over its reach

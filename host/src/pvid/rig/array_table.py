@@ -31,7 +31,7 @@ def read_npz(path: Path, columns: Columns) -> Table:
                 raise PvidError(f"{path} holds one bare array, where an archive of {listed(columns.units)} is wanted.")
             members = archive.zip.infolist() if archive.zip is not None else []
             refuse_beyond(path, max((member.file_size for member in members), default=0) // _LONGEST_NUMBER)
-            return _table(path, list(archive.files), archive.__getitem__, columns)
+            return table_of(path, list(archive.files), archive.__getitem__, columns)
     except PvidError:
         raise
     except Exception as error:  # zipfile, zlib and numpy raise a dozen kinds on damaged archives
@@ -62,7 +62,7 @@ def read_parquet(path: Path, columns: Columns) -> Table:
                 # a copy, so that pyarrow can give its memory back
                 return np.array(file.read(columns=[name], use_threads=False).column(0).to_numpy())
 
-            return _table(path, names, column, columns)
+            return table_of(path, names, column, columns)
     except PvidError:
         raise
     except Exception as error:  # pyarrow's readers raise many kinds on damaged files
@@ -79,7 +79,8 @@ def write_parquet(path: Path, named: dict[str, FloatArray]) -> bytes:
     return buffer.getvalue()
 
 
-def _table(path: Path, names: Sequence[str], column: Callable[[str], npt.NDArray[Any]], columns: Columns) -> Table:
+def table_of(path: Path, names: Sequence[str], column: Callable[[str], npt.NDArray[Any]], columns: Columns) -> Table:
+    """The signals among named columns of numbers; PvidError where one is missing or holds something else."""
     places = columns.places(path, names)
     signals: dict[str, FloatArray] = {}
     for signal in columns.units:

@@ -9,7 +9,10 @@ ignored. Every other fault is reported with its line number.
 from __future__ import annotations
 
 import csv
+import functools
 import gzip
+import io
+import math
 import re
 import zlib
 from collections import Counter
@@ -66,6 +69,10 @@ class _Layout:
         except ValueError:
             return False
         return True
+
+    def number(self, cell: str) -> float:
+        """Of a cell that is a number; NaN of an empty one."""
+        return math.nan if cell in _EMPTY_CELLS else float(cell.replace(self.decimal, "."))
 
 
 def read_csv(path: Path, columns: Columns) -> Table:
@@ -315,44 +322,70 @@ def _numbers(
         clean = _NO_DATA.sub(b"", block)
     try:
         return _parsed(clean, layout, places)
-    except ValueError as error:  # of which pyarrow's kinds are
-        without = _NO_DATA.sub(b"", clean)  # lines of blanks are not empty lines for pyarrow
+    except (ValueError, csv.Error) as error:
+        without = _NO_DATA.sub(b"", clean)  # of lines of blanks
         if without != clean:
             try:
                 return _parsed(without, layout, places)
-            except ValueError:
+            except (ValueError, csv.Error):
                 pass
         raise _fault(path, block, first_line, layout, places, error) from error
 
 
 def _parsed(block: bytes, layout: _Layout, places: dict[str, int]) -> dict[str, FloatArray]:
-    import pyarrow  # 40 ms that other commands need not wait for
-    import pyarrow.csv
-
-    if layout.separator == " ":
+    """As `_numbers`; ValueError where a line has too few or too many cells, or a cell is not a number."""
+    separator, wanted = layout.separator.encode(), sorted(set(places.values()))
+    if separator == b" ":
         block = re.sub(rb"[ \t]+", b" ", block)
         block = re.sub(rb"(?m)^ | $", b"", block)
     if not block.strip():
         return {}
+    if b'"' in block:
+        return _from_cells(block.decode(errors="replace"), layout, places)
+    lines = block.rstrip(b"\n").split(b"\n")
+    if {line.count(separator) for line in lines} != {len(layout.names) - 1}:
+        raise ValueError("a line has too few or too many cells")
+    if layout.decimal == ",":
+        if b"." in block:  # in a column that is not wanted, or in a number
+            return _from_cells(block.decode(errors="replace"), layout, places)
+        block = block.replace(b",", b".")
+    if b"_" in block or not block.isascii():
+        return _from_cells(block.decode(errors="replace"), layout, places)
+    try:
+        columns = _loaded(block, layout.separator, wanted)
+    except ValueError:
+        filled = _empty_cell(layout.separator).sub(b"nan", block.rstrip(b"\n"))
+        columns = _loaded(filled, layout.separator, wanted)
+    return {signal: columns[:, wanted.index(place)].copy() for signal, place in places.items()}
+
+
+def _loaded(block: bytes, separator: str, wanted: list[int]) -> FloatArray:
+    return np.loadtxt(io.BytesIO(block), delimiter=separator, usecols=wanted, comments=None, ndmin=2)
+
+
+@functools.cache
+def _empty_cell(separator: str) -> re.Pattern[bytes]:
+    """Cells that hold no number."""
+    between = re.escape(separator.encode())
+    cells = b"|".join(re.escape(one.encode()) for one in sorted(_EMPTY_CELLS, key=len, reverse=True))
+    return re.compile(rb"(?m)(?:(?<=" + between + rb")|^)(?:" + cells + rb")(?=" + between + rb"|\r?$)")
+
+
+def _from_cells(block: str, layout: _Layout, places: dict[str, int]) -> dict[str, FloatArray]:
+    """Cell by cell: for quotes, and for whatever else is seldom in a table of numbers."""
+    rows: list[list[float]] = []
     wanted = sorted(set(places.values()))
-    table = pyarrow.csv.read_csv(
-        pyarrow.py_buffer(block),
-        read_options=pyarrow.csv.ReadOptions(
-            column_names=[str(k) for k in range(len(layout.names))], use_threads=False, block_size=len(block) + 1
-        ),
-        parse_options=pyarrow.csv.ParseOptions(delimiter=layout.separator),
-        convert_options=pyarrow.csv.ConvertOptions(
-            column_types={str(k): pyarrow.float64() for k in wanted},
-            include_columns=[str(k) for k in wanted],
-            null_values=list(_EMPTY_CELLS),
-            decimal_point=layout.decimal,
-        ),
-    )
-    return {signal: table.column(str(place)).to_numpy() for signal, place in places.items()}
+    for line in block.splitlines():
+        cells = layout.cells(line)
+        if len(cells) != len(layout.names) or not all(layout.is_number(cells[place]) for place in wanted):
+            raise ValueError("a cell is not a number")
+        rows.append([layout.number(cells[place]) for place in wanted])
+    columns = np.array(rows, np.float64).reshape(-1, len(wanted))
+    return {signal: columns[:, wanted.index(place)].copy() for signal, place in places.items()}
 
 
 def _fault(
-    path: Path, block: bytes, first_line: int, layout: _Layout, places: dict[str, int], error: ValueError
+    path: Path, block: bytes, first_line: int, layout: _Layout, places: dict[str, int], error: Exception
 ) -> PvidError:
     """The refusal of a block's first line that cannot be read."""
     width = len(layout.names)

@@ -35,7 +35,7 @@ from pvid.models.model import Channel
 if TYPE_CHECKING:  # it loads SymPy, without which a run of the pendulum does
     from pvid.model.compiled import CompiledModel
 
-_OF_A_SENSOR = ("resolution", "noise", "gain_sd")
+_OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected")
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,8 @@ class MechanismRig:
     model : name of a shipped mechanism or path of a model file
     sample_rate : [Hz]; None: that of the run
     known, known_sd : values of the model's constants, and standard deviations of them
-    sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative]; of an input gain_sd alone
+    sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative], neglected (see Signal); of an
+        input gain_sd alone
     nominal : guesses of the unknowns
     """
 
@@ -140,7 +141,8 @@ class MechanismRig:
             given = self.sensor.get(signal.name, {})
             resolution, noise = given.get("resolution", signal.resolution), given.get("noise", signal.noise)
             gain_sd = given.get("gain_sd", signal.gain_sd)
-            signals.append(replace(signal, resolution=resolution, noise=noise, gain_sd=gain_sd))
+            neglected = given.get("neglected", signal.neglected)
+            signals.append(replace(signal, resolution=resolution, noise=noise, gain_sd=gain_sd, neglected=neglected))
         unknowns = []
         for one in model.unknowns:
             guess = self.nominal.get(one.name, one.guess)

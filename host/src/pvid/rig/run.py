@@ -23,7 +23,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed, reason
 from pvid.models.model import Channel
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.array_table import read_npz, read_parquet, write_npz, write_parquet
+from pvid.rig.array_table import read_npz, read_parquet, table_of, write_npz, write_parquet
 from pvid.rig.clock import Uniform, uniform
 from pvid.rig.columns import Columns
 from pvid.rig.csv_table import read_csv, write_csv, write_csv_gz
@@ -200,6 +200,30 @@ def read_recording(
     except MemoryError as error:
         raise PvidError(f"{path} does not fit into memory.") from error
     return _recording(_checked(table), rate)
+
+
+def recording_of_arrays(
+    named: Mapping[str, npt.ArrayLike],
+    rate: float | None = None,
+    columns: Columns | None = None,
+    name: str = "the data",
+) -> Recording:
+    """A recording of arrays by name, with the checks and corrections that a file gets.
+
+    Parameters
+    ----------
+    named : of each column an array-like, shape (n,)
+    rate, columns : see `read_recording`
+    name : of the data, in a refusal
+
+    Raises
+    ------
+    PvidError
+        For anything that is wrong with the data and cannot be bridged.
+    """
+    names = [str(one) for one in named]
+    arrays = dict(zip(names, map(np.asarray, named.values()), strict=True))
+    return _recording(_checked(table_of(Path(name), names, arrays.__getitem__, columns or Columns())), rate)
 
 
 def write_run(path: str | os.PathLike[str], run: Run) -> None:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import os
-import resource
 from pathlib import Path
+from typing import Any
 
 from pvid.base.errors import PvidError
+
+resource: Any = None  # not on Windows
+with contextlib.suppress(ImportError):
+    resource = importlib.import_module("resource")
 
 MOST_ROWS = 50_000_000  # 14 hours at 1 kHz
 BYTES_A_ROW = 160  # of memory while a run is read and identified, measured: 140 (bench reading has the reader's part)
@@ -15,6 +21,8 @@ _SHARE = 0.8  # of the memory
 
 def most_rows() -> int:
     """Of a run that is read on this machine."""
+    if resource is None:
+        return MOST_ROWS
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
     if soft != resource.RLIM_INFINITY:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +17,11 @@ from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.gate import gated
 from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import Compiled, WeakRows
+from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.run import Recording
-from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier import config_of, design_tables, for_engine
+from pvid.settings.fourier import FourierConfig, FourierDesign32
+from pvid.setup.fourier import LONGEST_HOP, config_of, design_tables, for_engine
 from pvid.sim.simulated_run import RigSimulation
 
 Run = Mapping[str, npt.ArrayLike]
@@ -28,7 +29,6 @@ Run = Mapping[str, npt.ArrayLike]
 # A design that costs less is taken if its score is at most this many times the best one's.
 _COST = 1.1
 _DECIMATIONS = (2, 4, 8, 16, 32)
-_RING = 512  # numbers in the ring of signals, 4 bytes each
 _FEWER = (24, 16, 12)
 
 # Length and degree of the polynomials before decimation, as in the designs of the shipped rigs.
@@ -37,7 +37,9 @@ _DEGREE, _LOW_DEGREE = 6, 4
 _SHORT = 15  # taps, for which the lower degree is
 
 
-def engine_config(compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None) -> FourierConfig:
+def engine_config(
+    compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None, *, start_there: bool = False
+) -> FourierConfig:
     """Settings of the engine for a rig, from a run of it.
 
     Parameters
@@ -45,29 +47,69 @@ def engine_config(compiled: CompiledModel, run: Run, design: FourierDesign, p: F
     run : name of each signal -> samples [n]
     design : of the oracle; the engine gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
+    start_there : the engine starts at the parameters of this run; False: at the guesses
 
     Raises
     ------
     PvidError
         Where the engine does not have what the model or the design needs.
     """
-    model = ready(compiled)
+    made = engine_tables(compiled, run, design, p)
+    return config_of(
+        made.tables, design.sample_rate, made.rows.compiled.parameters, made.p if start_there else None, run
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class EngineTables:
+    """What the settings of both cores follow from.
+
+    Attributes
+    ----------
+    rows : of the run, in float64
+    p : fitted to it [n_p]
+    errors : of the equations themselves, of each kind
+    tables : of the float32 engine
+    """
+
+    rows: WeakRows
+    p: Float
+    errors: list[EquationError]
+    tables: FourierDesign32
+
+
+def engine_tables(compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None) -> EngineTables:
+    """Tables of the engine for a rig, from a run of it; parameters as of engine_config."""
     tables_of = fourier_model_of(compiled)
-    rows = WeakRows.of(model, run, for_engine(design))
+    rows = WeakRows.of(ready(compiled), run, for_engine(design))
     fit = gated(rows, p)
-    tables = design_tables(tables_of, rows, fit.p, fit.errors)
-    return config_of(tables, design.sample_rate, model.parameters)
+    return EngineTables(rows, fit.p, list(fit.errors), design_tables(tables_of, rows, fit.p, fit.errors))
 
 
 def config_for_recording(compiled: CompiledModel, recording: Recording, functions: int | None = None) -> FourierConfig:
-    """Settings for the rig that made a recording.
+    """Settings for the rig that made a recording; the estimate starts at what the recording shows.
 
     Parameters
     ----------
     functions : K; None: chosen
     """
+    design, p, known = design_and_p(compiled, recording, functions)
+    return engine_config(compiled, recording.signals, design, p, start_there=known)
+
+
+def design_and_p(
+    compiled: CompiledModel, recording: Recording, functions: int | None = None
+) -> tuple[FourierDesign, Float, bool]:
+    """The design that is chosen for a recording, the parameters that it was chosen at [n_p], whether to start there."""
     best = design_for_recording(ready(compiled), recording.signals, recording.sample_rate)
-    return engine_config(compiled, recording.signals, _with(best.design, functions), best.p)
+    return _with(best.design, functions), best.p, best.known
+
+
+def config_to_identify(compiled: CompiledModel, recording: Recording) -> FourierConfig:
+    """The same, to identify the recording itself: the limit of a standard error is that of the analysis, whose verdict
+    judges the answer, not that of a microcontroller on its own."""
+    config = config_for_recording(compiled, recording)
+    return replace(config, trust=replace(config.trust, se_max=UNKNOWN))
 
 
 def design_for_recording(model: Compiled, run: Run, sample_rate: float) -> Scored:
@@ -75,26 +117,35 @@ def design_for_recording(model: Compiled, run: Run, sample_rate: float) -> Score
 
     A model with corners keeps its sample rate: filters before decimation blur them (measured: 0.2 % of a motor's L).
     """
-    best = found = ranked(model, run, sample_rate, reversals="averaged")[0]
-    signals = len({jet.of for jet in model.channels.needed})
-    slower = [] if model.jumps else [lambda one: _decimated(one, signals)]
-    for cheaper in (*slower, _with_fewer_functions):
-        for design in cheaper(found.design):
-            tried = score_of(model, run, design, best.p, best.chi2 > MODEL_ERROR)
-            if tried is None or tried.score > _COST * best.score:
-                break
-            found = tried
-    return found
+    best = ranked(model, run, sample_rate, reversals="averaged")[0]
+
+    def scored(designs: Iterable[FourierDesign]) -> list[Scored]:
+        tried = (score_of(model, run, one, best.p, best.chi2 > MODEL_ERROR) for one in designs)
+        return [one for one in tried if one is not None]
+
+    slower = [] if model.jumps else scored(_decimated(best.design))
+    found = _cheapest([best, *slower], best)
+    return _cheapest([found, *scored(_with_fewer_functions(found.design))], best)
 
 
-def _decimated(design: FourierDesign, signals: int) -> Iterator[FourierDesign]:
+def _cheapest(tried: Sequence[Scored], best: Scored) -> Scored:
+    """The last one that is nearly as good as the best and agrees with it, or the best of those that the engine has."""
+    possible = [one for one in tried if one.design.hop <= LONGEST_HOP]
+    if not possible:
+        raise PvidError(
+            f"half a window of {tried[0].design.window_s / 2:.3g} s has more than {LONGEST_HOP} samples, the most of "
+            "the weak engine: record at a lower rate"
+        )
+    good = [one for one in possible if one.score <= _COST * best.score and np.all(np.abs(one.p - best.p) <= best.error)]
+    return good[-1] if good else min(possible, key=lambda one: one.score)
+
+
+def _decimated(design: FourierDesign) -> Iterator[FourierDesign]:
     """With fewer steps a second, behind filters that let nothing fold into the band of the test functions."""
     for decimation in _DECIMATIONS:
         taps = round(_TAPS_A_STEP * decimation) | 1
         degree = _DEGREE if taps > _SHORT else _LOW_DEGREE
         rates = (taps, degree) if design.rate_taps < taps else (design.rate_taps, design.rate_degree)
-        if signals * (rates[0] + decimation) > _RING:
-            return
         try:
             found = replace(design, decimation=decimation, taps=taps, degree=degree)
             yield for_engine(replace(found, rate_taps=rates[0], rate_degree=rates[1]))
@@ -116,11 +167,16 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
     PvidError
         Where the mechanism has no shipped rig.
     """
+    run, design, p = simulated_run_of(compiled, functions)
+    return engine_config(compiled, run, design, p)
+
+
+def simulated_run_of(compiled: CompiledModel, functions: int | None = None) -> tuple[Run, FourierDesign, Float]:
+    """A run of the shipped rig of a mechanism, the rig's own design, and its parameters [n_p]."""
     rig = simulated_rig(compiled.name)
     simulation = RigSimulation.of(compiled, rig)
-    run = simulation.run()
     design = FourierDesign(rig.sample_rate, rig.window_s, **rig.design)  # type: ignore[arg-type]
-    return engine_config(compiled, run, _with(design, functions), np.asarray(simulation.truth))
+    return simulation.run(), _with(design, functions), np.asarray(simulation.truth)
 
 
 def samples_of(config: FourierConfig, run: Run) -> npt.NDArray[np.float32]:

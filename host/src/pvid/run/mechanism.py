@@ -13,6 +13,7 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
 from pvid.models.mechanisms import compiled_of
+from pvid.models.registry import MODELS
 from pvid.oracle.fourier.identify import Identified, given
 from pvid.oracle.fourier.identify import identify as identified_by
 from pvid.oracle.fourier.weights import Weights
@@ -70,6 +71,7 @@ class MechanismAnswer:
             "warning": found.verdict.warning,
             "reasons": {one.name: one.text for one in found.verdict.reasons},
             "parameters": parameters,
+            **own_keys(self.model, parameters),
             "chi2": found.chi2,
             "r2": found.r2,
             "window_s": found.design.window_s,
@@ -81,6 +83,12 @@ class MechanismAnswer:
             "core": "f64",
             "form": "weak",
         }
+
+
+def own_keys(model: CompiledModel, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters that are keys of the object of `identify --json` themselves: of the pendulum."""
+    own = MODELS.get(model.name)
+    return {} if own is None else {one.name: parameters[one.name] for one in own.answers if one.name in parameters}
 
 
 def model_of(rig: MechanismRig) -> CompiledModel:
@@ -113,17 +121,21 @@ def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
 
 
 def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
-    gains = gains_of(model, found)
-    # Of noise: the correlations of the rows, with the published standard errors but for gains and constants.
-    noise = np.sqrt(np.maximum(found.se**2 - np.sum(gains**2, axis=0), 0.0))
-    widened = noise / np.sqrt(np.diag(found.covariance))
+    # The correlations of the rows, with the published standard errors but for gains and constants.
+    widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
-    return values_of(model, found.p, covariance, gains, identified=found.verdict.identified)
+    return values_of(model, found.p, covariance, gains_of(model, found), identified=found.verdict.identified)
+
+
+def noise_of(model: CompiledModel, found: Identified) -> Float:
+    """The published standard errors but for gains and constants [n_p]."""
+    return np.asarray(np.sqrt(np.maximum(found.se**2 - np.sum(gains_of(model, found) ** 2, axis=0), 0.0)))
 
 
 def gains_of(model: CompiledModel, found: Identified) -> Float:
-    """What p is off by for one standard deviation of each gain and of each constant that has any [gains, n_p]."""
-    return np.array(given(model, found.by_gain, found.by_known)).reshape(-1, len(found.p))
+    """What p is off by for one standard deviation of each gain and constant that has any, and of what linearised
+    equations neglect [gains, n_p]."""
+    return np.array([*given(model, found.by_gain, found.by_known), found.by_neglect])
 
 
 def values_of(model: CompiledModel, p: Float, covariance: Float, gains: Float, *, identified: bool) -> dict[str, Value]:

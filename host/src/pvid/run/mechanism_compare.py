@@ -4,22 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, first_difference
-from pvid.run.engine_design import config_for_recording, samples_of
+from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.engine_design_q31 import FixedEngine, engine_to_identify
+from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.enums import Core
 from pvid.settings.fourier import FourierConfig
 from pvid.setup.fourier_sizes import sizes_of_model
 from pvid.twin import fnv
 from pvid.twin.fourier import FourierTwin
+from pvid.twin.fourier_q31 import FourierTwinQ31
 
 Progress = Callable[[int], None]
 
 
-def compare_recording(compiled: CompiledModel, recording: Recording, progress: Progress | None = None) -> Comparison:
+def compare_recording(
+    compiled: CompiledModel, recording: Recording, core: Core = "f32", progress: Progress | None = None
+) -> Comparison:
     """Runs a recording through the engine and its twin, with the design that `identify` chooses.
 
     Raises
@@ -27,8 +35,20 @@ def compare_recording(compiled: CompiledModel, recording: Recording, progress: P
     PvidError
         When there is no C compiler, or the engine does not have what the model needs.
     """
-    config = config_for_recording(compiled, recording)
+    return _COMPARISONS[core](compiled, recording, progress)
+
+
+def _in_float(compiled: CompiledModel, recording: Recording, progress: Progress | None) -> Comparison:
+    config = config_to_identify(compiled, recording)
     return compare_samples(compiled, config, samples_of(config, recording.signals), progress)
+
+
+def _in_fixed_point(compiled: CompiledModel, recording: Recording, progress: Progress | None) -> Comparison:
+    engine = engine_to_identify(compiled, recording)
+    return compare_counts(engine, engine.counts_of(recording.signals), progress)
+
+
+_COMPARISONS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
 
 
 def compare_samples(
@@ -45,4 +65,20 @@ def compare_samples(
         core_hash=identifier.running_hash,
         twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
         difference=first_difference(record, twin, compiled.p_names, moments),
+    )
+
+
+def compare_counts(engine: FixedEngine, readings: npt.ArrayLike, progress: Progress | None = None) -> Comparison:
+    """The same in fixed point, for readings [ticks, samples]."""
+    identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    record = identifier.run_samples(readings)
+    twin = FourierTwinQ31(engine.config, engine.parameters.model).run(np.asarray(readings).T).lane()
+    hashes = fnv.running_hashes(twin)
+    if progress is not None:
+        progress(len(record.reason))
+    return Comparison(
+        ticks=len(record.reason),
+        core_hash=identifier.running_hash,
+        twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
+        difference=first_difference(record, twin, engine.compiled.p_names, engine.parameters.model.moments),
     )

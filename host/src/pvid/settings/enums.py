@@ -32,6 +32,9 @@ class Reason(_Named):
     MISFIT = 10
     HELD_FROZEN = 11
     NOT_READY = 12
+    HELD_SEARCHING = 13
+    HELD_BLOCK = 14
+    HELD_DISAGREES = 15
 
 
 class Status(_Named):
@@ -105,3 +108,5 @@ class SnapshotStatus(_Named):
     OTHER_LAYOUT = 6
     OTHER_CONFIG = 7
     NOT_READY = 8
+    OTHER_MODEL = 9
+    OTHER_DESIGN = 10

@@ -57,6 +57,8 @@ class StrongConfig(Folded):
     estimator: EstimatorConfig
     drive_min: float = 0.0
     gate: GateConfig = field(default_factory=GateConfig)
+    block: int = 1
+    exact_every: int = 0
 
     form: ClassVar[Form] = "strong"
     core: ClassVar[Core] = "f32"
@@ -65,7 +67,7 @@ class StrongConfig(Folded):
     @property
     def ticks_needed(self) -> int:
         """Samples up to the first estimate."""
-        return 2 * self.delay + 1
+        return self.window
 
     @property
     def bank(self) -> StrongConfig:

@@ -189,7 +189,7 @@ class FourierModel:
 
 @dataclass(frozen=True, eq=False)
 class FourierFilter:
-    """pvid_fourier_filter_f32: weights float32 [half], outwards, per second^order."""
+    """pvid_fourier_filter_f32: weights float32 [half] from the centre outwards, per second^order."""
 
     weights: Float32
 
@@ -221,7 +221,8 @@ class FourierDesign32:
     power : n of sin^n
     decimation : D, ticks a step
     hop : steps of half a window, a multiple of 4
-    filter : of each jet
+    filter : of each jet, at the samples: block sums and compensator in one
+    compensator : of each jet, at the steps, behind the block sums; without a decimation the filter
     circle : cos(pi j / hop) [2 hop]
     noise : sorted by kind, then power
     error_order : of each kind uint8 [kinds]: its own error is that derivative of white noise
@@ -236,6 +237,7 @@ class FourierDesign32:
     decimation: int
     hop: int
     filter: tuple[FourierFilter, ...]
+    compensator: tuple[FourierFilter, ...]
     circle: Float32
     noise: tuple[FourierNoise, ...]
     error_order: UInt8
@@ -255,8 +257,13 @@ class FourierDesign32:
 
     @property
     def half(self) -> int:
-        """The largest half of a filter [ticks]."""
+        """The largest half of a filter at the samples [ticks]."""
         return max(one.half for one in self.filter)
+
+    @property
+    def half_steps(self) -> int:
+        """The largest half of a compensator [steps]."""
+        return max(one.half for one in self.compensator)
 
     def noise_of(self, kind: int) -> tuple[FourierNoise, ...]:
         """Entries of one kind."""
@@ -284,7 +291,7 @@ class FourierConfig:
     range: Float32 | None = None
     drive_min: Float32 | None = None
     compensation: bool = True
-    iterations: int = 3
+    iterations: int = 1
     trust: TrustConfig = field(default_factory=TrustConfig)
     gate: GateConfig = field(default_factory=GateConfig)
 
@@ -305,4 +312,4 @@ class FourierConfig:
     def ticks_needed(self) -> int:
         """Samples up to the first estimate, at most: one window, the filters, and the half window of processing."""
         design = self.design
-        return 2 * design.half + 3 + design.decimation * (3 * design.hop + 6)
+        return design.decimation * (2 * design.half_steps + 3 * design.hop + 9) + 3

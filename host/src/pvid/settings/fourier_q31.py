@@ -64,14 +64,10 @@ class Rescale:
 
 @dataclass(frozen=True, eq=False)
 class FourierFilterQ31:
-    """pvid_fourier_filter_q31: weights int32 [half], outwards; bits of the leading x of order 0.
-
-    is_wide: a product with a pair of signals needs 64 bits.
-    """
+    """pvid_fourier_filter_q31: weights int32 [half], outwards; bits of the leading x of order 0."""
 
     weights: Int32
     bits: int
-    is_wide: bool
     rescale: Rescale
 
     @property
@@ -117,13 +113,14 @@ class FourierDesignQ31:
     hop : steps of half a window, a multiple of 4
     sum_shift : of four steps' products 2^-14 before they are added
     full_scale : of the counts about their offsets [samples]
-    filter : of each jet
+    down : shift of the block sums of each signal to 28 bits
+    filter : of each jet, at the steps: its compensator
     run : from twice the sum over the steps to the input of `values` [runs]
     sign_width : of the soft sign, in the format of its argument [signs]; 0: the mean of sgn over a step
     integral : shifts (once, twice) of each integrand
     format : of each channel
     circle : int16 32767 cos(pi j / hop) [2 hop]
-    factor : of each term (m, e), of h^order times a unit of S_h
+    factor : of each term (m, e), of (h/H)^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
     error_variance : of that noise at a step, of h^(2 order) (m, e) [kinds]; (0, 0): the sensors explain the rows
@@ -138,6 +135,7 @@ class FourierDesignQ31:
     hop: int
     sum_shift: int
     full_scale: tuple[int, ...]
+    down: tuple[int, ...]
     filter: tuple[FourierFilterQ31, ...]
     run: tuple[Rescale, ...]
     sign_width: tuple[int, ...]
@@ -158,12 +156,12 @@ class FourierDesignQ31:
 
     @property
     def half(self) -> int:
-        """The largest half of a filter [ticks]."""
+        """The largest half of a compensator [steps]."""
         return max(one.half for one in self.filter)
 
     @property
-    def rows(self) -> int:
-        """Parts of the sums of a window, K + n."""
+    def parts(self) -> int:
+        """Of the sums of a window, K + n."""
         return self.functions + self.power
 
     @property

@@ -19,6 +19,7 @@ class Folded:
 
     weights: npt.NDArray[Any]
     stride: int
+    block: int = 1  # samples of a point
 
     @property
     def half(self) -> int:
@@ -27,13 +28,19 @@ class Folded:
 
     @property
     def window(self) -> int:
-        """Samples from the first point to the last, both included."""
-        return 2 * self.delay + 1
+        """Samples from the first to the last, both included."""
+        return 2 * self.half * self.stride + self.block
+
+    @property
+    def memory(self) -> int:
+        """Places of PVID_MAX_WINDOW that they need."""
+        points = 2 * self.half * self.stride + 1
+        return points + self.block + 2 if self.block > 1 else points
 
     @property
     def delay(self) -> int:
         """Samples from the newest one back to the instant the derivatives refer to."""
-        return self.half * self.stride
+        return self.half * self.stride + (self.block - 1) // 2
 
 
 class WeakSizes(Protocol):

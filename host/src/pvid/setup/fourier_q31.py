@@ -12,7 +12,9 @@ from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.rows import EquationError, WeakRows
 from pvid.settings.fourier_q31 import FourierConfigQ31, FourierDesignQ31
-from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31
+
+_GATE = GateConfigQ31(sigmas=4 << 16, patience_groups=100)  # as in float32
 
 _ROW_BITS = 28  # of an entry of a row
 _MARGIN_BITS = 3  # that the entries of a run leave free
@@ -20,8 +22,12 @@ _MOST_Y_BITS = 12
 _LEAST_Y_BITS = 0  # a row's noise is one standard deviation: rounding by one of them is too much
 
 
-def row_formats(rows: WeakRows, p: Float) -> tuple[tuple[int, ...], int]:
+def row_formats(rows: WeakRows, p: Float, errors: Sequence[EquationError] | None = None) -> tuple[tuple[int, ...], int]:
     """n_bits of all kinds and y_bits, from the white rows of a run at p.
+
+    Parameters
+    ----------
+    errors : of the equations themselves, of each kind; None by default
 
     Raises
     ------
@@ -29,11 +35,11 @@ def row_formats(rows: WeakRows, p: Float) -> tuple[tuple[int, ...], int]:
         Where rows are so large beside their noise that fixed point has no digit for it.
     """
     theta = rows.compiled.parameters.theta(p)
-    none = [EquationError()] * rows.kinds
+    found = list(errors or [EquationError()] * rows.kinds)
     n_bits: list[int] = []
     largest = 1.0
     for kind in range(rows.kinds):
-        white = rows.white((kind,), theta, none)
+        white = rows.white((kind,), theta, found)
         entries = np.abs(white.regressors).max(axis=(0, 2))
         terms = entries * np.abs(theta[kind])
         largest = max(largest, float(np.abs(white.known).max()), float(terms.max()))
@@ -58,10 +64,14 @@ def config_of_q31(
     p_bits: Sequence[int],
     offset: Sequence[int],
     start: Float | None = None,
+    overlap: float = 1.0,
 ) -> FourierConfigQ31:
     """Settings ready for the engine: the guesses, their standard deviations and bounds.
 
+    Parameters
+    ----------
     formats : as of row_formats
+    overlap : inflation of variances because windows share samples, as in float32
     """
     p = parameters.checked(start)
     unknowns = parameters.model.unknowns
@@ -88,6 +98,8 @@ def config_of_q31(
             n_bits=tuple(n_bits),
             y_bits=y_bits,
             row_sd=2 ** (8 + y_bits),
+            correlation=max(round(overlap * 2**16), 2**16),
         ),
         offset=tuple(offset),
+        gate=_GATE,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pvid.settings.fourier import FourierDesign32, FourierModel
+from pvid.settings.fourier_q31 import FourierDesignQ31
 
 
 def sizes_of_model(model: FourierModel) -> dict[str, int]:
@@ -24,7 +25,30 @@ def sizes_of_model(model: FourierModel) -> dict[str, int]:
 def sizes_of_design(design: FourierDesign32) -> dict[str, int]:
     """Those of its model among them."""
     return sizes_of_model(design.model) | {
-        "PVID_MAX_RING": design.model.signals * (2 * design.half + design.decimation),
+        "PVID_MAX_RING": design.model.signals * (4 * design.half_steps + 5),
+        "PVID_MAX_HARMONICS": design.highest + 1,
+        "PVID_MAX_FUNCTIONS": design.functions,
+        "PVID_MAX_POWER": design.power,
+        "PVID_MAX_DECIMATION": design.decimation,
+    }
+
+
+def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]:
+    """Those of a fixed-point design and its model with n_p parameters and n_c non-zeros of d theta / d p."""
+    model = design.model
+    thetas = [one.thetas for one in model.kind]
+    return {
+        "PVID_MAX_THETA_Q31": sum(thetas),
+        "PVID_MAX_P": n_p,
+        "PVID_MAX_MOMENTS_Q31": sum(n * (n + 1) // 2 for n in thetas),
+        "PVID_MAX_C_Q31": n_c,
+        "PVID_MAX_SAMPLES": model.samples,
+        "PVID_MAX_INPUTS": len(model.jet) + model.runs + model.signs,
+        "PVID_MAX_CHANNELS": max(len(model.channel), model.gains),
+        "PVID_MAX_INTEGRANDS": max(model.integrands, model.runs, model.signs),
+        "PVID_MAX_KINDS": len(model.kind),
+        "PVID_MAX_COLUMNS": max(one.columns for one in model.kind),
+        "PVID_MAX_RING": len(model.signal) * (4 * design.half + 5),
         "PVID_MAX_HARMONICS": design.highest + 1,
         "PVID_MAX_FUNCTIONS": design.functions,
         "PVID_MAX_POWER": design.power,

@@ -81,7 +81,7 @@ def settings_header(
 def _bounds(config: Any) -> dict[str, int]:
     """What pvid/config.h must hold at least."""
     if not FORMS[config.form].uses_windows:
-        return {"PVID_MAX_WINDOW": config.bank.window}
+        return {"PVID_MAX_WINDOW": config.bank.memory}
     return bounds_of(config.design)
 
 

@@ -1,4 +1,6 @@
-"""`pvid log --web`: the live page, served by a separate process that follows the log like any other reader.
+"""`pvid log --web` and `pvid view`: the page of a log.
+
+A separate process serves it and follows the log like any other reader.
 
 The page requests the next state when it has drawn the last one: a slow browser skips states, and no queue grows. The
 recording neither waits for this process nor shares its memory, and it has the higher priority.
@@ -9,7 +11,6 @@ recording neither waits for this process nor shares its memory, and it has the h
 from __future__ import annotations
 
 import contextlib
-import importlib.metadata
 import importlib.util
 import os
 import re
@@ -30,7 +31,7 @@ _ASSETS = Path(__file__).parent / "web"
 _TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css": "text/css"}
 _NICENESS = 5
 _MOST_CLIENTS = 32
-# Requests go to this server only; plotly.js sets styles in place and draws its icons from data.
+# Requests go to this server only; uPlot sets styles in place.
 _POLICY = (
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'; "
     "base-uri 'none'; form-action 'none'"
@@ -72,11 +73,11 @@ def page(at: str, log: Path, title: str) -> Iterator[str]:
     Raises
     ------
     PvidError
-        As `listen`, and when the packages of the extra `web` are not installed.
+        As `listen`, and when the packages of the extra `page` are not installed.
     """
-    lacking = [name for name in ("plotly", "starlette", "uvicorn") if importlib.util.find_spec(name) is None]
+    lacking = [name for name in ("starlette", "uvicorn") if importlib.util.find_spec(name) is None]
     if lacking:
-        raise PvidError(f"the live page needs {' and '.join(lacking)}: install pvid[web]")
+        raise PvidError(f"the live page needs {' and '.join(lacking)}: pip install 'pvid[page]'")
     listening, address = listen(at)
     command = [sys.executable, "-P", "-m", "pvid.show.page", str(listening.fileno()), str(log), title]
     with listening, open(os.devnull, "wb") as nowhere:
@@ -119,8 +120,7 @@ def _serve(listening: socket.socket, log: Path, title: str) -> None:
     def respond_state(_: Request) -> Response:
         return Response(state.as_json(), media_type="application/json", headers=headers)
 
-    plotly = importlib.metadata.distribution("plotly").locate_file("plotly/package_data/plotly.min.js")
-    files = [*sorted(_ASSETS.iterdir()), Path(str(plotly))]
+    files = [one for one in sorted(_ASSETS.iterdir()) if one.suffix in _TYPES]
     host = listening.getsockname()[0]
     # a page elsewhere whose name is made to point here gets nothing
     guard = [Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost", "[::1]"])]

@@ -27,8 +27,10 @@ from pvid.log.words import (
     received_words,
     residual_words,
 )
+from pvid.models.model import Parameter, Quantity
 from pvid.rig.file import RigFile
 from pvid.show.axis_limits import interesting
+from pvid.show.live_simulation import LiveSimulation
 
 Float = npt.NDArray[np.float64]
 
@@ -52,6 +54,7 @@ class LiveState(threading.Thread):
         self._rates = Rates()
         self._rig: str | None = None
         self._failed = 0
+        self._simulation = LiveSimulation()
 
     def run(self) -> None:
         """See the class."""
@@ -111,29 +114,42 @@ class LiveState(threading.Thread):
             "parameters": self._table(),
             "estimates": self._estimates(),
             "motion": self._motion(),
+            "modelled": self._simulation.words,
+            "marks": self._marks(),
         }
 
-    def _table(self) -> list[dict[str, str]]:
-        rows = []
+    def _table(self) -> list[dict[str, Any]]:
+        """Every answer with its standard error; `large`: the page draws its history."""
+        rows: list[dict[str, Any]] = []
         model = self._history.model
+        large = {one.name for one in self._drawn()}
         for one in model.answers:
             value = self._history.newest.get(one.name, math.nan)
             if not math.isnan(value):
                 shown, spread = with_error(value, self._history.newest[f"{one.name}_se"])
                 row = {"symbol": one.shown, "meaning": one.meaning, "unit": one.shown_unit, "value": shown}
-                rows.append({**row, "error": f"± {spread}"})
+                rows.append({**row, "error": f"± {spread}", "large": one.name in large})
         if not self._history.is_physical:
             meaning = "outside the physical region"
             names = ", ".join(one.shown for one in model.physical)
-            rows.append({"symbol": names, "meaning": meaning, "unit": "", "value": "", "error": ""})
+            rows.append({"symbol": names, "meaning": meaning, "unit": "", "value": "", "error": "", "large": False})
         return rows
 
+    def _drawn(self) -> tuple[Parameter | Quantity, ...]:
+        """The physical parameters, or the mapped ones where the rig is not known."""
+        model = self._history.model
+        return model.physical if self._history.has_physical else model.parameters[: model.n_mapped]
+
+    def _marks(self) -> dict[str, list[Any]]:
+        """When windows were held or rejected."""
+        withheld = self._history.withheld()
+        return {"t": [t for t, _ in withheld], "rejected": [why.startswith("rejected") for _, why in withheld]}
+
     def _estimates(self) -> dict[str, Any]:
-        """Of the physical parameters, or of the mapped ones where the rig is not known."""
+        """Of those that are drawn, of the residual and of kappa."""
         history = self._history
         curves = []
-        model = history.model
-        for one in model.physical if history.has_physical else model.parameters[: model.n_mapped]:
+        for one in self._drawn():
             value, band = history.estimates(one.name), 2 * history.estimates(f"{one.name}_se")
             limits = interesting(value, band)
             curves.append(
@@ -157,12 +173,17 @@ class LiveState(threading.Thread):
         }
 
     def _motion(self) -> list[dict[str, Any]]:
-        """Of each channel its curve over the last seconds."""
-        t, *signals = self._history.samples()
+        """Of each channel its curve over the last seconds; of the pendulum's angle what the estimate predicts, too."""
+        history = self._history
+        t, *signals = history.samples()
+        self._simulation.offer(history, t, signals)
         curves = []
-        for one, x in zip(self._history.model.channels, signals, strict=True):
+        for k, (one, x) in enumerate(zip(history.model.channels, signals, strict=True)):
             times, values = envelope(t, one.shown_in[1] * x, _BINS)
-            curves.append({"label": one.label, "t": _numbers(times), "x": _numbers(values)})
+            curve: dict[str, Any] = {"label": one.label, "t": _numbers(times), "x": _numbers(values)}
+            if k == 0 and (modelled := self._simulation.at(times)) is not None:
+                curve["modelled"] = _numbers(one.shown_in[1] * modelled)
+            curves.append(curve)
         return curves
 
 

@@ -9,9 +9,8 @@ import tempfile
 from pathlib import Path
 
 from pvid.base.errors import PvidError
-from pvid.base.user_cache import built_under
 from pvid.core.host_compiler import host_compiler
-from pvid.core.sources import ROOT
+from pvid.core.sources import build_folder
 
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w")
 
@@ -26,7 +25,7 @@ def loaded(code: str) -> ctypes.CDLL:
     """
     compiler = host_compiler("a simulation")
     name = hashlib.sha256("\n".join((compiler, *_FLAGS, code)).encode()).hexdigest()[:24]
-    place = built_under(ROOT / "build") / "cache" / "plants" / f"{name}.so"
+    place = build_folder() / "cache" / "plants" / f"{name}.so"
     if not place.exists():
         place.parent.mkdir(parents=True, exist_ok=True)
         _build(compiler, code, place)

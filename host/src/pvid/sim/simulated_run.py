@@ -32,11 +32,15 @@ SOFT = Imperfections("soft")
 
 @dataclass(frozen=True, eq=False)
 class RigSimulation:
-    """A rig ready to run: its model, its plant, its numbers."""
+    """A rig ready to run: its model, its plant, its numbers.
+
+    linearised : signals for whose small values the equations hold; the simulation takes these for exact
+    """
 
     model: CompiledModel
     rig: SimulatedRig
     plant: Plant
+    linearised: tuple[str, ...] = ()
     _motions: dict[Any, Trajectory] = field(default_factory=dict)
 
     @classmethod
@@ -45,8 +49,10 @@ class RigSimulation:
         missing = [name for name in model.p_names if name not in rig.truth]
         if missing:
             raise PvidError(f"the simulated rig of {model.name} gives no value of {', '.join(missing)}")
-        exact = tuple(replace(one, gain_sd=0.0) for one in model.signals)  # a simulation has no error of a gain
-        return cls(replace(model, signals=exact), rig, Plant(model))
+        # A simulation is exact: it has no error of a gain, and its equations are those of the model.
+        exact = tuple(replace(one, gain_sd=0.0, neglected=0.0) for one in model.signals)
+        linearised = tuple(one.name for one in model.signals if one.neglected)
+        return cls(replace(model, signals=exact), rig, Plant(model), linearised)
 
     @property
     def truth(self) -> Float:
@@ -199,5 +205,6 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
     settings = rig_path_of(path)
     exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven}
+    exact |= {name: {"neglected": 0.0} for name in simulation.linearised}
     MechanismRig(model.name, rate, known=simulation.rig.knowns, sensor=exact).write(settings)
     return settings

@@ -28,7 +28,7 @@ _BLOCK = 4
 
 @dataclass(frozen=True)
 class FourierSchedule:
-    """Twin of fourier/fourier_schedule.h: harmonics and stages of a free tick.
+    """Twin of fourier/ticks_f32.h: harmonics and stages of a free tick.
 
     free_ticks: those of a block of four steps
     """
@@ -89,9 +89,8 @@ class FourierTwin:
         design = self.design = config.design
         model = design.model
         functions = _F(design.functions) * _F(model.kinds)
-        rows = _F(design.functions + design.power) * _F(model.kinds)
         nuisances = _F(sum(one.nuisances for one in model.kind))
-        weight = (functions - nuisances) / rows
+        weight = (functions - nuisances) / functions
         rate = _F(config.sample_rate) / (_F(design.decimation) * _F(design.hop))
         lanes = [
             replace(e, row_weight=float(weight), correlation=design.overlap) for e in estimators or [config.estimator]
@@ -108,7 +107,7 @@ class FourierTwin:
 
     @property
     def _delay(self) -> int:
-        return (2 * self.design.half + 4) // self.design.decimation + 4
+        return 2 * self.design.half_steps + 8
 
     def stretch(self, samples: Float32) -> Stretch:
         """All that comes of a stretch of finite samples [ticks, samples] but the estimate; moves the runs."""

@@ -34,9 +34,7 @@ class FourierTwinQ31:
     ) -> None:
         self.config = config
         design = config.design
-        # K + n rows span K dimensions
-        weight = 2**16 * design.functions // design.rows
-        own = [replace(one, row_weight=weight) for one in estimators or [config.estimator]]
+        own = [replace(one, row_weight=2**16) for one in estimators or [config.estimator]]
         self.estimator = EstimatorQ31(own, model)
         self.trust = TrustQ31(config.trust, self.estimator)
         floor = scaled(np.ones(self.estimator.lanes, np.int64), 0)

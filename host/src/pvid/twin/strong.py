@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import EstimatorConfig, StrongConfig
-from pvid.twin.f32.differentiator import derivatives
-from pvid.twin.f32.estimator import Estimator
 from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.misfit import Misfit
 from pvid.twin.kapitza import strong as model
+from pvid.twin.kapitza import window
+from pvid.twin.kapitza.strong_estimator import StrongEstimator
 from pvid.twin.record import After, Mask, Reasons, Twin
 from pvid.twin.rows import follow_rows
 
@@ -34,30 +34,28 @@ class StrongTwin(Twin):
 
     def __init__(self, config: StrongConfig, estimators: Sequence[EstimatorConfig] | None = None) -> None:
         self.config = config
-        self.estimator = self._rows = Estimator(estimators or [config.estimator], config.sample_rate)
+        self.estimator = self._rows = StrongEstimator(
+            estimators or [config.estimator], config.sample_rate, config.exact_every
+        )
         rate = np.float32(config.sample_rate)
         floor = np.float32(1e-6) * self.estimator.row_variance
         self.gate = Gate(config.gate, rate, np.float32(0.25) * rate, floor)
         settings = estimators or [config.estimator]
         self.misfit = Misfit(rate, np.array([one.forgetting_s for one in settings], np.float32))
 
-    def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Float32, Reasons]:
-        """N [ticks, 11], Y [ticks] and the reason of each tick: ACCUMULATED if it has a row."""
+    def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Reasons]:
+        """Rows [ticks, 6] and the reason of each tick: ACCUMULATED if it has a row."""
         phi32 = np.asarray(phi, np.float32)
         y32 = np.asarray(y, np.float32)
         finite = np.isfinite(phi32) & np.isfinite(y32)
-        bank = (self.config.weights.astype(np.float32), self.config.stride, self.config.sample_rate)
-        d_phi, ready = derivatives(phi32, finite, *bank)
-        d_y, _ = derivatives(y32, finite, *bank)
-        u = d_y[:, 2:5] * (np.float32(1) / np.float32(self.config.l1))
-        n, row_y = model.rows(d_phi, u)
+        d_phi, u, ready = window.derivatives(self.config, phi32, y32, finite)
         row_reason = np.full(len(phi32), Reason.ACCUMULATED, np.uint8)
         row_reason[ready & ~self._driven(u[:, 0], ready)] = Reason.HELD_NOT_EXCITED
         if self.frozen is not None:
             row_reason[self.frozen] = Reason.HELD_FROZEN
         row_reason[~ready] = Reason.WARMING_UP
         row_reason[~finite] = Reason.REJECTED_NOT_FINITE
-        return n, row_y, row_reason
+        return model.rows(d_phi, u), row_reason
 
     def _driven(self, u: Float32, ready: Mask) -> Mask:
         """Whether the mean square of u over about a second reaches its threshold [ticks]."""
@@ -79,13 +77,14 @@ class StrongTwin(Twin):
         """Ticks from a sample until the identifier has processed it completely."""
         return self.config.window
 
-    def step(self, n: Float32, y: Float32) -> Reasons:
-        """A row of all lanes."""
-        return self._rows.step(n, y, self.gate, self.misfit)
+    def step(self, row: Float32) -> Reasons:
+        """A row of all lanes [6, lanes]."""
+        return self._rows.row(row, self.gate, self.misfit)
 
     def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
         """See Twin."""
-        return follow_rows(self.estimator, self.step, *self.rows(phi, y), after)
+        rows, row_reason = self.rows(phi, y)
+        return follow_rows(self.estimator, lambda n, _: self.step(n), rows, rows[:, 0], row_reason, after)
 
 
 def lanes_of(config: EstimatorConfig, starts: npt.ArrayLike) -> list[EstimatorConfig]:

@@ -49,9 +49,6 @@ bool pvid_kapitza_physical_f32(const pvid_estimate_f32 *estimate, float l1, pvid
  * so that 21 of the 66 products N_i N_j are bit-identical to others and need no sum of their own. */
 void pvid_kapitza_strong_row_f32(const float phi[5], const float u[3], float *y, float n[PVID_KAPITZA_STRONG_THETA]);
 
-/* The strong form as a model: 11 entries of theta, 3 free parameters, 45 moments. */
-extern const pvid_model_f32 pvid_kapitza_strong_f32;
-
 #ifdef __cplusplus
 }
 #endif

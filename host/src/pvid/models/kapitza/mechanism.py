@@ -2,12 +2,12 @@
 
 from math import pi
 
-from pvid.model import Model
+from pvid.model import Model, cos, sin
 
 model = Model("Kapitza pendulum, unknown zero")
 l1 = model.known("l1", "m", 0.3)
 y = model.sensor("y", "m", resolution=5e-6, noise=0.4, reach=0.02, driven=True)
-phi = model.sensor("phi", "rad", resolution=2 * pi / 2**14, reach=0.2)
+phi = model.sensor("phi", "rad", resolution=2 * pi / 2**14, reach=0.2, neglected=1.0)  # small angles
 u, x = model.define("u", "1/s^2", y.d(2) / l1), model.unmeasured("phi1", "rad")
 w, d1, d2 = model.unknown("w", "1/s^2", 31.67), model.unknown("d1", "", 8.875), model.unknown("d2", "", 5.625)
 c = model.unknown("c", "rad", 0.0, positive=False, sd=0.5)  # the encoder's zero
@@ -17,3 +17,12 @@ model.equation(phi.d(2) - G * x + (d1 - 1) * G * f)
 model.output("g", "m/s^2", w * l1)
 model.output("l2", "m", l1 * L2 / d2)
 model.output("rho2", "m", l1 * L2**0.5 / d2)
+
+# The refinement: the full equations in absolute angles, with the friction of both joints.
+a1, a2 = model.coordinate("a1", "rad"), model.coordinate("a2", "rad")
+k1, k2 = model.refined("k1", "1/s", sd=0.1), model.refined("k2", "1/s", sd=0.05)
+lam, sig = model.shape("lam", "", L2 / d2), model.shape("sig", "", 1 / L2)  # l2/l1, (rho2/l2)^2
+swing, turn = sin(a2 - a1), k2 * (a2.d() - a1.d())
+first = a1.d(2) + lam * (cos(a2 - a1) * a2.d(2) - swing * a2.d() ** 2) + G * sin(a1) + k1 * a1.d() - turn
+second = cos(a2 - a1) * a1.d(2) + (1 + sig) * lam * a2.d(2) + swing * a1.d() ** 2 + G * sin(a2) + turn / lam
+model.refine([first, second], outputs={phi: a2 - a1 + c}, region=[L2 - 0.02])

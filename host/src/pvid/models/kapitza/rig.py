@@ -9,6 +9,6 @@ RIG = SimulatedRig(
     drive={"y": Sines(((6e-3, 1.1, 0.3), (5e-3, 2.3, 1.7), (4e-3, 4.1, 4.0)))},
     start={"phi1": 0.06, "phi": 0.08},
     duration=40.0,
-    window_s=1.5,
-    design=dict(functions=12, decimation=8, taps=61, rate_taps=101, rate_degree=6),
+    window_s=1.536,
+    design=dict(functions=7, decimation=16, taps=41, rate_taps=61, rate_degree=6, comb=True),
 )

@@ -19,8 +19,9 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Part
 from pvid.model.signals import TIME, Integral, Jet, jets, sgn
 from pvid.oracle.fourier import reversals
-from pvid.oracle.fourier.front import Grid, filtered, polynomial_weights, weights_of
+from pvid.oracle.fourier.front import Grid, filtered, weights_of
 from pvid.oracle.fourier.functions import Float, TestFunctions
+from pvid.oracle.fourier.polynomials import polynomial_weights
 
 _ONE = sp.Integer(1)
 

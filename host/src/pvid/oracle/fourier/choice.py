@@ -15,21 +15,32 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.oracle.fourier import verdict
 from pvid.oracle.fourier.attenuation import other_line
+from pvid.oracle.fourier.blur import blur_of, rates_of_drives
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.front import samples_of
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.gate import gated
 from pvid.oracle.fourier.rows import Compiled, WeakRows
+from pvid.oracle.fourier.starts import starts_about
 
 _FEWEST_WINDOWS = 18
 _SHORT_RUN = 10  # windows of a run that has no more: its halves are not compared
+_SEARCHED = 1  # lengths of window, the longest ones, with other starts than the guesses
 _SHORTEST_STEPS = 40  # of a window
 _LENGTHS = 6
 _FUNCTIONS = (12, 24, 40)
 _FEW_FUNCTIONS = (5, 8)  # of runs with motion that the equations do not explain: it is above the drive's frequencies
 _RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
+_FLAT_RATES = (
+    (11, 4),
+    (21, 6),
+    (41, 8),
+    (81, 8),
+    (141, 8),
+)  # for a drive that is measured: see pvid.oracle.fourier.blur
 
 # Enough to compare designs, each from the best p so far.
 _PASSES = 10
@@ -40,12 +51,18 @@ MODEL_ERROR = 5.0
 
 @dataclass(frozen=True)
 class Scored:
-    """A design with its score, and p there."""
+    """A design with its score, and p there.
+
+    error : predicted, of each parameter [n_p]
+    known : every parameter has a value that means something, within the range of the model
+    """
 
     design: FourierDesign
     score: float
     p: Float
     chi2: float
+    error: Float
+    known: bool
 
 
 def score_of(
@@ -68,10 +85,11 @@ def score_of(
     size = np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd)
     other = other_line(fit)
     apart = np.zeros(len(fit.p)) if other is None else other - fit.p
-    relative = np.hypot(found.predicted, apart) / size
+    relative = np.hypot(np.hypot(found.predicted, apart) / size, blur_of(model, run, design))
     if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
         return None
-    return Scored(design, float(np.exp(np.mean(np.log(relative)))), fit.p, found.chi2)
+    known = not verdict.not_identified(model.bare, fit, found) and not verdict.of_range(model.bare, fit.p)
+    return Scored(design, float(np.exp(np.mean(np.log(relative)))), fit.p, found.chi2, relative * size, known)
 
 
 def power_of(model: Compiled) -> int:
@@ -132,28 +150,33 @@ def ranked(
 
     def attempt(designs: Iterable[FourierDesign]) -> None:
         for design in designs:
-            best = min(tried, key=lambda one: one.score, default=None)
+            best = min(tried, key=_order, default=None)
             found = score_of(model, run, design, best.p if best else start, errors, fewest - 2)
             if found is not None:
                 tried.append(found)
 
+    windows: list[float] = []
     for fewest in (_FEWEST_WINDOWS, _SHORT_RUN):
-        windows = lengths(samples, sample_rate, fewest)
-        attempt(made(basis, window_s=one) for one in windows)
-        if tried:
+        longer = lengths(samples, sample_rate, fewest)
+        windows = sorted({*windows, *longer}, reverse=True)
+        attempt(made(basis, window_s=one) for one in longer)
+        if not any(one.known for one in tried):
+            tried += _searched(model, run, [made(basis, window_s=one) for one in longer[:_SEARCHED]], start, fewest - 2)
+        if any(one.known for one in tried):
             break
     if not tried:
         raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
-    best = min(tried, key=lambda one: one.score)
+    best = min(tried, key=_order)
     if best.chi2 > MODEL_ERROR and equation_error:
         errors = True
         tried.clear()
         attempt([best.design])
         attempt(made(basis, window_s=one) for one in windows)
-        best = min(tried, key=lambda one: one.score)
+        best = min(tried, key=_order)
     if rates:
-        attempt(made(best.design, rate_taps=taps, rate_degree=degree) for taps, degree in _RATES)
-        best = min(tried, key=lambda one: one.score)
+        filters = _RATES + (_FLAT_RATES if rates_of_drives(model) else ())
+        attempt(made(best.design, rate_taps=taps, rate_degree=degree) for taps, degree in filters)
+        best = min(tried, key=_order)
     place = windows.index(best.design.window_s)
     near = windows[max(place - 1, 0) : place + 2]
     attempt(
@@ -163,9 +186,31 @@ def ranked(
         if (length, count) != (best.design.window_s, best.design.functions)
     )
     if len(model.model.rows) > 1 and reversals == "located":
-        best = min(tried, key=lambda one: one.score)
+        best = min(tried, key=_order)
         attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
-    return sorted(tried, key=lambda one: one.score)
+    return sorted(tried, key=_order)
+
+
+def _order(one: Scored) -> tuple[bool, float]:
+    return not one.known, one.score
+
+
+def _searched(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    designs: Iterable[FourierDesign],
+    start: Float | None,
+    fewest: int,
+) -> list[Scored]:
+    """Of each design the minimum of least chi^2 that other starts than the guesses lead to, if any is plausible."""
+    starts = list(starts_about(model.parameters, model.parameters.checked(start)))
+    out = []
+    for design in designs:
+        tried = [score_of(model, run, design, other, False, fewest) for other in starts]
+        known = [one for one in tried if one is not None and one.known]
+        if known:
+            out.append(min(known, key=lambda one: one.chi2))
+    return out
 
 
 def made(design: FourierDesign, **changes: float) -> FourierDesign:

@@ -7,7 +7,11 @@ from functools import cached_property
 from typing import Literal
 
 from pvid.base.errors import PvidError
+from pvid.oracle.fourier.comb import nodes_of
 from pvid.oracle.fourier.functions import TestFunctions
+from pvid.oracle.fourier.polynomials import edge_of
+
+_BAND = 1.2  # highest frequency of the motion over that of the test functions
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,9 @@ class FourierDesign:
         exact integral; "averaged" takes the mean of sgn over a step, v linear there; "soft" is tanh(v / soft)
     soft : width of the soft sign [unit of the velocity]
     joint : whiten all row kinds together; noise that they share then counts once
+    comb
+        values and derivatives from block sums and compensators at the steps (pvid.oracle.fourier.comb) in place of
+        polynomials at the samples, with about as many taps. Needs a decimation above 1
     """
 
     sample_rate: float
@@ -42,6 +49,7 @@ class FourierDesign:
     reversals: Literal["located", "averaged", "soft"] = "located"
     soft: float = 0.0
     joint: bool = False
+    comb: bool = False
 
     def __post_init__(self) -> None:
         for name, taps, degree in (("taps", self.taps, self.degree), ("rate_taps", self.rate_taps, self.rate_degree)):
@@ -54,6 +62,8 @@ class FourierDesign:
             )
         if self.reversals == "soft" and self.soft <= 0:
             raise PvidError("a soft sign needs a width above 0")
+        if self.comb and self.decimation < 2:
+            raise PvidError("block sums need a decimation above 1")
 
     @property
     def dt(self) -> float:
@@ -69,6 +79,25 @@ class FourierDesign:
     def highest(self) -> int:
         """Highest harmonic."""
         return self.functions // 2 + self.power // 2
+
+    def band_of(self, order: int) -> float:
+        """Highest frequency that the compensator of a derivative is made for [Hz].
+
+        A little above the test functions', but not above where the polynomial of as many taps is right.
+        """
+        found = _BAND * self.highest / self.window_s
+        taps, degree = self._polynomial_of(order)
+        return min(found, edge_of(taps, max(degree, order), order) * self.sample_rate) if taps > 1 else found
+
+    def _polynomial_of(self, order: int) -> tuple[int, int]:
+        rates = order > 0 and self.rate_taps > 1
+        return (self.rate_taps, self.rate_degree) if rates else (self.taps, self.degree)
+
+    def compensator_of(self, order: int) -> tuple[int, int]:
+        """Of a derivative: steps on either side, about as long as the polynomial; frequencies at which it is exact."""
+        taps, degree = self._polynomial_of(order)
+        count = nodes_of(order, degree)
+        return max(round((taps + 1 - 2 * self.decimation) / (2 * self.decimation)), count), count
 
     @cached_property
     def test_functions(self) -> TestFunctions:

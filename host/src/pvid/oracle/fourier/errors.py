@@ -39,24 +39,9 @@ def uncertainty(fit: Fit) -> Uncertainty:
     """Of an estimate, in units of p."""
     designs, residuals = fit.designs(), fit.residuals()
     unit = fit.parameters.unit(fit.p)
-    prior = fit.parameters.prior(fit.start)
-    information = np.diag(prior)
-    for d in designs:
-        own = flat(d.transpose(0, 2, 1))
-        information = information + own @ own.T
+    information, neighbours = moments_of(fit, designs)
     s_inverse = inverse(information)
-    neighbours = np.zeros_like(information)
-    theta = fit.parameters.theta(fit.p)
-    adjacent = np.flatnonzero(np.diff(fit.rows.numbers) == 1)
-    for d, white in zip(designs, fit.white, strict=True):
-        back = white.whitener.back(d.transpose(0, 2, 1))
-        r1 = fit.rows.with_next(white.kinds, theta, fit.errors)
-        neighbours += flat(back[adjacent] @ r1) @ flat(back[adjacent + 1]).T
-        if fit.rows.places.size:
-            in_doubt = fit.rows.directions(white.kinds, theta) @ back.transpose(0, 2, 1)
-            neighbours += fit.rows.reversals.shared(in_doubt, fit.rows.places)
-    middle = information + neighbours + neighbours.T
-    covariance = s_inverse @ middle @ s_inverse
+    covariance = s_inverse @ (information + neighbours + neighbours.T) @ s_inverse
     free = sum(one.free for one in fit.white) - len(fit.p)
     weighted = sum(float(np.sum(e**2)) for e in residuals) / max(free, 1)
     predicted = unit * np.sqrt(np.diag(covariance) * max(1.0, weighted))
@@ -71,6 +56,40 @@ def uncertainty(fit: Fit) -> Uncertainty:
         covariance * np.outer(unit, unit),
         explained(fit),
     )
+
+
+def moments_of(fit: Fit, designs: list[Float]) -> tuple[Float, Float]:
+    """Information, and covariance of the scores of windows and their next ones, which share samples [n_p, n_p].
+
+    Parameters
+    ----------
+    designs : of `fit`
+    """
+    information = np.diag(fit.parameters.prior(fit.start))
+    for d in designs:
+        own = flat(d.transpose(0, 2, 1))
+        information = information + own @ own.T
+    neighbours = np.zeros_like(information)
+    theta = fit.parameters.theta(fit.p)
+    adjacent = np.flatnonzero(np.diff(fit.rows.numbers) == 1)
+    for d, white in zip(designs, fit.white, strict=True):
+        back = white.whitener.back(d.transpose(0, 2, 1))
+        r1 = fit.rows.with_next(white.kinds, theta, fit.errors)
+        neighbours += flat(back[adjacent] @ r1) @ flat(back[adjacent + 1]).T
+        if fit.rows.places.size:
+            in_doubt = fit.rows.directions(white.kinds, theta) @ back.transpose(0, 2, 1)
+            neighbours += fit.rows.reversals.shared(in_doubt, fit.rows.places)
+    return information, neighbours
+
+
+def inflation(fit: Fit) -> float:
+    """Largest factor by which the variance of a parameter exceeds that of independent windows, in a long run."""
+    information, neighbours = moments_of(fit, fit.designs())
+    windows = fit.rows.windows
+    shared = neighbours * windows / max(windows - 1, 1)  # every window has a next one
+    s_inverse = inverse(information)
+    factors = np.diag(s_inverse @ (shared + shared.T) @ s_inverse) / np.diag(s_inverse)
+    return 1.0 + max(0.0, float(np.max(factors)))
 
 
 def flat(x: Float) -> Float:

@@ -4,29 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import legendre
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Jet
+from pvid.oracle.fourier.comb import at_samples, compensator
 from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.polynomials import polynomial_weights
 
 Float = npt.NDArray[np.float64]
-
-
-@cache
-def polynomial_weights(taps: int, degree: int, order: int) -> Float:
-    """Weights [taps] of the derivative per step^order at the centre of a least-squares polynomial."""
-    half = (taps - 1) // 2
-    if half == 0:
-        return np.ones(1)
-    basis = legendre.legvander(np.arange(-half, half + 1) / half, degree)
-    at_centre = [legendre.legval(0.0, legendre.legder(one, order)) for one in np.eye(degree + 1)]
-    return np.asarray(np.array(at_centre) @ np.linalg.pinv(basis) / float(half) ** order)
 
 
 def filtered(x: Float, weights: Float) -> Float:
@@ -65,12 +54,22 @@ class Grid:
 
 def weights_of(design: FourierDesign, order: int) -> Float:
     """Weights of the filter that gives the derivative of this order from raw samples [1 / s^order]."""
+    if design.comb:
+        return at_samples(design.decimation, tuple(step_weights_of(design, order)))
     if order == 0:
         return polynomial_weights(design.taps, design.degree, 0)
     taps, degree = (design.rate_taps, design.rate_degree) if design.rate_taps > 1 else (design.taps, design.degree)
     if taps == 1:
         raise PvidError("a model that needs a derivative needs rate_taps or taps above 1")
     return polynomial_weights(taps, max(degree, order), order) * design.sample_rate**order
+
+
+def step_weights_of(design: FourierDesign, order: int) -> Float:
+    """Weights at the steps of the block sums; without a decimation those at the samples [1 / s^order]."""
+    if not design.comb:
+        return weights_of(design, order)
+    half, count = design.compensator_of(order)
+    return np.array(compensator(design.decimation, design.sample_rate, order, half, design.band_of(order), count))
 
 
 def samples_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> dict[str, Float]:
@@ -113,4 +112,4 @@ def grid_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], design: Four
 
 def density(signal: Signal, design: FourierDesign) -> float:
     """Variance of white noise at the steps that has the sensor's density in the band of the test functions."""
-    return signal.sd**2 / (design.decimation if design.taps > 1 else 1)
+    return signal.sd**2 / (design.decimation if design.taps > 1 or design.comb else 1)

@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Known
 from pvid.oracle.fourier import verdict
 from pvid.oracle.fourier.attenuation import other_line
-from pvid.oracle.fourier.choice import chosen
+from pvid.oracle.fourier.choice import ranked
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.functions import Float
@@ -35,6 +35,7 @@ class Identified:
     se : published standard errors, those of gains included [n_p]
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
     by_known : of each constant with a standard deviation, what p is off by over the constant's error [n_p]
+    by_neglect : what p may be off by because equations are linearised [n_p]
     sensor_error : the systematic error of a sensor that explains residuals; None: there is none
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     covariance : of p, that of `predicted` [n_p, n_p]
@@ -66,6 +67,7 @@ class Identified:
     fit: Fit
     by_gain: dict[str, Float]
     by_known: dict[str, Float]
+    by_neglect: Float
     sensor_error: SensorError | None
 
     @property
@@ -127,9 +129,15 @@ def identify(
     model = ready(compiled)
     begun = start_of(compiled, start)
     with_error = weights == "residuals"
-    used = design or chosen(model, run, sample_rate, begun, with_error)
+    if design is None:
+        best = ranked(model, run, sample_rate, begun, with_error)[0]
+        used, near = best.design, best.p
+    else:
+        used, near = design, None
     rows = WeakRows.of(model, run, used)
     fit = gated(rows, begun, with_error, compensate)
+    if near is not None and not _found(compiled, fit):  # the guesses lead elsewhere
+        fit = replace(gated(rows, near, with_error, compensate), start=fit.start)
     found = uncertainty(fit)
     halves = verdict.halves_of(fit)
     reasons = {
@@ -157,6 +165,7 @@ def identify(
     reasons["sensors"] = of_sensors(compiled, error, found.se)
     reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
     by_known = {one.name: of_known(compiled, run, fit, one) for one in compiled.knowns if one.sd > 0}
+    by_neglect = fit.parameters.positive * fit.p * neglected(compiled, run)
     white = as_white_force(fit)
     by_weights = [] if white is None else [white - fit.p]
     history = online(fit.rows, begun, with_error)
@@ -166,7 +175,10 @@ def identify(
         p=fit.p,
         se=np.sqrt(
             np.sum(
-                np.square([verdict.widened(found.se, halves), *given(compiled, by_gain, by_known), *by_weights]), axis=0
+                np.square(
+                    [verdict.widened(found.se, halves), *given(compiled, by_gain, by_known), by_neglect, *by_weights]
+                ),
+                axis=0,
             )
         ),
         predicted=found.predicted,
@@ -183,7 +195,15 @@ def identify(
         fit=fit,
         by_gain=by_gain,
         by_known=by_known,
+        by_neglect=by_neglect,
         sensor_error=error,
+    )
+
+
+def _found(model: CompiledModel, fit: Fit) -> bool:
+    """Whether a search came to rest at plausible parameters."""
+    return (
+        fit.settled and not verdict.not_identified(model, fit, uncertainty(fit)) and not verdict.of_range(model, fit.p)
     )
 
 
@@ -191,6 +211,16 @@ def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[
     """Errors of p [n_p] for one standard deviation of each gain and constant that has any."""
     gains = [one.gain_sd * by_gain[one.name] for one in model.signals if one.gain_sd > 0]
     return gains + [one.sd * by_known[one.name] for one in model.knowns if one.sd > 0]
+
+
+def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:
+    """Largest relative error of linearised equations on a run."""
+    errors = [0.0]
+    for one in model.signals:
+        if one.neglected:
+            x = np.asarray(run[one.name], np.float64)
+            errors.append(one.neglected * float(np.max(np.abs(x - np.mean(x)))) ** 2)
+    return max(errors)
 
 
 def of_known(compiled: CompiledModel, run: Mapping[str, npt.ArrayLike], fit: Fit, known: Known) -> Float:

@@ -22,8 +22,9 @@ from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Jet
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import clustered_variance
-from pvid.oracle.fourier.front import filtered, polynomial_weights
+from pvid.oracle.fourier.front import filtered
 from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.polynomials import polynomial_weights
 from pvid.oracle.fourier.rows import WhiteRows, record_of
 from pvid.oracle.fourier.solve import Fit, inverse
 from pvid.oracle.fourier.verdict import Reason

@@ -39,12 +39,13 @@ Name = Literal[
     "weights",
     "misfit",
     "core",
+    "held",
 ]
 Status = Literal["good", "warning", "not_identified"]
 
 # A standard error of a positive parameter beyond this part of it, or of another one beyond this part of its range,
 # means that the run does not determine it.
-_UNKNOWN = 0.3
+UNKNOWN = 0.3
 _UNKNOWN_OF_RANGE = 0.5
 
 # Two estimates disagree if they differ by so many standard errors of the difference ...
@@ -122,7 +123,7 @@ def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[R
     """Parameters that the run does not determine, and with what the worst is mixed."""
     p, parameters = fit.p, fit.parameters
     relative = np.where(
-        parameters.positive, found.se / np.abs(p) / _UNKNOWN, found.se / parameters.sd / _UNKNOWN_OF_RANGE
+        parameters.positive, found.se / np.abs(p) / UNKNOWN, found.se / parameters.sd / _UNKNOWN_OF_RANGE
     )
     bad = [k for k in np.argsort(-relative) if relative[k] > 1 or not np.isfinite(relative[k])]
     if not bad:

@@ -96,3 +96,23 @@ def tanh(x: npt.ArrayLike) -> Float32:
     below = below * z + F(1)
     inside = (given * above) / below
     return np.where(given > _TANH_END, F(1), np.where(given < -_TANH_END, F(-1), inside)).astype(np.float32, copy=False)
+
+
+_SINE = (F(-1.66666546e-1), F(8.33216087e-3), F(1.95152959e-4))
+_COSINE = (F(-0.5), F(4.16666456e-2), F(-1.38873163e-3), F(2.44331571e-5))
+
+
+def sincos(x: npt.ArrayLike) -> tuple[Float32, Float32]:
+    """pvid_sincos_f32: sine and cosine of x [rad]."""
+    given = np.asarray(x, np.float32)
+    far = (given > F(0.7854)) | (given < F(-0.7854))
+    total = np.where(far, given * F(0.636619772) + _MAGIC, _MAGIC)
+    turns = total - _MAGIC
+    r = np.where(far, (given - turns * F(1.5703125)) - turns * F(4.83826797e-4), given)
+    quarter = np.where(far, np.ascontiguousarray(total).view(np.uint32) & 3, 0)
+    z = r * r
+    sine = r + (r * z) * (_SINE[0] + z * (_SINE[1] - z * _SINE[2]))
+    cosine = F(1) + z * (_COSINE[0] + z * (_COSINE[1] + z * (_COSINE[2] + z * _COSINE[3])))
+    odd, turned = (quarter & 1) != 0, (quarter & 2) != 0
+    one, other = np.where(odd, cosine, sine), np.where(odd, -sine, cosine)
+    return np.where(turned, -one, one), np.where(turned, -other, other)

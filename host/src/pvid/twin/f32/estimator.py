@@ -16,11 +16,8 @@ from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import EstimatorConfig
 from pvid.twin import estimates
 from pvid.twin.f32 import cholesky
-from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.information import Information
-from pvid.twin.f32.misfit import Misfit
 from pvid.twin.f32.pattern import PatternModel
-from pvid.twin.kapitza import strong as model
 from pvid.twin.record import COUNTERS
 
 Float32 = npt.NDArray[np.float32]
@@ -31,7 +28,7 @@ RESIDUAL_MAX = np.float32(1e30)
 ROUNDING = np.float32(2.4e-7)  # of a step's terms
 
 
-def _capped(residual: Float32) -> Float32:
+def capped(residual: Float32) -> Float32:
     """At most RESIDUAL_MAX; NaN becomes RESIDUAL_MAX."""
     return np.where(residual <= RESIDUAL_MAX, residual, RESIDUAL_MAX)
 
@@ -57,8 +54,8 @@ class Estimator:
         self,
         configs: Sequence[EstimatorConfig],
         update_rate: float,
-        n_p: int = model.N_P,
-        n_sums: int = model.SUMS,
+        n_p: int,
+        n_sums: int,
     ) -> None:
         rate = np.float32(update_rate)
         stack = {
@@ -94,62 +91,6 @@ class Estimator:
             return np.float32(0)
         gain = (np.float32(config.feedback_hz) * np.float32(config.divider)) / rate
         return np.float32(gain if config.feedback_hz > 0 and gain < 1 else 1)
-
-    def step(
-        self, n: Float32, y: Float32, gate: Gate | None = None, misfit: Misfit | None = None
-    ) -> npt.NDArray[np.uint8]:
-        """One row a lane: N [11, lanes], Y [lanes]. Returns the reasons [lanes]; `sums` is up to date after it."""
-        with np.errstate(all="ignore"):
-            e, gradient = model.innovate(self.p, n, y)
-            if misfit is not None:
-                misfit.take(e, gradient[0] * self.p[0])
-            passed = np.ones(len(y), np.bool_) if gate is None else gate.passes(e * e)
-            reason = self._step(n, y, e, gradient, passed)
-            if misfit is not None:
-                reported = misfit.alarm & (reason == Reason.UPDATED)
-                reason[reported] = Reason.MISFIT
-                self.counters["misfits"] += reported
-            return reason
-
-    def _step(
-        self, n: Float32, y: Float32, e: Float32, gradient: Float32, passed: npt.NDArray[np.bool_]
-    ) -> npt.NDArray[np.uint8]:
-        usable = _squares(n, y) <= ROW_LIMIT * ROW_LIMIT
-        taken = passed & usable
-        reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
-        if not taken.all():
-            not_finite = passed & ~usable & ~(np.isfinite(n).all(axis=0) & np.isfinite(y))
-            saturated = passed & ~usable & ~not_finite
-            reason[not_finite] = Reason.REJECTED_NOT_FINITE
-            reason[saturated] = Reason.REJECTED_SATURATED
-            reason[~passed] = Reason.REJECTED_OUTLIER
-            self.counters["rejected_outlier"] += ~passed
-            self.counters["rejected_not_finite"] += not_finite
-            self.counters["rejected_saturated"] += saturated
-        if not taken.any():
-            return reason
-        is_rate = taken & (self.gain < 1)
-        if is_rate.any():
-            self.innovation = np.where(is_rate, self.innovation + gradient * e, self.innovation)
-        self.sums = self.information.add(model.terms(n, y), taken)
-        self.counters["rows"] += taken
-        self.phase += taken
-        due = taken & (self.phase >= self.divider)
-        if due.any():
-            self.phase[due] = 0
-            reason[due] = self._solve(due)[due]
-        self.information.end_group(taken)
-        self.sums = self.information.read()
-        return reason
-
-    def _solve(self, due: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-        s, force, _ = model.project(self.p, self.sums)
-        everywhere = np.ones(len(due), np.bool_)
-        x, reason, in_dead_zone = self._step_from(s, force, self.gain, due, everywhere)
-        moving = due & (reason == Reason.UPDATED) & ~in_dead_zone
-        self.p = np.where(moving, x, self.p)
-        self.counters["updates"] += moving
-        return reason
 
     def _reference(self) -> Float32:
         """Reference of the relative size of a step [n_p, lanes]."""
@@ -217,10 +158,7 @@ class Estimator:
 
     def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
         """S [n_p, n_p, lanes] and the sum of squared residuals [lanes], not below its rounding."""
-        s, _, rss_minus_yy = model.project(self.p, sums)
-        floor = RESIDUAL_FLOOR * sums[-2]
-        residual = _capped(sums[-2] + rss_minus_yy)
-        return s, np.where(residual > floor, residual, floor)
+        raise NotImplementedError
 
     def assess(self) -> npt.NDArray[np.void]:
         """pvid_estimator_assess_f32 of every lane, dtype estimates.F32 [lanes]."""
@@ -290,6 +228,7 @@ class RelativeEstimator(Estimator):
         self.row_weight = _lanes([c.row_weight for c in configs])
         self.noise_margin = _lanes([c.noise_margin for c in configs])
         self.noise = np.zeros((3, len(configs)), np.float32)
+        self.noise_alone: Float32 | None = None  # that a solve's S must exceed, in place of the model's
         self.rss = np.zeros(len(configs), np.float32)
         self.group_rss = self.rss
         self.group_weight = np.zeros(len(configs), np.float32)
@@ -326,6 +265,47 @@ class RelativeEstimator(Estimator):
         self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
         self.counters["rejected_not_finite"] += not_finite
         return reason
+
+    def accept_rows(self, squares: Float32, rss: Float32) -> npt.NDArray[np.uint8]:
+        """pvid_products_accept_f32: squares of the columns of rows [theta of their kind, lanes]."""
+        limit = ROW_LIMIT * ROW_LIMIT
+        fits = (squares <= limit).all(axis=0) & (rss <= limit)
+        not_finite = ~fits & ~(np.isfinite(squares).all(axis=0) & np.isfinite(rss))
+        reason = np.full(len(rss), Reason.ACCUMULATED, np.uint8)
+        reason[~fits] = Reason.REJECTED_SATURATED
+        reason[not_finite] = Reason.REJECTED_NOT_FINITE
+        self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
+        self.counters["rejected_not_finite"] += not_finite
+        return reason
+
+    def add_moment(self, kind: int, place: int, product: Float32) -> None:
+        """Adds to an entry of a kind's packed upper triangle of M."""
+        self._add_to_low(self.model.blocks.places_of_kind(kind)[0].start + place, product)
+
+    def add_gradient(self, kind: int, place: int, product: Float32) -> None:
+        """Adds sum N e to an entry of a kind's b."""
+        self._add_to_low(self.model.moments + self.model.blocks.of_kind[kind].start + place, product)
+
+    def _add_to_low(self, place: int, value: Float32) -> None:
+        with np.errstate(all="ignore"):
+            low = self.information.low.copy()
+            low[place] = low[place] + value
+            self.information.low = low
+            self.sums = self.information.read()
+
+    def end_rows(self, kind: int, gradient: Float32, rss: Float32, rows: int) -> None:
+        """pvid_products_end_f32: behind the products of so many rows; sum N e of the kind [theta, lanes], sum e^2."""
+        pattern = self.model
+        with np.errstate(all="ignore"):
+            weight = self.row_weight * np.float32(rows)
+            self._add_to_low(-2, rss)
+            self._add_to_low(-1, weight)
+            self.rss = self.rss + rss
+            self.group_weight = self.group_weight + weight
+            if self.is_rate:
+                slope = pattern.transpose_times(pattern.jacobian(self.p), gradient, kind)
+                self.innovation = self.innovation + slope
+        self.counters["rows"] += rows
 
     def add_to_b(self, g: Float32) -> npt.NDArray[np.uint8]:
         """pvid_estimator_add_to_b_f32: g [n_theta, lanes]."""
@@ -402,12 +382,13 @@ class RelativeEstimator(Estimator):
         return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
 
     def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
-        if self.model.noise is None:
+        if self.model.noise is None and self.noise_alone is None:
             return self.everywhere
         gated = self.model.gated
         rest = np.zeros((gated, gated, s.shape[2]), np.float32)
         much = (self.noise_margin * variance) * weight
-        noise = self.model.noise(self.p, self.noise)
+        noise = self.noise_alone if self.model.noise is None else self.model.noise(self.p, self.noise)
+        assert noise is not None
         for a in range(gated):
             for b in range(a, gated):
                 rest[a, b] = s[a, b] - much * noise[a, b]
@@ -452,7 +433,7 @@ class RelativeEstimator(Estimator):
         low[places] = low[places] - moved
         low[-2] = residual
         self.information.low = np.where(moving, low, self.information.low)
-        lost = _capped(self.information.rounding + ROUNDING * size)
+        lost = capped(self.information.rounding + ROUNDING * size)
         self.information.rounding = np.where(moving, lost, self.information.rounding)
         self.theta = np.where(moving, theta, self.theta)
         self.p = np.where(moving, x, self.p)
@@ -473,7 +454,7 @@ class RelativeEstimator(Estimator):
     def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
         s = self.model.project(self.model.jacobian(self.p), self.model.matrix(sums))
         floor = self.expected * (sums[-1] - np.float32(len(self.p)))
-        residual = _capped(sums[-2] + self.information.rounding)
+        residual = capped(sums[-2] + self.information.rounding)
         return s, np.where(residual > floor, residual, floor)
 
     def set_expected(self, variance: Float32) -> None:
@@ -481,7 +462,7 @@ class RelativeEstimator(Estimator):
         with np.errstate(all="ignore"):
             part = self.group_weight / self.sums[-1]
             share = np.where(self.group_weight < self.sums[-1], part, np.float32(1))
-            moved = self.expected + (_capped(variance) - self.expected) * share
+            moved = self.expected + (capped(variance) - self.expected) * share
         self.expected = np.where(self.group_weight > 0, moved, self.expected)
 
     def misfit(self, sums: Float32) -> Float32:
@@ -489,7 +470,7 @@ class RelativeEstimator(Estimator):
         freedom = sums[-1] - np.float32(len(self.p))
         explained = freedom * self.expected
         known = (freedom >= 1) & (explained > 0) & (sums[-2] > 0)
-        return np.where(known, _capped(sums[-2] / explained), np.float32(0))
+        return np.where(known, capped(sums[-2] / explained), np.float32(0))
 
     @property
     def rounded(self) -> npt.NDArray[np.bool_]:

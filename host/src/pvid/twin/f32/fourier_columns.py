@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.fourier import NONE
-from pvid.twin.f32.fourier_white import Rows, total
+from pvid.twin.f32.fourier_white import White, total
 
 Float32 = npt.NDArray[np.float32]
 
@@ -16,29 +16,31 @@ _SKIP = _F(1e-6)
 _SMALLEST, _LARGEST = _F(1.17549435e-38), _F(3.4e38)
 
 
-def sums_of_columns(rows: Rows, kind: int, window: Float32) -> Float32:
-    """Sums over the terms of each column, factor (-1)^m (i omega)^m S_h [columns, 2, harmonics].
+def parts_of_columns(white: White, window: Float32) -> Float32:
+    """Sums over the terms of each column, factor (-1)^m (i omega)^m S_h over its standard deviation
+    [columns, parts, lanes].
 
     window: sums of the channels [channels, 2, harmonics]
     """
-    model = rows.design.model
-    rate = np.arange(rows.harmonics).astype(np.float32) * rows.omega
-    out = np.zeros((model.kind[kind].columns, 2, rows.harmonics), np.float32)
+    rows, model = white.rows, white.rows.design.model
+    rate = (np.arange(rows.harmonics).astype(np.float32) * rows.omega)[:, None]
+    sines = slice(1, 1 + rows.parts - rows.cosines)
+    out = np.zeros((model.kind[white.kind].columns, rows.parts, white.scale.shape[1]), np.float32)
     with np.errstate(all="ignore"):
-        for one in model.terms_of(kind):
-            factor = _F(one.factor)
+        for one in model.terms_of(white.kind):
+            factor, column = _F(one.factor), out[one.column]
             if model.channel[one.channel].gain == NONE:
-                whole = factor * (_F(2) * _F(rows.design.hop)) if one.order == 0 else _F(0)
-                out[one.column, 0, 0] = out[one.column, 0, 0] + whole
+                whole = white.scale[0] * (factor * (_F(2) * _F(rows.design.hop)))
+                column[0] = column[0] + (whole if one.order == 0 else _F(0))
                 continue
             turned, negative = one.order % 2 == 1, (one.order + 1) % 4 >= 2
-            parts = window[one.channel][::-1] if turned else window[one.channel]
+            re, im = window[one.channel][::-1] if turned else window[one.channel]
             sign = -factor if negative else factor
-            power = np.ones(rows.harmonics, np.float32)
+            weight = white.scale
             for _ in range(one.order):
-                power = power * rate
-            factors = np.stack([(-sign if turned else sign) * power, sign * power])
-            out[one.column] = out[one.column] + factors * parts
+                weight = weight * rate
+            column[: rows.cosines] = column[: rows.cosines] + ((-sign if turned else sign) * weight) * re[:, None]
+            column[rows.cosines :] = column[rows.cosines :] + ((sign * weight) * im[:, None])[sines]
     return out
 
 

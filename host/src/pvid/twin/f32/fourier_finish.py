@@ -10,9 +10,10 @@ import numpy.typing as npt
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig
 from pvid.twin.f32.estimator import RelativeEstimator
-from pvid.twin.f32.fourier_columns import projected, sums_of_columns
+from pvid.twin.f32.fourier_columns import parts_of_columns, projected
+from pvid.twin.f32.fourier_noise import ENTRIES, Noise, shares
 from pvid.twin.f32.fourier_scores import Scores
-from pvid.twin.f32.fourier_white import Rows, White
+from pvid.twin.f32.fourier_white import Rows, White, total
 from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.trust import Trust
 from pvid.twin.record import Mask, Reasons, of_all_lanes
@@ -22,7 +23,7 @@ Float32 = npt.NDArray[np.float32]
 Stages = Iterator[Reasons | None]
 
 _F = np.float32
-_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 48, 4
+_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 36, 4
 _GATE_MEMORY = _F(4)
 _VARIANCE_MAX = _F(1e36)
 
@@ -64,19 +65,48 @@ class Finish:
         own = self.design.model.kind[kind]
         vectors, nuisances = self.design.power // 2, own.nuisances
         project = nuisances * own.columns - nuisances * (nuisances - 1) // 2 if nuisances else 1
-        residual = _parts(self.rows.count, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
-        return self._entries() + 1 + vectors * vectors + own.columns * (vectors + 1) + project + residual
+        residual = _parts(self.design.functions, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
+        squares = _parts(own.thetas, self._products)
+        basis = vectors * (vectors + 1) + self._stages_of_share
+        noise = _parts(len(self.design.noise), ENTRIES) if self._checks_noise else 1
+        return self._entries() + 1 + noise + basis + 3 * own.columns + project + residual + squares
 
     @property
-    def _stages_of_shares(self) -> int:
-        return _parts(self.rows.count, _SHARES_PER_STAGE) + self._entries() if self.shares else 0
+    def _checks_noise(self) -> bool:
+        """S is compared with the information of the sensors' noise; lanes have one margin."""
+        return bool(self.estimator.noise_margin[0] > 0) and bool(self.design.noise)
+
+    @property
+    def _weight(self) -> Float32:
+        """Of a window's rows [lanes]."""
+        return np.asarray(
+            (_F(self.design.functions) * _F(self.design.model.kinds)) * self.estimator.row_weight, np.float32
+        )
+
+    @property
+    def _products(self) -> int:
+        """Products of columns that a stage forms."""
+        return max(1, _PRODUCTS_PER_STAGE // self.design.functions)
+
+    def _stages_of_adding(self, kind: int) -> int:
+        """Stages of a kind behind its gate."""
+        thetas = self.design.model.kind[kind].thetas
+        return _parts(thetas * (thetas + 1) // 2, self._products)
+
+    @property
+    def _stages_of_share(self) -> int:
+        return _parts(self.rows.parts, _SHARES_PER_STAGE) if self.shares else 0
+
+    @property
+    def _stages_of_pull(self) -> int:
+        return self._entries() if self.shares else 0
 
     @property
     def stages(self) -> int:
         """Of a window with all its solves."""
         estimator = self.estimator
         of_kinds = sum(
-            self._stages_of_rows(kind) + self._stages_of_shares + self.rows.count
+            self._stages_of_rows(kind) + self._stages_of_pull + self._stages_of_adding(kind)
             for kind in range(self.design.model.kinds)
         )
         solves = estimator.solve_stages(True) + (self.iterations - 1) * estimator.solve_stages(False)
@@ -96,16 +126,26 @@ class Finish:
         nothing = np.zeros(lanes, np.float32)
         expected, free, square, used = nothing, nothing, nothing, 0
         first = 0
+        noise = Noise(estimator.model, estimator.p, self._weight)
         for kind, own in enumerate(self.design.model.kind):
             block = slice(first, first + own.thetas)
-            first += own.thetas
             theta = estimator.theta[block]
             white = White(self.rows, kind, theta)
-            columns, live = projected(white.columns(sums_of_columns(self.rows, kind, window)), own.thetas)
+            if self._checks_noise:
+                self._add_noise(noise, white, first)
+            first += own.thetas
+            columns, live = projected(white.columns(parts_of_columns(white, window)), own.thetas)
             e, rss = _residuals(columns, theta)
             for _ in range(self._stages_of_rows(kind) - 1):
                 yield None
             freedom = _F(self.design.functions) - live
+            n = columns[: own.thetas]
+            with np.errstate(all="ignore"):
+                squares = np.array([total(one * one) for one in n])
+            accepted = estimator.accept_rows(squares, rss)
+            if not of_all_lanes(accepted == Reason.ACCUMULATED):
+                yield accepted
+                continue
             with np.errstate(all="ignore"):
                 passes = of_all_lanes(self.gates[kind].passes(rss / freedom))
             if not passes:
@@ -120,25 +160,50 @@ class Finish:
             free, square = free + freedom, square + rss
             yield None
             if self.shares:
-                yield from self._share(white, block, score)
+                yield from self._pull(white, block, score)
                 expected = expected + white.sensors()
             else:
                 expected = expected + _F(1)
-            for k in range(self.rows.count):
-                n = columns[: own.thetas, k]
-                with np.errstate(all="ignore"):
-                    score[block] = score[block] + n * e[k]
-                added = estimator.add(n, columns[own.thetas, k], kind)
-                yield None if (added == Reason.ACCUMULATED).all() else added
+            yield from self._add(kind, np.concatenate([n, e[None]]), squares, score[block], rss)
         if used == 0:
             self.scores.skip()
             return
+        estimator.noise_alone = noise.s if self._checks_noise else None
         yield from self._steps(score, expected / _F(used), free, square)
 
-    def _share(self, white: White, block: slice, score: Float32) -> Stages:
-        """The stages of the noise's share, the last of which adds the compensation."""
+    def _add(self, kind: int, columns: Float32, squares: Float32, score: Float32, rss: Float32) -> Stages:
+        """Products of the columns of N and e [thetas + 1, rows, lanes] to the estimator, a few a stage."""
+        thetas, moment, done = len(squares), 0, 0
+        gradient = np.zeros_like(score)
+        for i in range(thetas):
+            self.estimator.add_moment(kind, moment, squares[i])
+            moment += 1
+            for j in range(i + 1, thetas + 1):
+                with np.errstate(all="ignore"):
+                    product = total(columns[i] * columns[j])
+                    if j < thetas:
+                        self.estimator.add_moment(kind, moment, product)
+                        moment += 1
+                    else:
+                        gradient[i] = product
+                        score[i] = score[i] + product
+                        self.estimator.add_gradient(kind, i, product)
+                done += 1
+                if i < thetas - 1 and done % self._products == 0:
+                    yield None
+        self.estimator.end_rows(kind, gradient, rss, self.design.functions)
+        yield None
+
+    def _add_noise(self, noise: Noise, white: White, first: int) -> None:
+        share = white.share if self.shares else shares(white)
+        with np.errstate(all="ignore"):
+            for one in self.design.noise_of(white.kind):
+                noise.add(one, first, self.design.model.kind[white.kind].thetas, share)
+
+    def _pull(self, white: White, block: slice, score: Float32) -> Stages:
+        """The stages of the compensation, the last of which adds it."""
         estimator = self.estimator
-        for _ in range(self._stages_of_shares - 1):
+        for _ in range(self._stages_of_pull - 1):
             yield None
         pull = np.zeros_like(score)
         if self.compensation:
@@ -164,6 +229,7 @@ class Finish:
                     reason = solved
             if not estimator.was_due:
                 break
+        estimator.noise_alone = None
         size, group_rss = estimator.size, estimator.group_rss
         for _ in range(estimator.assessment_stages + 1 + len(estimator.p)):
             yield None
@@ -180,8 +246,7 @@ class Finish:
         n_p = len(estimator.p)
         covariance = np.moveaxis(candidate["covariance"], 0, 2)[:n_p, :n_p].copy()
         wide = estimator.judged_variance * estimator.correlation
-        rows = (_F(self.rows.count) * _F(self.design.model.kinds)) * estimator.row_weight
-        windows = candidate["weight"] / rows
+        windows = np.asarray(candidate["weight"] / self._weight, np.float32)
         growth = np.ones((n_p, len(wide)), np.float32)
         for a in range(n_p):
             variance = self.scores.variance(a, covariance, wide, windows)

@@ -14,68 +14,54 @@ Places = npt.NDArray[np.int64]
 
 _F = np.float32
 _HELD_SCALE = _F(1) / _F(24)
-_LEAST_BEFORE = 2  # ticks before the first step
-_LONG_STEP, _PAIRS = 8, 16
+_TWO_TICKS = 4  # least D whose jets and channels have a tick each
 
 
 @dataclass(frozen=True)
 class FrontTicks:
-    """Twin of fourier/fourier_schedule.h, as far as it depends on the front end: the work of the ticks of a stretch.
+    """Twin of the front end's counters: the work of the ticks of a stretch.
 
     Ticks count from its first sample.
 
     Attributes
     ----------
-    half : of the longest filter
-    pairs : of all filters
+    half : of the longest compensator [steps]
     decimation : D
     held : a signal needs the next sample
+    lost : outputs before those of the first step
     """
 
     half: int
-    pairs: int
     decimation: int
     held: bool
+    lost: int
 
     @classmethod
     def of(cls, design: FourierDesign32) -> FrontTicks:
         """Those of a design."""
-        held = any(one.source == Source.HELD for one in design.model.signal)
-        return cls(design.half, sum(one.half for one in design.filter), design.decimation, held)
+        sources = {one.source for one in design.model.signal}
+        half = design.half_steps
+        lost = 1 if design.decimation > 1 else max(2 - half, 0) if sources != {Source.SAMPLED} else 0
+        return cls(half, design.decimation, Source.HELD in sources, lost)
 
     @property
     def first(self) -> int:
         """Sample to whose instant the first step refers."""
-        return max(self.half, _LEAST_BEFORE)
-
-    @property
-    def _job_ticks(self) -> int:
-        few = min(-(-self.pairs // _PAIRS), self.decimation // 2)
-        return 1 if self.decimation < _LONG_STEP else max(few, 1)
-
-    @property
-    def _step_place(self) -> int:
-        """Place in a step of the tick that forms the channels."""
-        return self.decimation - 1 if self.decimation < _LONG_STEP else self._job_ticks
-
-    @property
-    def _work_place(self) -> int:
-        """Place of the first tick that adds to the sums or runs stages."""
-        return 0 if self.decimation < _LONG_STEP else self._job_ticks + 1
+        return self.decimation * (self.lost + self.half)
 
     @property
     def free_ticks(self) -> int:
         """Ticks of a block of four steps that add harmonics or run stages."""
-        return 4 * (self.decimation - self._work_place - (1 < self.decimation < _LONG_STEP))
+        return 4 * max(self.decimation - 1 - self._apart, 1)
 
     @property
-    def _begin(self) -> int:
-        """Tick at which the first job begins."""
-        return self.first + self.half + self.held
+    def _apart(self) -> int:
+        """Ticks from a step's jets to its channels."""
+        return int(self.decimation >= _TWO_TICKS)
 
     def tick_of(self, step: int) -> int:
-        """Tick that takes the jets of a step."""
-        return self._begin + self.decimation * step + self._step_place
+        """Tick that takes the jets of a step to the channels."""
+        return self.decimation * (self.lost + 2 * self.half + 1 + step) - 1 + self.held + self._apart
 
     def steps(self, ticks: int) -> int:
         """Steps whose jets have been taken after a stretch of so many ticks."""
@@ -83,10 +69,12 @@ class FrontTicks:
 
     def free(self, ticks: int) -> npt.NDArray[np.bool_]:
         """Which ticks add harmonics or run stages [ticks]."""
-        since = np.arange(ticks) - self._begin
-        place = since % self.decimation
-        works = (place >= self._work_place) & (place != self._step_place)
-        return np.asarray((since < 0) | works | (self.decimation == 1))
+        place = np.arange(1, ticks + 1) - self.held
+        used = (place > 0) & (place % self.decimation == 0)
+        forms = np.zeros_like(used)
+        if self._apart:
+            forms[self.tick_of(0) :: self.decimation] = True
+        return np.asarray((self.decimation == 1) | ~(used | forms))
 
 
 def signals(samples: Float32, model: FourierModel, sample_rate: float) -> Float32:
@@ -109,11 +97,22 @@ def signals(samples: Float32, model: FourierModel, sample_rate: float) -> Float3
     return out
 
 
+def block_means(of_ticks: Float32, decimation: int) -> Float32:
+    """Outputs of whole blocks [blocks, signals] of signals [ticks, signals]."""
+    blocks, d = len(of_ticks) // decimation, _F(decimation)
+    x = np.zeros((blocks, decimation + 1, of_ticks.shape[1]), np.float32)
+    x[:, 1:] = of_ticks[: blocks * decimation].reshape(blocks, decimation, -1)
+    with np.errstate(all="ignore"):
+        once = np.add.accumulate(x, axis=1, dtype=np.float32)
+        twice = np.add.accumulate(once, axis=1, dtype=np.float32)[:, -1]
+        carry = np.zeros_like(twice)
+        carry[1:] = (d * once[:, -1] - twice)[:-1]
+        return np.asarray((_F(1) / (d * d)) * (twice + carry))
+
+
 def filtered(x: Float32, weights: Float32, order: int, centres: Places) -> Float32:
-    """A signal [ticks], or a derivative of it, at the centres."""
+    """A signal [steps], or a derivative of it, at the centres."""
     middle = x[centres]
-    if not len(weights):
-        return middle
     total = np.zeros(len(centres), np.float32)
     for i, weight in enumerate(weights, 1):
         newer, older = x[centres + i], x[centres - i]
@@ -124,10 +123,11 @@ def filtered(x: Float32, weights: Float32, order: int, centres: Places) -> Float
 def jets(samples: Float32, design: FourierDesign32, sample_rate: float) -> Float32:
     """Jets [jets, steps] of one stretch of finite samples [ticks, samples]."""
     ticks, model = FrontTicks.of(design), design.model
-    centres = ticks.first + ticks.decimation * np.arange(ticks.steps(len(samples)))
+    centres = ticks.lost + ticks.half + np.arange(ticks.steps(len(samples)))
     of_ticks = signals(samples, model, sample_rate)
+    outputs = block_means(of_ticks[: len(samples) - ticks.held], design.decimation)
     out = np.empty((model.jets, len(centres)), np.float32)
     with np.errstate(all="ignore"):
-        for place, (jet, one) in enumerate(zip(model.jet, design.filter, strict=True)):
-            out[place] = filtered(of_ticks[:, jet.signal], one.weights, jet.order, centres)
+        for place, (jet, one) in enumerate(zip(model.jet, design.compensator, strict=True)):
+            out[place] = filtered(outputs[:, jet.signal], one.weights, jet.order, centres)
     return out

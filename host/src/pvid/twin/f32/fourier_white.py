@@ -1,6 +1,6 @@
 """Twin of fourier/white_f32.c: noise of a kind's rows at p, and the directions that the test functions leave out.
 
-Rows are parts of the sums S_h: real ones of the harmonics 0.., then imaginary ones of the harmonics 1...
+Rows are made of parts of the sums S_h: real ones of the harmonics 0.., then imaginary ones of the harmonics 1...
 """
 
 from __future__ import annotations
@@ -32,21 +32,23 @@ class Rows:
     ----------
     harmonics : H + 1
     cosines : real parts
-    count : with the imaginary parts, K + n
+    parts : with the imaginary parts, K + n
     omega : of h = 1 [rad/s]
     powers : of omega^2 in the noise
-    harmonic : of each row [rows]
+    harmonic : of each part [parts]
+    vectors : n/2, reflections of each family
     """
 
     def __init__(self, design: FourierDesign32, dt: np.float32) -> None:
         self.design = design
         self.harmonics = design.highest + 1
         self.cosines = self.harmonics
-        self.count = design.functions + design.power
+        self.parts = design.functions + design.power
+        self.vectors = design.power // 2
         self.omega = _TURN / (_F(2) * (_F(design.hop) * dt))
         orders = [one.power for one in design.noise] + [int(one) for one in design.error_order]
         self.powers = max(orders, default=0) + 1
-        self.harmonic = np.concatenate([np.arange(self.cosines), np.arange(1, 1 + self.count - self.cosines)])
+        self.harmonic = np.concatenate([np.arange(self.cosines), np.arange(1, 1 + self.parts - self.cosines)])
         rate = np.arange(self.harmonics).astype(np.float32) * self.omega
         self.square = rate * rate
         self.samples = np.full(self.harmonics, design.hop, np.float32)
@@ -55,7 +57,7 @@ class Rows:
     @property
     def families(self) -> tuple[slice, slice]:
         """Places of the real parts and of the imaginary parts."""
-        return slice(0, self.cosines), slice(self.cosines, self.count)
+        return slice(0, self.cosines), slice(self.cosines, self.parts)
 
 
 class White:
@@ -67,7 +69,8 @@ class White:
         with np.errstate(all="ignore"):
             self.weight = self._weighed()
             self.scale = self._scale()
-            self.basis = self._basis()
+            self.reflections: list[Float32] = []
+            self.leverage = self._leverage()
 
     def _weighed(self) -> Float32:
         """c_j of the sensors [powers, lanes]."""
@@ -90,52 +93,54 @@ class White:
         least = np.where(part > _SPECTRUM_MIN, part, _SPECTRUM_MIN)
         return np.asarray(_F(1) / np.sqrt(np.where(spectrum > least, spectrum, least)), np.float32)
 
-    def _basis(self) -> list[Float32]:
-        """The directions, each [rows, lanes]: one of the real parts above one of the imaginary parts."""
+    def _leverage(self) -> Float32:
+        """Sum of the squares of the directions [parts, lanes]; finds their reflections."""
         rows = self.rows
         x = (rows.harmonic.astype(np.float32) / _F(rows.cosines - 1))[:, None]
-        basis: list[Float32] = []
-        for k in range(rows.design.power // 2):
-            if k == 0:
-                scale = self.scale[rows.harmonic]
-                u = np.where(np.arange(rows.count)[:, None] < rows.cosines, scale, x * scale)
-            else:
-                u = (x * x) * basis[-1]
-            for turn in range(2 * k):
-                u = self._without(basis[turn % k], u)
+        scale = self.scale[rows.harmonic]
+        u: Float32 = np.where(np.arange(rows.parts)[:, None] < rows.cosines, scale, x * scale)
+        leverage: Float32 = np.zeros(u.shape, np.float32)
+        for k in range(rows.vectors):
+            u = (x * x) * u if k else u
+            for place in range(k):
+                u = self._reflected(place, u)
+            self.reflections.append(np.zeros_like(u))
             for family in rows.families:
-                u[family] = u[family] * (_F(1) / np.sqrt(total(u[family] * u[family])))
-            basis.append(u)
-        return basis
+                own = slice(family.start + k, family.stop)
+                self.reflections[k][own] = _reflection(u[own])
+            u = np.zeros_like(u)
+            for family in rows.families:
+                u[family.start + k] = 1
+            for place in reversed(range(k + 1)):
+                u = self._reflected(place, u)
+            leverage = leverage + u * u
+        return leverage
 
-    def _without(self, u: Float32, x: Float32) -> Float32:
-        """x [rows, ..., lanes] less its components along the two vectors in u [rows, lanes]."""
-        out = x.copy()
-        wide = u.reshape(len(u), *(1,) * (x.ndim - 2), u.shape[-1])
+    def _reflected(self, place: int, x: Float32) -> Float32:
+        """x [parts, ..., lanes] behind a reflection of both families."""
+        out, v = x.copy(), self.reflections[place]
+        wide = v.reshape(len(v), *(1,) * (x.ndim - 2), v.shape[-1])
         for family in self.rows.families:
-            out[family] = x[family] - total(wide[family] * x[family]) * wide[family]
+            own = slice(family.start + place, family.stop)
+            out[own] = x[own] - total(wide[own] * x[own]) * wide[own]
         return out
 
-    def columns(self, sums: Float32) -> Float32:
-        """White columns [columns, rows, lanes] from their sums [columns, 2, harmonics]."""
-        rows = self.rows
+    def columns(self, parts: Float32) -> Float32:
+        """White columns [columns, rows, lanes] from their parts in standard deviations [columns, parts, lanes]."""
+        x = np.moveaxis(parts, 0, 1)
         with np.errstate(all="ignore"):
-            parts = np.concatenate([sums[:, 0], sums[:, 1, 1 : 1 + rows.count - rows.cosines]], axis=1)
-            x = self.scale[rows.harmonic][:, None] * parts.T[:, :, None]
-            for u in self.basis:
-                x = self._without(u, x)
-        return np.moveaxis(x, 0, 1)
+            for place in range(self.rows.vectors):
+                x = self._reflected(place, x)
+        kept = np.concatenate([x[one.start + self.rows.vectors : one.stop] for one in self.rows.families])
+        return np.moveaxis(kept, 0, 1)
 
     @cached_property
     def share(self) -> Float32:
         """Q_j = tr(R^-1 dR/dc_j) [powers, lanes]."""
         rows = self.rows
         scale = self.scale[rows.harmonic]
-        left = np.ones_like(scale)
         with np.errstate(all="ignore"):
-            for u in self.basis:
-                left = left - u * u
-            weight = rows.samples[rows.harmonic][:, None] * (left * (scale * scale))
+            weight = rows.samples[rows.harmonic][:, None] * ((_F(1) - self.leverage) * (scale * scale))
             share = []
             for _ in range(rows.powers):
                 share.append(total(weight))
@@ -158,3 +163,13 @@ class White:
         """Mean variance of the white rows by the sensors alone [lanes]."""
         with np.errstate(all="ignore"):
             return total(self.weight * self.share) / _F(self.rows.design.functions)
+
+
+def _reflection(x: Float32) -> Float32:
+    """v with v^T v = 2, such that x - v (v^T x) has nothing behind its first entry [entries, lanes]."""
+    size, head = np.sqrt(total(x * x)), x[0]
+    negative = head < 0
+    scale = _F(1) / np.sqrt(size * (size + np.where(negative, -head, head)))
+    v: Float32 = x * scale
+    v[0] = np.where(negative, head - size, head + size) * scale
+    return v

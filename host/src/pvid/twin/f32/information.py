@@ -10,7 +10,7 @@ Float32 = npt.NDArray[np.float32]
 _BLOCK_MAX = 64
 
 
-def _decay(x: np.float32) -> np.float32:
+def decay(x: np.float32) -> np.float32:
     """exp(-x) as the core computes it."""
     one = np.float32(1)
     total = one
@@ -42,7 +42,7 @@ class Information:
             if groups > 0:
                 if groups < np.float32(16 * _BLOCK_MAX):
                     self.block[lane] = 1 if groups < np.float32(32) else int(groups / np.float32(16))
-                self.retention[lane] = _decay(np.float32(self.block[lane]) / groups)
+                self.retention[lane] = decay(np.float32(self.block[lane]) / groups)
 
     def read(self) -> Float32:
         """Values of the sums [n_sums, lanes]."""

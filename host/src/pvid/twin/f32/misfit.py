@@ -27,29 +27,36 @@ class Misfit:
         self.least_rss = np.full(lanes, _UNKNOWN)
         self.least_part = np.full(lanes, _UNKNOWN)
         self.block = int(np.clip(BLOCK_S * rate, np.float32(1), _ROWS_MAX))
-        self.left = self.block
+        self.left = np.full(lanes, self.block)
         self.alarm = np.zeros(lanes, np.bool_)
 
-    def take(self, e: Float32, sensitivity: Float32) -> None:
+    def add(self, e: Float32, sensitivity: Float32) -> None:
         """A row of every lane: its residual and p[0] times its gradient in p[0], [lanes]."""
         self.rss = self.rss + e * e
         self.signal = self.signal + sensitivity * sensitivity
         self.left -= 1
-        if self.left == 0:
-            self._judge()
 
-    def _judge(self) -> None:
+    def end_row(self, deferred: Mask) -> None:
+        """Judges the blocks that end with this row; those deferred [lanes] take one row more."""
+        ends = self.left == 0
+        self.left[ends & deferred] = 1
+        due = ends & ~deferred
+        if due.any():
+            self._judge(due)
+
+    def _judge(self, due: Mask) -> None:
         part = self.rss / self.signal
         has_reference = self.least_part < _UNKNOWN
         larger = (self.rss > TIMES * self.least_rss) & (part > TIMES * self.least_part) & (part > LEAST)
-        numbers = np.isfinite(self.rss) & np.isfinite(self.signal)
+        numbers = np.isfinite(self.rss + self.signal)
         moves = numbers & (self.signal > 0)
-        self.alarm = ~numbers | (moves & has_reference & (larger | (part > MOST)))
-        self.least_rss = np.where(moves, self._least(self.least_rss, self.rss), self.least_rss)
-        self.least_part = np.where(moves, self._least(self.least_part, part), self.least_part)
-        self.rss = np.zeros_like(self.rss)
-        self.signal = np.zeros_like(self.signal)
-        self.left = self.block
+        alarm = ~numbers | (moves & has_reference & (larger | (part > MOST)))
+        self.alarm = np.where(due, alarm, self.alarm)
+        self.least_rss = np.where(due & moves, self._least(self.least_rss, self.rss), self.least_rss)
+        self.least_part = np.where(due & moves, self._least(self.least_part, part), self.least_part)
+        self.rss = np.where(due, np.float32(0), self.rss)
+        self.signal = np.where(due, np.float32(0), self.signal)
+        self.left = np.where(due, self.block, self.left)
 
     def _least(self, least: Float32, now: Float32) -> Float32:
         grown = least * self.growth

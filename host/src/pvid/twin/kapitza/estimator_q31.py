@@ -187,7 +187,7 @@ class _System:
         coefficients = {r: [b * x for b, x in zip(row, powers, strict=False)] for r, row in _BINOMIALS.items()}
 
         def along(at: int, r: int) -> Int:
-            total = m[at] << 30
+            total: Int = m[at] << 30
             for i, c in enumerate(coefficients[r]):
                 total = total + c * m[at + 1 + i]
             return total

@@ -8,14 +8,12 @@ from enum import IntEnum
 import numpy as np
 
 from pvid.settings.fourier_q31 import FourierDesignQ31
-from pvid.twin.q31.fourier_front import first_step, is_held, jets
+from pvid.twin.q31.fourier_front import FrontTicks, jets
 from pvid.twin.q31.fourier_sums import windows
 from pvid.twin.q31.fourier_values import LATER, steps
 from pvid.twin.q31.integer import Int
 
 _BLOCK = 4
-_LEAST_PAIRS = 16  # of a filter, a tick
-_SHARING = 4  # the least D whose ticks share the work
 
 
 class Tick(IntEnum):
@@ -33,74 +31,52 @@ class Schedule:
 
     Attributes
     ----------
-    decimation, hop : of the design
-    first : tick in which the job of the first step begins
-    job : ticks of a job
-    at_once : each tick does all that is due
-    slices : harmonics that a tick adds to
-    adding : ticks that add a block
+    front : its counters
+    hop : of the design
+    harmonics : H + 1
     """
 
-    decimation: int
+    front: FrontTicks
     hop: int
-    first: int
-    job: int
-    at_once: bool
-    slices: int
-    adding: int
+    harmonics: int
 
     @classmethod
     def of(cls, design: FourierDesignQ31) -> Schedule:
         """Of a design."""
-        ticks = design.decimation
-        share = ticks // 2 if ticks > 1 else 1
-        pairs = sum(one.half for one in design.filter)
-        each = max(-(-pairs // share), _LEAST_PAIRS)
-        at_once = ticks < _SHARING
-        job = max(-(-pairs // each), 1)
-        others = ticks if at_once else ticks - job - 1
-        slots = max(_BLOCK * others // 2, 1)
-        harmonics = design.highest + 1
-        slices = -(-harmonics // slots)
-        return cls(
-            decimation=ticks,
-            hop=design.hop,
-            first=first_step(design) + design.half + int(is_held(design)),
-            job=job,
-            at_once=at_once,
-            slices=slices,
-            adding=-(-harmonics // slices),
-        )
+        return cls(FrontTicks.of(design), design.hop, design.highest + 1)
+
+    @property
+    def _others(self) -> int:
+        """Ticks of a block that add harmonics or run stages."""
+        return _BLOCK * max(self.front.decimation - 1, 1)
+
+    @property
+    def items(self) -> int:
+        """Harmonics that a tick adds or joins."""
+        return -(-2 * self.harmonics // self._others)
 
     @property
     def free_ticks(self) -> int:
         """Before the next window is joined, at least."""
-        ticks = self.decimation
-        if self.at_once:
-            return (self.hop - _BLOCK) * ticks
-        return (self.hop // _BLOCK - 1) * (_BLOCK * (ticks - self.job - 1) - self.adding)
-
-    def tick_of_jets(self, step: int) -> int:
-        """In which the channels are made from the jets of a step."""
-        return self.first + step * self.decimation + self.job - 1 + (0 if self.at_once else 1)
+        return (self.hop // _BLOCK - 1) * (self._others - -(-self.harmonics // self.items))
 
     def play(self, ticks: int, count: int) -> Int:
         """What each tick of a stretch does that has `count` steps of channels [ticks]."""
+        at_once = self.front.decimation == 1
         out = np.full(ticks, Tick.FREE, np.int64)
-        if not self.at_once:
-            for begin in range(self.first, ticks, self.decimation):
-                out[begin : begin + self.job + 1] = Tick.BUSY
+        ends = self.front.ends(ticks)
+        if not at_once:
+            out[ends] = Tick.BUSY
         for block in range(count // _BLOCK):
-            made = self.tick_of_jets(_BLOCK * (block + 1) - 1 + LATER)
-            at = made if self.at_once else made + 1
-            left = self.adding
-            while left and at < ticks:
-                if self.at_once or out[at] == Tick.FREE:
-                    left -= 1
-                    out[at] = Tick.FREE if self.at_once else Tick.BUSY
-                    steps_done = _BLOCK * (block + 1)
-                    if not left and steps_done % self.hop == 0 and steps_done > self.hop:
-                        out[at] = Tick.WINDOW
+            made = self.front.tick_of(_BLOCK * (block + 1) - 1 + LATER)
+            at = made if at_once else made + 1
+            steps = _BLOCK * (block + 1)
+            joins = steps % self.hop == 0 and steps > self.hop
+            left = (2 if joins else 1) * self.harmonics
+            while left > 0 and at < ticks:
+                if at_once or not ends[at]:
+                    left -= self.items
+                    out[at] = Tick.WINDOW if joins and left <= 0 else Tick.BUSY
                 at += 1
         return out
 
@@ -125,23 +101,22 @@ def collect(counts: Int, design: FourierDesignQ31) -> Collected:
     runs = np.zeros(design.model.runs, np.int64)
     found, played = [np.zeros((0, len(design.model.channel), design.highest + 1, 2), np.int64)], []
     spreads = [np.zeros((0, len(counts)), np.int64)]
-    lead = first_step(design)
+    lead = plan.front.lead
     first = 0
     while first < total:
         beyond = np.flatnonzero(~within[first:])
         last = first + int(beyond[0]) if len(beyond) else total
         of_steps = jets(counts[:, first:last], design)
-        whole = sum(1 for step in range(of_steps.shape[1]) if plan.tick_of_jets(step) < last - first)
-        made = steps(of_steps[:, :whole], design, runs, lead)
-        if whole and made.beyond != 0:
+        made = steps(of_steps, design, runs, lead)
+        if of_steps.shape[1] and made.beyond != 0:
             lead = 0
         if made.beyond is not None:
-            last = first + plan.tick_of_jets(made.beyond)
+            last = first + plan.front.tick_of(made.beyond)
         ticks = plan.play(last - first, made.channels.shape[1])
         played.append(ticks)
         count = int(np.sum(ticks == Tick.WINDOW))
         found.append(windows(made, design)[:count])
-        when = first + plan.tick_of_jets(0) + (LATER + np.arange(made.channels.shape[1])) * design.decimation
+        when = first + plan.front.tick_of(0) + (LATER + np.arange(made.channels.shape[1])) * design.decimation
         spreads.append(_spreads(counts[:, when], design.hop)[:count])
         runs = made.runs
         if last < total:

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pvid.base.errors import PvidError
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierKind
 from pvid.settings.fourier_q31 import FourierDesignQ31
 from pvid.twin.q31 import fourier_white
 from pvid.twin.q31.estimator import ROW_LIMIT, EstimatorQ31
 from pvid.twin.q31.gate import GateQ31
-from pvid.twin.q31.integer import WIDE, Int, clamp, integers, scale
+from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
 from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.trust import TrustQ31
 from pvid.twin.record import of_all_lanes
@@ -20,9 +21,11 @@ from pvid.twin.weak_schedule import Work
 
 _ENTRIES_PER_STAGE = 4
 _HARMONICS_PER_STAGE = 2
+_ROOTS_PER_STAGE = 4
 _RESIDUALS_PER_STAGE = 2
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
+_SMALL_STEP = 2**15
 _MOST = 2**31 - 1
 
 
@@ -30,39 +33,48 @@ def _parts(count: int, few: int) -> int:
     return max(-(-count // few), 1)
 
 
-def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind) -> int:
+def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int = 0) -> int:
     """Up to the residuals, these included."""
     harmonics = design.highest + 1
-    column = harmonics + 2 + design.power // 2
     project = sum(kind.columns - i for i in range(kind.nuisances)) or 1
     return (
         _parts(len(design.noise), _ENTRIES_PER_STAGE)
         + _parts(harmonics, _HARMONICS_PER_STAGE)
+        + _parts(harmonics, _ROOTS_PER_STAGE)
+        + design.power
+        + 1
         + harmonics
-        + (design.power // 2) ** 2
-        + kind.columns * column
+        + kind.columns
         + project
-        + _parts(design.rows, _RESIDUALS_PER_STAGE)
+        + kind.thetas
+        + 1
+        + _parts(design.functions - live, _RESIDUALS_PER_STAGE)
     )
 
 
 def number_of_stages(design: FourierDesignQ31, iterations: int, estimator: EstimatorQ31) -> int:
     """Of a window."""
-    rows = sum(_stages_before_gate(design, kind) + _END_PARTS + design.rows for kind in design.model.kind)
+    rows = sum(_stages_before_gate(design, kind) + _END_PARTS + design.functions for kind in design.model.kind)
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
     return rows + solves + estimator.assessment_stages + 1
 
 
 def _rows(made: fourier_white.Columns, first: int, n_bits: Sequence[int], y_bits: int) -> tuple[Int, Int]:
-    """N of the kind [rows, thetas, lanes], and Y [rows, lanes]."""
+    """N of the kind [K, thetas, lanes], and Y [K, lanes]."""
     thetas = len(made.x) - 1
 
     def entries(place: int, bits: int) -> Int:
         shift = np.broadcast_to(-(made.exponent[place] + bits), made.x[place].shape)
-        return clamp(scale(made.x[place], shift), _MOST)
+        return clamp(round_shift(made.x[place], np.clip(shift, 0, 63)) << np.clip(-shift, 0, 31), _MOST)
 
     n = np.stack([entries(j, n_bits[first + j]) for j in range(thetas)], axis=1)
     return n, entries(thetas, y_bits)
+
+
+def _of_all_lanes(live: Int) -> int:
+    if (live != live[0]).any():
+        raise PvidError("lanes of one twin must leave out the same nuisances: their estimates differ too much")
+    return int(live[0])
 
 
 def _ratio(rss: Int, freedom: Int, expected: Scaled) -> Scaled:
@@ -93,15 +105,17 @@ def stages(
         made = fourier_white.columns(fourier_white.white(design, place, theta), place, sums)
         n, y = _rows(made, first, *formats)
         first += kind.thetas
-        freedom = np.maximum(design.functions - made.live, 1)
+        live = _of_all_lanes(made.live)
+        freedom = np.full(lanes, max(design.functions - live, 1))
         saturated = np.zeros(lanes, np.bool_)
         rss = np.zeros(lanes, np.int64)
-        for k in range(design.rows):
+        innovations = {}
+        for k in range(live, design.functions):
             e, fits = estimator.innovation(n[k], y[k], place)
-            within = clamp(e, ROW_LIMIT)
+            innovations[k] = clamp(e, ROW_LIMIT)
             saturated = saturated | ~fits
-            rss = clamp(rss + within * within, WIDE)
-        for _ in range(_stages_before_gate(design, kind) - 1):
+            rss = clamp(rss + innovations[k] * innovations[k], WIDE)
+        for _ in range(_stages_before_gate(design, kind, live) - 1):
             yield None
         gate = gates[place]
         if gate.is_on and not of_all_lanes(gate.passes(_ratio(rss, freedom, expected), ~saturated)):
@@ -113,8 +127,8 @@ def stages(
             yield None
         else:
             yield from estimator.fade(trust.next_fade_factor())
-        for k in range(design.rows):
-            added = estimator.add(n[k], np.where(saturated, _MOST, y[k]), place)
+        for k in range(live, design.functions):
+            added = estimator.take_row(n[k], innovations[k], ~saturated, place)
             yield None if (added == Reason.ACCUMULATED).all() else added
         used += 1
         free = free + freedom
@@ -128,7 +142,7 @@ def stages(
             yield None
             if solved is not None:
                 reason = solved
-        if not estimator.was_due:
+        if not estimator.was_due or of_all_lanes(estimator.size <= _SMALL_STEP):
             break
     size = estimator.size
     for _ in range(estimator.assessment_stages):

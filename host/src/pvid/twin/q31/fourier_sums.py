@@ -47,12 +47,12 @@ def windows(steps: Steps, design: FourierDesignQ31) -> Int:
     for k, one in enumerate(design.model.channel):
         form = design.format[k]
         first, second = sums[k, :-1], sums[k, 1:]
-        own = round_shift(np.where(odd, first - second, first + second), form.own)
+        own = np.where(odd, first - second, first + second) >> form.own
         shift = np.zeros_like(own)
         if one.fold:
-            shift = shift + round_shift(_edge(edges, one, one.fold, design.hop) * sums[one.plain, 1:], form.plain)
+            shift = shift + ((_edge(edges, one, one.fold, design.hop) * sums[one.plain, 1:]) >> form.plain)
         if one.fold > 1:
-            shift = shift + round_shift(_edge(edges, one, 1, design.hop) * sums[one.ramp, 1:], form.ramp)
+            shift = shift + ((_edge(edges, one, 1, design.hop) * sums[one.ramp, 1:]) >> form.ramp)
         out[:, k] = own + np.where(odd, -shift, shift)
         if one.gain == NONE:
             out[:, k, 0, 0] = 2 * design.hop

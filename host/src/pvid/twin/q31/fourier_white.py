@@ -1,82 +1,120 @@
-"""Twin of fourier/white_q31.c, direction_q31.c and columns_q31.c: white columns of windows, all windows at once.
+"""Twin of fourier/white_q31.c, mirror_q31.c and columns_q31.c: white columns of windows, all windows at once.
 
 Arrays have the windows (or lanes) last: a column is [rows, windows].
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.settings.fourier_q31 import FourierDesignQ31
-from pvid.twin.q31.integer import Int, bit_length, clamp, reciprocal, root_of, round_shift, scale, square_root
+from pvid.twin.q31.integer import Int, bit_length, round_shift
 from pvid.twin.q31.scaled import Scaled, pick, scaled
 
 _COLUMN_BITS = 27
-_GUARD = 4  # bits that products lose at least
+_SUM_BITS = 30  # of the sums of a channel
+_PRODUCT_DOWN = 33
+_NEWTON_STEPS = 4
 _NONE = -(2**31)  # exponent where there is no term
 _FLOOR_BITS = 20
 _LEAST_EXPONENT = -200
 _KEPT_BITS = 20
 _SQUARE_DOWN = 16
 _ONE = 1 << 30
-_MOST = 2**31 - 1
 
 
-def block(wide: Int) -> tuple[Int, Int]:
+def block(x: Int) -> tuple[Int, Int]:
     """Entries [n, lanes] as a block: (x, exponent [lanes])."""
-    longest = bit_length(np.abs(wide)).max(axis=0)
+    longest = bit_length(np.bitwise_or.reduce(np.abs(x), axis=0))
     exponent = np.where(longest > 0, longest - _COLUMN_BITS, 0)
-    return scale(wide, exponent), exponent
+    return (x >> np.maximum(exponent, 0)) << np.maximum(-exponent, 0), exponent
 
 
-def take_off(u: Int, x: Int) -> Int:
-    """x - u (u^T x), [n, lanes] each."""
-    along = clamp(round_shift(np.add.reduce(u * x, axis=0), 30), _MOST)
-    return clamp(x - round_shift(u * along, 30), _MOST)
+def inverse_root(x: Scaled) -> Scaled:
+    """1 / sqrt(x), x > 0, by Newton's method."""
+    odd = x.e & 1
+    m, exponent = x.m >> odd, x.e + 30 + odd
+    y = 1181116006 - 5 * (m >> 3)
+    for _ in range(_NEWTON_STEPS):
+        part = (m * ((y * y) >> 30)) >> 30
+        y = (y * (3 * 2**28 - part)) >> 29
+    return Scaled(y, -(exponent // 2) - 29)
 
 
-def normalise(x: Int) -> Int:
-    """x over its length, Q30; 0 stays 0."""
+def mirror_of(x: Int) -> Int:
+    """The reflection that leaves the first entry of x [n, lanes] alone; 0 stays 0."""
     square = np.add.reduce(x * x, axis=0)
-    m, k = reciprocal(np.maximum(square_root(square), 1))
-    return np.where(square > 0, clamp(round_shift(x * m, np.broadcast_to(31 - k, x.shape)), _ONE), 0)
+    inverse = inverse_root(scaled(np.maximum(square, 1), 0))
+    shift = np.broadcast_to(-(inverse.e + 30), x.shape)
+    u = round_shift(x * inverse.m, shift)
+    size = np.minimum(np.abs(u[0]), _ONE)
+    half = inverse_root(scaled(_ONE + size, -30))
+    v = round_shift(u * half.m, 30)
+    top = round_shift(((_ONE + size) >> 1) * half.m, 29)
+    v[0] = np.where(u[0] < 0, -top, top)
+    return np.where(square > 0, v, 0)
+
+
+def mirrored(v: Int, x: Int) -> Int:
+    """x - v (v^T x), [n, lanes] each."""
+    along = round_shift(np.add.reduce(v * x, axis=0), 30)
+    return np.asarray(x - ((v * along) >> 30))
 
 
 @dataclass(frozen=True)
 class White:
-    """1 / sqrt(D_h) [H + 1, lanes] and the basis [n/2, rows, lanes] of a kind."""
+    """Of a kind: 1 / sqrt(D_h) = gain 2^exponent, and the reflections.
+
+    Attributes
+    ----------
+    design : of the weak form
+    gain : [H + 1, lanes]
+    exponent : [lanes]
+    mirrors : of the real parts, of the imaginary parts [n/2][entries, lanes]
+    """
 
     design: FourierDesignQ31
-    scale: Scaled
-    basis: Int
+    gain: Int
+    exponent: Int
+    mirrors: tuple[list[Int], list[Int]]
 
     @property
     def cosines(self) -> int:
-        """Rows of real parts."""
+        """Real parts."""
         return self.design.highest + 1
 
-    @property
-    def families(self) -> tuple[slice, slice]:
-        """Rows of real parts, of imaginary parts."""
-        return slice(0, self.cosines), slice(self.cosines, self.design.rows)
+    def rows(self, column: Int) -> Int:
+        """White rows [K, lanes] of a column [K + n, lanes]."""
+        kept = []
+        for one, mirrors in zip((column[: self.cosines], column[self.cosines :]), self.mirrors, strict=True):
+            kept.append(_reflected(mirrors, one)[len(mirrors) :])
+        return np.concatenate(kept)
 
-    def without_basis(self, column: Int) -> Int:
-        """A column [rows, lanes] without all directions."""
-        found = column
-        for u in self.basis:
-            found = np.concatenate([take_off(u[one], found[one]) for one in self.families])
-        return found
+
+def _reflected(mirrors: Sequence[Int], x: Int) -> Int:
+    found = x.copy()
+    for k, v in enumerate(mirrors):
+        found[k:] = mirrored(v, found[k:])
+    return found
+
+
+def _weight(gain: Int, highest: int, order: int, h: int) -> Int:
+    """(h / H)^order / sqrt(D_h) [lanes]."""
+    weight: Int = gain[h]
+    for _ in range(order):
+        weight = (weight * (h * (_ONE // highest))) >> 30
+    return weight
 
 
 def _number(x: int, like: Int) -> Scaled:
     return scaled(np.full_like(like, x), 0)
 
 
-def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> Scaled:
-    """1 / sqrt(D_h) [H + 1, lanes] at theta of the kind [thetas, lanes]."""
+def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]:
+    """1 / sqrt(D_h) [H + 1, lanes] as a block with its exponent [lanes], at theta of the kind [thetas, lanes]."""
     like = theta.m[0]
     thetas = design.model.kind[kind].thetas
     powers = design.powers
@@ -107,77 +145,61 @@ def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> Scaled:
     least = pick(mean.m > 0, mean, scaled(np.ones_like(like), _LEAST_EXPONENT))
     out = []
     for one_h in found:
-        variance = pick(one_h.minus(least).m < 0, least, one_h)
-        out.append(_number(1, like).over(scaled(*root_of(variance.m, variance.e))))
-    return Scaled(np.stack([one.m for one in out]), np.stack([one.e for one in out]))
+        out.append(inverse_root(pick(least.exceeds(one_h), least, one_h)))
+    exponents = np.stack([one.e for one in out])
+    exponent = exponents.max(axis=0)
+    return np.stack([one.m for one in out]) >> np.minimum(exponent - exponents, 63), exponent
 
 
-def _harmonics(design: FourierDesignQ31) -> npt.NDArray[np.int64]:
-    row = np.arange(design.rows)
-    return np.where(row <= design.highest, row, row - design.highest)
-
-
-def basis(design: FourierDesignQ31, inverse: Scaled) -> Int:
-    """Orthonormal directions [n/2, rows, lanes], Q30."""
-    h = _harmonics(design)
-    families = (slice(0, design.highest + 1), slice(design.highest + 1, design.rows))
-    made: list[Int] = []
+def _mirrors(design: FourierDesignQ31, gain: Int, first: int, count: int) -> list[Int]:
+    """Of a family of `count` harmonics from `first` on."""
+    found: list[Int] = []
     for k in range(design.power // 2):
-        parts = []
-        for place, rows in enumerate(families):
-            of = h[rows][:, np.newaxis]
-            if k:
-                wide = of * of * made[k - 1][rows]
-            else:
-                m, e = inverse.m[h[rows]], inverse.e[h[rows]]
-                wide = scale((of * m if place else m) * 65536, np.max(e, axis=0) - e)
-            u = block(wide)[0]
-            for _ in range(2):
-                for before in made:
-                    u = block(take_off(before[rows], u))[0]
-            parts.append(normalise(u))
-        made.append(np.concatenate(parts))
-    return np.stack(made)
+        order = 2 * k + (first > 0)
+        vector = np.stack([_weight(gain, design.highest, order, h) for h in range(first, first + count)])
+        rest = _reflected(found, block(vector)[0])[k:]
+        found.append(mirror_of(block(rest)[0]))
+    return found
 
 
 def white(design: FourierDesignQ31, kind: int, theta: Scaled) -> White:
     """At theta of the kind [thetas, lanes]."""
-    inverse = spectrum(design, kind, theta)
-    return White(design, inverse, basis(design, inverse))
+    gain, exponent = spectrum(design, kind, theta)
+    cosines = design.highest + 1
+    mirrors = (_mirrors(design, gain, 0, cosines), _mirrors(design, gain, 1, design.parts - cosines))
+    return White(design, gain, exponent, mirrors)
 
 
 def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
-    """A column [rows, lanes] in standard deviations with its exponent [lanes], before the basis is taken off.
+    """A column [K + n, lanes] in standard deviations with its exponent [lanes], before it is reflected.
 
     window: S_h [lanes, channels, H + 1, 2].
     """
     design = made.design
     own = design.model.kind[kind]
-    terms = [t for t in range(own.first, own.end) if design.model.term[t].column == place]
+    terms = [t for t in range(own.first, own.end) if design.model.term[t].column == place and design.factor[t][0]]
     lanes = window.shape[0]
-    weights = {(t, h): _weight(made, t, h) for t in terms for h in range(made.cosines)}
-    exponents = [np.where(one.m != 0, one.e, _NONE) for one in weights.values()]
-    top = np.max([np.full(lanes, _NONE), *exponents], axis=0)
-    total = np.zeros((design.rows, lanes), np.int64)
-    for (t, h), weight in weights.items():
+    lifts, exponents = {}, [np.full(lanes, _NONE)]
+    for t in terms:
+        sums = np.abs(window[:, design.model.term[t].channel])
+        length = bit_length(np.bitwise_or.reduce(np.bitwise_or.reduce(sums, axis=-1), axis=-1))
+        lifts[t] = np.where((length == 0) | (length > _SUM_BITS), 0, _SUM_BITS - length)
+        exponents.append(design.factor[t][1] - lifts[t])
+    top = np.max(exponents, axis=0)
+    total = np.zeros((design.parts, lanes), np.int64)
+    for t in terms:
         term = design.model.term[t]
-        turned, negative = term.order % 2 == 1, (term.order + 1) % 4 >= 2
-        shift = np.where(weight.m != 0, top - weight.e + _GUARD, 0)
-        for part in range(2 if h and made.cosines + h <= design.rows else 1):
-            s = window[:, term.channel, h, (1 - part) if turned else part]
-            minus = (turned != negative) if part == 0 else negative
-            total[h if part == 0 else made.cosines + h - 1] += round_shift((-s if minus else s) * weight.m, shift)
+        negative = (term.order % 4 >= 2, (term.order + 1) % 4 >= 2)
+        below = top - (design.factor[t][1] - lifts[t])
+        for h in range(made.cosines):
+            whole = (_weight(made.gain, design.highest, term.order, h) * design.factor[t][0]) >> 30
+            weight = np.where(below < _SUM_BITS, whole >> np.minimum(below, 63), 0)
+            for part in range(2 if h and made.cosines + h <= design.parts else 1):
+                s = window[:, term.channel, h, (part + term.order) % 2] << lifts[t]
+                place_of = h if part == 0 else made.cosines + h - 1
+                total[place_of] += (s * (-weight if negative[part] else weight)) >> _PRODUCT_DOWN
     x, exponent = block(total)
-    return x, np.where(top > _NONE, top + _GUARD, 0) + exponent
-
-
-def _weight(made: White, t: int, h: int) -> Scaled:
-    """Of a term at a harmonic, |m| <= 2^30."""
-    factor, order = made.design.factor[t], made.design.model.term[t].order
-    power = h**order
-    both = (factor[0] * made.scale.m[h]) >> 30
-    bits = power.bit_length()
-    return Scaled((both * power) >> bits, factor[1] + made.scale.e[h] + 30 + bits)
+    return x, np.where(top > _NONE, top + made.exponent + 30 + _PRODUCT_DOWN, 0) + exponent
 
 
 def square(x: Int) -> Int:
@@ -191,7 +213,7 @@ class Columns:
 
     Attributes
     ----------
-    x : [columns, rows, lanes]
+    x : [columns, K, lanes]; of these rows the first `live` are left out
     exponent : [columns, lanes]
     live : nuisances that were projected out [lanes]
     """
@@ -202,18 +224,21 @@ class Columns:
 
 
 def columns(made: White, kind: int, window: Int) -> Columns:
-    """Of windows' sums [lanes, channels, H + 1, 2], without the basis and the nuisances."""
+    """Of windows' sums [lanes, channels, H + 1, 2], without what the test functions and the nuisances leave out."""
     own = made.design.model.kind[kind]
     plain = [column(made, kind, place, window) for place in range(own.columns)]
-    x = [made.without_basis(one) for one, _ in plain]
+    x = np.stack([made.rows(one) for one, _ in plain])
     whole = [square(one) for one in x]
     live = np.zeros(window.shape[0], np.int64)
     for place in range(own.thetas + 1, own.columns):
-        left = square(x[place])
-        kept = (left > 0) & (left > (whole[place] >> _KEPT_BITS))
-        live = live + kept
-        direction = np.where(kept, normalise(block(x[place])[0]), 0)
-        for other in [*range(own.thetas + 1), *range(place + 1, own.columns)]:
-            x[other] = take_off(direction, x[other])
+        for begin in np.unique(live).tolist():  # lanes may differ in what is left
+            at = np.flatnonzero(live == begin)
+            rest = x[place][begin:, at]
+            left = square(rest)
+            kept = (left > 0) & (left > (whole[place][at] >> _KEPT_BITS))
+            mirror = np.where(kept, mirror_of(block(rest)[0]), 0) if len(rest) else rest
+            for other in [*range(own.thetas + 1), *range(place + 1, own.columns)]:
+                x[other][begin:, at] = mirrored(mirror, x[other][begin:, at])
+            live[at] = begin + kept
     used = own.thetas + 1
-    return Columns(np.stack(x[:used]), np.stack([e for _, e in plain[:used]]), live)
+    return Columns(x[:used], np.stack([e for _, e in plain[:used]]), live)

@@ -1,0 +1,127 @@
+/* pvid/detail/refine_state.h - the state behind refine.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_REFINE_STATE_H
+#define PVID_DETAIL_REFINE_STATE_H
+
+#include "pvid/detail/publication_mark.h"
+#include "pvid/refine.h"
+
+#define PVID_REFINE_AB 7  /* order of the Adams-Bashforth formula */
+#define PVID_REFINE_SUB 4 /* steps of the motion in a big step: of the columns and of a row of each output */
+#define PVID_REFINE_SIGNALS (PVID_REFINE_INPUTS + PVID_REFINE_OUTPUTS)
+#define PVID_REFINE_STATES (PVID_REFINE_ORDER * PVID_REFINE_COORDINATES)
+#define PVID_REFINE_COLUMNS (PVID_REFINE_STATES + PVID_REFINE_MOVING)      /* that are integrated */
+#define PVID_REFINE_UNKNOWNS (PVID_REFINE_STATES + PVID_REFINE_PARAMETERS) /* of a block */
+#define PVID_REFINE_WIDTH (PVID_REFINE_UNKNOWNS + 1)                       /* and the residual */
+#define PVID_REFINE_SUMS ((PVID_REFINE_WIDTH * (PVID_REFINE_WIDTH + 1)) / 2)
+#define PVID_REFINE_TRIANGLE ((PVID_REFINE_PARAMETERS * (PVID_REFINE_PARAMETERS + 1)) / 2)
+#if PVID_REFINE_OUTPUTS == 3
+#define PVID_REFINE_ROWS 3 /* that are added to the sums together */
+#else
+#define PVID_REFINE_ROWS 4
+#endif
+
+/* The front end: means of blocks of samples, their droop undone, second derivatives; then the ring, in units of range /
+ * 32767. The derivatives are behind by `half` entries. */
+typedef struct {
+    uint8_t wait;                                        /* samples that the block needs yet */
+    uint8_t means;                                       /* since the restart, up to 3 */
+    bool referred;                                       /* there is a first sample */
+    uint8_t sample[PVID_REFINE_SIGNALS];                 /* places in the argument of step */
+    uint8_t behind;                                      /* entries by which the slowest signal is behind */
+    uint16_t place;                                      /* of the newest entry of `line` */
+    uint32_t next;                                       /* entry of the ring that is written next */
+    float share;                                         /* 1 / ratio */
+    float droop;                                         /* (1 - 1 / ratio^2) / 24 */
+    float to_counts[PVID_REFINE_SIGNALS];                /* 32767 / range, with the scale of the signal */
+    float from_counts[PVID_REFINE_SIGNALS];              /* range / 32767 */
+    float sum[PVID_REFINE_SIGNALS];                      /* of the block */
+    float reference[PVID_REFINE_INPUTS];                 /* the first sample since the restart */
+    float mean[2][PVID_REFINE_SIGNALS];                  /* the last two means, latest first */
+    float line[PVID_REFINE_INPUTS][PVID_REFINE_LINE];    /* means of inputs of order 2, circular, twice */
+    int16_t ring[PVID_REFINE_RING][PVID_REFINE_SIGNALS]; /* INT16_MIN: missing or beyond its range */
+} pvid_refine_front_f32;
+
+/* One pass over one block: the motion from a start, the derivatives of the motion, and the sums of the rows. */
+typedef struct {
+    float h; /* a step [s] */
+#if PVID_REFINE_SKEW
+    float late[5];  /* weights of five steps that give an input at the time of the outputs */
+    float slope[5]; /* and its derivative there */
+#endif
+    float gate; /* largest |residual| that is used; 0: no gate */
+    float constants[PVID_REFINE_CONSTANTS];
+    float state[PVID_REFINE_STATES];                       /* q, then v */
+    float rate[PVID_REFINE_COORDINATES][PVID_REFINE_AB];   /* highest derivatives of the last steps, circular */
+    float column[PVID_REFINE_COLUMNS][PVID_REFINE_STATES]; /* d state / d (start, moving parameters) */
+    float kick[PVID_REFINE_COORDINATES * (PVID_REFINE_STATES + PVID_REFINE_MOVING)]; /* derivatives at the middle of
+                                                                the big step, times the big step */
+    float scratch[2][PVID_REFINE_STATES]; /* between the jobs of a first step */
+#if !PVID_REFINE_OUTPUT_LINEAR
+    float output_column[PVID_REFINE_OUTPUTS * PVID_REFINE_UNKNOWNS]; /* dz/dq, dz/dv, dz/dr at that middle */
+#endif
+    float last[PVID_REFINE_OUTPUTS]; /* residuals at the last step; NaN: missing */
+    float mean[PVID_REFINE_OUTPUTS]; /* their sum over the big step, by trapezoids */
+    float row[PVID_REFINE_ROWS][PVID_REFINE_WIDTH];
+    float sum[PVID_REFINE_SUMS]; /* of the products of the rows' entries, upper triangle */
+    uint8_t job;
+    uint8_t head;   /* newest place of `rate` */
+    uint8_t rows;   /* in `row` */
+    uint8_t starts; /* double steps that are still Runge-Kutta's */
+    uint16_t step;  /* big steps that are done */
+    uint16_t used;  /* rows in the sums but those of the gate */
+} pvid_refine_pass_f32;
+
+/* Between the jobs of a solution. */
+typedef struct {
+    float sum[PVID_REFINE_SUMS];
+    float triangle[PVID_REFINE_TRIANGLE];
+    float right[PVID_REFINE_PARAMETERS];
+    float whole[PVID_REFINE_UNKNOWNS];  /* diagonal before the elimination */
+    float step[PVID_REFINE_PARAMETERS]; /* of r */
+    float shift[PVID_REFINE_STATES];    /* of the block's start */
+    float size;                         /* of the step before it is shortened [prior_sd] */
+    float residual;                     /* sum of squares of the block after its own fit */
+    float clash;                        /* what the block and the past cannot both have, squared */
+    uint8_t job;
+    uint8_t halvings;
+} pvid_refine_solve_f32;
+
+/* Only the functions of refine.h write to it. */
+struct pvid_refine_f32 {
+    pvid_refine_config_f32 config;
+    float h;                           /* a step of the motion [s] */
+    float fade;                        /* forgetting of a full block, on the triangle */
+    float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
+    bool renewed;                      /* the weak form has given an estimate since the search began from one */
+    bool frozen;
+    bool solved;         /* the last solution exists */
+    bool restarted;      /* the block's start is not known from the one before */
+    bool waiting;        /* the next job needs an entry of the ring that is not there */
+    bool sane;           /* the block */
+    pvid_reason verdict; /* on the block */
+    uint8_t phase;
+    uint8_t pass;                         /* of the block */
+    uint8_t taken;                        /* blocks in a row, up to 2 */
+    uint8_t refused;                      /* in a row */
+    uint8_t lost;                         /* in the search */
+    uint16_t length;                      /* of the block in big steps */
+    uint32_t begin;                       /* entry of the ring */
+    float level;                          /* mean square of residuals of the last blocks over the sensors' */
+    float r[PVID_REFINE_PARAMETERS];      /* of the last block that was taken, or the weak form's */
+    float next[PVID_REFINE_PARAMETERS];   /* where the next block starts its linearisation */
+    float linear[PVID_REFINE_PARAMETERS]; /* point of linearisation */
+    float weak[PVID_REFINE_PARAMETERS];   /* newest estimate of the weak form */
+    float weak_se[PVID_REFINE_P];
+    float triangle[PVID_REFINE_TRIANGLE]; /* square root of the information of the steps of r, in residuals */
+    float start[PVID_REFINE_STATES];      /* of the pass */
+    float expected[PVID_REFINE_STATES];   /* start of the block, from the one before */
+    pvid_refine_front_f32 front;
+    pvid_refine_pass_f32 work;
+    pvid_refine_solve_f32 solve;
+    pvid_publication_mark mark;
+    pvid_refine_estimate_f32 candidate;
+    pvid_refine_estimate_f32 estimate;
+    pvid_refine_estimate_f32 copy;
+};
+
+#endif

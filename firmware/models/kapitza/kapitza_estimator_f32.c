@@ -1,0 +1,195 @@
+#include "number/uncontracted.h"
+
+#include "kapitza_estimator_f32.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "kapitza_project_f32.h"
+#include "kapitza_row_f32.h"
+#include "number/finite_f32.h"
+#include "solve/assess_f32.h"
+#include "solve/settings_f32.h"
+
+/* Rounding of yy - 2 B^T theta + theta^T M theta, relative to yy: a few ulp of each term. */
+#define RESIDUAL_FLOOR 4.8e-7f
+
+/* Most rows between folds: long enough to be cheap, short enough that `low` keeps 17 bits of a row's terms. */
+#define FOLD_MAX 64u
+
+/* A sixteenth of the time constant of forgetting, in rows. */
+#define FOLDS_PER_CONSTANT 16.0f
+
+/* Rows between exact projections, where no other number is configured. */
+#define EXACT_EVERY 8u
+
+/* ---- configuration ---- */
+
+static void prepare_folds(pvid_strong_estimator_f32 *self, float forgetting_rows)
+{
+    uint32_t rows = FOLD_MAX;
+    if ((forgetting_rows > 0.0f) && (forgetting_rows < (FOLDS_PER_CONSTANT * (float)FOLD_MAX))) {
+        rows = (uint32_t)(forgetting_rows / FOLDS_PER_CONSTANT);
+    }
+    const uint32_t unit =
+        (self->staged != 0u) ? self->divider : PVID_STRONG_ROWS; /* rows from one chance to the next */
+    rows = (rows < unit) ? unit : (rows - (rows % unit));
+    self->fold_every = (uint8_t)rows;
+    self->sums.retention = 1.0f;
+    if (forgetting_rows > 0.0f) {
+        self->sums.retention = pvid_settings_decay_f32((float)rows / forgetting_rows);
+    }
+}
+
+static uint8_t exact_every_of(const pvid_strong_config_f32 *config)
+{
+    const pvid_estimator_config_f32 *estimator = &config->estimator;
+    if (estimator->dead_zone > 0.0f) {
+        return 0;
+    }
+    if (config->exact_every > 0u) {
+        return (uint8_t)config->exact_every;
+    }
+    return (estimator->law == PVID_LAW_PSEUDOVELOCITY) ? 1u : EXACT_EVERY;
+}
+
+pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self, const pvid_strong_config_f32 *config)
+{
+    const pvid_estimator_config_f32 *estimator = &config->estimator;
+    const pvid_status status = pvid_settings_are_valid_f32(estimator, PVID_KAPITZA_P, 7u, config->sample_rate_hz);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if (!pvid_within_f32(estimator->row_weight, 1.0f, 1.0f)) {
+        return PVID_BAD_ROW_WEIGHT;
+    }
+    if (config->exact_every > UINT8_MAX) {
+        return PVID_BAD_DIVIDER;
+    }
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        const float ratio = estimator->row_sd / estimator->start_sd[a];
+        self->p[a] = estimator->start[a];
+        self->prior[a] = ratio * ratio;
+        self->lower[a] = estimator->lower[a];
+        self->upper[a] = estimator->upper[a];
+    }
+    const float forgetting_rows = estimator->forgetting_s * config->sample_rate_hz;
+    self->row_variance = estimator->row_sd * estimator->row_sd;
+    self->correlation = estimator->correlation;
+    self->step_limit = estimator->step_limit;
+    self->kappa_min = estimator->kappa_min;
+    self->dead_zone = estimator->dead_zone * estimator->dead_zone;
+    self->divider = estimator->divider;
+    self->exact_every = exact_every_of(config);
+    const uint32_t every = (self->exact_every > 1u) ? self->exact_every : 1u;
+    const float interval = (float)((self->divider > 1u) ? self->divider : every);
+    self->gain = pvid_settings_gain_f32(estimator, config->sample_rate_hz, interval);
+    const bool long_enough = (forgetting_rows <= 0.0f) || (forgetting_rows >= (float)self->divider);
+    self->staged = ((self->divider % PVID_STRONG_ROWS) == 0u) && (self->divider >= (2u * PVID_STRONG_ROWS)) &&
+                   (self->divider <= FOLD_MAX) && !(self->dead_zone > 0.0f) && long_enough;
+    self->projects_at = (self->staged != 0u) ? 1u : 0u;
+    self->mixes = self->gain < 1.0f;
+    prepare_folds(self, forgetting_rows);
+    return PVID_OK;
+}
+
+/* ---- the equations from all rows ---- */
+
+/* Completes theta^T M theta - 2 theta^T B to the residuals of all rows. */
+static PVID_SELDOM void add_residuals(const pvid_strong_estimator_f32 *self, pvid_kapitza_residual_f32 *residual)
+{
+    const float yy = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_YY);
+    float squares = 0.0f;
+    for (size_t i = 0; i < self->in_block; i++) {
+        float g[PVID_KAPITZA_P];
+        const float e = pvid_kapitza_innovate_f32(self->p, &self->block[i], g);
+        squares += e * e;
+    }
+    residual->rss = (yy + residual->rss) + squares;
+    residual->floor = RESIDUAL_FLOOR * yy;
+    residual->weight = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_WEIGHT) + (float)self->in_block;
+}
+
+void pvid_kapitza_gather_f32(const pvid_strong_estimator_f32 *self, float s[6], float force[3],
+                             pvid_kapitza_residual_f32 *residual)
+{
+    const size_t rows = self->in_block;
+    const float p[PVID_KAPITZA_P] = {self->p[0], self->p[1], self->p[2]};
+    float all_s[6];
+    float all_force[PVID_KAPITZA_P];
+    float *rss = (residual != NULL) ? &residual->rss : NULL;
+    pvid_kapitza_project_f32(&self->sums, p, all_s, all_force, rss);
+    for (size_t i = 0; i < rows; i++) {
+        float g[PVID_KAPITZA_P];
+        const float e = pvid_kapitza_innovate_f32(p, &self->block[i], g);
+        pvid_kapitza_add_squares_f32(g, all_s);
+        pvid_kapitza_add_products_f32(g, e, all_force);
+    }
+    PVID_UNROLL
+    for (size_t i = 0; i < 6u; i++) {
+        s[i] = all_s[i];
+    }
+    PVID_UNROLL
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        force[a] = all_force[a];
+    }
+    if (residual != NULL) {
+        add_residuals(self, residual);
+    }
+}
+
+/* ---- accuracy ---- */
+
+static void settings_of(const pvid_strong_estimator_f32 *self, pvid_solve_settings_f32 *settings)
+{
+    memset(settings, 0, sizeof *settings);
+    settings->row_variance = self->row_variance;
+    settings->correlation = self->correlation;
+    settings->n_p = PVID_KAPITZA_P;
+    settings->n_excited = PVID_KAPITZA_P;
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        settings->prior[a] = self->prior[a];
+        settings->start_sd[a] = sqrtf(self->row_variance / self->prior[a]);
+    }
+}
+
+static void system_of(const pvid_kapitza_residual_f32 *residual, pvid_system_f32 *system)
+{
+    system->rss = residual->rss;
+    system->rounding = 0.0f;
+    system->floor = residual->floor;
+    system->weight = residual->weight;
+}
+
+void pvid_kapitza_assess_f32(const pvid_strong_estimator_f32 *self, pvid_estimate_f32 *estimate)
+{
+    float s[6];
+    pvid_kapitza_residual_f32 residual;
+    pvid_system_f32 system;
+    pvid_solve_settings_f32 settings;
+    settings_of(self, &settings);
+    pvid_kapitza_gather_f32(self, s, system.force, &residual);
+    system_of(&residual, &system);
+    size_t next = 0;
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        for (size_t b = a; b < PVID_KAPITZA_P; b++) {
+            system.s[a][b] = s[next];
+            next++;
+        }
+    }
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof self->p);
+    pvid_assess_f32(&system, &settings, estimate);
+}
+
+bool pvid_kapitza_is_at_rest_f32(const pvid_strong_estimator_f32 *self, float square,
+                                 const pvid_kapitza_residual_f32 *residual)
+{
+    pvid_system_f32 system;
+    pvid_solve_settings_f32 settings;
+    settings_of(self, &settings);
+    system_of(residual, &system);
+    const float variance = pvid_assess_variance_f32(&system, &settings);
+    const float noise = (variance < self->row_variance) ? variance : self->row_variance;
+    return square <= (self->dead_zone * (self->correlation * noise));
+}

@@ -1,0 +1,456 @@
+#include "number/uncontracted.h"
+
+#include "pvid/refine.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "judge/publication.h"
+#include "number/count.h"
+#include "number/finite_f32.h"
+#include "number/init.h"
+#include "number/unroll.h"
+#include "refine/refine_front_f32.h"
+#include "refine/refine_judge_f32.h"
+#include "refine/refine_pass_f32.h"
+#include "refine/refine_solve_f32.h"
+#include "refine/refine_valid_f32.h"
+#include "refine_model_f32.h"
+
+#define N PVID_REFINE_PARAMETERS
+
+/* What the next tick does. */
+enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
+
+/* Mean square of the rows' noise over its density at low frequencies: the trapezoids of neighbouring rows share a
+ * sample. */
+#define WHITENESS 0.89f
+
+/* Residuals beyond this are never used [units of the first output]. */
+#define ABSURD 1.0e3f
+
+/* In the search: a converged block with less than this many times the limit may grow; one with more than that many
+ * begins anew with the first length. */
+#define MAY_GROW 3.0f
+#define HOPELESS 30.0f
+
+/* Lost blocks until the search begins again from the weak form's estimate; a block that is not sane counts twice. */
+#define LOST_MOST 6u
+
+/* Entries of the ring before an estimate of the weak form that the search may use. */
+#define RECENT 200u
+
+/* Part of the difference by which the level follows a block's. */
+#define LEVEL_GAIN 0.2f
+
+static inline bool is_ready(const pvid_refine_f32 *self)
+{
+    const bool ready = (self != NULL) && (self->config.signal != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static void forget_state(pvid_refine_f32 *self)
+{
+    memset(self->expected, 0, sizeof self->expected);
+    self->restarted = true;
+}
+
+static float at_least_one(float level)
+{
+    return (level > 1.0f) ? level : 1.0f;
+}
+
+/* ---- blocks ---- */
+
+static void begin_pass(pvid_refine_f32 *self)
+{
+    const bool gated = (self->taken > 0u) && (self->config.gate > 0.0f) && !self->restarted;
+    const float gate = gated ? (self->config.gate * self->config.sd[0] * pvid_refine_root_f32(self->level)) : ABSURD;
+    pvid_refine_pass_begin_f32(&self->work, self->linear, self->start, self->h, gate);
+    self->phase = PASS;
+    self->waiting = false;
+}
+
+static void begin_block(pvid_refine_f32 *self)
+{
+    if ((pvid_refine_front_end_f32(&self->front) - self->begin) > (pvid_refine_front_room_f32(&self->front) - 8u)) {
+        self->begin = pvid_refine_front_end_f32(&self->front); /* overwritten, or will be */
+        forget_state(self);
+    }
+    memcpy(self->linear, self->next, sizeof self->linear);
+    memcpy(self->start, self->expected, sizeof self->start);
+    self->pass = 0;
+    begin_pass(self);
+}
+
+/* The triangle and r are those of the weak form. */
+static void begin_search(pvid_refine_f32 *self)
+{
+    pvid_refine_prior_f32(self->config.prior_sd, self->config.sd[0], self->triangle);
+    self->taken = 0;
+    self->refused = 0;
+    self->level = 0.0f;
+}
+
+/* Takes a new estimate of the weak form if it is in the region; until a block has been taken it is the prior's mean. */
+PVID_SELDOM static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
+{
+    float r[N];
+    pvid_refine_from_p(weak->p, r);
+    if (pvid_refine_region(r)) {
+        memcpy(self->weak, r, sizeof self->weak);
+        memcpy(self->weak_se, weak->se, sizeof self->weak_se);
+        self->renewed = true;
+    }
+}
+
+static void begin_anew(pvid_refine_f32 *self)
+{
+    memcpy(self->r, self->weak, sizeof self->r);
+    memcpy(self->next, self->weak, sizeof self->next);
+    forget_state(self);
+    self->renewed = false;
+    self->lost = 0;
+    self->length = self->config.first_block;
+}
+
+/* ---- the end of a block ---- */
+
+static bool is_sane(const pvid_refine_f32 *self)
+{
+    bool sane = self->solved && ((uint32_t)self->work.used * 10u >= (uint32_t)self->length * 6u * PVID_REFINE_OUTPUTS);
+    for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+        sane = sane && pvid_refine_within_f32(self->start[i], self->config.state_limit[i]);
+    }
+    return sane;
+}
+
+static void take(pvid_refine_f32 *self, float square)
+{
+    const pvid_refine_config_f32 *config = &self->config;
+    self->refused = 0;
+    self->lost = 0;
+    self->taken = (uint8_t)((self->taken < 2u) ? (self->taken + 1u) : 2u);
+    self->level = (self->taken == 1u) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
+    memcpy(self->r, self->linear, sizeof self->r);
+    memcpy(self->next, self->linear, sizeof self->next);
+    const float fade = 1.0f - ((1.0f - self->fade) * ((float)self->length / (float)config->block));
+    for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
+        self->triangle[i] = self->solve.triangle[i] * fade;
+    }
+    const uint32_t twice = 2u * (uint32_t)self->length;
+    self->length = (uint16_t)((twice < config->block) ? twice : config->block);
+}
+
+/* A block that is not taken. */
+static void refuse(pvid_refine_f32 *self, bool sane)
+{
+    if (self->taken > 0u) {
+        self->refused++;
+        if (self->refused >= 2u) {
+            begin_search(self);
+            if (sane) {
+                memcpy(self->next, self->linear, sizeof self->next);
+            }
+        }
+    } else {
+        self->lost = (uint8_t)(self->lost + (sane ? 1u : 2u));
+        if (sane) {
+            memcpy(self->next, self->linear, sizeof self->next);
+        }
+    }
+}
+
+/* Length of the next block of a search. */
+static void resize(pvid_refine_f32 *self, bool sane, float square)
+{
+    const pvid_refine_config_f32 *config = &self->config;
+    if (sane && (square < (MAY_GROW * config->chi_max))) {
+        const uint32_t twice = 2u * (uint32_t)self->length;
+        self->length = (uint16_t)((twice < config->block) ? twice : self->length);
+    } else if (!sane || !(square <= (HOPELESS * config->chi_max))) {
+        self->length = config->first_block;
+    } else {
+        /* as long again */
+    }
+}
+
+/* The start of the next block. */
+static void follow(pvid_refine_f32 *self)
+{
+    bool within = self->sane;
+    if (within) {
+        pvid_refine_end_state_f32(&self->solve, &self->work, self->linear, self->expected);
+        for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+            within = within && pvid_refine_within_f32(self->expected[i], self->config.state_limit[i]);
+        }
+    }
+    self->restarted = false;
+    if (!within) {
+        forget_state(self);
+    }
+}
+
+/* Takes the block or not; `square`: mean square of its residuals. */
+static void end_block(pvid_refine_f32 *self)
+{
+    const pvid_refine_config_f32 *config = &self->config;
+    const float variance = config->sd[0] * config->sd[0];
+    const uint32_t used = self->work.used;
+    const float freedom = (used > (PVID_REFINE_UNKNOWNS + 1u)) ? (float)(used - PVID_REFINE_UNKNOWNS) : 1.0f;
+    const float square = self->solve.residual / (freedom * (WHITENESS * variance));
+    const float clash = self->solve.clash / ((float)N * variance);
+    self->sane = is_sane(self);
+    const float room = at_least_one(self->level);
+    const bool taken = self->sane && (square < (config->chi_max * room)) &&
+                       ((self->taken == 0u) || (clash < (config->clash_max * room))) &&
+                       (self->solve.size < config->step_max);
+    self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
+    if (taken) {
+        take(self, square);
+        self->verdict = PVID_UPDATED;
+    } else {
+        self->verdict = (self->taken > 0u) ? PVID_HELD_BLOCK : PVID_HELD_SEARCHING;
+        refuse(self, self->sane);
+        if (self->taken == 0u) {
+            resize(self, self->sane, square);
+        }
+    }
+}
+
+/* ---- jobs ---- */
+
+static void pass_job(pvid_refine_f32 *self)
+{
+    pvid_refine_signals_f32 signals;
+    uint32_t first = 0;
+    if (pvid_refine_pass_needs_f32(&self->work, &first)) {
+        const uint32_t entry = self->begin + first;
+        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < (3 + PVID_REFINE_REACH)) {
+            self->waiting = true;
+            return;
+        }
+        pvid_refine_front_read_f32(&self->front, entry, &signals);
+    }
+    pvid_refine_pass_job_f32(&self->work, self->linear, self->weight, &signals);
+    if (pvid_refine_pass_ends_f32(&self->work, self->length)) {
+        pvid_refine_solve_begin_f32(&self->solve);
+        self->phase = SOLVE;
+    }
+}
+
+static void solve_job(pvid_refine_f32 *self)
+{
+    const pvid_refine_solution solution =
+        pvid_refine_solve_job_f32(&self->solve, &self->work, self->triangle, self->r, self->linear,
+                                  self->config.prior_sd, self->config.step_limit);
+    if (solution != PVID_REFINE_SOLVING) {
+        self->solved = solution == PVID_REFINE_SOLVED;
+        self->phase = self->solved ? MOVE : END;
+    }
+}
+
+/* Whether the block has had enough passes: until the steps are small, in the track `passes` of them usually do. */
+static bool is_enough(const pvid_refine_f32 *self)
+{
+    const pvid_refine_config_f32 *config = &self->config;
+    const bool small = self->solve.size < config->step_max;
+    return (self->pass >= config->most_passes) || (small && (self->pass >= config->passes));
+}
+
+/* The point of linearisation and the start move by the steps. */
+static void move(pvid_refine_f32 *self)
+{
+    float moved[N];
+    pvid_refine_move_f32(self->linear, self->solve.step, moved);
+    memcpy(self->linear, moved, sizeof self->linear);
+    for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+        self->start[i] += self->solve.shift[i];
+    }
+    self->pass++;
+    if (is_enough(self)) {
+        self->phase = END;
+    } else {
+        begin_pass(self);
+    }
+}
+
+/* A column of the covariance. */
+static void assess(pvid_refine_f32 *self)
+{
+    if (self->pass == 0u) {
+        pvid_refine_assess_begin_f32(&self->candidate, &self->config);
+    }
+    pvid_refine_assess_column_f32(&self->candidate, self->solve.triangle, self->pass,
+                                  (self->config.sd[0] * self->config.sd[0]) * at_least_one(self->level));
+    self->pass++;
+    self->phase = (self->pass < N) ? ASSESS : JUDGE;
+}
+
+static void publish(pvid_refine_f32 *self)
+{
+    if (self->verdict == PVID_UPDATED) {
+        uint32_t number = self->mark.number[0];
+        pvid_count_up(&number);
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->candidate, sizeof self->candidate,
+                               number);
+    }
+}
+
+/* Where the first block begins: it need not wait for new samples. */
+static uint32_t recent(const pvid_refine_front_f32 *front)
+{
+    const uint32_t first = pvid_refine_front_first_f32(front);
+    const uint32_t end = pvid_refine_front_end_f32(front);
+    return (end > (first + RECENT)) ? (end - RECENT) : first;
+}
+
+/* The next block. A search begins anew from the weak form's newest estimate when it is lost. */
+static void next_block(pvid_refine_f32 *self)
+{
+    const bool astray = (self->length == self->config.first_block) && self->renewed;
+    if ((self->taken == 0u) && ((self->lost >= LOST_MOST) || ((self->lost > 0u) && astray))) {
+        begin_anew(self);
+    }
+    begin_block(self);
+}
+
+PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
+{
+    pvid_reason reason = PVID_ACCUMULATED;
+    switch (self->phase) {
+    case PASS:
+        pass_job(self);
+        break;
+    case SOLVE:
+        solve_job(self);
+        break;
+    case MOVE:
+        move(self);
+        break;
+    case END:
+        end_block(self);
+        self->phase = FOLLOW;
+        break;
+    case FOLLOW:
+        follow(self);
+        self->pass = 0;
+        self->phase = (self->verdict == PVID_UPDATED) ? ASSESS : NEXT;
+        break;
+    case ASSESS:
+        assess(self);
+        break;
+    case JUDGE:
+        pvid_refine_assess_end_f32(&self->candidate, self->r, self->level);
+        self->verdict = pvid_refine_verdict_f32(&self->candidate, &self->config, self->weak, self->weak_se);
+        self->phase = PUBLISH;
+        break;
+    case PUBLISH:
+        publish(self);
+        self->phase = NEXT;
+        break;
+    case NEXT:
+        reason = self->verdict;
+        next_block(self);
+        break;
+    default:
+        reason = PVID_WARMING_UP;
+        if (self->renewed) {
+            self->begin = recent(&self->front);
+            begin_search(self);
+            begin_anew(self);
+            begin_block(self);
+        }
+        break;
+    }
+    return reason;
+}
+
+/* ---- API ---- */
+
+pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config)
+{
+    pvid_status status = pvid_init_is_given(self, config) ? pvid_refine_valid_f32(config) : PVID_BAD_POINTER;
+    if (status == PVID_OK) {
+        memset(self, 0, sizeof *self);
+        self->config = *config;
+        self->h = (float)config->ratio / config->sample_rate_hz;
+        const float seconds = (float)config->block * ((float)PVID_REFINE_SUB * self->h);
+        self->fade = 1.0f;
+        if (config->forgetting_s > 0.0f) {
+            const float share = seconds / (2.0f * config->forgetting_s);
+            self->fade = (share < 0.9f) ? (1.0f - share) : 0.1f;
+        }
+        for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++) {
+            self->weight[i] = config->sd[0] / config->sd[i];
+        }
+        pvid_refine_front_init_f32(&self->front, config);
+        self->phase = WAIT;
+    }
+    return pvid_init_end(self, sizeof *self, status);
+}
+
+/* Restarts the block with what the ring will contain. */
+static void restart(pvid_refine_f32 *self)
+{
+    pvid_refine_front_reset_f32(&self->front, &self->config);
+    self->begin = pvid_refine_front_first_f32(&self->front);
+    forget_state(self);
+    if (self->phase != (uint8_t)WAIT) {
+        begin_block(self);
+    }
+}
+
+void pvid_refine_gap_f32(pvid_refine_f32 *self)
+{
+    if (is_ready(self)) {
+        restart(self);
+    }
+}
+
+void pvid_refine_freeze_f32(pvid_refine_f32 *self, bool frozen)
+{
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
+}
+
+pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak)
+{
+    if (!is_ready(self) || (sample == NULL)) {
+        return PVID_NOT_READY;
+    }
+    if (weak != NULL) {
+        take_weak(self, weak);
+    }
+    const pvid_refine_entry entry = pvid_refine_front_step_f32(&self->front, &self->config, sample);
+    if (entry == PVID_REFINE_BROKEN) {
+        restart(self);
+        return PVID_REJECTED_NOT_FINITE;
+    }
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    if (entry == PVID_REFINE_ENTERED) {
+        self->waiting = false;
+    }
+    const bool works = (entry == PVID_REFINE_NOTHING) || (self->config.ratio == 1u);
+    if (works && !self->waiting) {
+        return work(self);
+    }
+    return (self->phase == (uint8_t)WAIT) ? PVID_WARMING_UP : PVID_ACCUMULATED;
+}
+
+const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self)
+{
+    return (is_ready(self) && (self->mark.number[0] > 0u)) ? &self->estimate : NULL;
+}
+
+bool pvid_refine_read_f32(const pvid_refine_f32 *self, pvid_refine_estimate_f32 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    return pvid_publication_read(&self->mark, &self->estimate, &self->copy, estimate, sizeof *estimate, number);
+}

@@ -1,0 +1,132 @@
+#include "number/uncontracted.h"
+
+/* Means x of `ratio` samples, x - droop (x_-1 - 2 x + x_+1): the mean's droop undone to second order. Second
+ * derivatives: w_0 x + sum_i w_i (x_-i + x_+i), i = 1..half. */
+#include "refine/refine_front_f32.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "number/finite_f32.h"
+#include "number/unroll.h"
+
+#define INPUTS PVID_REFINE_INPUTS
+#define SIGNALS PVID_REFINE_SIGNALS
+#define LENGTH ((2 * PVID_REFINE_HALF) + 1) /* of a line */
+#define FULL_SCALE 32767.0f
+#define MASK ((uint32_t)PVID_REFINE_RING - 1u)
+
+void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+{
+    const float ratio = (float)config->ratio;
+    self->share = 1.0f / ratio;
+    self->droop = (1.0f - (1.0f / (ratio * ratio))) / 24.0f;
+    self->behind = 0;
+    for (size_t i = 0; i < SIGNALS; i++) {
+        const pvid_refine_signal_f32 *signal = &config->signal[i];
+        self->sample[i] = signal->sample;
+        self->to_counts[i] = signal->scale * (FULL_SCALE / signal->range);
+        self->from_counts[i] = signal->range / FULL_SCALE;
+        self->behind = (signal->order == 2u) ? (uint8_t)PVID_REFINE_HALF : self->behind;
+    }
+    pvid_refine_front_reset_f32(self, config);
+}
+
+void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+{
+    self->wait = config->ratio;
+    self->means = 0;
+    self->referred = false;
+    self->place = 0;
+    self->next = 0;
+    memset(self->sum, 0, sizeof self->sum);
+}
+
+uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self)
+{
+    return (uint32_t)self->behind + PVID_REFINE_REACH;
+}
+
+uint32_t pvid_refine_front_end_f32(const pvid_refine_front_f32 *self)
+{
+    return (self->next > self->behind) ? (self->next - self->behind) : 0u;
+}
+
+uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)
+{
+    return (uint32_t)PVID_REFINE_RING - self->behind;
+}
+
+/* Rounded to the nearest count; INT16_MIN if it is not finite or beyond full scale. */
+static int16_t counts(float x)
+{
+    if (!((x > -FULL_SCALE) && (x < FULL_SCALE))) {
+        return INT16_MIN;
+    }
+    return (int16_t)(int32_t)((x < 0.0f) ? (x - 0.5f) : (x + 0.5f));
+}
+
+/* The second derivative in the middle of a line. */
+static float second_derivative(const float line[], const float weights[])
+{
+    float sum = weights[0] * line[PVID_REFINE_HALF];
+    PVID_UNROLL for (size_t i = 1; i <= PVID_REFINE_HALF; i++)
+    {
+        sum += weights[i] * (line[PVID_REFINE_HALF - i] + line[PVID_REFINE_HALF + i]);
+    }
+    return sum;
+}
+
+/* A mean with its droop undone, of the entry `next`. */
+static void enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, size_t signal, float x)
+{
+    if (config->signal[signal].order == 2u) {
+        float *newest = &self->line[signal][self->place];
+        newest[0] = x;
+        newest[LENGTH] = x;
+        if (self->next >= (uint32_t)(LENGTH - 1)) {
+            const float d = second_derivative(&newest[1], config->second);
+            self->ring[(self->next - PVID_REFINE_HALF) & MASK][signal] = counts(d * self->to_counts[signal]);
+        }
+    } else {
+        self->ring[self->next & MASK][signal] = counts(x * self->to_counts[signal]);
+    }
+}
+
+pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+{
+    const bool known = self->means >= 2u;
+    for (size_t i = 0; i < INPUTS; i++) {
+        if (!pvid_finite_f32(self->sum[i])) {
+            return PVID_REFINE_BROKEN;
+        }
+    }
+    for (size_t i = 0; i < SIGNALS; i++) {
+        const float x = self->sum[i] * self->share;
+        const float middle = self->mean[0][i];
+        if (known) {
+            enter(self, config, i, middle - (self->droop * ((self->mean[1][i] - (2.0f * middle)) + x)));
+        }
+        self->mean[1][i] = middle;
+        self->mean[0][i] = x;
+        self->sum[i] = 0.0f;
+    }
+    self->wait = config->ratio;
+    if (!known) {
+        self->means++;
+        return PVID_REFINE_NOTHING;
+    }
+    self->next++;
+    self->place = (uint16_t)((self->place == (uint16_t)(LENGTH - 1)) ? 0u : (self->place + 1u));
+    return PVID_REFINE_ENTERED;
+}
+
+void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
+                                 const float sample[])
+{
+    for (size_t i = 0; i < INPUTS; i++) {
+        const float x = sample[config->signal[i].sample];
+        self->reference[i] = (config->signal[i].order == 2u) ? x : 0.0f;
+    }
+    self->referred = true;
+}

@@ -1,0 +1,89 @@
+#include "number/uncontracted.h"
+
+#include "refine/refine_judge_f32.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "number/finite_f32.h"
+#include "refine/refine_solve_f32.h"
+#include "refine_model_f32.h"
+
+#define N PVID_REFINE_PARAMETERS
+
+/* Standard errors of both estimates by which they may differ. */
+#define ERRORS 5.0f
+
+float pvid_refine_root_f32(float level)
+{
+    return sqrtf((level > 1.0f) ? level : 1.0f);
+}
+
+bool pvid_refine_within_f32(float x, float limit)
+{
+    return (x > -limit) && (x < limit);
+}
+
+void pvid_refine_assess_begin_f32(pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config)
+{
+    for (size_t i = 0; i < N; i++) {
+        for (size_t j = 0; j < N; j++) {
+            estimate->covariance[i][j] = config->gain_sd[i] * config->gain_sd[j];
+        }
+    }
+}
+
+void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const float triangle[], size_t column,
+                                   float variance)
+{
+    float x[N];
+    pvid_refine_inverse_column_f32(triangle, column, x);
+    for (size_t i = 0; i <= column; i++) {
+        const float scaled = variance * x[i];
+        for (size_t j = 0; j <= column; j++) {
+            estimate->covariance[i][j] += scaled * x[j];
+        }
+    }
+}
+
+void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level)
+{
+    estimate->level = level;
+    for (size_t i = 0; i < N; i++) {
+        const float sd = sqrtf(estimate->covariance[i][i]);
+        estimate->r[i] = r[i];
+        estimate->se[i] = pvid_refine_is_logarithmic_f32(i) ? (sd * r[i]) : sd;
+    }
+}
+
+/* Whether the two estimates of an entry of r agree. */
+static bool agrees(const pvid_refine_estimate_f32 *estimate, size_t place, float weak, float weak_se, float distance)
+{
+    const float x = estimate->r[place];
+    const bool logarithmic = pvid_refine_is_logarithmic_f32(place);
+    const float errors = sqrtf((estimate->se[place] * estimate->se[place]) + (weak_se * weak_se));
+    const float allowed = (ERRORS * errors) + (logarithmic ? (distance * x) : distance);
+    const float difference = x - weak;
+    return (difference >= -allowed) && (difference <= allowed);
+}
+
+pvid_reason pvid_refine_verdict_f32(const pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config,
+                                    const float weak[], const float weak_se[])
+{
+    bool certain = true;
+    for (size_t i = 0; i < N; i++) {
+        const bool logarithmic = pvid_refine_is_logarithmic_f32(i);
+        certain = certain && pvid_finite_f32(estimate->r[i]) && pvid_finite_f32(estimate->se[i]) &&
+                  (!logarithmic || (estimate->se[i] <= (config->se_max * estimate->r[i])));
+    }
+    if (!certain) {
+        return PVID_HELD_UNCERTAIN;
+    }
+    bool agree = true;
+    for (size_t i = 0; i < PVID_REFINE_P; i++) {
+        const size_t place = pvid_refine_place_of_p[i];
+        agree = agree && agrees(estimate, place, weak[place], weak_se[i], config->distance);
+    }
+    return agree ? PVID_UPDATED : PVID_HELD_DISAGREES;
+}

@@ -1,0 +1,48 @@
+#include "number/uncontracted.h"
+
+#include "solve/products_f32.h"
+
+#include <stddef.h>
+
+#include "number/count.h"
+#include "number/finite_f32.h"
+#include "solve/pattern_f32.h"
+
+pvid_reason pvid_products_accept_f32(pvid_estimator_f32 *self, size_t n, const float squares[], float rss)
+{
+    const float limit = PVID_ROW_LIMIT * PVID_ROW_LIMIT;
+    bool fits = rss <= limit; /* NaN fails the comparison */
+    bool finite = pvid_finite_f32(rss);
+    for (size_t i = 0; i < n; i++) {
+        fits = fits && (squares[i] <= limit);
+        finite = finite && pvid_finite_f32(squares[i]);
+    }
+    if (fits) {
+        return PVID_ACCUMULATED;
+    }
+    pvid_count_up(finite ? &self->counters.rejected_saturated : &self->counters.rejected_not_finite);
+    return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
+}
+
+void pvid_products_end_f32(pvid_estimator_f32 *self, const pvid_block *block, const float gradient[], float rss,
+                           uint32_t rows)
+{
+    const pvid_model_f32 *model = self->model;
+    const float weight = self->information.row_weight * (float)rows;
+    float *tail = &self->information.low[model->n_moments + model->n_theta];
+    tail[0] += rss;
+    tail[1] += weight;
+    self->group_rss += rss;
+    self->group_weight += weight;
+    const uint32_t room = UINT32_MAX - self->counters.rows;
+    self->counters.rows += (rows < room) ? rows : room;
+    if (self->settings.gain < 1.0f) {
+        float c[PVID_MAX_THETA * PVID_MAX_P];
+        float innovation[PVID_MAX_P];
+        model->jacobian(self->p, c);
+        pvid_pattern_transpose_times_f32(model, c, block, gradient, innovation);
+        for (size_t a = 0; a < model->n_p; a++) {
+            self->innovation[a] += innovation[a];
+        }
+    }
+}

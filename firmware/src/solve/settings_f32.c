@@ -1,0 +1,88 @@
+#include "number/uncontracted.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "solve/settings_f32.h"
+
+#include "number/finite_f32.h"
+
+static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive)
+{
+    for (size_t i = 0; i < n_p; i++) {
+        const float lower = config->lower[i];
+        const float upper = config->upper[i];
+        if (!pvid_finite_f32(lower) || !pvid_finite_f32(upper) || !(lower < upper) ||
+            ((((positive >> i) & 1u) != 0u) && !(lower > 0.0f))) {
+            return PVID_BAD_BOUNDS;
+        }
+        if (!pvid_within_f32(config->start[i], lower, upper)) {
+            return PVID_BAD_START;
+        }
+        if (!pvid_within_f32(config->start_sd[i], 1.0e-12f, 1.0e12f)) {
+            return PVID_BAD_START_SD;
+        }
+    }
+    return PVID_OK;
+}
+
+pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive,
+                                        float update_rate_hz)
+{
+    const pvid_status parameters = parameters_are_valid(config, n_p, positive);
+    if (parameters != PVID_OK) {
+        return parameters;
+    }
+    if (!pvid_within_f32(config->row_sd, 1.0e-12f, 1.0e12f)) {
+        return PVID_BAD_ROW_SD;
+    }
+    if (!pvid_within_f32(update_rate_hz, 1.0e-6f, 1.0e6f)) {
+        return PVID_BAD_UPDATE_RATE;
+    }
+    const float groups = config->forgetting_s * update_rate_hz;
+    if (!pvid_within_f32(config->forgetting_s, 0.0f, 1.0e12f) || ((config->forgetting_s > 0.0f) && (groups < 4.0f))) {
+        return PVID_BAD_FORGETTING;
+    }
+    if (!pvid_within_f32(config->feedback_hz, 0.0f, 1.0e12f)) {
+        return PVID_BAD_FEEDBACK;
+    }
+    if (!pvid_within_f32(config->correlation, 1.0f, 1.0e6f)) {
+        return PVID_BAD_CORRELATION;
+    }
+    if (!pvid_within_f32(config->step_limit, 1.0e-6f, 0.9f)) {
+        return PVID_BAD_STEP_LIMIT;
+    }
+    if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
+        return PVID_BAD_KAPPA_MIN;
+    }
+    if (!pvid_within_f32(config->noise_margin, 0.0f, 1.0e6f)) {
+        return PVID_BAD_NOISE_MARGIN;
+    }
+    if (!pvid_within_f32(config->dead_zone, 0.0f, 100.0f)) {
+        return PVID_BAD_DEAD_ZONE;
+    }
+    if ((config->law != PVID_LAW_STATIONARY) && (config->law != PVID_LAW_PSEUDOVELOCITY)) {
+        return PVID_BAD_LAW;
+    }
+    return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
+}
+
+float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float update_rate_hz, float interval)
+{
+    if (config->law == PVID_LAW_PSEUDOVELOCITY) {
+        return 0.0f;
+    }
+    const float gain = (config->feedback_hz * interval) / update_rate_hz;
+    return ((config->feedback_hz > 0.0f) && (gain < 1.0f)) ? gain : 1.0f;
+}
+
+/* exp(-x), 0 <= x <= 4, by the series of exp(x): the core has no libm but sqrtf. Accurate to a few
+ * ulp; called once, in init. */
+float pvid_settings_decay_f32(float x)
+{
+    float sum = 1.0f;
+    for (size_t k = 24; k > 0u; k--) {
+        sum = 1.0f + ((x / (float)k) * sum);
+    }
+    return 1.0f / sum;
+}

@@ -1,0 +1,21 @@
+/* The settings of an estimator in float32, for all estimators. Private to the core. */
+#ifndef PVID_SOLVE_SETTINGS_F32_H
+#define PVID_SOLVE_SETTINGS_F32_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "pvid/estimator.h"
+
+/* Checks every field of a configuration but model and row_weight, for n_p parameters, those of the bits of `positive`
+ * being positive. The status names the refused field. */
+pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive,
+                                        float update_rate_hz);
+
+/* g of estimator.h for solves at this interval [groups of rows]. */
+float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float update_rate_hz, float interval);
+
+/* exp(-x), 0 <= x <= 4: the core has no libm but sqrtf. */
+float pvid_settings_decay_f32(float x);
+
+#endif

@@ -1,0 +1,54 @@
+/* Declared in replay_refine.h. Host only. */
+#include "replay_refine.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "pvid/fnv_refine.h"
+
+void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_samples, const float samples[],
+                            const float weak_p[], const float weak_se[], uint32_t *running_hash, uint8_t reason[],
+                            uint32_t hash[], float r[], float se[])
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        pvid_estimate_f32 weak;
+        const float *p = &weak_p[(size_t)tick * PVID_REFINE_P];
+        memset(&weak, 0, sizeof weak);
+        memcpy(weak.p, p, PVID_REFINE_P * sizeof weak.p[0]);
+        memcpy(weak.se, &weak_se[(size_t)tick * PVID_REFINE_P], PVID_REFINE_P * sizeof weak.se[0]);
+        const bool given = (p[0] - p[0]) >= 0.0f;
+        const pvid_reason one = pvid_refine_step_f32(self, &samples[(size_t)tick * n_samples], given ? &weak : NULL);
+        if (reason != NULL) {
+            reason[tick] = (uint8_t)one;
+        }
+        if (hash != NULL) {
+            *running_hash = pvid_fnv_refine_f32(*running_hash, self, one);
+            hash[tick] = *running_hash;
+        }
+        const pvid_refine_estimate_f32 *latest = pvid_refine_latest_f32(self);
+        if ((r != NULL) && (latest != NULL)) {
+            memcpy(&r[(size_t)tick * PVID_REFINE_PARAMETERS], latest->r, sizeof latest->r);
+            memcpy(&se[(size_t)tick * PVID_REFINE_PARAMETERS], latest->se, sizeof latest->se);
+        }
+    }
+}
+
+void pvid_replay_weak_candidates_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[], const float y[], float p[],
+                                     float se[])
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const pvid_reason reason = pvid_weak_step_f32(self, phi[tick], y[tick]);
+        if ((reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN)) {
+            const pvid_estimate_f32 *estimate = &self->finish.candidate;
+            memcpy(&p[(size_t)tick * PVID_REFINE_P], estimate->p, PVID_REFINE_P * sizeof p[0]);
+            memcpy(&se[(size_t)tick * PVID_REFINE_P], estimate->se, PVID_REFINE_P * sizeof se[0]);
+        }
+    }
+}
+
+void pvid_replay_refine_shape(uint32_t shape[8])
+{
+    const uint32_t numbers[8] = {PVID_REFINE_ORDER,  PVID_REFINE_COORDINATES, PVID_REFINE_INPUTS, PVID_REFINE_OUTPUTS,
+                                 PVID_REFINE_MOVING, PVID_REFINE_PARAMETERS,  PVID_REFINE_SKEW,   PVID_REFINE_P};
+    memcpy(shape, numbers, sizeof numbers);
+}

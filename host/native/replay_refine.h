@@ -1,0 +1,24 @@
+/* What Python calls of the refinement. */
+#ifndef PVID_REPLAY_REFINE_H
+#define PVID_REPLAY_REFINE_H
+
+#include <stdint.h>
+
+#include "pvid/pvid.h"
+
+/* Steps an initialised refinement through samples[ticks][n_samples]. weak_p, weak_se [ticks][PVID_REFINE_P]: estimates
+ * of the weak form that are new at a tick, NaN at all others. Results, each NULL or [ticks]: the reason; the running
+ * hash (pvid/fnv_refine.h); r and standard errors [parameters] as published, 0 before the first publication. */
+void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_samples, const float samples[],
+                            const float weak_p[], const float weak_se[], uint32_t *running_hash, uint8_t reason[],
+                            uint32_t hash[], float r[], float se[]);
+
+/* Steps an initialised weak form and writes its assessed estimates, trusted or not, at the ticks at which they are new:
+ * p, se [ticks][PVID_REFINE_P], NaN at all others. */
+void pvid_replay_weak_candidates_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[], const float y[], float p[],
+                                     float se[]);
+
+/* Numbers of the model and of this build: order, coordinates, inputs, outputs, moving, parameters, skew, p. */
+void pvid_replay_refine_shape(uint32_t shape[8]);
+
+#endif

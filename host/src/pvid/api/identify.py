@@ -1,0 +1,114 @@
+"""`pvid.identify`: parameters of a mechanism from a file, a data frame or arrays."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy.typing as npt
+
+from pvid.api.result import Result, of_core, of_mechanism, of_pendulum
+from pvid.base.errors import PvidError
+from pvid.core.native import Native
+from pvid.log.mechanism_settings import mechanism_rig
+from pvid.log.rig_settings import rig_for
+from pvid.rig.columns import Columns, parsed
+from pvid.rig.mechanism_file import channels_of
+from pvid.rig.run import Recording, Run, read_recording, recording_of_arrays
+from pvid.rig.sensor_steps import resolution_note, resolved
+from pvid.run.advice import advice, advice_on_refusal, behind
+from pvid.run.identify import identify as identify_pendulum
+from pvid.run.mechanism import identify_mechanism, model_of
+from pvid.run.mechanism_core import identify_in_c
+from pvid.run.skew import aligned
+from pvid.settings.engine_cores import ENGINE_CORES
+
+Data = str | os.PathLike[str] | Mapping[str, npt.ArrayLike] | Any
+
+
+def identify(
+    data: Data,
+    *,
+    model: str | os.PathLike[str] | None = None,
+    rig: str | os.PathLike[str] | None = None,
+    columns: str | None = None,
+    core: Literal["f32", "q31", "f64"] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    **keys: Any,
+) -> Result:
+    """Identifies a mechanism from measured data.
+
+    Parameters
+    ----------
+    data
+        A table (csv, npz, parquet, ...), a data frame, or a mapping of names to arrays, shape (n,): the time t [s] and
+        the signals of the mechanism; of the pendulum phi [rad] and y [m].
+    model
+        A mechanism of `pvid models` or a model file; the rig file's or the pendulum by default.
+    rig
+        The rig file; RUN.toml beside RUN.csv by default.
+    columns
+        Names and units of the columns, as for `--columns`: "t=time_ms:ms,phi=angle:deg,y=h:mm".
+    core
+        Arithmetic: float32 by default for the pendulum, float64 for other mechanisms,
+        whose C core is compiled for f32 and q31.
+    settings, keys
+        Keys of the rig file, which come before the file: l1=0.25, settings={"sensor.phi_lsb": 0.0015}.
+
+    Returns
+    -------
+    Also where the data do not suffice: `Result.identified` is False then.
+
+    Raises
+    ------
+    PvidError
+        When the data or the rig cannot be read; one sentence names the thing and the likely cause.
+
+    Examples
+    --------
+    >>> pvid.identify("run.csv", l1=0.25)["g"].value  # doctest: +SKIP
+    """
+    path = Path(data) if isinstance(data, str | os.PathLike) else None
+    texts = tuple(f"{key}={_toml(value)}" for key, value in {**(settings or {}), **keys}.items())
+    rig_path = None if rig is None else Path(rig)
+    described = mechanism_rig(path, rig_path, texts, None if model is None else os.fspath(model))
+    if described is not None:
+        compiled = model_of(described)
+        recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
+        answer = identify_mechanism(recording.whole(), compiled)
+        engine = ENGINE_CORES.get(core or "")
+        return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
+    file = rig_for(path, rig_path, texts)
+    if core is not None:
+        file = replace(file, identifier=replace(file.identifier, core=core))
+    run = aligned(Run.of(_recording(data, path, file.sample_rate, parsed(columns))), file.sensor.y_delay)
+    if not file.identifier.core_traits.takes_gaps:
+        run = run.whole()
+    given, file = file, resolved(file, run)
+    run = replace(run, notes=(*run.notes, *resolution_note(given, file)))
+    native = Native()
+    try:
+        found = identify_pendulum(run, file, native)
+    except PvidError as error:
+        raise behind(advice_on_refusal(run, file, native), error) from error
+    return of_pendulum(replace(found, notes=run.notes, advice=advice(run, file, found, native)))
+
+
+def _recording(data: Data, path: Path | None, rate: float | None, columns: Columns) -> Recording:
+    if path is not None:
+        recording = read_recording(path, rate, columns)
+    else:
+        frame: Any = data
+        names = frame.keys() if isinstance(data, Mapping) else getattr(frame, "columns", None)
+        if names is None:
+            raise PvidError(f"data: a path, a data frame or a mapping of arrays is wanted, not {type(data).__name__}")
+        recording = recording_of_arrays({str(one): frame[one] for one in names}, rate, columns)
+    recording.refuse_damaged()
+    return recording
+
+
+def _toml(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,125 @@
+"""The answer of `pvid.identify`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from pvid.base.rounding import with_error
+from pvid.run import answer
+from pvid.run.identify import Identification
+from pvid.run.mechanism import MechanismAnswer
+from pvid.run.mechanism_core import CoreAnswer
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A value with its standard error `se`, both in `unit` (SI)."""
+
+    value: float
+    se: float
+    unit: str
+
+    def __str__(self) -> str:
+        value, error = with_error(self.value, self.se)
+        return f"{value} ± {error} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """An identification.
+
+    Attributes
+    ----------
+    identified : whether the data say enough; otherwise `parameters` is empty and `status` says why
+    parameters : by name: physical parameters, then the unknowns of the equations
+    status : the last word of the identifier
+    warning : reasons to doubt the estimate; None: there are none
+    notes : what was done to the data, a sentence each
+    details : everything, as `pvid identify --json` prints it
+    """
+
+    identified: bool
+    parameters: Mapping[str, Parameter]
+    status: str
+    warning: str | None
+    notes: tuple[str, ...]
+    details: Mapping[str, Any]
+    _answer: Identification | MechanismAnswer
+
+    def __getitem__(self, name: str) -> Parameter:
+        return self.parameters[name]
+
+    def __str__(self) -> str:
+        head = f"nothing identified: {self.status}"
+        lines = [f"{name} = {one}" for name, one in self.parameters.items()] if self.identified else [head]
+        return "\n".join([*lines, *([f"warning: {self.warning}"] if self.warning else [])])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        if not self.identified:
+            return f"<p>{escape(str(self))}</p>"
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(str(one))}</td></tr>" for name, one in self.parameters.items()
+        )
+        warning = f"<p>warning: {escape(self.warning)}</p>" if self.warning else ""
+        return f"<table>{rows}</table>{warning}"
+
+    def plot(self, path: str | Path) -> Path:
+        """Writes a figure of the estimates over time with their standard errors (png, svg or pdf) and returns its path.
+
+        Raises
+        ------
+        PvidError
+            When it cannot be written.
+        """
+        out = Path(path)
+        if isinstance(self._answer, Identification):
+            from pvid.show.figures import convergence
+
+            convergence(self._answer, out)
+        else:
+            from pvid.show.mechanism_figure import convergence as of_mechanism
+
+            of_mechanism(self._answer, out)
+        return out
+
+
+def of_pendulum(found: Identification) -> Result:
+    """Of the pendulum's identifier."""
+    return _result(found, answer.as_json(found), found.identified, found.status, found.warning, found.notes)
+
+
+def of_mechanism(found: MechanismAnswer) -> Result:
+    """Of a described mechanism."""
+    verdict = found.found.verdict
+    notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
+    return _result(found, found.as_json(), found.identified, verdict.status, verdict.warning, notes)
+
+
+def of_core(found: CoreAnswer) -> Result:
+    """Of a described mechanism by the C core."""
+    verdict = found.verdict
+    notes = (*found.oracle.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
+    status = verdict.status if found.published else found.reason.text
+    return _result(found.oracle, found.as_json(), found.identified, status, verdict.warning, notes)
+
+
+def _result(
+    found: Identification | MechanismAnswer,
+    details: Mapping[str, Any],
+    identified: bool,
+    status: str,
+    warning: str | None,
+    notes: tuple[str, ...],
+) -> Result:
+    known = {
+        name: Parameter(one["value"], one["se"], one["unit"])
+        for name, one in details["parameters"].items()
+        if identified and one["value"] is not None
+    }
+    return Result(identified, known, status, warning, tuple(notes), details, found)

@@ -1,0 +1,37 @@
+"""The fixed-point weak form of a mechanism in C, on this computer: generated, compiled, loaded."""
+
+from __future__ import annotations
+
+from pvid.codegen import files_fourier_q31
+from pvid.codegen.fourier_q31 import FixedFourier
+from pvid.codegen.parameters_q31 import ParametersQ31
+from pvid.core.fourier_native_q31 import FourierNativeQ31
+from pvid.core.model_library import model_library
+from pvid.core.sizes import raised
+from pvid.settings.fourier_q31 import FourierConfigQ31
+from pvid.setup.fourier_sizes import sizes_of_q31
+
+_MADE_BY = "identification"
+
+
+def fourier_native_q31(made: FixedFourier, parameters: ParametersQ31, config: FourierConfigQ31) -> FourierNativeQ31:
+    """The library of a model, a design and its settings.
+
+    Raises
+    ------
+    PvidError
+        When there is no compiler.
+    """
+    name = made.functions.name
+    needed = sizes_of_q31(config.design, parameters.model.n_p, len(parameters.model.c_row))
+    texts = {
+        f"{name}_weak_q31.h": files_fourier_q31.header(made, needed, _MADE_BY),
+        f"{name}_weak_q31.c": files_fourier_q31.source(made, parameters, _MADE_BY),
+        f"{name}_design_q31.h": files_fourier_q31.design_header(config, name, needed, _MADE_BY, []),
+        "configuration.c": f'#include "{name}_design_q31.h"\n#include "configuration.h"\n\n'
+        f"const pvid_fourier_config_q31 *{name}_settings_q31 = &{name}_config_q31;\n",
+        "configuration.h": '#include "pvid/fourier_q31.h"\n'
+        f"extern const pvid_fourier_config_q31 *{name}_settings_q31;\n",
+    }
+    headers = ("configuration.h",)
+    return FourierNativeQ31(name, model_library(name, texts, raised(needed), "q31", headers), config)

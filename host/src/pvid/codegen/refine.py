@@ -1,0 +1,676 @@
+"""The refinement of a model: its equations of motion solved for the accelerations, their Jacobians and the sensors'.
+
+    r -> constants m               once a pass: what depends on the refined parameters alone
+    m, q, v, u -> a                order 2: q'' = a(q, v, u); order 1: q' = a(q, u), and v is not read
+    m, q, v, u -> a, K, D, U, B    da/dq, da/dv, da/du by rows, da/d(steps of the motion's parameters) by parameters
+    m, q, v, u -> z, Zq, Zv, Zr    what the sensors measure, and its derivatives
+    r -> region                    whether the mechanism is possible
+    r, row -> row                  derivatives by the motion's steps to those by the steps of r: the chart
+
+A refinement with a skew has one more moving entry behind the others: the time by which the sensors are late on the
+inputs. Its column is U times the derivative of u; the kernel makes it, and its entries of B are not written.
+
+A step of a positive parameter is one of its logarithm. The motion's parameters are those of r, but for shapes:
+functions of unknowns that the equations contain in their place. Derivatives come from the equations, not from the
+solution: with A h = b, A dh = db - dA h for every column, so that A is inverted once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.codegen.functions import with_values
+from pvid.codegen.names import identifiers
+from pvid.codegen.operations import Argument, Builder, Literal, Operation, Program, Value
+from pvid.model.compiled import CompiledModel
+from pvid.model.signals import Integral, Jet, jets, sgn
+
+_ZERO, _ONE = sp.Integer(0), sp.Integer(1)
+_ARRAYS = frozenset("m q v u r a z K D B U row Zq Zv Zr".split())
+SKEW = "tau"
+SKEW_SD = 5e-3  # [s]
+LOG_SD = 0.15  # of the logarithm of a positive parameter: how far off the start may be
+
+
+@dataclass(frozen=True)
+class RefinedParameter:
+    """An entry of r.
+
+    Attributes
+    ----------
+    name, unit : as in files
+    log : its step is one of the logarithm
+    place : in p of the weak form; -1: it starts at 0
+    prior_sd : how far off the start may be, in its step
+    """
+
+    name: str
+    unit: str
+    log: bool
+    place: int
+    prior_sd: float
+
+
+@dataclass(frozen=True)
+class RefineFunction:
+    """A generated function.
+
+    Attributes
+    ----------
+    name : constants, motion, jacobian, output, output_jacobian, region, chart
+    given : arrays that are read: name, entries
+    written : arrays that are written: name, entries
+    program : from all entries that are read to all that are written
+    """
+
+    name: str
+    given: tuple[tuple[str, int], ...]
+    written: tuple[tuple[str, int], ...]
+    program: Program
+
+
+@dataclass(frozen=True)
+class RefineFunctions:
+    """What is generated for the refinement.
+
+    Attributes
+    ----------
+    model : as compiled
+    name : of the model, in C
+    order : 1 or 2, highest derivative
+    coordinates : names of q
+    inputs : u, jets of signals and of defined ones
+    outputs : names of the sensors z
+    parameters : r; the first `moving` ones change the motion
+    motion_names : parameters of the motion
+    constants : what each m is, as text
+    settings : further entries of r's array where constants are arguments: widths of signs, knowns
+    skew : the last moving entry is that of the sensors
+    functions : by name
+    """
+
+    model: CompiledModel
+    name: str
+    order: int
+    coordinates: tuple[str, ...]
+    inputs: tuple[Jet, ...]
+    outputs: tuple[str, ...]
+    parameters: tuple[RefinedParameter, ...]
+    moving: int
+    motion_names: tuple[str, ...]
+    constants: tuple[str, ...]
+    settings: tuple[str, ...]
+    skew: bool
+    functions: Mapping[str, RefineFunction] = field(repr=False)
+
+
+def width_name(argument: sp.Expr) -> str:
+    """Of the setting that is the width of the sign of this argument."""
+    return f"width_{identifiers([str(argument)])[0]}"
+
+
+def signs_of(model: CompiledModel) -> tuple[sp.Expr, ...]:
+    """Arguments of the signs in the equations of the refinement."""
+    found = {one for equation in _equations(model) for one in equation.atoms(sgn)}
+    return tuple(one.args[0] for one in sorted(found, key=str))
+
+
+def default_widths(model: CompiledModel) -> dict[str, float]:
+    """A hundredth of the largest rate, as far as the description tells, for each sign."""
+    reach = {one.name: one.reach for one in model.signals}
+    return {str(one): max(reach.get(jet.of, 1.0) for jet in jets(one)) / 100 for one in signs_of(model)}
+
+
+def has_skew(model: CompiledModel) -> bool:
+    """Whether the inputs are measured by sensors and derived, so that a delay between sensors matters."""
+    return any(jet in model.opaque and not model.opaque[jet].has(Integral) for jet in _inputs(model))
+
+
+def _inputs(model: CompiledModel) -> set[Jet]:
+    return {jet for one in _equations(model) for jet in jets(one)}
+
+
+def refine_functions_of(
+    model: CompiledModel, widths: Mapping[str, float] | None = None, skew: bool = False
+) -> RefineFunctions:
+    """What is generated of a model.
+
+    Parameters
+    ----------
+    model
+        As compiled.
+    widths
+        Argument of a sgn, as in phi_1 -> width of v / sqrt(v^2 + width^2) in its place. None: widths and known
+        constants are settings, arguments behind r.
+    skew
+        r has one.
+
+    Raises
+    ------
+    PvidError
+        Where the equations do not determine a motion, or a sign has no width.
+    """
+    return _Refine(model, widths, skew).functions()
+
+
+def _equations(model: CompiledModel) -> tuple[sp.Expr, ...]:
+    """Those of the refinement: integrals of what the run sets are inputs, not coordinates."""
+    if model.refinement.equations:
+        return model.refinement.equations
+    integrals = {jet.of for jet, value in model.opaque.items() if value.has(Integral)}
+    return tuple(one for one in model.equations if not any(jet.of in integrals and jet.order == 1 for jet in jets(one)))
+
+
+class _Refine:
+    def __init__(self, model: CompiledModel, widths: Mapping[str, float] | None, skew: bool) -> None:
+        self.model, self.skew = model, skew
+        own = model.refinement
+        self._definitions: dict[sp.Symbol, sp.Expr] = {}
+        self._inner: list[tuple[sp.Symbol, sp.Expr, sp.Expr]] = []  # symbol, argument, derivative by the argument
+        equations = _equations(model)
+        self.settings: tuple[sp.Symbol, ...] = ()
+        signs = {one: width_name(one) for one in signs_of(model)}
+        width_symbols = {one: sp.Symbol(name, positive=True) for one, name in signs.items()}
+        if widths is None:
+            self.settings = (*width_symbols.values(), *(one.symbol for one in model.knowns))
+        else:
+            missing = [str(one) for one in signs if not widths.get(str(one), 0.0) > 0]
+            if missing:
+                raise PvidError(
+                    f"{model.name}: the refinement needs the width of the soft sign of {missing[0]} "
+                    f"(--soft-sign {missing[0]}=WIDTH)"
+                )
+            literal = {mark: sp.Rational(repr(float(widths[str(one)]))) for one, mark in width_symbols.items()}
+            self._definitions |= literal
+        inputs_of = {one.name for one in model.signals if one.driven or one.kind == "input"}
+        inputs_of |= {jet.of for jet in model.opaque}
+        whole = [*equations, *own.outputs.values()]
+        found = {jet for one in whole for jet in jets(one)}
+        order = [one.name for one in model.signals] + [jet.of for jet in model.opaque]
+        self.u = tuple(
+            sorted((jet for jet in found if jet.of in inputs_of), key=lambda jet: (order.index(jet.of), jet.order))
+        )
+        free = list(dict.fromkeys(jet.of for jet in self._in_order(found, equations) if jet.of not in inputs_of))
+        if len(free) != len(equations):
+            raise PvidError(
+                f"{model.name} has {len(equations)} equations for the {len(free)} quantities {', '.join(free)}: "
+                "the refinement needs as many equations"
+            )
+        top = {name: max(jet.order for jet in found if jet.of == name) for name in free}
+        self.highest = [Jet(name, top[name]) for name in free]
+        self.order = 2 if all(n == 2 for n in top.values()) else 1
+        if self.order == 2:
+            self.q = [Jet(name) for name in free]
+            self.v = [Jet(name, 1) for name in free]
+        else:
+            self.q = [Jet(name, k) for name in free for k in range(top[name])]
+            self.v = []
+        sensors = [one.name for one in model.signals if one.kind == "sensor" and not one.driven]
+        self.outputs = tuple(sensors)
+        readings = [own.outputs.get(name, Jet(name)) for name in sensors]
+        for one in readings:
+            beyond = jets(one) - set(self.q) - set(self.v) - set(self.u) - set(self.highest)
+            if beyond:
+                raise PvidError(
+                    f"{model.name}: the refinement does not know {min(map(str, beyond))}, which is measured"
+                )
+        self._parameters([*equations, *readings], equations)
+        marked = [self._marked(one, width_symbols) for one in (*equations, *readings)]
+        self._solve(marked[: len(equations)])
+        self.z = [one.xreplace(dict(zip(self.highest, self._h, strict=True))) for one in marked[len(equations) :]]
+
+    @staticmethod
+    def _in_order(found: Iterable[Jet], equations: Sequence[sp.Expr]) -> list[Jet]:
+        """By the equation in which each first has its highest derivative, so that q has the equations' order."""
+        top = {jet.of: 0 for jet in found}
+        for jet in found:
+            top[jet.of] = max(top[jet.of], jet.order)
+
+        def first(jet: Jet) -> tuple[int, str]:
+            high = Jet(jet.of, top[jet.of])
+            places = [k for k, one in enumerate(equations) if high in one.free_symbols]
+            return (places[0] if places else len(equations), jet.of)
+
+        return sorted(found, key=first)
+
+    # ---- parameters
+
+    def _parameters(self, whole: Sequence[sp.Expr], equations: Sequence[sp.Expr]) -> None:
+        """r, and the symbols of the motion in the order of its moving entries."""
+        own, model = self.model.refinement, self.model
+        used = {symbol for one in whole for symbol in one.free_symbols}
+        moved = {symbol for one in equations for symbol in one.free_symbols}
+        if any(top.order == 0 for top in self.highest):  # an algebraic equation only measures
+            moved = {
+                symbol
+                for one in equations
+                if not any(top.order == 0 and top in one.free_symbols for top in self.highest)
+                for symbol in one.free_symbols
+            }
+        shapes = [one for one in own.shapes if one in used]
+        behind = {symbol for one in shapes for symbol in own.shapes[one].free_symbols}
+        every = [*(one.symbol for one in model.unknowns), *(one.symbol for one in own.extras)]
+        direct = [one for one in every if one in moved]
+        hidden = [one for one in every if one in behind and one not in direct]
+        if len(hidden) != len(shapes):
+            raise PvidError(
+                f"{model.name}: the refinement has {len(shapes)} shapes of the {len(hidden)} unknowns "
+                f"{', '.join(map(str, hidden))}, which are not in its equations otherwise: there must be as many"
+            )
+        places = iter(shapes)
+        moving = [one for one in every if one in direct or one in hidden]
+        self.motion = [next(places) if one in hidden else one for one in moving]
+        self.r = moving + [one for one in every if one not in moving]
+        for one in self.r:
+            if one not in used and one not in behind:
+                raise PvidError(f"{model.name}: {one} is in no equation of the refinement and in no output")
+        self.moving = len(moving)
+        by_symbol = {one.symbol: one for one in model.unknowns}
+        extras = {one.symbol: one for one in own.extras}
+        names = identifiers([str(one) for one in self.r])
+        self.parameters = []
+        for name, one in zip(names, self.r, strict=True):
+            if one in by_symbol:
+                unknown = by_symbol[one]
+                sd = LOG_SD if unknown.positive else unknown.sd
+                place = model.unknowns.index(unknown)
+                self.parameters.append(RefinedParameter(name, unknown.unit, unknown.positive, place, sd))
+            else:
+                self.parameters.append(RefinedParameter(name, extras[one].unit, False, -1, extras[one].sd))
+        self.log = {one: entry.log for one, entry in zip(self.r, self.parameters, strict=True)}
+        self.log |= dict.fromkeys(shapes, True)
+
+    # ---- functions inside: angles that are sums, signs
+
+    def _marked(self, e: sp.Expr, widths: Mapping[sp.Expr, sp.Symbol]) -> sp.Expr:
+        """With a symbol in place of each angle that is no single symbol, and of each sign."""
+        known = {one.symbol for one in self.model.knowns}
+        whole = e if self.settings else with_values(self.model, e)
+        signs = {}
+        for one in sorted(whole.atoms(sgn), key=str):
+            argument = one.args[0]
+            soft, slope, root = (sp.Symbol(f"{word}[{argument}]") for word in ("sign", "slope", "root"))
+            width = widths[argument]
+            if soft not in self._definitions:
+                self._definitions[root] = 1 / sp.sqrt(argument**2 + width**2)
+                self._definitions[soft] = argument * root
+                self._definitions[slope] = width**2 * root * root**2
+                self._inner.append((soft, argument, slope))
+            signs[one] = soft
+        whole = whole.xreplace(signs)
+        for one in sorted({*whole.atoms(sp.sin), *whole.atoms(sp.cos)}, key=str):
+            argument = one.args[0]
+            if argument.is_Symbol or not argument.free_symbols - known:
+                continue
+            negative = sp.Symbol(f"angle[{-argument}]")
+            if negative in self._definitions:
+                turned = -sp.sin(negative) if isinstance(one, sp.sin) else sp.cos(negative)
+                whole = whole.xreplace({one: turned})
+                continue
+            mark = sp.Symbol(f"angle[{argument}]")
+            if mark not in self._definitions:
+                self._definitions[mark] = argument
+                self._inner.append((mark, argument, _ONE))
+                self._add_theorem(mark, argument)
+            whole = whole.xreplace({one: one.func(mark)})
+        return whole
+
+    def _add_theorem(self, mark: sp.Symbol, argument: sp.Expr) -> None:
+        """Sine and cosine of a sum or difference of two coordinates, from theirs."""
+        terms = sp.Add.make_args(argument)
+        if len(terms) != 2:
+            return
+        signs = [one.could_extract_minus_sign() for one in terms]
+        plain = [abs(one) if one.is_number else (-one if sign else one) for one, sign in zip(terms, signs, strict=True)]
+        if not all(one in self.q for one in plain) or all(signs):
+            return
+        x, y = plain if not signs[0] else (plain[1], plain[0])
+        sign = -1 if any(signs) else 1
+        self._definitions[sp.sin(mark)] = sp.sin(x) * sp.cos(y) + sign * sp.cos(x) * sp.sin(y)
+        self._definitions[sp.cos(mark)] = sp.cos(x) * sp.cos(y) - sign * sp.sin(x) * sp.sin(y)
+
+    def _symbol(self, name: str, e: sp.Expr) -> sp.Expr:
+        """A symbol for an expression that several need; what is short stands for itself."""
+        if e.is_number or e.is_Symbol:
+            return e
+        mark = sp.Symbol(name)
+        assert mark not in self._definitions
+        self._definitions[mark] = e
+        return mark
+
+    # ---- solution
+
+    def _solve(self, equations: Sequence[sp.Expr]) -> None:
+        n, name = len(equations), self.model.name
+        matrix = sp.Matrix(n, n, lambda i, j: sp.diff(equations[i], self.highest[j]))
+        for i, j in sorted(matrix.todok()):
+            if matrix[i, j].has(*self.highest):
+                raise PvidError(f"{name}: equation {i + 1} of the refinement is not linear in {self.highest[j]}")
+        right = [-one.xreplace(dict.fromkeys(self.highest, _ZERO)) for one in equations]
+        self._matrix = matrix
+        self._right = [self._symbol(f"right_{i}", one) for i, one in enumerate(right)]
+        self._plain_right = right
+        self._inverse = self._inverted(matrix)
+        self._h = [
+            self._symbol(f"h_{i}", sum((self._inverse[i, j] * self._right[j] for j in range(n)), _ZERO))
+            for i in range(n)
+        ]
+        # what is 0 for the solution: its derivatives at fixed h are the right sides of all columns
+        self._rest = [right[i] - sum((matrix[i, j] * self._h[j] for j in range(n)), _ZERO) for i in range(n)]
+        self._by_inner = {
+            (i, mark): self._symbol(f"d{i} by {mark}", sp.diff(self._rest[i], mark))
+            for i in range(n)
+            for mark, _, _ in self._inner
+        }
+        self._columns: dict[tuple[sp.Expr, ...], list[sp.Expr]] = {}
+
+    def _inverted(self, matrix: sp.Matrix) -> sp.Matrix:
+        """By blocks of at most three equations that have nothing in common."""
+        n = matrix.rows
+        whole = sp.zeros(n, n)
+        left = set(range(n))
+        while left:
+            rows, columns = {min(left)}, set[int]()
+            while True:
+                more = {j for i in rows for j in range(n) if matrix[i, j] != 0}
+                other = {i for j in more for i in range(n) if matrix[i, j] != 0}
+                if more == columns and other == rows:
+                    break
+                rows, columns = rows | other, more
+            i, j = sorted(rows), sorted(columns)
+            if len(i) != len(j) or len(i) > 3:
+                raise PvidError(
+                    f"{self.model.name}: the equations do not determine the motion"
+                    if len(i) != len(j)
+                    else f"{self.model.name}: {len(i)} coupled equations; the refinement solves up to three"
+                )
+            block = self._inverted_block(matrix.extract(i, j), f"{i[0]}")
+            for a, column in enumerate(j):
+                for b, row in enumerate(i):
+                    whole[column, row] = block[a, b]
+            left -= rows
+        return whole
+
+    def _inverted_block(self, block: sp.Matrix, name: str) -> sp.Matrix:
+        if block.rows == 1:
+            return sp.Matrix([[self._symbol(f"inverse_{name}_00", 1 / block[0, 0])]])
+        fixed = set(self.motion) | set(self.r) | set(self.settings)
+        pairs = {one: sp.Dummy() for one in (*block.atoms(sp.sin), *block.atoms(sp.cos))}
+        plain = block.xreplace(pairs)
+        determinant = sp.expand(plain.det())
+        squares = {}
+        for one, mark in list(pairs.items()):
+            if isinstance(one, sp.cos):
+                other = pairs.setdefault(sp.sin(one.args[0]), sp.Dummy())
+                squares[mark**2] = 1 - other**2
+        factored = sp.factor(sp.expand(determinant.subs(squares)))
+        if sp.count_ops(factored) >= sp.count_ops(sp.factor(determinant)):
+            factored = sp.factor(determinant)
+        back = {mark: one for one, mark in pairs.items()}
+        ahead = sp.Mul(*[one for one in sp.Mul.make_args(factored) if one.free_symbols <= fixed])
+        rest = sp.Mul(*[one for one in sp.Mul.make_args(factored) if not one.free_symbols <= fixed])
+        once = self._symbol(f"over_{name}", 1 / rest.xreplace(back))
+        found = (plain.adjugate() / ahead).applyfunc(lambda one: sp.factor(sp.cancel(one)))
+        entries: dict[tuple[int, int], sp.Expr] = {}
+        for i in range(block.rows):
+            for j in range(block.rows):
+                before = next((key for key in entries if sp.expand(found[key] - found[i, j]) == 0), None)
+                entries[i, j] = (
+                    entries[before]
+                    if before
+                    else self._symbol(f"inverse_{name}_{i}{j}", found[i, j].xreplace(back) * once)
+                )
+        return sp.Matrix(block.rows, block.rows, lambda i, j: entries[i, j])
+
+    # ---- derivatives
+
+    def _by(self, e: sp.Expr, x: sp.Symbol, by_inner: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+        total = sp.diff(e, x)
+        for mark, argument, slope in self._inner:
+            step = sp.diff(argument, x)
+            if step != 0 and by_inner[mark] != 0:
+                total += by_inner[mark] * slope * step
+        return total
+
+    def _column(self, x: sp.Symbol, factor: sp.Expr = _ONE) -> list[sp.Expr]:
+        """d h / d x times a factor [n]."""
+        n = len(self._h)
+        sides = []
+        for i in range(n):
+            by_inner = {mark: self._by_inner[i, mark] for mark, _, _ in self._inner}
+            sides.append(self._by(self._rest[i], x, by_inner))
+        key = tuple(sides)
+        if factor != 1 and key in self._columns:
+            return [factor * one for one in self._columns[key]]
+        marks = [self._symbol(f"side_{i} by {x}", _shortest(factor * one)) for i, one in enumerate(sides)]
+        column = [
+            self._symbol(f"d h_{i} by {x}", sum((self._inverse[i, j] * marks[j] for j in range(n)), _ZERO))
+            for i in range(n)
+        ]
+        if factor == 1:
+            self._columns[key] = column
+        return column
+
+    def _rates(self, of_h: Sequence[sp.Expr], x: sp.Symbol | None) -> list[sp.Expr]:
+        """From values (or derivatives by x) of the highest derivatives those of q'' or q'."""
+        found = []
+        places = {jet: k for k, jet in enumerate(self.highest)}
+        for one in self.v if self.order == 2 else self.q:
+            above = one.d()
+            if above in places:
+                found.append(of_h[places[above]])
+            else:
+                found.append(above if x is None else sp.Integer(int(above == x)))
+        return found
+
+    def functions(self) -> RefineFunctions:
+        """All of it."""
+        q, v, u, n = self.q, self.v, list(self.u), len(self.q)
+        by_u = {one: self._column(one) for one in u}
+        by_q = {one: self._column(one) for one in (*q, *v)}
+        by_m = {one: self._column(one, one if self.log[one] else _ONE) for one in self.motion}
+        tail = self.r[self.moving :]
+        a = self._rates(self._h, None)
+        wide = {
+            "K": [self._rates(by_q[one], one) for one in q],
+            "D": [self._rates(by_q[one], one) for one in v],
+            "U": [self._rates(by_u[one], one) for one in u],
+        }
+        jacobian = {key: [column[i] for i in range(n) for column in columns] for key, columns in wide.items()}
+        jacobian["B"] = [e for one in self.motion for e in self._rates(by_m[one], one)]
+        steps = [*self.motion, *tail]
+        readings = {
+            "Zq": [self._reading(z, one, by_q[one]) for z in self.z for one in q],
+            "Zv": [self._reading(z, one, by_q[one]) for z in self.z for one in v],
+            "Zr": [
+                (one if self.log[one] else _ONE)
+                * self._reading(z, one, None if one in by_m else self._column(one), by_m.get(one))
+                for z in self.z
+                for one in steps
+            ],
+        }
+        groups: dict[str, list[tuple[str, list[sp.Expr]]]] = {
+            "motion": [("a", a)],
+            "jacobian": [("a", a), *((key, e) for key, e in jacobian.items() if e)],
+            "output": [("z", list(self.z))],
+            "output_jacobian": [(key, e) for key, e in readings.items() if e],
+        }
+        return self._generated(groups)
+
+    def _reading(
+        self, z: sp.Expr, x: sp.Symbol, of_h: Sequence[sp.Expr] | None, scaled: Sequence[sp.Expr] | None = None
+    ) -> sp.Expr:
+        """dz/dx, with what goes through an algebraic equation; `scaled` is d h / d log x."""
+        by_inner = {mark: sp.diff(z, mark) for mark, _, _ in self._inner}
+        total = self._by(z, x, by_inner)
+        for place, h in enumerate(self._h):
+            share = sp.diff(z, h) if h.is_Symbol else _ZERO
+            if share != 0:
+                if scaled is not None:
+                    total += share * scaled[place] / (x if self.log[x] else _ONE)
+                elif of_h is not None:
+                    total += share * of_h[place]
+        return sp.expand(total) if total.is_Add else total
+
+    def _generated(self, groups: Mapping[str, Sequence[tuple[str, list[sp.Expr]]]]) -> RefineFunctions:
+        own = self.model.refinement
+        definitions = {**self._definitions, **own.shapes}
+        skew = [sp.Symbol(SKEW)] if self.skew else []
+        given: list[sp.Symbol] = [*self.r[: self.moving], *skew, *self.r[self.moving :], *self.settings]
+        arguments = [*given, *self.q, *self.v, *self.u]
+        builder = Builder(arguments, {}, definitions, given)
+        places = {name: [[builder.place_of(one) for one in e] for _, e in parts] for name, parts in groups.items()}
+        split = _Split(builder.values, len(given), [p for parts in places.values() for one in parts for p in one])
+        counts = {"m": len(split.hoisted), "q": len(self.q), "v": len(self.v), "u": len(self.u)}
+        whole = _locals([*(f"m{k}" for k in range(counts["m"])), *map(str, (*self.q, *self.v, *self.u))])
+        arrays = tuple(counts.items())
+        made: dict[str, RefineFunction] = {}
+        r_names = tuple(_locals(list(map(str, given))))
+        r_array = (("r", len(r_names)),)
+        constants = split.constants(r_names)
+        made["constants"] = RefineFunction("constants", r_array, (("m", len(split.hoisted)),), constants)
+        for name, parts in groups.items():
+            written = tuple((key, len(e)) for key, e in parts)
+            flat = [p for one in places[name] for p in one]
+            made[name] = RefineFunction(name, arrays, written, split.rest(flat, tuple(whole)))
+        region = [
+            *(one for one, entry in zip(self.r, self.parameters, strict=True) if entry.log),
+            *(one if self.settings else with_values(self.model, one) for one in own.region),
+        ]
+        apart = Builder(given, {}, definitions)
+        found = tuple(apart.place_of(one) for one in region)
+        made["region"] = RefineFunction(
+            "region", r_array, (("positive", len(region)),), Program(r_names, tuple(apart.values), found)
+        )
+        chart = self._chart()
+        if chart:
+            row = [sp.Symbol(f"row[{k}]") for k in range(len(self.motion))]
+            apart = Builder([*given, *row], {}, definitions, given)
+            found = tuple(
+                apart.place_of(sum((row[k] * one for k, one in enumerate(column)), _ZERO)) for column in chart
+            )
+            names = (*r_names, *_locals([f"by_{one}" for one in self.motion]))
+            array = (("row", len(row)),)
+            made["chart"] = RefineFunction(
+                "chart", (*r_array, *array), array, Program(names, tuple(apart.values), found)
+            )
+        parameters = list(self.parameters)
+        if self.skew:
+            parameters.insert(self.moving, RefinedParameter(SKEW, "s", False, -1, SKEW_SD))
+        return RefineFunctions(
+            model=self.model,
+            name=identifiers([self.model.name])[0],
+            order=self.order,
+            coordinates=tuple(map(str, self.q)),
+            inputs=self.u,
+            outputs=self.outputs,
+            parameters=tuple(parameters),
+            moving=self.moving + self.skew,
+            motion_names=tuple(map(str, self.motion)),
+            constants=split.texts(r_names),
+            settings=tuple(map(str, self.settings)),
+            skew=self.skew,
+            functions=made,
+        )
+
+    def _chart(self) -> list[list[sp.Expr]]:
+        """d(steps of the motion)/d(steps of r), by entries of r; empty: it is the identity."""
+        own = self.model.refinement
+        if not any(one in own.shapes for one in self.motion):
+            return []
+        found = []
+        for step in self.r[: self.moving]:
+            column = []
+            for one in self.motion:
+                if one in own.shapes:
+                    slope = sp.diff(own.shapes[one], step) * (step if self.log[step] else _ONE)
+                    column.append(sp.factor(slope / own.shapes[one]))
+                else:
+                    column.append(sp.Integer(int(one == step)))
+            found.append(column)
+        return found
+
+
+def _locals(names: Sequence[str]) -> list[str]:
+    """Identifiers that are no array's name."""
+    return [f"{one}_" if one in _ARRAYS else one for one in identifiers(names)]
+
+
+def _shortest(e: sp.Expr) -> sp.Expr:
+    """The form with the fewest operations."""
+    return min((sp.factor_terms(e), sp.expand(e), e), key=lambda one: (sp.count_ops(one), str(one)))
+
+
+class _Split:
+    """A list of values in two: what depends on the first arguments alone, and the rest, which reads it as constants."""
+
+    def __init__(self, values: Sequence[Value], given: int, results: Sequence[int]) -> None:
+        self.values, self.given = values, given
+        self.fixed: list[bool] = []
+        for value in values:
+            if isinstance(value, Argument):
+                self.fixed.append(value.place < given)
+            elif isinstance(value, Literal):
+                self.fixed.append(True)
+            else:
+                self.fixed.append(all(self.fixed[one] for one in value.operands))
+        needed = {one for one in results if self._is_constant(one)}
+        for place, value in enumerate(values):
+            if isinstance(value, Operation) and not self.fixed[place]:
+                needed |= {one for one in value.operands if self._is_constant(one)}
+        self.hoisted = sorted(needed)
+
+    def _is_constant(self, place: int) -> bool:
+        return self.fixed[place] and not isinstance(self.values[place], Literal)
+
+    def constants(self, names: tuple[str, ...]) -> Program:
+        """From r to m."""
+        return self._program(names, self.hoisted, {})
+
+    def rest(self, results: Sequence[int], names: tuple[str, ...]) -> Program:
+        """From m, q, v, u to the results."""
+        return self._program(names, results, {place: k for k, place in enumerate(self.hoisted)})
+
+    def _program(self, names: tuple[str, ...], results: Sequence[int], constants: Mapping[int, int]) -> Program:
+        found: list[Value] = []
+        at: dict[int, int] = {}
+        shift = len(constants) - self.given if constants else 0
+
+        def put(place: int) -> int:
+            if place not in at:
+                value = self.values[place]
+                if place in constants:
+                    made: Value = Argument(constants[place])
+                elif isinstance(value, Argument):
+                    made = Argument(value.place + shift)
+                elif isinstance(value, Operation):
+                    made = Operation(value.kind, tuple(put(one) for one in value.operands))
+                else:
+                    made = value
+                at[place] = len(found)
+                found.append(made)
+            return at[place]
+
+        wanted = tuple(put(one) for one in results)
+        return Program(names, tuple(found), wanted)
+
+    def texts(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Each constant as text."""
+
+        def text(place: int, inside: bool) -> str:
+            value = self.values[place]
+            if isinstance(value, Argument):
+                return names[value.place]
+            if isinstance(value, Literal):
+                return str(value.value)
+            parts = [text(one, True) for one in value.operands]
+            if value.kind in ("+", "-", "*", "/"):
+                whole = f"{parts[0]} {value.kind} {parts[1]}"
+                return f"({whole})" if inside else whole
+            return f"-{parts[0]}" if value.kind == "neg" else f"{value.kind}({', '.join(parts)})"
+
+        return tuple(text(one, False) for one in self.hoisted)

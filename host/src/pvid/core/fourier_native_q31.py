@@ -1,0 +1,51 @@
+"""The fixed-point weak form of a mechanism in C: its library, and an identifier that is stepped through runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.headers import Filled
+from pvid.core.native import Native, Publisher
+from pvid.settings.fourier_q31 import FourierConfigQ31
+from pvid.settings.record import Record
+
+
+class FourierNativeQ31(Native):
+    """A library of pvid.core.model_library, which contains a configuration as well.
+
+    Parameters
+    ----------
+    name : of the mechanism, in C
+    path : of the library
+    config : the configuration that it contains
+    """
+
+    def __init__(self, name: str, path: Path, config: FourierConfigQ31) -> None:
+        super().__init__(path)
+        self.name, self.config = name, config
+
+    def identifier(self) -> FourierIdentifierQ31:  # type: ignore[override]
+        """An initialised identifier."""
+        return FourierIdentifierQ31(self)
+
+
+class FourierIdentifierQ31(Publisher):
+    """The identifier: readings of every tick in counts."""
+
+    def __init__(self, native: FourierNativeQ31) -> None:
+        self._config = getattr(native.library, f"{native.name}_settings_q31")[0]
+        super().__init__(native, "fourier", "q31", native.config, replay="fourier")
+
+    def _filled_with(self, native: Native, kind: str, config: object) -> Filled:
+        """The configuration in the library."""
+        return Filled(self._config, {}, {}, [])
+
+    def run_samples(
+        self, readings: npt.ArrayLike, *, sums: bool = True, hashes: bool = True, estimate_every: int = 0
+    ) -> Record:
+        """Steps through readings [ticks, samples]."""
+        given = np.ascontiguousarray(readings, np.int32)
+        return self._recorded(len(given), [given], sums, hashes, estimate_every)

@@ -1,0 +1,33 @@
+"""The rig file of a mechanism that the core has a form of its own for, as that of its description."""
+
+from __future__ import annotations
+
+from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
+
+
+def described(rig: RigFile) -> MechanismRig:
+    """Constants, resolutions, gains and guesses of a rig file in the terms of the mechanism's description.
+
+    The standard deviation of a length is relative there and absolute here; the reading at rest becomes the guess of the
+    offset.
+    """
+    mechanism = rig.mechanism
+    model, constants = mechanism.model, dict(mechanism.constants or {})
+    guess = mechanism.mapped([getattr(rig.nominal, one) for one in model.physical_names])
+    nominal = dict(zip(model.mapped_names, map(float, guess), strict=True))
+    if model.offset_name:
+        nominal[model.offset_name] = float(rig.sensor.phi_zero)
+    sensor = {one.name: {"resolution": float(getattr(rig.sensor, f"{one.name}_lsb"))} for one in model.channels}
+    for name in sensor:
+        if hasattr(rig.sensor, f"{name}_gain_sd"):
+            sensor[name]["gain_sd"] = float(getattr(rig.sensor, f"{name}_gain_sd"))
+    known_sd = {name: value * float(getattr(rig, f"{name}_sd")) for name, value in constants.items()}
+    return MechanismRig(
+        rig.model.name,
+        rig.sample_rate,
+        known={name: float(value) for name, value in constants.items()},
+        sensor=sensor,
+        nominal=nominal,
+        known_sd=known_sd,
+    )

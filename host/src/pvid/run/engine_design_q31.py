@@ -1,0 +1,172 @@
+"""The fixed-point weak engine for a rig: formats, tables and settings, from a recording or a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
+from pvid.codegen.parameters_q31 import ParametersQ31, fixed_parameters
+from pvid.design.fourier_q31 import Sensing, fixed_design, most_counts
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.verdict import UNKNOWN
+from pvid.rig.run import Recording
+from pvid.run.engine_design import Run, design_and_p, engine_tables, simulated_run_of
+from pvid.settings.fourier_q31 import FourierConfigQ31
+from pvid.setup.fourier import with_soft_widths
+from pvid.setup.fourier_q31 import config_of_q31, row_formats
+
+_INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
+_HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
+_FULL_SCALE = 1.5  # over the reach of a signal
+_SE_BITS = 24  # of se_max
+_LONGEST_RUN_S = 3600.0  # of integrals since the start of the run, at least
+
+
+@dataclass(frozen=True, eq=False)
+class FixedEngine:
+    """A mechanism's fixed-point engine for a rig.
+
+    Attributes
+    ----------
+    compiled : the mechanism
+    made : functions of the rows, with their formats
+    parameters : functions of p
+    config : settings and tables
+    sample_rate : [Hz]
+    lsb : value of a count of each sample [samples]
+    """
+
+    compiled: CompiledModel
+    made: FixedFourier
+    parameters: ParametersQ31
+    config: FourierConfigQ31
+    sample_rate: float
+    lsb: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the mechanism, in C."""
+        return self.made.functions.name
+
+    @property
+    def sample_names(self) -> tuple[str, ...]:
+        """In the argument of step."""
+        return self.made.functions.samples
+
+    @property
+    def hop_s(self) -> float:
+        """Half a window."""
+        return self.config.design.hop * self.config.design.decimation / self.sample_rate
+
+    @property
+    def ticks_needed(self) -> int:
+        """Samples up to the first estimate, at most: as in float32."""
+        design = self.config.design
+        return design.decimation * (2 * design.half + 3 * design.hop + 9) + 3
+
+    def counts_of(self, run: Run) -> npt.NDArray[np.int32]:
+        """The argument of step at every tick [ticks, samples]."""
+        columns = [np.rint(np.asarray(run[name]) / lsb) for name, lsb in zip(self.sample_names, self.lsb, strict=True)]
+        most = float(np.iinfo(np.int32).max)
+        return np.asarray(np.clip(np.stack(columns, axis=1), -most, most), np.int32)
+
+    def values(self, p: npt.ArrayLike) -> Float:
+        """Parameters, or standard errors, from their integers [..., n_p]."""
+        return np.asarray(p, np.float64) * 2.0 ** -np.array(self.parameters.p_bits, np.float64)
+
+
+def fixed_engine(
+    compiled: CompiledModel,
+    run: Run,
+    design: FourierDesign,
+    p: Float | None = None,
+    *,
+    start_there: bool = False,
+    soft_signs: Mapping[str, float] | None = None,
+) -> FixedEngine:
+    """The engine for a rig, from a run of it.
+
+    Parameters
+    ----------
+    design : of the oracle; the engine gets the nearest one that it has
+    p : parameters near those of the rig [n_p]; None: the guesses
+    start_there : the engine starts at the parameters of this run; False: at the guesses
+    soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
+
+    Raises
+    ------
+    PvidError
+        Where fixed point, or the engine, does not have what the model or the design needs.
+    """
+    functions = fourier_functions_of(compiled)
+    found = engine_tables(compiled, run, design, p)
+    known = {one.name: one for one in compiled.signals}
+    lsb = tuple(known[one].resolution or known[one].reach / 2**_INPUT_BITS for one in functions.samples)
+    largest = [float(np.max(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
+    limits = most_counts(functions.signal, len(lsb), found.tables.decimation)
+    full_scale = tuple(
+        max(round(min(max(_FULL_SCALE * known[one].reach, top) / step, limit)), 16)
+        for one, step, top, limit in zip(functions.samples, lsb, largest, limits, strict=True)
+    )
+    of_jets = {str(jet): x for jet, x in found.rows.record.grid.jets.items()}
+    reaches = {one: _HIGHEST_JET * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in functions.jet_names}
+    seconds = len(next(iter(of_jets.values()))) * found.tables.decimation / design.sample_rate
+    made = fixed_fourier(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
+    parameters_of = found.rows.compiled.parameters
+    bounds = [
+        (min(one.low, x), max(one.high, x))
+        for one, x in zip(parameters_of.model.unknowns, parameters_of.guess, strict=True)
+    ]
+    parameters = fixed_parameters(functions.functions, bounds)
+    sizes = with_soft_widths(found.tables, soft_signs or {})
+    tables = fixed_design(made.model, sizes, Sensing(lsb, full_scale, design.sample_rate), made.formats)
+    formats = row_formats(found.rows, found.p, found.errors)
+    config = config_of_q31(
+        tables,
+        parameters_of,
+        formats,
+        parameters.p_bits,
+        (0,) * len(lsb),
+        found.p if start_there else None,
+        found.tables.overlap,
+    )
+    return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
+
+
+def engine_for_recording(
+    compiled: CompiledModel,
+    recording: Recording,
+    functions: int | None = None,
+    soft_signs: Mapping[str, float] | None = None,
+) -> FixedEngine:
+    """For the rig that made a recording, with the design that float32 gets.
+
+    Parameters
+    ----------
+    functions : K; None: chosen
+    soft_signs : as of fixed_engine
+    """
+    design, p, known = design_and_p(compiled, recording, functions)
+    return fixed_engine(compiled, recording.signals, design, p, start_there=known, soft_signs=soft_signs)
+
+
+def engine_to_identify(compiled: CompiledModel, recording: Recording) -> FixedEngine:
+    """The same, to identify the recording itself: as config_to_identify."""
+    engine = engine_for_recording(compiled, recording)
+    trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS))
+    return replace(engine, config=replace(engine.config, trust=trust))
+
+
+def engine_for_simulated_rig(
+    compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
+) -> FixedEngine:
+    """For the shipped rig of a mechanism, with its own design."""
+    run, design, p = simulated_run_of(compiled, functions)
+    return fixed_engine(compiled, run, design, p, soft_signs=soft_signs)

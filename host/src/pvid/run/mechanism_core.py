@@ -1,0 +1,250 @@
+"""Identification of a described mechanism by the C core in float32 or fixed point, compiled for this computer.
+
+The float64 oracle analyses the recording first, for the verdict; then it chooses the engine's design and finds the
+equations' own errors. The engine starts at the guesses and runs over the samples as on a board.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.base.wording import listed, with_unit
+from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.core.native import Publisher
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.verdict import Reason, Verdict
+from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.engine_design_q31 import engine_to_identify
+from pvid.run.identify import Publications
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, values_of
+from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.enums import Core
+from pvid.settings.enums import Reason as Outcome
+from pvid.settings.record import Record
+
+# The core and the analysis disagree if they differ by so many standard errors, and by this part of the value.
+_CLASH = 3.0
+_VISIBLE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class CoreAnswer:
+    """An identification by the C core, beside that of the oracle.
+
+    Attributes
+    ----------
+    oracle : of the same recording
+    core : arithmetic
+    functions, decimation, hop_s : of the engine's design
+    averages_signs : whether signs are averaged over a step
+    values : by name: outputs of the model, then p; of the last published estimate
+    published : whether there is one
+    reason : of the last window
+    misfit : of the published estimate; None: not judged
+    windows : how many the engine has judged
+    hash : running hash of its state after the last tick
+    publications : every estimate that was published; their standard errors contain what `values` contains
+    """
+
+    oracle: MechanismAnswer
+    core: Core
+    functions: int
+    decimation: int
+    hop_s: float
+    averages_signs: bool
+    values: Mapping[str, Value]
+    published: bool
+    reason: Outcome
+    misfit: float | None
+    windows: int
+    hash: int
+    publications: Publications
+
+    @property
+    def identified(self) -> bool:
+        """Whether the core has published, and the recording shows every parameter."""
+        return self.published and self.oracle.identified
+
+    @property
+    def verdict(self) -> Verdict:
+        """The doubts of the core's own answer, then those of the analysis."""
+        return Verdict((*self._doubts(), *self.oracle.found.verdict.reasons))
+
+    def _doubts(self) -> Iterator[Reason]:
+        if not self.identified:
+            return
+        if apart := [name for name in self.oracle.model.p_names if self._clashes(name)]:
+            first = [values[apart[0]] for values in (self.values, self.oracle.values)]
+            one, other = (with_unit(found.value or 0.0, found.unit, 4) for found in first)
+            of_signs = " The core takes the mean of a friction's sign over a step, the analysis locates its reversals."
+            yield Reason(
+                "core",
+                f"The C core and the float64 analysis disagree on {listed(apart)} ({apart[0]}: "
+                f"{one} and {other}); the analysis is nearer." + (of_signs if self.averages_signs else ""),
+            )
+        if self.reason not in (Outcome.UPDATED, Outcome.MISFIT):
+            yield Reason(
+                "held", f"The C core holds an earlier estimate, its last windows published nothing: {self.reason.text}."
+            )
+        if self.reason == Outcome.MISFIT and self.misfit is not None:
+            yield Reason(
+                "misfit",
+                f"The residuals in the C core are {self.misfit:.3g} times what the sensors explain; standard errors "
+                "are from their scatter.",
+                alarm=False,
+            )
+
+    def _clashes(self, name: str) -> bool:
+        one, other = self.values[name], self.oracle.values[name]
+        if one.value is None or one.se is None or other.value is None or other.se is None:
+            return False
+        apart = abs(one.value - other.value)
+        return apart > _CLASH * math.hypot(one.se, other.se) and apart > _VISIBLE * abs(other.value)
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        parameters = {
+            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
+            for name, one in self.values.items()
+        }
+        return self.oracle.as_json() | {
+            "identified": self.identified,
+            "parameters": parameters,
+            **own_keys(self.oracle.model, parameters),
+            "status": self.verdict.status,
+            "warning": self.verdict.warning,
+            "reasons": {one.name: one.text for one in self.verdict.reasons},
+            "chi2": self.misfit,
+            "reason": self.reason.text,
+            "window_s": 2 * self.hop_s,
+            "windows": self.windows,
+            "functions": self.functions,
+            "decimation": self.decimation,
+            "hash": f"{self.hash:08x}",
+            "core": self.core,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """The C core after a recording, in the units of the model.
+
+    p, covariance : of the published estimate
+    published : p and standard errors published after every tick [ticks, n_p]
+    """
+
+    core: Core
+    functions: int
+    decimation: int
+    hop_s: float
+    signs: int
+    identifier: Publisher
+    record: Record
+    p: Float
+    covariance: Float
+    published: tuple[Float, Float]
+
+
+def identify_in_c(answer: MechanismAnswer, core: Core = "f32") -> CoreAnswer:
+    """The same recording by the C core.
+
+    Raises
+    ------
+    PvidError
+        When there is no C compiler, or the engine does not have what the model needs.
+    """
+    try:
+        run = _RUNS[core](answer)
+    except PvidError as error:
+        raise PvidError(f"--core {core}: {error}") from error
+    return _answer(answer, run)
+
+
+def _in_float(answer: MechanismAnswer) -> _Run:
+    config = config_to_identify(answer.model, answer.recording)
+    design = config.design
+    identifier = fourier_native(answer.model, design).identifier_of(config)
+    record = identifier.run_samples(samples_of(config, answer.recording.signals), sums=False)
+    last, n_p = identifier.estimate, len(answer.found.p)
+    return _Run(
+        "f32",
+        design.functions,
+        design.decimation,
+        config.hop_s,
+        design.model.signs,
+        identifier,
+        record,
+        np.asarray(last["p"][:n_p], np.float64),
+        np.asarray(last["covariance"], np.float64)[:n_p, :n_p],
+        (record.published.astype(np.float64), record.published_se.astype(np.float64)),
+    )
+
+
+def _in_fixed_point(answer: MechanismAnswer) -> _Run:
+    engine = engine_to_identify(answer.model, answer.recording)
+    design = engine.config.design
+    identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    record = identifier.run_samples(engine.counts_of(answer.recording.signals), sums=False)
+    last, n_p = identifier.estimate, len(answer.found.p)
+    se = engine.values(last["se"][:n_p])
+    correlation = np.asarray(last["correlation"], np.float64)[:n_p, :n_p] * 2.0**-30
+    return _Run(
+        "q31",
+        design.functions,
+        design.decimation,
+        engine.hop_s,
+        design.model.signs,
+        identifier,
+        record,
+        engine.values(last["p"][:n_p]),
+        correlation * np.outer(se, se),
+        (engine.values(record.published), engine.values(record.published_se)),
+    )
+
+
+_RUNS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
+
+
+def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
+    identifier, record = run.identifier, run.record
+    published = identifier.is_published
+    ends = record.reason[(record.reason != Outcome.WARMING_UP) & (record.reason != Outcome.ACCUMULATED)]
+    model, found = answer.model, answer.found
+    gains = gains_of(model, found)
+    # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
+    wider = np.maximum(noise_of(model, found) / np.sqrt(np.diag(run.covariance)), 1.0)
+    covariance = run.covariance * np.outer(wider, wider)
+    values = values_of(model, run.p, covariance, gains, identified=published and answer.identified)
+    misfit = identifier.misfit
+    return CoreAnswer(
+        oracle=answer,
+        core=run.core,
+        functions=run.functions,
+        decimation=run.decimation,
+        hop_s=run.hop_s,
+        averages_signs=run.signs > 0,
+        values=values,
+        published=published,
+        reason=Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP,
+        misfit=None if not published or np.isnan(misfit) else misfit,
+        windows=int(len(ends)),
+        hash=identifier.running_hash,
+        publications=_published(answer, run, gains, wider),
+    )
+
+
+def _published(answer: MechanismAnswer, run: _Run, gains: Float, wider: Float) -> Publications:
+    """All publications of a run: their own errors, times what the analysis found, and those of gains and constants."""
+    ticks = np.flatnonzero(np.isin(run.record.reason, (Outcome.UPDATED, Outcome.MISFIT)))
+    n_p = len(wider)
+    p, own = run.published
+    se = np.hypot(own[ticks, :n_p] * wider, np.sqrt(np.sum(gains**2, axis=0)))
+    alarm = np.full(len(ticks), answer.found.verdict.warning is not None)
+    return Publications(answer.recording.t[ticks], p[ticks, :n_p], se, alarm)

@@ -1,0 +1,386 @@
+"""Refinement in float64: output error by multiple shooting over the whole run, iterated to convergence.
+
+The run is cut into blocks, each with a start of its own. In every pass all blocks are simulated with the full equations
+from their starts at the present r, with exact derivatives; a QR of each block eliminates its start, and what is left of
+all blocks, with the prior, gives the step of r. Steps that do not lower the sum of squares are halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.run.refined_kernel import RefinedKernel
+
+Float = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+
+Inputs = Callable[[float], tuple[Float, Float]]
+
+PASSES = 40
+_LARGEST = 0.3  # step of a logarithm in one pass
+_HALVINGS = 6
+_SETTLED = 0.01  # standard errors: of the last step
+_START_SD = 1e3  # of the outputs' spread: the starts are free
+_GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
+_LONG_S = 0.016  # residuals are averaged over this for the chi^2 of slow residuals
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What is fitted.
+
+    Attributes
+    ----------
+    z : readings [samples, outputs]; NaN where there is none
+    sd : of one [outputs]
+    inputs : of a skew [s]: inputs and their rates at begin, middle and end of each step, [steps, 3, inputs] each
+    rate : of the samples [Hz]
+    sub : steps a sample
+    """
+
+    z: Float
+    sd: Float
+    inputs: Inputs
+    rate: float
+    sub: int
+
+    @property
+    def h(self) -> float:
+        """Of a step [s]."""
+        return 1.0 / self.rate / self.sub
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Where r is expected: r [parameters], sd of a step from it (inf: nothing is known), and what is searched."""
+
+    r: Float
+    sd: Float
+    free: Bool
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A run in blocks of one length: first sample of each [blocks], samples in each."""
+
+    first: npt.NDArray[np.int32]
+    samples: int
+
+    @classmethod
+    def of(cls, total: int, samples: int) -> Cut:
+        """As many whole blocks of about this length as fill the run."""
+        blocks = max(1, round(total / samples))
+        length = total // blocks
+        return cls(np.arange(blocks, dtype=np.int32) * np.int32(length), length)
+
+    def rows(self, values: Float) -> Float:
+        """Samples by blocks [blocks, samples, ...]."""
+        return np.stack([values[first : first + self.samples] for first in self.first])
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Quantities of one pass, for the tests of other implementations.
+
+    Attributes
+    ----------
+    jacobian : J [blocks, samples, outputs, columns], over sd: by starts, then by steps of r
+    error : e [blocks, samples, outputs], over sd; 0 where a sample is left out
+    triangle : R of [J e] of each block [blocks, columns + 1, columns + 1]
+    """
+
+    jacobian: Float
+    error: Float
+    triangle: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Outcome.
+
+    Attributes
+    ----------
+    r : parameters and settings
+    covariance : of the steps of r [parameters, parameters], with the factor of chi^2 and of the scatter of the blocks
+    noise : the same from the sensors' noise alone
+    chi2 : residual variance over that of the sensors
+    slow_chi2 : of averages over about 16 ms, which an error of the equations raises first
+    converged : the last step was far below the standard errors
+    passes : of the search
+    cut, starts : blocks and their starts [blocks, states]
+    kept : share of the samples that were fitted
+    sum_of_squares : of the residuals and the prior
+    """
+
+    r: Float
+    covariance: Float
+    noise: Float
+    chi2: float
+    slow_chi2: float
+    converged: bool
+    passes: int
+    cut: Cut
+    starts: Float
+    kept: float
+    sum_of_squares: float
+
+
+class Problem:
+    """A run under a model."""
+
+    def __init__(self, kernel: RefinedKernel, measured: Measured) -> None:
+        self.kernel, self.measured = kernel, measured
+        self.n = len(kernel.made.parameters)
+        self.log = np.array([one.log for one in kernel.made.parameters])
+
+    def moved(self, r: Float, step: Float) -> Float:
+        """r after a step [parameters]."""
+        out = r.copy()
+        head = out[: self.n]
+        out[: self.n] = np.where(self.log, head * np.exp(np.where(self.log, step, 0.0)), head + step)
+        return out
+
+    def step_between(self, before: Float, after: Float) -> Float:
+        """The step from one r to another."""
+        a, b = before[: self.n], after[: self.n]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.log, np.log(b / a), b - a)
+
+    def inputs(self, r: Float) -> tuple[Float, Float]:
+        """u and du as the sensors' skew in r has them."""
+        made = self.kernel.made
+        return self.measured.inputs(float(r[made.moving - 1]) if made.skew else 0.0)
+
+    def simulated(self, r: Float, cut: Cut, starts: Float) -> Float:
+        """Readings [blocks, samples, outputs]."""
+        m = self.measured
+        return self.kernel.blocks(r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, False)[0]
+
+    def block(self, r: Float, cut: Cut, starts: Float, use: Bool) -> Block | None:
+        """One pass; None where the motion is no number."""
+        m = self.measured
+        z, jacobian, _ = self.kernel.blocks(r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts)
+        assert jacobian is not None
+        if not (np.isfinite(z).all() and np.isfinite(jacobian).all()):
+            return None
+        error = np.where(use, (cut.rows(m.z) - z) / m.sd, 0.0)
+        jacobian /= m.sd[:, None]
+        jacobian *= use[..., None]
+        blocks, columns = len(cut.first), jacobian.shape[-1]
+        stacked = np.concatenate([jacobian.reshape(blocks, -1, columns), error.reshape(blocks, -1, 1)], -1)
+        return Block(jacobian, error, np.asarray(np.linalg.qr(stacked, mode="r")))
+
+    def cost(self, r: Float, cut: Cut, starts: Float, use: Bool, prior: Prior) -> float:
+        """Sum of squares of residuals and prior; inf where the motion is no number."""
+        if not self.kernel.possible(r):
+            return np.inf
+        z = self.simulated(r, cut, starts)
+        error = np.where(use, (cut.rows(self.measured.z) - z) / self.measured.sd, 0.0)
+        total = float(np.sum(error**2))
+        return total + self._prior_cost(r, prior) if np.isfinite(total) else np.inf
+
+    def _prior_cost(self, r: Float, prior: Prior) -> float:
+        return float(np.sum((self.step_between(prior.r, r)[prior.free] / prior.sd[prior.free]) ** 2))
+
+    def searched(self, r: Float, prior: Prior, cut: Cut, starts: Float, use: Bool, move: bool = True) -> Refined:
+        """Gauss-Newton from r and these starts; `move` False: of the starts alone."""
+        free = np.flatnonzero(prior.free) if move else np.zeros(0, int)
+        cost = self.cost(r, cut, starts, use, prior)
+        converged, passes = False, 0
+        while passes < PASSES:
+            passes += 1
+            found = self.block(r, cut, starts, use)
+            if found is None:
+                break
+            d_r, d_starts, _, relative = self._step(found.triangle, r, prior, free)
+            if relative < _SETTLED:
+                converged = True
+                break
+            size = np.abs(d_r[self.log]).max(initial=0.0)
+            share = min(1.0, _LARGEST / max(size, 1e-12))
+            for _ in range(_HALVINGS):
+                near, begun = self.moved(r, share * d_r), starts + share * d_starts
+                now = self.cost(near, cut, begun, use, prior)
+                if now < cost:
+                    break
+                share /= 2
+            else:
+                converged = relative < 0.3  # rounding
+                break
+            gained = cost - now
+            r, starts, cost = near, begun, now
+            if gained < 1e-9 * cost:
+                converged = relative < 0.3
+                break
+        return self._judged(r, prior, cut, starts, use, converged, passes, cost)
+
+    def _step(
+        self, triangle: Float, r: Float, prior: Prior, free: npt.NDArray[np.intp]
+    ) -> tuple[Float, Float, Float, float]:
+        """Steps of r and of the starts, R of r's free entries, and the size of r's step (or the starts') in standard
+        errors."""
+        states, n = self.kernel.states, self.n
+        top, corner = triangle[:, :states], triangle[:, states:, states:]
+        columns = np.append(free, n)
+        d_r, whole = np.zeros(n), np.zeros((0, 0))
+        relative = 0.0
+        if len(free):
+            pull = self.step_between(r, prior.r)[free] / prior.sd[free]
+            rows = np.concatenate(
+                [corner[:, :, columns].reshape(-1, len(columns)), np.column_stack([np.diag(1 / prior.sd[free]), pull])]
+            )
+            scale = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
+            q = np.asarray(np.linalg.qr(rows / np.append(scale, 1.0), mode="r"))
+            whole = q[: len(free), : len(free)] * scale
+            d_r[free] = np.linalg.lstsq(q[: len(free), : len(free)], q[: len(free), -1], rcond=1e-13)[0] / scale
+            relative = float(np.linalg.norm(q[: len(free), -1]))
+        right = top[:, :, -1] - top[:, :, states:-1] @ d_r
+        left = top[:, :, :states]
+        size = np.maximum(np.linalg.norm(left, axis=1), 1e-300)
+        scaled = left / size[:, None, :]
+        normal = np.swapaxes(scaled, 1, 2) @ scaled + 1e-14 * np.eye(states)
+        d_starts = np.linalg.solve(normal, (np.swapaxes(scaled, 1, 2) @ right[..., None]))[..., 0] / size
+        if not len(free):
+            relative = float(np.sqrt(np.mean(right**2)))
+        return d_r, d_starts, whole, relative
+
+    def _judged(
+        self, r: Float, prior: Prior, cut: Cut, starts: Float, use: Bool, converged: bool, passes: int, cost: float
+    ) -> Refined:
+        n, states = self.n, self.kernel.states
+        empty = np.full((n, n), np.nan)
+        found = self.block(r, cut, starts, use) if np.isfinite(cost) else None
+        if found is None:
+            return Refined(r, empty, empty, np.inf, np.inf, False, passes, cut, starts, 0.0, np.inf)
+        free = np.flatnonzero(prior.free)
+        _, _, triangle, _ = self._step(found.triangle, r, prior, free)
+        count = int(use.sum())
+        freedom = max(count - len(cut.first) * states - len(free), 1)
+        chi2 = float(np.sum(found.error**2)) / freedom
+        slow = self._slow_chi2(found.error, use, len(cut.first) * states + len(free))
+        inverse = np.linalg.pinv(triangle, rcond=1e-14)
+        information = inverse @ inverse.T
+        # scatter of the blocks: each one's score after its start is eliminated
+        corner = found.triangle[:, states:, states:]
+        scores = np.einsum("bki,bk->bi", corner[:, :, free], corner[:, :, -1])
+        blocks = len(cut.first)
+        factor = max(1.0, chi2, slow)
+        wide = factor * information
+        if blocks > 2 * len(free):
+            clustered = information @ (scores.T @ scores) @ information * blocks / (blocks - len(free))
+            grown = np.sqrt(np.maximum(np.diag(clustered) / np.diag(wide), 1.0))
+            wide = wide * np.outer(grown, grown)
+        covariance, noise = np.zeros((n, n)), np.zeros((n, n))
+        covariance[np.ix_(free, free)], noise[np.ix_(free, free)] = wide, information
+        kept = count / max(np.isfinite(cut.rows(self.measured.z)).sum(), 1)
+        return Refined(r, covariance, noise, chi2, slow, converged, passes, cut, starts, float(kept), cost)
+
+    def _slow_chi2(self, error: Float, use: Bool, parameters: int) -> float:
+        """Of averages of residuals, each with the variance that white noise of as many samples has."""
+        bins = max(1, round(_LONG_S * self.measured.rate))
+        whole = error.shape[1] // bins * bins
+        if whole == 0:
+            return 1.0
+        shape = (len(error), whole // bins, bins, error.shape[2])
+        sums = np.asarray(error[:, :whole].reshape(shape).sum(2))
+        counts = np.asarray(use[:, :whole].reshape(shape).sum(2))
+        there = counts > 0
+        many = int(there.sum())
+        total = float(np.sum(sums[there] ** 2 / counts[there]))
+        return total / max(many - parameters, 1)
+
+    def first_starts(self, cut: Cut, r: Float, guess: Float | None = None) -> Float:
+        """Starts: measured coordinates and their rates from the samples about each block's first; the rest from
+        `guess` or 0."""
+        made, m = self.kernel.made, self.measured
+        starts = np.zeros((len(cut.first), self.kernel.states)) if guess is None else guess.copy()
+        names = list(made.coordinates)
+        for column, output in enumerate(made.outputs):
+            if output in names:
+                place = names.index(output)
+                value, slope = self._local(cut, m.z[:, column])
+                starts[:, place] = value
+                if made.order == 2:
+                    starts[:, len(names) + place] = slope
+                elif f"{output}_1" in names:
+                    starts[:, names.index(f"{output}_1")] = slope
+        return starts
+
+    def _local(self, cut: Cut, z: Float) -> tuple[Float, Float]:
+        """Value and rate at each first sample, of a parabola through the samples about it."""
+        half = max(3, min(10, cut.samples // 4))
+        values, slopes = [], []
+        for first in cut.first:
+            low = max(0, min(int(first) - half, len(z) - 2 * half - 1))
+            part = z[low : low + 2 * half + 1]
+            t = (np.arange(low, low + len(part)) - int(first)) / self.measured.rate
+            there = np.isfinite(part)
+            if there.sum() < 4:
+                values.append(0.0)
+                slopes.append(0.0)
+                continue
+            c = np.polynomial.polynomial.polyfit(t[there], part[there], 2)
+            values.append(float(c[0]))
+            slopes.append(float(c[1]))
+        return np.array(values), np.array(slopes)
+
+    def used(self, cut: Cut) -> Bool:
+        """Samples that are there [blocks, samples, outputs]."""
+        return np.isfinite(cut.rows(self.measured.z))
+
+    def starts_along(self, r: Float, before: Refined, cut: Cut) -> Float:
+        """Starts of other blocks, from the motion of those that are solved."""
+        m, old, u = self.measured, before.cut, self.inputs(r)
+        out = np.empty((len(cut.first), self.kernel.states))
+        for k, first in enumerate(cut.first):
+            b = int(np.clip(np.searchsorted(old.first, first, side="right") - 1, 0, len(old.first) - 1))
+            gap = int(first - old.first[b])
+            if gap <= 0:
+                out[k] = before.starts[b]
+                continue
+            at = old.first[b : b + 1]
+            out[k] = self.kernel.blocks(r, at, gap, m.sub, m.h, *u, before.starts[b : b + 1], False)[2][0]
+        return out
+
+
+def gated(problem: Problem, found: Refined) -> Bool:
+    """Samples whose residual is not beyond the gate."""
+    z = problem.simulated(found.r, found.cut, found.starts)
+    error = (found.cut.rows(problem.measured.z) - z) / problem.measured.sd
+    spread = 1.4826 * np.nanmedian(np.abs(error), axis=(0, 1))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(error) <= _GATE * np.maximum(spread, 1.0))
+
+
+def refined(problem: Problem, prior: Prior, lengths: tuple[int, ...], start: Float | None = None) -> Refined:
+    """Blocks of each length [samples] in turn, each from the outcome of the one before; then without outliers.
+
+    Raises
+    ------
+    PvidError
+        When the run is shorter than a block.
+    """
+    total = len(problem.measured.z)
+    if total < lengths[0]:
+        raise PvidError(f"the run has {total} samples and a block of the refinement {lengths[0]}")
+    r = prior.r.copy() if start is None else start.copy()
+    found: Refined | None = None
+    for samples in lengths:
+        cut = Cut.of(total, samples)
+        use = problem.used(cut)
+        starts = problem.first_starts(cut, r) if found is None else problem.starts_along(r, found, cut)
+        if found is None:
+            starts = problem.searched(r, prior, cut, starts, use, move=False).starts
+        found = problem.searched(r, prior, cut, starts, use)
+        r = found.r
+    assert found is not None
+    use = gated(problem, found)
+    if not use.all() and np.isfinite(found.chi2):
+        again = problem.searched(found.r, prior, found.cut, found.starts, use & problem.used(found.cut))
+        found = replace(again, passes=found.passes + again.passes)
+    return found

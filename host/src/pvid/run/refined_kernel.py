@@ -1,0 +1,165 @@
+"""The refinement's functions of a model in float64 C on this computer: blocks of a run and their derivatives."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.files_refine import DOUBLE, function
+from pvid.codegen.refine import RefineFunctions, has_skew, refine_functions_of
+from pvid.model.compiled import CompiledModel
+from pvid.sim.compiled_plant import loaded
+
+Float = npt.NDArray[np.float64]
+
+
+class RefinedKernel:
+    """Blocks of a run of a model.
+
+    Attributes
+    ----------
+    made : the functions, with settings: widths of signs and knowns
+    states : numbers in a start: q and, of order 2, v
+    columns : derivatives by these, by the motion's parameters (and the skew) and by the rest of r
+    """
+
+    def __init__(self, model: CompiledModel) -> None:
+        self.made = refine_functions_of(model, None, has_skew(model))
+        self._library = loaded(_code(self.made))
+        self.states = self.made.order * len(self.made.coordinates)
+        self.columns = self.states + len(self.made.parameters)
+
+    def blocks(
+        self,
+        r: Float,
+        first: npt.NDArray[np.int32],
+        samples: int,
+        sub: int,
+        h: float,
+        u: Float,
+        du: Float,
+        starts: Float,
+        derivatives: bool = True,
+    ) -> tuple[Float, Float | None, Float]:
+        """Readings, derivatives, ends.
+
+        Parameters
+        ----------
+        r : parameters and settings
+        first : sample of each block's start [blocks]
+        samples : of each block
+        sub : steps a sample, of h [s]
+        u, du : inputs and their rates at begin, middle and end of each step [steps, 3, inputs]
+        starts : [blocks, states]
+
+        Returns
+        -------
+        z [blocks, samples, outputs], its derivatives by starts and steps of r [blocks, samples, outputs, columns] (or
+        None), ends [blocks, states]
+        """
+        made, n = self.made, len(first)
+        z = np.empty((n, samples, len(made.outputs)))
+        jacobian = np.empty((*z.shape, self.columns)) if derivatives else None
+        ends = np.empty((n, self.states))
+        self._library.refine_blocks(
+            _pointer(r),
+            n,
+            np.ascontiguousarray(first, np.int32).ctypes.data_as(ctypes.c_void_p),
+            samples,
+            sub,
+            ctypes.c_double(h),
+            _pointer(u),
+            _pointer(du),
+            _pointer(starts),
+            _pointer(z),
+            None if jacobian is None else _pointer(jacobian),
+            _pointer(ends),
+        )
+        if jacobian is not None and "chart" in made.functions:
+            moving = made.moving - made.skew
+            part = slice(self.states, self.states + moving)
+            jacobian[..., part] = jacobian[..., part] @ self.chart(r)
+        return z, jacobian, ends
+
+    def derivatives(self, r: Float, q: Float, v: Float, u: Float) -> dict[str, Float]:
+        """a, K, D, U, B at one instant, flat."""
+        out = {key: np.empty(max(n, 1)) for key, n in self.made.functions["jacobian"].written}
+        given = [np.ascontiguousarray(one, np.float64) for one in (r, q, v, u)]
+        self._library.refine_derivatives(*map(_pointer, given), *map(_pointer, out.values()))
+        return out
+
+    def slopes(self, r: Float, state: Float, u: Float) -> Float:
+        """dx'/dx [states, states] at a state, which has v behind q."""
+        n = len(self.made.coordinates)
+        found = self.derivatives(r, state[:n], state[n:] if self.made.order == 2 else np.zeros(1), u)
+        below = found["K"].reshape(n, n)
+        if self.made.order == 1:
+            return below
+        return np.block([[np.zeros((n, n)), np.eye(n)], [below, found["D"].reshape(n, n)]])
+
+    def chart(self, r: Float) -> Float:
+        """d(steps of the motion's parameters)/d(steps of r) [moving, moving], the skew left out."""
+        moving = self.made.moving - self.made.skew
+        rows = np.eye(moving)
+        if "chart" in self.made.functions:
+            for row in rows:
+                self._library.refine_chart(_pointer(r), row.ctypes.data_as(ctypes.c_void_p))
+        return rows
+
+    def possible(self, r: Float) -> bool:
+        """Whether a mechanism can have these parameters."""
+        return bool(self._library.refine_region(_pointer(r)))
+
+
+def _pointer(array: Float) -> ctypes.c_void_p:
+    assert array.dtype == np.float64 and array.flags.c_contiguous
+    return array.ctypes.data_as(ctypes.c_void_p)
+
+
+def _code(made: RefineFunctions) -> str:
+    counts = {
+        "N": len(made.coordinates),
+        "ORDER": made.order,
+        "NU": len(made.inputs),
+        "NZ": len(made.outputs),
+        "NM": made.moving - made.skew,
+        "NT": len(made.parameters) - made.moving,
+        "SKEW": int(made.skew),
+        "NUMBER_OF_CONSTANTS": len(made.constants),
+    }
+    jacobian = [key for key, _ in made.functions["jacobian"].written]
+    arrays = ", ".join(f"double *{key}" for key in jacobian)
+    export = [
+        f"void refine_derivatives(const double *r, const double *q, const double *v, const double *u, {arrays}) "
+        f"{{ double m[NUMBER_OF_CONSTANTS + 1]; pvid_refine_constants(r, m); "
+        f"pvid_refine_jacobian(m, q, v, u, {', '.join(jacobian)}); }}",
+    ]
+    export += ["int refine_region(const double *r) { return pvid_refine_region(r); }"]
+    if "chart" in made.functions:
+        export.append("void refine_chart(const double *r, double *row) { pvid_refine_chart(r, row); }")
+    return "\n".join(
+        [
+            "#include <math.h>\n#include <stdbool.h>",
+            *(f"#define {name} {value}" for name, value in counts.items()),
+            *(function(one, DOUBLE) for one in made.functions.values()),
+            (files("pvid.run") / "refinement.c").read_text(encoding="utf-8"),
+            *export,
+        ]
+    )
+
+
+@lru_cache(maxsize=32)
+def _kept(model_id: int) -> list[RefinedKernel]:
+    return []
+
+
+def kernel_of(model: CompiledModel) -> RefinedKernel:
+    """The kernel of a compiled model; made once for each object."""
+    found = _kept(id(model))
+    if not found or found[0].made.model is not model:
+        found[:] = [RefinedKernel(model)]
+    return found[0]

@@ -1,0 +1,122 @@
+/* Blocks of a run under the equations of a model, with their derivatives by each block's start and by r: RK4.
+ *
+ * Before this text: N, ORDER, NU, NZ, NM, NT, SKEW and pvid_refine_ constants, motion, jacobian, output, output_jacobian.
+ * Derivatives are those of the steps as they are computed, so that a search by them converges to rounding. */
+#define NX (ORDER * N)
+#define NC (NX + NM + SKEW) /* columns that are integrated */
+#define NW (NC + NT)        /* and those of the outputs alone */
+
+/* dx/dt and dS/dt, S [NX][NC] */
+static void rates(const double *m, const double *x, const double *u, const double *du, const double *s, double *f,
+                  double *ds)
+{
+    double a[N];
+    if (!ds) {
+        pvid_refine_motion(m, x, x + N, u, a);
+    } else {
+        double K[N * N], D[N * N], U[N * NU + 1], B[NM * N + 1];
+#if ORDER == 2
+        pvid_refine_jacobian(m, x, x + N, u, a, K, D, U, B);
+#else
+        pvid_refine_jacobian(m, x, x, u, a, K, U, B);
+        (void)D;
+#endif
+        for (int i = 0; i < N; i++) {
+            double *row = ds + (NX - N + i) * NC;
+            for (int c = 0; c < NC; c++) {
+                double sum = 0;
+                for (int j = 0; j < N; j++) {
+                    sum += K[i * N + j] * s[j * NC + c];
+#if ORDER == 2
+                    sum += D[i * N + j] * s[(N + j) * NC + c];
+#endif
+                }
+                row[c] = sum;
+            }
+            for (int k = 0; k < NM; k++) row[NX + k] += B[k * N + i];
+#if SKEW
+            for (int k = 0; k < NU; k++) row[NX + NM] += U[i * NU + k] * du[k];
+#endif
+#if ORDER == 2
+            for (int c = 0; c < NC; c++) ds[i * NC + c] = s[(N + i) * NC + c];
+#endif
+        }
+    }
+    for (int i = 0; i < N; i++) {
+#if ORDER == 2
+        f[i] = x[N + i];
+#endif
+        f[NX - N + i] = a[i];
+    }
+}
+
+static void step(const double *m, double *x, double *s, const double *u, const double *du, double h, int columns)
+{
+    static const double along[3] = {0.5, 0.5, 1}, weight[4] = {1. / 6, 1. / 3, 1. / 3, 1. / 6};
+    static const int place[4] = {0, 1, 1, 2};
+    double t[NX], f[NX], sum[NX], st[NX * NC], ds[NX * NC], ssum[NX * NC];
+    for (int i = 0; i < NX; i++) { t[i] = x[i]; sum[i] = 0; }
+    if (columns) for (int i = 0; i < NX * NC; i++) { st[i] = s[i]; ssum[i] = 0; }
+    for (int stage = 0; stage < 4; stage++) {
+        rates(m, t, u + place[stage] * NU, du + place[stage] * NU, st, f, columns ? ds : 0);
+        for (int i = 0; i < NX; i++) {
+            sum[i] += weight[stage] * f[i];
+            if (stage < 3) t[i] = x[i] + along[stage] * h * f[i];
+        }
+        if (columns) for (int i = 0; i < NX * NC; i++) {
+            ssum[i] += weight[stage] * ds[i];
+            if (stage < 3) st[i] = s[i] + along[stage] * h * ds[i];
+        }
+    }
+    for (int i = 0; i < NX; i++) x[i] += h * sum[i];
+    if (columns) for (int i = 0; i < NX * NC; i++) s[i] += h * ssum[i];
+}
+
+static void read_out(const double *m, const double *x, const double *u, const double *s, double *z, double *J)
+{
+    pvid_refine_output(m, x, x + NX - N, u, z);
+    if (!J) return;
+    double Zq[NZ * N], Zr[NZ * (NM + NT) + 1];
+#if ORDER == 2
+    double Zv[NZ * N];
+    pvid_refine_output_jacobian(m, x, x + N, u, Zq, Zv, Zr);
+#else
+    pvid_refine_output_jacobian(m, x, x, u, Zq, Zr);
+#endif
+    for (int o = 0; o < NZ; o++) {
+        double *row = J + o * NW;
+        for (int c = 0; c < NC; c++) {
+            double sum = 0;
+            for (int j = 0; j < N; j++) {
+                sum += Zq[o * N + j] * s[j * NC + c];
+#if ORDER == 2
+                sum += Zv[o * N + j] * s[(N + j) * NC + c];
+#endif
+            }
+            row[c] = sum;
+        }
+        for (int k = 0; k < NM; k++) row[NX + k] += Zr[o * (NM + NT) + k];
+        for (int k = 0; k < NT; k++) row[NC + k] = Zr[o * (NM + NT) + NM + k];
+    }
+}
+
+/* u, du: at begin, middle and end of each step [steps][3][NU]; z [blocks][samples][NZ]; J [blocks][samples][NZ][NW] or
+ * NULL; ends [blocks][NX] */
+void refine_blocks(const double *r, int blocks, const int *first, int samples, int sub, double h, const double *u,
+                   const double *du, const double *starts, double *z, double *J, double *ends)
+{
+    double m[NUMBER_OF_CONSTANTS + 1];
+    pvid_refine_constants(r, m);
+    for (int b = 0; b < blocks; b++) {
+        double x[NX], s[NX * NC];
+        for (int i = 0; i < NX; i++) x[i] = starts[b * NX + i];
+        for (int i = 0; i < NX * NC; i++) s[i] = i / NC == i % NC;
+        for (int k = 0; k < samples; k++) {
+            const long at = ((long)first[b] + k) * sub;
+            const long row = (long)b * samples + k;
+            read_out(m, x, u + at * 3 * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0);
+            for (int j = 0; j < sub; j++) step(m, x, s, u + (at + j) * 3 * NU, du + (at + j) * 3 * NU, h, J != 0);
+        }
+        for (int i = 0; i < NX; i++) ends[b * NX + i] = x[i];
+    }
+}

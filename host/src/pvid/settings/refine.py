@@ -1,0 +1,97 @@
+"""Settings of the refinement, as in refine.h."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Float32 = npt.NDArray[np.float32]
+
+BIG_STEP = 4  # steps of the motion in one of the columns and rows
+
+
+@dataclass(frozen=True)
+class RefineSignal:
+    """pvid_refine_signal_f32: an input or an output of the model.
+
+    Attributes
+    ----------
+    sample : place in the argument of step
+    order : 0: the sample, 2: its second derivative
+    scale : factor to the model's unit
+    range : largest absolute value [model's unit]
+    """
+
+    sample: int
+    order: int
+    scale: float
+    range: float
+
+
+@dataclass(frozen=True, eq=False)
+class RefineConfig:
+    """pvid_refine_config_f32.
+
+    Attributes
+    ----------
+    sample_rate : ticks per second [Hz]
+    ratio : ticks of a step of the motion
+    second : weights of second derivatives, centre first [17], 1/s^2; None: no signal has order 2
+    signal : inputs, then outputs
+    block, first_block : big steps of a full block and of the first one of a search
+    sd : of the noise of a row at low frequencies [outputs]
+    prior_sd : of the weak form's estimate [parameters], relative if logarithmic
+    gain_sd : errors by the gain of the sensors [parameters]
+    state_limit : largest |start| of a block [states]
+    passes, most_passes : of a block: at least, and while the steps are not small
+    forgetting_s : time constant; 0: none
+    gate, chi_max, clash_max, step_max, step_limit, se_max, distance : limits
+    """
+
+    sample_rate: float
+    ratio: int
+    second: Float32 | None
+    signal: tuple[RefineSignal, ...]
+    block: int
+    first_block: int
+    sd: Float32
+    prior_sd: Float32
+    gain_sd: Float32
+    state_limit: Float32
+    passes: int = 2
+    most_passes: int = 8
+    forgetting_s: float = 0.0
+    gate: float = 8.0
+    chi_max: float = 3.0
+    clash_max: float = 25.0
+    step_max: float = 0.02
+    step_limit: float = 2.0
+    se_max: float = 0.01
+    distance: float = 0.03
+
+
+@dataclass(frozen=True)
+class RefineRig:
+    """What the refinement of a rig depends on.
+
+    Attributes
+    ----------
+    sample_rate : [Hz]
+    slow_hz, fast_hz : frequencies of the motion
+    signal : inputs, then outputs of the model
+    sample_sd : white noise of a sample of each output [outputs]
+    prior_sd, gain_sd : [parameters]
+    state_limit : [states]
+    """
+
+    sample_rate: float
+    slow_hz: float
+    fast_hz: float
+    signal: tuple[RefineSignal, ...]
+    sample_sd: Sequence[float]
+    prior_sd: Sequence[float]
+    gain_sd: Sequence[float]
+    state_limit: Sequence[float]

@@ -1,0 +1,82 @@
+"""What the twin of the refinement needs of a mechanism: refine_shape.h and refine_model_f32.h."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Float32 = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class RefineShape:
+    """Numbers of refine_shape.h."""
+
+    coordinates: int
+    inputs: int
+    outputs: int
+    moving: int
+    parameters: int
+    skew: bool
+    rates: bool  # an output depends on v
+    logarithmic: tuple[bool, ...]
+    place_of_p: tuple[int, ...]
+
+    @property
+    def reach(self) -> int:
+        """Steps before and behind whose inputs a skew needs."""
+        return 2 if self.skew else 0
+
+    @property
+    def states(self) -> int:
+        """q and v."""
+        return 2 * self.coordinates
+
+    @property
+    def columns(self) -> int:
+        """That are integrated."""
+        return self.states + self.moving
+
+    @property
+    def unknowns(self) -> int:
+        """Of a block."""
+        return self.states + self.parameters
+
+    @property
+    def width(self) -> int:
+        """Of a row: unknowns and the residual."""
+        return self.unknowns + 1
+
+    @property
+    def rows(self) -> int:
+        """That are added to the sums together."""
+        return 3 if self.outputs == 3 else 4
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Accelerations a [q] and their derivatives K, D [q, q], U [q, inputs], B [moving, q] (that of the skew is 0)."""
+
+    a: Float32
+    K: Float32
+    D: Float32
+    U: Float32
+    B: Float32
+
+
+class RefineModel(Protocol):
+    """The functions of refine_model_f32.h in numpy float32, the same operations in the same order."""
+
+    @property
+    def shape(self) -> RefineShape: ...
+    def region(self, r: Float32) -> bool: ...
+    def constants(self, r: Float32) -> Float32: ...
+    def motion(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32: ...
+    def jacobian(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Derivatives: ...
+    def output(self, m: Float32, r: Float32, q: Float32, v: Float32) -> Float32: ...
+    def output_jacobian(self, m: Float32, r: Float32, q: Float32, v: Float32) -> tuple[Float32, Float32, Float32]: ...
+    def chart(self, r: Float32, row: Float32) -> Float32: ...
+    def from_p(self, p: Float32) -> Float32: ...

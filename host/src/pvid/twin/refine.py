@@ -1,0 +1,377 @@
+"""Twin of refine_f32.c: samples and estimates of a weak form in, refined estimates and the running hash out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.settings.enums import Reason
+from pvid.settings.refine import BIG_STEP, RefineConfig
+from pvid.twin.f32.refine_front import Entry, Front
+from pvid.twin.f32.refine_model import Float32, RefineModel
+from pvid.twin.f32.refine_pass import Pass
+from pvid.twin.f32.refine_solve import Solution, Solve, Steps, inverse_column
+from pvid.twin.fnv import START, fold_bytes
+
+_F = np.float32
+_WHITENESS = _F(0.89)
+_ABSURD = _F(1e3)
+_MAY_GROW = _F(3)
+_HOPELESS = _F(30)
+_LOST_MOST = 6
+_RECENT = 200
+_LEVEL_GAIN = _F(0.2)
+_ERRORS = _F(5)
+
+
+class Phase(Enum):
+    """What the next tick does."""
+
+    WAIT = auto()
+    PASS = auto()
+    SOLVE = auto()
+    MOVE = auto()
+    END = auto()
+    FOLLOW = auto()
+    ASSESS = auto()
+    JUDGE = auto()
+    PUBLISH = auto()
+    NEXT = auto()
+
+
+@dataclass(frozen=True)
+class RefineEstimate:
+    """pvid_refine_estimate_f32."""
+
+    r: Float32
+    se: Float32
+    covariance: Float32
+    level: np.float32
+
+
+@dataclass(frozen=True)
+class TwinRefineRecord:
+    """One entry a tick; see pvid.core.refine_native.RefineRecord."""
+
+    reason: npt.NDArray[np.uint8]
+    hash: npt.NDArray[np.uint32]
+    r: Float32
+    se: Float32
+
+
+def _at_least_one(level: np.float32) -> np.float32:
+    return level if level > 1 else _F(1)
+
+
+class RefineTwin:
+    """pvid_refine_f32 of a model; its state persists between calls of `run`."""
+
+    def __init__(self, model: RefineModel, config: RefineConfig) -> None:
+        shape = self.shape = model.shape
+        self.model, self.config = model, config
+        self.steps = Steps(model)
+        self.sd = np.asarray(config.sd, _F)
+        self.prior_sd = np.asarray(config.prior_sd, _F)
+        self.gain_sd = np.asarray(config.gain_sd, _F)
+        self.state_limit = np.asarray(config.state_limit, _F)
+        self.variance = self.sd[0] * self.sd[0]
+        self.weight = self.sd[0] / self.sd
+        self.h = _F(config.ratio) / _F(config.sample_rate)
+        self.fade = _F(1)
+        if config.forgetting_s > 0:
+            seconds = _F(config.block) * (_F(BIG_STEP) * self.h)
+            share = seconds / (_F(2) * _F(config.forgetting_s))
+            self.fade = _F(1) - share if share < _F(0.9) else _F(0.1)
+        self.front = Front(config, shape)
+        self.work, self.solve = Pass(model), Solve(model)
+        n = shape.parameters
+        self.phase = Phase.WAIT
+        self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
+        self.passed = self.taken = self.refused = self.lost = self.length = self.begin = 0
+        self.level = _F(0)
+        self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
+        self.weak_se = np.zeros(len(shape.place_of_p), _F)
+        self.triangle = np.zeros((n, n), _F)
+        self.start, self.expected = np.zeros(shape.states, _F), np.zeros(shape.states, _F)
+        self.covariance = np.zeros((n, n), _F)
+        self.verdict = Reason.UPDATED
+        self.estimate: RefineEstimate | None = None
+        self.hash = START
+
+    # ---- blocks ----
+
+    def _forget_state(self) -> None:
+        self.expected = np.zeros_like(self.expected)
+        self.restarted = True
+
+    def _begin_pass(self) -> None:
+        gate = _ABSURD
+        if self.taken > 0 and self.config.gate > 0 and not self.restarted:
+            gate = (_F(self.config.gate) * self.sd[0]) * np.sqrt(_at_least_one(self.level))
+        self.work.begin(self.linear, self.start, self.h, gate)
+        self.phase = Phase.PASS
+        self.waiting = False
+
+    def _begin_block(self) -> None:
+        if (self.front.end - self.begin) % 2**32 > self.front.room - 8:
+            self.begin = self.front.end
+            self._forget_state()
+        self.linear, self.start = self.next.copy(), self.expected.copy()
+        self.passed = 0
+        self._begin_pass()
+
+    def _begin_search(self) -> None:
+        self.triangle = np.diag(self.sd[0] / self.prior_sd)
+        self.taken = self.refused = 0
+        self.level = _F(0)
+
+    def _take_weak(self, p: Float32, se: Float32) -> None:
+        r = self.model.from_p(p)
+        if self.model.region(r):
+            self.weak, self.weak_se = r, se.copy()
+            self.renewed = True
+
+    def _begin_anew(self) -> None:
+        self.r, self.next = self.weak.copy(), self.weak.copy()
+        self._forget_state()
+        self.renewed = False
+        self.lost = 0
+        self.length = self.config.first_block
+
+    # ---- the end of a block ----
+
+    def _is_sane(self) -> bool:
+        enough = self.work.used * 10 >= self.length * 6 * self.shape.outputs
+        return bool(self.solved and enough and np.all(np.abs(self.start) < self.state_limit))
+
+    def _take(self, square: np.float32) -> None:
+        config = self.config
+        self.refused = self.lost = 0
+        self.taken = min(self.taken + 1, 2)
+        self.level = square if self.taken == 1 else self.level + _LEVEL_GAIN * (square - self.level)
+        self.r, self.next = self.linear.copy(), self.linear.copy()
+        fade = _F(1) - (_F(1) - self.fade) * (_F(self.length) / _F(config.block))
+        self.triangle = self.solve.triangle * fade
+        self.length = min(2 * self.length, config.block)
+
+    def _refuse(self) -> None:
+        if self.taken > 0:
+            self.refused += 1
+            if self.refused >= 2:
+                self._begin_search()
+                if self.sane:
+                    self.next = self.linear.copy()
+        else:
+            self.lost += 1 if self.sane else 2
+            if self.sane:
+                self.next = self.linear.copy()
+
+    def _resize(self, square: np.float32) -> None:
+        config = self.config
+        if self.sane and square < _MAY_GROW * _F(config.chi_max):
+            self.length = 2 * self.length if 2 * self.length < config.block else self.length
+        elif not self.sane or not square <= _HOPELESS * _F(config.chi_max):
+            self.length = config.first_block
+
+    def _follow(self) -> None:
+        within = self.sane
+        if within:
+            self.expected = self.solve.end_state(self.work, self.linear)
+            within = bool(np.all(np.abs(self.expected) < self.state_limit))
+        self.restarted = False
+        if not within:
+            self._forget_state()
+
+    def _end_block(self) -> None:
+        config, unknowns = self.config, self.shape.unknowns
+        used = self.work.used
+        freedom = _F(used - unknowns) if used > unknowns + 1 else _F(1)
+        square = self.solve.residual / (freedom * (_WHITENESS * self.variance))
+        clash = self.solve.clash / (_F(self.shape.parameters) * self.variance)
+        self.sane = self._is_sane()
+        room = _at_least_one(self.level)
+        taken = (
+            self.sane
+            and square < _F(config.chi_max) * room
+            and (self.taken == 0 or clash < _F(config.clash_max) * room)
+            and self.solve.size < _F(config.step_max)
+        )
+        self.begin += self.work.step * BIG_STEP
+        if taken:
+            self._take(square)
+            self.verdict = Reason.UPDATED
+        else:
+            self.verdict = Reason.HELD_BLOCK if self.taken > 0 else Reason.HELD_SEARCHING
+            self._refuse()
+            if self.taken == 0:
+                self._resize(square)
+
+    # ---- the estimate ----
+
+    def _assess(self) -> None:
+        if self.passed == 0:
+            self.covariance = np.multiply.outer(self.gain_sd, self.gain_sd)
+        x = inverse_column(self.solve.triangle, self.passed)
+        variance = self.variance * _at_least_one(self.level)
+        upto = self.passed + 1
+        self.covariance[:upto, :upto] = self.covariance[:upto, :upto] + np.multiply.outer(variance * x[:upto], x[:upto])
+        self.passed += 1
+        self.phase = Phase.ASSESS if self.passed < self.shape.parameters else Phase.JUDGE
+
+    def _judge(self) -> None:
+        sd = np.sqrt(np.diag(self.covariance))
+        logarithmic = self.steps.logarithmic
+        se = np.where(logarithmic, sd * self.r, sd)
+        self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level)
+        certain = np.all(np.isfinite(self.r)) and np.all(np.isfinite(se))
+        certain = certain and np.all(~logarithmic | (se <= _F(self.config.se_max) * self.r))
+        self.verdict = Reason.UPDATED
+        if not certain:
+            self.verdict = Reason.HELD_UNCERTAIN
+            return
+        distance = _F(self.config.distance)
+        for i, place in enumerate(self.shape.place_of_p):
+            x, error, weak_se = self.r[place], se[place], self.weak_se[i]
+            errors = np.sqrt(error * error + weak_se * weak_se)
+            allowed = _ERRORS * errors + (distance * x if logarithmic[place] else distance)
+            if not -allowed <= x - self.weak[place] <= allowed:
+                self.verdict = Reason.HELD_DISAGREES
+
+    # ---- jobs ----
+
+    def _pass_job(self) -> None:
+        first = self.work.needs()
+        signals = None
+        if first is not None:
+            entry = self.begin + first
+            if self.front.end - entry < 3 + self.shape.reach:
+                self.waiting = True
+                return
+            signals = self.front.read(entry)
+        self.work.do(self.linear, self.weight, signals)
+        if self.work.ends(self.length):
+            self.solve.begin()
+            self.phase = Phase.SOLVE
+
+    def _solve_job(self) -> None:
+        solution = self.solve.do(
+            self.work.sum, self.triangle, self.r, self.linear, self.prior_sd, _F(self.config.step_limit)
+        )
+        if solution is not Solution.SOLVING:
+            self.solved = solution is Solution.SOLVED
+            self.phase = Phase.MOVE if self.solved else Phase.END
+
+    def _move(self) -> None:
+        config = self.config
+        self.linear = self.steps.moved(self.linear, self.solve.step)
+        self.start = self.start + self.solve.shift
+        self.passed += 1
+        small = bool(self.solve.size < _F(config.step_max))
+        if self.passed >= config.most_passes or (small and self.passed >= config.passes):
+            self.phase = Phase.END
+        else:
+            self._begin_pass()
+
+    def _next_block(self) -> None:
+        astray = self.length == self.config.first_block and self.renewed
+        if self.taken == 0 and (self.lost >= _LOST_MOST or (self.lost > 0 and astray)):
+            self._begin_anew()
+        self._begin_block()
+
+    def _wait(self) -> None:
+        if self.renewed:
+            self.begin = max(self.front.end - _RECENT, self.front.first)
+            self._begin_search()
+            self._begin_anew()
+            self._begin_block()
+
+    def _do(self) -> Reason:
+        match self.phase:
+            case Phase.WAIT:
+                self._wait()
+                return Reason.WARMING_UP
+            case Phase.PASS:
+                self._pass_job()
+            case Phase.SOLVE:
+                self._solve_job()
+            case Phase.MOVE:
+                self._move()
+            case Phase.END:
+                self._end_block()
+                self.phase = Phase.FOLLOW
+            case Phase.FOLLOW:
+                self._follow()
+                self.passed = 0
+                self.phase = Phase.ASSESS if self.verdict == Reason.UPDATED else Phase.NEXT
+            case Phase.ASSESS:
+                self._assess()
+            case Phase.JUDGE:
+                self._judge()
+                self.phase = Phase.PUBLISH
+            case Phase.PUBLISH:
+                if self.verdict == Reason.UPDATED:
+                    self.estimate = self.candidate
+                self.phase = Phase.NEXT
+            case Phase.NEXT:
+                reason = self.verdict
+                self._next_block()
+                return reason
+        return Reason.ACCUMULATED
+
+    # ---- API ----
+
+    def gap(self) -> None:
+        """pvid_refine_gap_f32."""
+        self.front.reset()
+        self.begin = self.front.first
+        self._forget_state()
+        if self.phase is not Phase.WAIT:
+            self._begin_block()
+
+    def freeze(self, frozen: bool) -> None:
+        """pvid_refine_freeze_f32."""
+        self.frozen = frozen
+
+    def step(self, sample: Float32, p: Float32, se: Float32) -> Reason:
+        """A tick; p and se [p] of the weak form if they are new, else NaN."""
+        if np.isfinite(p[0]):
+            self._take_weak(p, se)
+        entry = self.front.step(sample)
+        if entry is Entry.BROKEN:
+            self.gap()
+            return Reason.REJECTED_NOT_FINITE
+        if self.frozen:
+            return Reason.HELD_FROZEN
+        if entry is Entry.ENTERED:
+            self.waiting = False
+        works = entry is Entry.NOTHING or self.config.ratio == 1
+        if works and not self.waiting:
+            return self._do()
+        return Reason.WARMING_UP if self.phase is Phase.WAIT else Reason.ACCUMULATED
+
+    def _fold(self, reason: Reason) -> None:
+        values = np.concatenate([self.linear, self.work.state, [self.level]]).astype(_F)
+        words = np.where(np.isfinite(values), values.view(np.uint32), np.uint32(0x7FC00000))
+        self.hash = fold_bytes(self.hash, words.astype("<u4").tobytes() + int(reason).to_bytes(4, "little"))
+
+    def run(self, samples: npt.ArrayLike, weak_p: npt.ArrayLike, weak_se: npt.ArrayLike) -> TwinRefineRecord:
+        """Steps through samples [ticks, samples] with the weak form's new estimates, else NaN [ticks, p]."""
+        given, p, se = (np.asarray(x, _F) for x in (samples, weak_p, weak_se))
+        ticks, n = len(given), self.shape.parameters
+        record = TwinRefineRecord(
+            np.zeros(ticks, np.uint8),
+            np.zeros(ticks, np.uint32),
+            np.zeros((ticks, n), _F),
+            np.zeros((ticks, n), _F),
+        )
+        with np.errstate(all="ignore"):
+            for tick in range(ticks):
+                reason = self.step(given[tick], p[tick], se[tick])
+                self._fold(reason)
+                record.reason[tick], record.hash[tick] = reason, self.hash
+                if self.estimate is not None:
+                    record.r[tick], record.se[tick] = self.estimate.r, self.estimate.se
+        return record

@@ -1,0 +1,350 @@
+"""The refinement's functions: C and numpy have the same bits, values and derivatives are those of the equations."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.codegen import files_refine, refine_twin
+from pvid.codegen.build import refine_functions
+from pvid.codegen.operations import Argument, Literal, Operation
+from pvid.codegen.refine import RefineFunctions, default_widths, refine_functions_of
+from pvid.core.host_compiler import host_compiler
+from pvid.core.sources import INCLUDES, source
+from pvid.model import Model
+from pvid.model.signals import Jet, sgn
+from pvid.models import mechanisms
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+
+WARNINGS = (
+    "-Werror",
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+)
+VECTORS = 200
+
+Float = npt.NDArray[np.float64]
+Given = dict[str, Any]
+
+
+@cache
+def functions(name: str) -> RefineFunctions:
+    return refine_functions(compiled_of(name))
+
+
+@cache
+def given_of(name: str) -> Given:
+    """Parameters around the rig's own and states within reach, [entries, VECTORS]."""
+    made, rng = functions(name), np.random.default_rng(5)
+    truth = simulated_rig(name).truth
+    near = [truth.get(one.name, 0.0) for one in made.parameters]
+    share = rng.uniform(0.9, 1.1, (len(near), VECTORS))
+    r = np.array(near)[:, None] * share + np.where(np.array(near) == 0, 1e-2, 0)[:, None] * rng.normal(size=share.shape)
+    n = len(made.coordinates)
+    v = rng.uniform(-3, 3, (n if made.order == 2 else 0, VECTORS))
+    q, u = (
+        rng.uniform(-2, 2, (n, VECTORS)),
+        rng.uniform(-5, 5, (len(made.inputs), VECTORS)),
+    )
+    return {key: value.astype(np.float32) for key, value in dict(r=r, q=q, v=v, u=u).items()}
+
+
+def sizes_of(made: RefineFunctions) -> dict[str, int]:
+    """Entries of each array of the core's functions."""
+    sizes = {key: n for one in made.functions.values() for key, n in (*one.given, *one.written)}
+    tail = len(made.parameters) - made.moving
+    return {"D": 0, "Zv": 0, **sizes, "Zr": len(made.outputs) * tail}
+
+
+def arrays_of(made: RefineFunctions, name: str) -> tuple[list[str], list[str]]:
+    """What a function of the core is given and writes."""
+    given = [key for key, _ in made.functions[name].given if key != "row"]
+    if name.startswith("output"):
+        given.insert(1, "r")
+    return given, list(files_refine.WRITTEN[name])
+
+
+def wrapped(made: RefineFunctions) -> str:
+    """C that exports a loop around each function."""
+    sizes = sizes_of(made)
+    lines = ['#include "refine_model_f32.h"']
+    for name in made.functions:
+        if name == "region":
+            lines.append("void each_region(int n, float *r, _Bool *found);")
+            lines.append("void each_region(int n, float *r, _Bool *found)")
+            lines.append(f"{{ for (int k = 0; k < n; k++) found[k] = pvid_refine_region(&r[k * {sizes['r']}]); }}")
+            continue
+        entries = [one for group in arrays_of(made, name) for one in group]
+        arguments = ", ".join(f"float *{key}" for key in entries)
+        calls = ", ".join(f"&{key}[k * {sizes[key]}]" for key in entries)
+        lines.append(f"void each_{name}(int n, {arguments});")
+        lines.append(f"void each_{name}(int n, {arguments})")
+        lines.append(f"{{ for (int k = 0; k < n; k++) pvid_refine_{name}({calls}); }}")
+    return "\n".join(lines) + "\n"
+
+
+class InC:
+    """The header on this computer."""
+
+    def __init__(self, made: RefineFunctions, folder: Path) -> None:
+        self.made = made
+        (folder / "pvid").mkdir()
+        (folder / "pvid" / "refine_shape.h").write_text(files_refine.shape(made, "test"), encoding="utf-8")
+        (folder / "refine_model_f32.h").write_text(files_refine.header(made, "test"), encoding="utf-8")
+        (folder / "each.c").write_text(wrapped(made), encoding="utf-8")
+        library = folder / "each.so"
+        flags = (
+            "-std=c99",
+            "-O2",
+            "-ffp-contract=off",
+            "-DPVID_PLAIN_NAMES",
+            *WARNINGS,
+            "-shared",
+            "-fPIC",
+        )
+        sources = [str(folder / "each.c"), str(source("elementary_f32.c"))]
+        command = [
+            host_compiler("a test"),
+            *flags,
+            f"-I{folder}",
+            *INCLUDES,
+            *sources,
+            "-o",
+            str(library),
+            "-lm",
+        ]
+        subprocess.run(command, check=True)
+        self.library = ctypes.CDLL(str(library))
+
+    def __call__(self, name: str, given: Given) -> dict[str, npt.NDArray[np.float32]]:
+        sizes = sizes_of(self.made)
+        read, written = arrays_of(self.made, name)
+        arrays = [np.ascontiguousarray(given[key].T) for key in read]
+        out = {key: np.full((VECTORS, sizes[key]), np.nan, np.float32) for key in written}
+        if name == "chart":
+            out["row"] = np.ascontiguousarray(given["row"].T)
+        pointers = (x.ctypes.data_as(ctypes.c_void_p) for x in (*arrays, *out.values()))
+        self.library[f"each_{name}"](VECTORS, *pointers)
+        return {key: value.T for key, value in out.items()}
+
+
+@pytest.mark.parametrize("name", mechanisms.names())
+def test_c_and_twin_have_the_same_bits(name: str, tmp_path: Path) -> None:
+    made = functions(name)
+    in_c, twin, given = (
+        InC(made, tmp_path),
+        refine_twin.loaded(made),
+        dict(given_of(name)),
+    )
+    given["m"] = twin.constants(given["r"])[0]
+    given["row"] = np.random.default_rng(1).normal(size=(made.moving - made.skew, VECTORS)).astype(np.float32)
+    assert np.isfinite(given["m"]).all()
+    for function in made.functions.values():
+        if function.name == "region":
+            continue
+        want = getattr(twin, function.name)(*(given[key] for key, _ in function.given))
+        got = in_c(function.name, given)
+        for (key, n), b in zip(function.written, want, strict=True):
+            if key == "Zr":  # the core has the columns behind the motion's
+                b = b.reshape(len(made.outputs), -1, VECTORS)
+                assert (b[:, : made.moving - made.skew] == 0).all()
+                b = b[:, made.moving - made.skew :].reshape(-1, VECTORS)
+            elif key == "Zv" and np.isnan(got[key]).all():
+                assert (b == 0).all()
+                continue
+            else:
+                assert len(b) == n
+            assert got[key].shape == b.shape and np.isfinite(b).all(), key
+            assert (np.ascontiguousarray(got[key]).view(np.uint32) == b.view(np.uint32)).all(), key
+    given["r"] = given["r"].copy()
+    given["r"][0, ::2] *= -1  # every model's first parameter is positive
+    found = np.zeros(VECTORS, bool)
+    arrays = np.ascontiguousarray(given["r"].T), found
+    in_c.library.each_region(VECTORS, *(x.ctypes.data_as(ctypes.c_void_p) for x in arrays))
+    assert (found == twin.region(given["r"])).all() and not found[::2].any() and found[1::2].all()
+
+
+@pytest.mark.parametrize("name", mechanisms.names())
+def test_the_motion_solves_the_equations_of_the_description(name: str) -> None:
+    """With values of float64 in the equations themselves, which the printer took apart."""
+    made, model = functions(name), compiled_of(name)
+    given = {key: value.astype(np.float64) for key, value in given_of(name).items()}
+    (given["m"],) = evaluated(made, "constants", given)
+    (a,), (z,) = evaluated(made, "motion", given), evaluated(made, "output", given)
+    own = model.refinement
+    r = [sp.Symbol(one.name, real=True) for one in made.parameters]
+    q = [jet for jet in _states(made) if jet.order == 0 or made.order == 1]
+    values = dict(zip(r, given["r"], strict=True)) | dict(zip(q, given["q"], strict=True))
+    values |= dict(zip(made.inputs, given["u"], strict=True))
+    rates = dict(zip([jet.d() for jet in q], a, strict=True))
+    if made.order == 2:
+        values |= dict(zip([jet.d() for jet in q], given["v"], strict=True))
+        rates = dict(zip([jet.d(2) for jet in q], a, strict=True))
+    values |= {jet: value for jet, value in rates.items() if jet not in values}
+    measured = {sp.Symbol(f"measured_{k}"): value for k, value in enumerate(z)}
+    outputs = [own.outputs.get(one, Jet(one)) - mark for one, mark in zip(made.outputs, measured, strict=True)]
+    algebraic = {Jet(one): mark for one, mark in zip(made.outputs, measured, strict=True) if Jet(one) not in values}
+    widths = default_widths(model)
+    integrals = {jet.d() for jet in model.opaque}
+    equations = [one for one in own.equations or model.equations if not one.free_symbols & integrals]
+    for one in [*equations, *outputs]:
+        soft = {
+            sign: sign.args[0] / sp.sqrt(sign.args[0] ** 2 + widths[str(sign.args[0])] ** 2) for sign in one.atoms(sgn)
+        }
+        plain = model.with_knowns(one.xreplace(soft).xreplace(own.shapes).xreplace(algebraic))
+        symbols = sorted(plain.free_symbols, key=str)
+        terms = [sp.lambdify(symbols, term) for term in sp.Add.make_args(sp.expand(plain))]
+        at = [{**values, **measured}[symbol] for symbol in symbols]
+        found = np.array([np.broadcast_to(term(*at), (VECTORS,)) for term in terms])
+        assert (np.abs(found.sum(0)) <= 1e-12 * np.abs(found).sum(0)).all(), one
+
+
+def _states(made: RefineFunctions) -> list[Jet]:
+    names = [one.name for one in made.model.signals] + [jet.of for jet in made.model.hidden]
+    found = []
+    for text in made.coordinates:
+        of, _, order = text.rpartition("_")
+        found.append(Jet(of, int(order)) if of in names and order.isdigit() else Jet(text))
+    return found
+
+
+@pytest.mark.parametrize("name", mechanisms.names())
+def test_derivatives_are_those_of_finite_differences(name: str) -> None:
+    """In float64, from each function's own list: central, to 2e-6 of the largest entry."""
+    made = functions(name)
+    inner = {key: value[:, :40].astype(np.float64) for key, value in given_of(name).items()}
+
+    def values(function: str, at: Given) -> list[Float]:
+        (m,) = evaluated(made, "constants", at)
+        return evaluated(made, function, {**at, "m": m})
+
+    names = [key for one in ("jacobian", "output_jacobian") for key, _ in made.functions[one].written]
+    base = dict(
+        zip(
+            names,
+            [*values("jacobian", inner), *values("output_jacobian", inner)],
+            strict=True,
+        )
+    )
+    np.testing.assert_allclose(base["a"], values("motion", inner)[0], rtol=1e-12, atol=1e-12)
+    rows, moving = (
+        {"motion": len(made.coordinates), "output": len(made.outputs)},
+        made.moving - made.skew,
+    )
+    for function, key, got in (
+        *(
+            ("motion", "q", "K"),
+            ("motion", "v", "D"),
+            ("motion", "u", "U"),
+            ("motion", "r", "B"),
+        ),
+        *(("output", "q", "Zq"), ("output", "v", "Zv"), ("output", "r", "Zr")),
+    ):
+        entries = [k for k in range(len(inner[key])) if key != "r" or not made.skew or k != moving]
+        if not entries or got not in base:
+            continue
+        slopes = []
+        for entry in entries:
+            log = key == "r" and made.parameters[entry].log
+            ends = []
+            for sign in (1, -1):
+                moved = inner[key].copy()
+                moved[entry] += sign * 1e-5 * (inner[key][entry] if log else 1.0)
+                ends.append(values(function, {**inner, key: moved})[0])
+            slopes.append((ends[0] - ends[1]) / 2e-5)
+        wide = np.array(slopes).swapaxes(0, 1)  # [row, entry, vector]
+        mine = base[got].reshape(rows[function], -1, wide.shape[-1])
+        if got == "B":
+            mine = base[got].reshape(moving, rows[function], -1).swapaxes(0, 1)
+            mine, wide = charted(made, inner, mine), wide[:, :moving]
+        elif got == "Zr":
+            mine = np.concatenate([charted(made, inner, mine[:, :moving]), mine[:, moving:]], axis=1)
+        scale = np.abs(wide).max(initial=1e-3)
+        np.testing.assert_allclose(mine, wide, atol=2e-6 * scale, err_msg=f"{function} by {key}")
+
+
+def charted(made: RefineFunctions, given: Given, by_motion: Float) -> Float:
+    """Derivatives [rows, moving, vectors] by the motion's steps to those by the steps of r."""
+    if "chart" not in made.functions:
+        return by_motion
+    return np.array([evaluated(made, "chart", {**given, "row": one})[0] for one in by_motion])
+
+
+def evaluated(made: RefineFunctions, name: str, given: Given) -> list[Float]:
+    """What a function writes, in float64."""
+    one = made.functions[name]
+    arguments = np.concatenate([given[key] for key, _ in one.given if len(given[key])])
+    does: dict[str, Callable[..., Any]] = {
+        "+": np.add,
+        "-": np.subtract,
+        "*": np.multiply,
+        "/": np.divide,
+        "neg": np.negative,
+        "sin": np.sin,
+        "cos": np.cos,
+        "abs": np.abs,
+        "sqrt": np.sqrt,
+    }
+    places: list[Any] = []
+    for value in one.program.values:
+        if isinstance(value, Argument):
+            places.append(arguments[value.place])
+        elif isinstance(value, Literal):
+            places.append(float(value.value))
+        else:
+            places.append(does[value.kind](*(places[k] for k in value.operands)))
+    flat = np.array([np.broadcast_to(places[k], arguments.shape[1:]) for k in one.program.results])
+    return np.split(flat, np.cumsum([n for _, n in one.written])[:-1])
+
+
+def test_the_pendulums_are_as_lean_as_those_by_hand() -> None:
+    """The prototype's C has 41 operations in the accelerations, 122 with all derivatives (evidence/refinement.md)."""
+    made = functions("kapitza")
+    counts = {name: one.program.operations for name, one in made.functions.items()}
+    assert (counts["motion"], counts["jacobian"]) == (42, 125)
+    divisions = [
+        one for one in made.functions["jacobian"].program.values if isinstance(one, Operation) and one.kind == "/"
+    ]
+    assert len(divisions) == 1
+
+
+def test_a_sign_without_a_width_is_refused_by_name() -> None:
+    with pytest.raises(PvidError, match=r"width of the soft sign of phi_1"):
+        refine_functions_of(compiled_of("dc_motor"), {})
+
+
+def test_the_description_of_a_refinement_is_checked() -> None:
+    model = Model("test")
+    F, x = model.input("F", "N", hold="zoh"), model.sensor("x", "m", noise=1e-3)
+    m, k = model.unknown("m", "kg", 1.0), model.unknown("k", "N/m", 1.0)
+    model.equation(m * x.d(2) + k * x - F)
+    with pytest.raises(PvidError, match="sd must be positive"):
+        model.refined("b", "N*s/m", sd=0.0)
+    b = model.refined("b", "N*s/m", sd=0.1)
+    with pytest.raises(PvidError, match="equation 1 of the refinement"):
+        model.refine([m * x.d(2) + b * x + k * x - F])
+    model.refine([m * x.d(2) + b * x.d() + k * x - F], region=[k - m])
+    made = refine_functions_of(model.compiled("test"), {})
+    assert [(one.name, one.place, one.log) for one in made.parameters] == [
+        ("m", 0, True),
+        ("k", 1, True),
+        ("b", -1, False),
+    ]
+    model.refined("lost", "1", sd=1.0)
+    with pytest.raises(PvidError, match="lost is in no equation of the refinement"):
+        refine_functions_of(model.compiled("test"), {})

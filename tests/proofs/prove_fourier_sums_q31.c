@@ -1,0 +1,61 @@
+/* values_q31.c and sums_q31.c with the generated functions and the design of the pendulum (engine_design_q31.h, which
+ * tools/prove.py makes): any jets within their reach from a restart on through a half; then sums of any blocks of such
+ * channels, at all harmonics, and the window that is joined of them. Channels are within 2^28. */
+#include <string.h>
+
+#include "prove.h"
+
+#include "fourier/sums_q31.h"
+#include "fourier/values_q31.h"
+#include "engine_design_q31.h"
+
+#define DESIGN (&engine_design_q31)
+
+static pvid_fourier_values_q31 values;
+static pvid_fourier_sums_q31 sums;
+static pvid_fourier_window_q31 window;
+
+/* Each entry of the blocks may contain the channels of any step. */
+static void any_step(void)
+{
+    int32_t channel[PVID_MAX_CHANNELS];
+    int32_t jet[PVID_MAX_INPUTS];
+    for (size_t i = 0; i < DESIGN->model->jets; i++) {
+        jet[i] = any_i32(-engine_reach[i], engine_reach[i]);
+    }
+    const pvid_fourier_outcome outcome = pvid_fourier_values_step_q31(&values, DESIGN, jet, channel);
+    /*@ assert outcome != PVID_FOURIER_BEYOND; */
+    if (outcome == PVID_FOURIER_CHANNELS) {
+        for (size_t k = 0; k < pvid_fourier_summed_q31(DESIGN->model); k++) {
+            /*@ assert -0x10000000 <= channel[k] <= 0x10000000; */
+            for (size_t j = 0; j < 2u * PVID_FOURIER_BLOCK_Q31; j++) {
+                int32_t *place = &sums.block[j / PVID_FOURIER_BLOCK_Q31][j % PVID_FOURIER_BLOCK_Q31][k];
+                *place = any_bool() ? channel[k] : *place;
+            }
+        }
+        pvid_fourier_values_next_q31(&values, DESIGN->hop);
+    }
+}
+
+static void any_half(uint8_t half)
+{
+    for (uint16_t last = PVID_FOURIER_BLOCK_Q31 - 1; last < DESIGN->hop; last += PVID_FOURIER_BLOCK_Q31) {
+        pvid_fourier_sums_next_q31(&sums, DESIGN, last, half);
+        while (sums.left > 0u) {
+            pvid_fourier_sums_item_q31(&sums, DESIGN, &values, &window);
+        }
+    }
+}
+
+void main(void)
+{
+    pvid_fourier_values_init_q31(&values, (uint16_t)any_u32(0, 1000));
+    for (uint32_t step = 0; step < (uint32_t)DESIGN->hop + 4u; step++) {
+        any_step();
+    }
+    memcpy(values.edge[1], values.edge[0], sizeof values.edge[1]); /* the other half ends likewise */
+    pvid_fourier_sums_reset_q31(&sums);
+    any_half(0);
+    any_half(1);
+    /*@ assert sums.halves == 2; */
+}
