@@ -66,8 +66,8 @@ ESTIMATOR = (
         "src/solve/information_q31.c",
         "src/solve/kinds.c",
         "src/solve/scaled_model_q31.c",
+        "src/solve/settings_q31.c",
         "models/kapitza/kapitza_weak_q31.c",
-        "models/kapitza/kapitza_strong_q31.c",
     ),
     *("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
 )
@@ -145,8 +145,8 @@ PROOFS = (
     ),
     Proof(
         "kapitza_q31",
-        "theta and Jacobian of the three models within 2^60 for any p; their formats; the strong form's rows",
-        ("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c", "src/number/integer_q31.c"),
+        "theta and Jacobian of the weak models within 2^60 for any p, their formats; the strong form's rows",
+        ("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_row_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200"),
     ),
     Proof(
@@ -205,21 +205,30 @@ PROOFS = (
     Proof(
         "strong_q31",
         "any configuration; any tick on top of any state, whatever the bank's derivatives",
-        ("src/strong/strong_q31.c", "src/judge/gate_q31.c", "src/strong/differentiator_q31.c", *ESTIMATOR),
+        (
+            *("src/strong/strong_q31.c", "src/judge/gate_q31.c", "src/strong/differentiator_q31.c"),
+            *("src/solve/assess_q31.c", "models/kapitza/kapitza_row_q31.c"),
+            *("src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ),
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             *("-inline-calls", "is_within", "-eva-domains", "equality", "-eva-slevel-function"),
             "main:50,any_configuration:200,any_tick:200,prepare:100,pvid_strong_init_q31:100,pvid_gate_init_q31:50,"
-            "row_is_valid:5,shifts_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,pvid_kapitza_strong_row_q31:30,"
-            "round_entry:4,row_powers:20,pvid_estimator_terms_q31:4,take_row:20,pvid_differentiator_step_q31:5,"
-            "pvid_gate_passes_q31:5",
+            "shifts_are_valid:5,multipliers_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,"
+            "take_row:20,pvid_differentiator_step_q31:5,pvid_gate_passes_q31:5",
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
             *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31"),
-            *("pvid_estimator_init_q31", "pvid_estimator_add_row_q31", "pvid_estimator_update_q31"),
+            *("pvid_kapitza_estimator_init_q31", "pvid_kapitza_estimator_take_q31"),
             *("pvid_misfit_init_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
         ),
+    ),
+    Proof(
+        "kapitza_sums_q31",
+        "the strong form's sums: any row on top of any sums within 2^61, its end at any age and exponent up to 30",
+        ("models/kapitza/kapitza_sums_q31.c", "src/number/integer_q31.c"),
+        ("-eva-min-loop-unroll", "80"),
     ),
     Proof(
         "kapitza_physical_q31",
@@ -250,7 +259,7 @@ PROOFS = (
         "any configuration of the three models; any group on top of any state that a group leaves",
         (
             *("src/judge/trust_q31.c", "src/judge/publication.c"),
-            *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
+            *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c"),
         ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
         taken=("pvid_square_root_q31",),
@@ -266,7 +275,7 @@ PROOFS = (
                 "src/keep/fnv_q31.c",
                 "src/keep/fnv.c",
             ),
-            *("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
+            "models/kapitza/kapitza_weak_q31.c",
         ),
         ("-eva-auto-loop-unroll", "20"),
     ),
