@@ -258,3 +258,14 @@ def test_refusals_of_tune_are_recorded(native: Native, monkeypatch: pytest.Monke
     monkeypatch.setattr("pvid.run.tune.tune", refuse)
     record, _ = identify_rig(native, simulated(), tuned=True)
     assert record["reason"] == "nothing can be tuned"
+
+
+def test_a_rig_with_viscous_friction_is_answered_by_the_refinement() -> None:
+    """The campaign in its short form: a rig of the shipped population that the weak form alone does not answer."""
+    native = Native()
+    rig = simulate_rig(native, shipped(), 33, 30)
+    record, result = identify_rig(native, rig, refine=True)
+    assert rig.rig.condition == "damp" and record["suffices"]
+    assert result is not None and result.refinement.adopted
+    assert record["published"] and record["answered"] and not record["silently_wrong"]
+    assert isinstance(record["worst_error"], float) and record["worst_error"] < 2.5e-3

@@ -253,7 +253,12 @@ def _with_options(search: _Search, problem: Problem, found: Refined) -> tuple[Pr
             best = other, without_outliers(other, prior, again)
         if best[1].slow_chi2 < _ASKED:
             break
-    return best
+    problem, found = best
+    if not found.converged:
+        prior = search.prior(problem, found.r)
+        found = problem.searched(found.r, prior, found.cut, found.starts, problem.used(found.cut))
+        found = without_outliers(problem, prior, found)
+    return problem, found
 
 
 def _inputs(t: Float, u: Float, rate: float, sub: int, samples: int) -> Inputs:
