@@ -159,7 +159,11 @@ SHIFT = Range(0, 62, Status.BAD_SHIFT)
 COUNTS = Range(1, 2**24, Status.BAD_FULL_SCALE)
 STRONG_Q31 = {
     **ESTIMATOR_Q31,
-    **{f"row.{name}": SHIFT for name in ("n_a", "n_e", "n_phi2", "n_phi0", "part", "y")},
+    "estimator.p_bits": Range(-64, 64, Status.BAD_FORMAT, (Status.BAD_FORMAT,)),
+    "row.phi_shift": Range(-31, 31, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
+    "row.finer": Range(-31, 31, Status.BAD_SHIFT, (Status.BAD_FORMAT, Status.BAD_SHIFT)),
+    "row.phi3": Range(1, 2**31 - 1, Status.BAD_SHIFT),
+    "row.reference": Range(0, 2**29, Status.BAD_SHIFT),
     "u_multiplier": Range(1, 2**31 - 1, Status.BAD_U_MULTIPLIER),
     "u_shift": SHIFT,
     "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
@@ -239,7 +243,7 @@ UNUSED = {
     "weak": {*SET_BY_WEAK_INIT, *FLAGS, "angle", "passes"},
     "corrected": {*SET_BY_WEAK_INIT, *FLAGS},
     "weak q31": {*SET_BY_INIT, *FLAGS},
-    "strong q31": SET_BY_INIT,
+    "strong q31": SET_BY_INIT | {"estimator.n_bits", "estimator.y_bits"},
     "estimator": set(),
 }
 
@@ -265,9 +269,7 @@ class Subject:
         sizes = {name: table.size for name, table in self.identifier.tables.items()}
         self.tables: dict[str, Any] = {}
         self.fields = {field.name: field for field in headers.scalars(config, prefix)}
-        model = getattr(
-            self.identifier.estimator, "model", None
-        )  # the strong form in float32 has an estimator of its own
+        model = getattr(self.identifier.estimator, "model", None)  # the strong forms have estimators of their own
         self.n_theta = int(model.n_theta) if model is not None else 0
         self.design: Any = config.design[0] if "design.taps" in self.fields else None
         self.entries = {name: sizes[name.rpartition(".")[2]] for name, field in self.fields.items() if is_table(field)}

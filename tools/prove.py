@@ -66,8 +66,8 @@ ESTIMATOR = (
         "src/solve/information_q31.c",
         "src/solve/kinds.c",
         "src/solve/scaled_model_q31.c",
+        "src/solve/settings_q31.c",
         "models/kapitza/kapitza_weak_q31.c",
-        "models/kapitza/kapitza_strong_q31.c",
     ),
     *("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
 )
@@ -145,8 +145,8 @@ PROOFS = (
     ),
     Proof(
         "kapitza_q31",
-        "theta and Jacobian of the three models within 2^60 for any p; their formats; the strong form's rows",
-        ("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c", "src/number/integer_q31.c"),
+        "theta and Jacobian of the weak models within 2^60 for any p, their formats; the strong form's rows",
+        ("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_row_q31.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "200"),
     ),
     Proof(
@@ -205,21 +205,30 @@ PROOFS = (
     Proof(
         "strong_q31",
         "any configuration; any tick on top of any state, whatever the bank's derivatives",
-        ("src/strong/strong_q31.c", "src/judge/gate_q31.c", "src/strong/differentiator_q31.c", *ESTIMATOR),
+        (
+            *("src/strong/strong_q31.c", "src/judge/gate_q31.c", "src/strong/differentiator_q31.c"),
+            *("src/solve/assess_q31.c", "models/kapitza/kapitza_row_q31.c"),
+            *("src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ),
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             *("-inline-calls", "is_within", "-eva-domains", "equality", "-eva-slevel-function"),
             "main:50,any_configuration:200,any_tick:200,prepare:100,pvid_strong_init_q31:100,pvid_gate_init_q31:50,"
-            "row_is_valid:5,shifts_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,pvid_kapitza_strong_row_q31:30,"
-            "round_entry:4,row_powers:20,pvid_estimator_terms_q31:4,take_row:20,pvid_differentiator_step_q31:5,"
-            "pvid_gate_passes_q31:5",
+            "shifts_are_valid:5,multipliers_are_valid:5,pvid_strong_step_q31:200,accelerations:20,passes:5,"
+            "take_row:20,pvid_differentiator_step_q31:5,pvid_gate_passes_q31:5",
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
             *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31"),
-            *("pvid_estimator_init_q31", "pvid_estimator_add_row_q31", "pvid_estimator_update_q31"),
+            *("pvid_kapitza_estimator_init_q31", "pvid_kapitza_estimator_take_q31"),
             *("pvid_misfit_init_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
         ),
+    ),
+    Proof(
+        "kapitza_sums_q31",
+        "the strong form's sums: any row on top of any sums within 2^61, its end at any age and exponent up to 30",
+        ("models/kapitza/kapitza_sums_q31.c", "src/number/integer_q31.c"),
+        ("-eva-min-loop-unroll", "80"),
     ),
     Proof(
         "kapitza_physical_q31",
@@ -250,9 +259,10 @@ PROOFS = (
         "any configuration of the three models; any group on top of any state that a group leaves",
         (
             *("src/judge/trust_q31.c", "src/judge/publication.c"),
-            *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
+            *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c"),
         ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
+        taken=("pvid_square_root_q31",),
     ),
     Proof(
         "fingerprint_q31",
@@ -265,7 +275,7 @@ PROOFS = (
                 "src/keep/fnv_q31.c",
                 "src/keep/fnv.c",
             ),
-            *("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_strong_q31.c"),
+            "models/kapitza/kapitza_weak_q31.c",
         ),
         ("-eva-auto-loop-unroll", "20"),
     ),
@@ -393,19 +403,28 @@ def unexplained(proof: Proof, said: str) -> list[str]:
 
 
 def engine_design(folder: Path) -> None:
-    """Writes engine_design_q31.h: the generated functions and tables of the pendulum that tests/twin plays, and the
-    reach of its jets."""
-    sys.path.insert(0, str(ROOT / "tests" / "twin"))
-    from fourier_q31 import rig
+    """Writes engine_design_q31.h: functions and tables of the pendulum's shipped rig, the reach of its jets."""
+    from pvid.codegen import files_fourier_q31
+    from pvid.models.mechanisms import compiled_of
+    from pvid.run.engine_design_q31 import engine_for_simulated_rig
 
-    from pvid.codegen.files_fourier_q31 import source
-
-    one = rig("kapitza", 3000)
-    text = source(one.fixed, one.parameters, one.design, "engine")
+    engine = engine_for_simulated_rig(compiled_of("kapitza"))
+    name, made_by = engine.name, "tools/prove.py"
+    text = files_fourier_q31.source(engine.made, engine.parameters, made_by)
     reach = re.search(r"limits\[\d+\] = (\{[^}]*\})", text)
     assert reach is not None, "the generated function refuses no input"
-    lines = [text, f"static const int32_t engine_reach[] = {reach[1]};", ""]
-    (folder / "engine_design_q31.h").write_text("\n".join(lines), encoding="utf-8")
+    sizes = {"PVID_MAX_P": 3}  # those of the proofs are the defaults
+    own = [
+        f"#define engine_design_q31 {name}_design_q31",
+        f"static const int32_t engine_reach[] = {reach[1]};",
+    ]
+    files = {
+        f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, made_by),
+        f"{name}_design_q31.h": files_fourier_q31.design_header(engine.config, name, sizes, made_by, []),
+        "engine_design_q31.h": "\n".join([text, f'#include "{name}_design_q31.h"', *own, ""]),
+    }
+    for file, content in files.items():
+        (folder / file).write_text(content, encoding="utf-8")
 
 
 def program_of(proof: Proof) -> Path:

@@ -35,8 +35,12 @@ void pvid_replay_rows_q31(pvid_estimator_q31 *self, uint32_t ticks, const int32_
 void pvid_replay_derivatives_q31(pvid_differentiator_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
                                  int32_t d_phi[], int32_t d_y[], uint8_t ready[]);
 
-/* Rows of the strong form from phi[ticks][5] and u[ticks][3], and whether they fit[ticks]. */
-void pvid_replay_strong_rows_q31(const pvid_strong_row_q31 *shifts, uint32_t ticks, const int32_t phi[],
-                                 const int32_t u[], int32_t n[], int32_t y[], uint8_t fits[]);
+/* Rows[ticks] of the strong form from phi[ticks][5] and u[ticks][3], and whether they fit[ticks]. */
+void pvid_replay_strong_rows_q31(const pvid_strong_row_q31 *format, uint32_t ticks, const int32_t phi[],
+                                 const int32_t u[], int32_t rows[], uint8_t fits[]);
+
+/* Steps an initialised estimator of the strong form through rows[ticks]. */
+void pvid_replay_kapitza_rows_q31(pvid_kapitza_estimator_q31 *self, uint32_t ticks, const int32_t rows[],
+                                  const pvid_record_q31 *record);
 
 #endif

@@ -26,10 +26,15 @@
 #define STREAM_INIT pvid_strong_init_f32
 #define STREAM_STEP pvid_strong_step_f32
 #endif
-#if STREAM_CORE == 1
+#if (STREAM_CORE == 1) && (STREAM_FORM == 1)
 #define STREAM_HASH pvid_fnv_estimator_q31
+#define STREAM_ASSESS pvid_estimator_assess_q31
+#elif STREAM_CORE == 1
+#define STREAM_HASH pvid_fnv_kapitza_estimator_q31
+#define STREAM_ASSESS pvid_kapitza_estimator_assess_q31
 #else
 #define STREAM_HASH pvid_fnv_estimator_f32
+#define STREAM_ASSESS pvid_estimator_assess_f32
 #endif
 
 #define STREAM_SETTINGS 0x12345678u

@@ -531,8 +531,8 @@ static void configure_strong_q31(bool sound)
     if (one_in(2)) {
         spoil_estimator_q31(&config->estimator);
     }
-    config->u_multiplier = one_in(5) ? any_i32() : config->u_multiplier;
-    config->u_shift = one_in(5) ? (uint8_t)below(70) : config->u_shift;
+    config->u_multiplier[1] = one_in(5) ? any_i32() : config->u_multiplier[1];
+    config->u_shift[2] = one_in(5) ? (uint8_t)below(70) : config->u_shift[2];
     config->drive_min = one_in(5) ? any_i32() : config->drive_min;
     config->drive_ticks = one_in(5) ? any_word() : config->drive_ticks;
     config->bank.phi_shift[0] = one_in(5) ? (uint8_t)below(70) : config->bank.phi_shift[0];
@@ -541,8 +541,10 @@ static void configure_strong_q31(bool sound)
     config->bank.stride = one_in(8) ? (uint16_t)any_word() : config->bank.stride;
     config->bank.weights = one_in(20) ? NULL : config->bank.weights;
     config->phi_offset = one_in(5) ? any_i32() : config->phi_offset;
-    config->row.n_a = one_in(8) ? (uint8_t)below(70) : config->row.n_a;
-    config->row.y = one_in(8) ? (uint8_t)below(70) : config->row.y;
+    config->row.phi_shift[3] = one_in(8) ? (int8_t)((int32_t)below(100) - 50) : config->row.phi_shift[3];
+    config->row.finer[1] = one_in(8) ? (int8_t)((int32_t)below(100) - 50) : config->row.finer[1];
+    config->row.phi3 = one_in(8) ? any_i32() : config->row.phi3;
+    config->row.reference = one_in(8) ? any_i32() : config->row.reference;
     config->gate.sigmas = one_in(8) ? any_word() : config->gate.sigmas;
 }
 
@@ -573,10 +575,14 @@ static void freeze_strong_q31(bool frozen)
 
 static void check_strong_q31(bool published)
 {
-    check_p_q31(&strong_q31.self.estimator);
+    const pvid_kapitza_estimator_q31 *estimator = &strong_q31.self.estimator;
+    for (size_t i = 0; i < PVID_KAPITZA_P; i++) {
+        require((estimator->p[i] >= estimator->settings.lower[i]) && (estimator->p[i] <= estimator->settings.upper[i]),
+                "q31 p within its bounds");
+    }
     if (published && one_in(50)) {
         pvid_estimate_q31 estimate;
-        pvid_estimator_assess_q31(&strong_q31.self.estimator, &estimate);
+        pvid_kapitza_estimator_assess_q31(&strong_q31.self.estimator, &estimate);
     }
 }
 

@@ -6,7 +6,6 @@
 
 #include "number/integer_q31.h"
 #include "pvid/estimator_q31.h"
-#include "pvid/kapitza_strong_q31.h"
 #include "pvid/kapitza_weak_q31.h"
 #include "solve/kinds.h"
 

@@ -39,7 +39,6 @@ static void any_group(const pvid_model_q31 *model)
 void main(void)
 {
     any_group(&pvid_kapitza_weak_q31);
-    any_assessment(&pvid_kapitza_strong_q31);
     any_assessment(&pvid_kapitza_weak_q31);
     any_assessment(&pvid_kapitza_weak_zeroed_q31);
     any_assessment(&blocks);

@@ -64,7 +64,6 @@ void main(void)
 {
     any_weak();
     any_strong();
-    any_estimator(&pvid_kapitza_strong_q31);
     any_estimator(&pvid_kapitza_weak_q31);
     any_estimator(&pvid_kapitza_weak_zeroed_q31);
 }

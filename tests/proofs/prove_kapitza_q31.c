@@ -1,5 +1,6 @@
-/* The models: theta, its Jacobian and the formats of both of any p and any formats that the estimator takes; the rows
- * of the strong form from any derivatives within their limit and any shifts. theta and C stay within +-2^60. */
+/* The models: theta, its Jacobian and the formats of both of any p and any formats that the estimator takes: theta and
+ * C stay within +-2^60. The strong form's rows from any derivatives within their limits in any formats, and the
+ * innovation of any row at any p. */
 #include "prove.h"
 
 #include "pvid/kapitza_strong_q31.h"
@@ -28,37 +29,55 @@ static void any_model(const pvid_model_q31 *model)
     }
 }
 
-static uint8_t any_shift(void)
+static int8_t any_shift(void)
 {
-    return (uint8_t)any_u32(0, 62);
+    return (int8_t)any_i32(-31, 31);
 }
 
 static void any_row(void)
 {
-    pvid_strong_row_q31 shifts = {.n_a = any_shift(), .n_e = any_shift(), .part = any_shift(), .y = any_shift()};
-    for (size_t k = 0; k < 4u; k++) {
-        shifts.n_phi2[k] = any_shift();
+    pvid_strong_row_q31 format = {.phi3 = any_i32(1, INT32_MAX), .reference = any_i32(0, PVID_KAPITZA_RATE_LIMIT_Q31)};
+    for (size_t k = 0; k < PVID_ORDERS; k++) {
+        format.phi_shift[k] = any_shift();
     }
-    for (size_t k = 0; k < 5u; k++) {
-        shifts.n_phi0[k] = any_shift();
-    }
+    format.finer[0] = any_shift();
+    format.finer[1] = any_shift();
     int32_t phi[PVID_ORDERS];
     int32_t u[PVID_Y_ORDERS_Q31];
     for (size_t k = 0; k < PVID_ORDERS; k++) {
         phi[k] = any_i32(-PVID_DERIVATIVE_LIMIT_Q31, PVID_DERIVATIVE_LIMIT_Q31);
     }
-    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
-        u[k] = any_i32(-PVID_DERIVATIVE_LIMIT_Q31, PVID_DERIVATIVE_LIMIT_Q31);
+    u[0] = any_i32(-PVID_KAPITZA_RATE_LIMIT_Q31, PVID_KAPITZA_RATE_LIMIT_Q31);
+    u[1] = any_i32(-PVID_DERIVATIVE_LIMIT_Q31, PVID_DERIVATIVE_LIMIT_Q31);
+    u[2] = any_i32(-PVID_DERIVATIVE_LIMIT_Q31, PVID_DERIVATIVE_LIMIT_Q31);
+    int32_t row[PVID_KAPITZA_ROW_Q31];
+    (void)pvid_kapitza_strong_row_q31(&format, phi, u, row);
+}
+
+static void any_innovation(void)
+{
+    static pvid_kapitza_estimator_q31 estimator;
+    int32_t row[PVID_KAPITZA_ROW_Q31];
+    int32_t gradient[PVID_KAPITZA_P];
+    int32_t e;
+    for (size_t i = 0; i < PVID_KAPITZA_ROW_G; i++) {
+        row[i] = any_i32(-PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31);
     }
-    int32_t y;
-    int32_t n[PVID_KAPITZA_STRONG_THETA];
-    (void)pvid_kapitza_strong_row_q31(&shifts, phi, u, &y, n);
+    row[PVID_KAPITZA_ROW_G] = any_i32(-PVID_KAPITZA_RATE_LIMIT_Q31, 2 * PVID_KAPITZA_RATE_LIMIT_Q31);
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        estimator.p[a] = any_i32(1, INT32_MAX);
+    }
+    estimator.reference = any_i32(0, 2 * PVID_KAPITZA_RATE_LIMIT_Q31);
+    estimator.bits[0] = (int8_t)any_i32(0, 60);
+    estimator.bits[1] = (int8_t)any_i32(0, 60);
+    (void)pvid_kapitza_estimator_innovate_q31(&estimator, row, &e, gradient);
+    /*@ assert -0x10000000 <= e <= 0x10000000; */
 }
 
 void main(void)
 {
     any_model(&pvid_kapitza_weak_q31);
     any_model(&pvid_kapitza_weak_zeroed_q31);
-    any_model(&pvid_kapitza_strong_q31);
     any_row();
+    any_innovation();
 }

@@ -71,7 +71,7 @@ void main(void)
     Frama_C_make_unknown((char *)&strong, sizeof strong);
     weak.design = &design;
     weak.estimator.model = &pvid_kapitza_weak_q31;
-    strong.estimator.model = &pvid_kapitza_strong_q31;
+    strong.estimator.ready = true;
     strong.differentiator.bank.weights = pvid_five_points_q31;
     weak_config.design = &design;
     any_image();

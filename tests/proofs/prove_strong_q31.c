@@ -1,12 +1,13 @@
 /* The strong form's identifier: any configuration; any tick on top of any state: any bank's derivatives, any estimator,
  * gate and drive. */
-#include "any_estimator_q31.h"
+#include "prove.h"
 
 #include "contracts.h"
 #include "strong_contracts.h"
 #include "pvid/strong_q31.h"
 
 #define DRIVE_MAX ((int64_t)1 << 60)
+#define ONE_Q30 ((int32_t)1 << 30)
 
 static pvid_strong_q31 identifier; /* zeroed by init */
 
@@ -30,34 +31,45 @@ static uint8_t any_shift(void)
 
 static void any_row_format(pvid_strong_row_q31 *row)
 {
-    row->n_a = any_shift();
-    row->n_e = any_shift();
-    row->part = any_shift();
-    row->y = any_shift();
-    for (size_t k = 0; k < 4u; k++) {
-        row->n_phi2[k] = any_shift();
+    for (size_t k = 0; k < PVID_ORDERS; k++) {
+        row->phi_shift[k] = (int8_t)any_i32(-31, 31);
     }
-    for (size_t k = 0; k < 5u; k++) {
-        row->n_phi0[k] = any_shift();
+    row->finer[0] = (int8_t)any_i32(-31, 31);
+    row->finer[1] = (int8_t)any_i32(-31, 31);
+    row->phi3 = any_i32(1, INT32_MAX);
+    row->reference = any_i32(0, PVID_KAPITZA_RATE_LIMIT_Q31);
+}
+
+static void any_p(pvid_kapitza_estimator_q31 *estimator)
+{
+    Frama_C_make_unknown((char *)estimator, sizeof *estimator);
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        estimator->p[a] = any_i32(1, INT32_MAX);
     }
+    estimator->reference = any_i32(0, 2 * PVID_KAPITZA_RATE_LIMIT_Q31);
+    estimator->bits[0] = (int8_t)any_i32(0, 60);
+    estimator->bits[1] = (int8_t)any_i32(0, 60);
+    estimator->ready = true;
 }
 
 static void any_tick(void)
 {
-    any_state(&pvid_kapitza_strong_q31, &identifier.estimator);
+    any_p(&identifier.estimator);
     identifier.differentiator.bank.phi_max = any_i32(1, PVID_COUNTS_LIMIT_Q31);
     identifier.differentiator.bank.y_max = any_i32(1, PVID_COUNTS_LIMIT_Q31);
     identifier.differentiator.length = (uint16_t)any_u32(5, PVID_MAX_WINDOW);
     any_row_format(&identifier.row);
-    identifier.u_multiplier = any_i32(1, INT32_MAX);
-    identifier.u_shift = any_shift();
+    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
+        identifier.u_multiplier[k] = any_i32(1, INT32_MAX);
+        identifier.u_shift[k] = any_shift();
+    }
     identifier.phi_offset = any_i32(INT32_MIN, INT32_MAX);
     identifier.y_offset = any_i32(INT32_MIN, INT32_MAX);
     identifier.drive = any_i64(-DRIVE_MAX, DRIVE_MAX);
     identifier.drive_min = any_i64(0, DRIVE_MAX);
     identifier.drive_forgetting = any_i32(0, INT32_MAX);
-    identifier.gate.limit.m = any_i32(0, PVID_ONE_Q30);
-    identifier.gate.scale.m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
+    identifier.gate.limit.m = any_i32(0, ONE_Q30);
+    identifier.gate.scale.m = any_i32(-ONE_Q30, ONE_Q30);
     identifier.gate.scale.e = any_i32(-2001, 72);
     pvid_strong_freeze_q31(&identifier, any_bool());
     (void)pvid_strong_step_q31(&identifier, any_i32(INT32_MIN, INT32_MAX), any_i32(INT32_MIN, INT32_MAX));

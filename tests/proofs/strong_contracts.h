@@ -2,11 +2,10 @@
 #ifndef STRONG_CONTRACTS_H
 #define STRONG_CONTRACTS_H
 
-#include "solve/row_q31.h"
-#include "solve/state_q31.h"
 #include "judge/misfit_q31.h"
 #include "pvid/differentiator_q31.h"
 #include "pvid/gate_q31.h"
+#include "pvid/kapitza_strong_q31.h"
 
 /* Of what they read but a number is named: a number made of pointers would be none. */
 
@@ -35,17 +34,20 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
     ensures \result == 0 ==> \initialized(&self->bank.y_max) && 1 <= self->bank.y_max <= 0x1000000; */
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
 
-/*@ assigns \result, *self \from config->row_sd;
+/*@ assigns \result, *self \from config->row_sd, rows->reference;
     ensures 0 <= \result <= 100;
     ensures \result == 0 || \result >= 1;
-    ensures \result == 0 ==> \initialized(&self->information.exponent) && self->information.exponent == 0;
-    ensures \result == 0 ==> \initialized(&self->settings.row_sd) && 1 <= self->settings.row_sd; */
-pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config);
+    ensures \result == 0 ==> \initialized(&self->settings.row_sd) && 1 <= self->settings.row_sd;
+    ensures self->ready == 0 || self->ready == 1; */
+pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self, const pvid_estimator_config_q31 *config,
+                                            const pvid_strong_row_q31 *rows);
 
-/*@ requires -0x10000000 <= e <= 0x10000000 && 0 <= square <= 0x100000000000000;
-    assigns *self \from n[0 .. 10], e, square; */
-void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const pvid_block *block, const int32_t n[], int32_t e,
-                                int64_t square);
+/* Any state that prove_kapitza_estimator_q31.c takes. */
+/*@ requires -0x10000000 <= e <= 0x10000000;
+    assigns \result, *self \from row[0 .. 12], e, gradient[0 .. 2];
+    ensures self->ready == 1; */
+pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, const int32_t row[PVID_KAPITZA_ROW_Q31],
+                                            int32_t e, const int32_t gradient[PVID_KAPITZA_P]);
 
 /*@ requires 1 <= drive_ticks <= 0x40000000;
     assigns *self \from drive_ticks, forgetting_groups; */
@@ -59,9 +61,5 @@ bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitiv
 /*@ assigns \result, *self \from *self;
     ensures \result == 0 || \result == 1; */
 bool pvid_misfit_judge_q31(pvid_misfit_q31 *self);
-
-/* Any state that prove_estimator_solve_q31.c takes. */
-/*@ assigns \result, *self \from self->settings.row_sd; */
-pvid_reason pvid_estimator_update_q31(pvid_estimator_q31 *self);
 
 #endif

@@ -19,8 +19,7 @@ from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start, strong_config
 from pvid.setup.q31 import counts_of, strong_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
-from pvid.twin.kapitza import strong_q31 as kapitza_strong_q31
-from pvid.twin.q31.estimator import EstimatorQ31
+from pvid.twin.kapitza.estimator_q31 import KapitzaEstimatorQ31
 from pvid.twin.strong_q31 import StrongTwinQ31
 
 SLOW_HZ = 125.0  # the default filter with one sample in eight: 31 points
@@ -130,23 +129,27 @@ def test_other_drives_are_no_misfit(core: str, native: Native) -> None:
     assert not (reason[settled] == Reason.MISFIT).any()
 
 
-def test_sensitivity_of_a_row_is_w_times_the_gradient_in_w(changed: Run) -> None:
+def test_gradient_of_a_row_is_that_of_its_innovation(changed: Run) -> None:
     rig = rig_of(FINE_BITS)
     config = strong_config_q31(rig, SLOW_HZ)
-    n, y, row_reason = StrongTwinQ31(config).rows(*counts_of(rig, changed))
-    rows = np.flatnonzero(row_reason == Reason.ACCUMULATED)[::50]
+    rows, row_reason = StrongTwinQ31(config).rows(*counts_of(rig, changed))
+    taken = rows[row_reason == Reason.ACCUMULATED][::50].T
 
-    def predicted(w_factor: float) -> npt.NDArray[np.float64]:
-        w, d1, d2 = nominal_start(rig)
-        start = strong_config_q31(rig, SLOW_HZ, (w * w_factor, d1, d2)).estimator
-        terms = EstimatorQ31([start], kapitza_strong_q31.STRONG).terms(n[rows].T, y[rows])[0]
-        return np.asarray(terms.sum(axis=0), np.float64)
+    def innovation(factors: tuple[float, float, float]) -> tuple[Any, Any]:
+        start = strong_config_q31(rig, SLOW_HZ, np.multiply(nominal_start(rig), factors)).estimator
+        e, gradient, fits = KapitzaEstimatorQ31([start] * taken.shape[1], config.row).innovation(taken)
+        assert fits.all()
+        return np.asarray(e, np.float64), np.asarray(gradient, np.float64)
 
-    terms = EstimatorQ31([config.estimator], kapitza_strong_q31.STRONG).terms(n[rows].T, y[rows])[0]
-    sensitivity = kapitza_strong_q31.sensitivity(terms)
-    slope = (predicted(1.001) - predicted(0.999)) / 0.002
-    # of third order in 0.001, and terms rounded to 1
-    assert np.abs(sensitivity - slope).max() < 1e-4 * np.abs(sensitivity).max() + 11 / 0.002
+    gradient = innovation((1, 1, 1))[1]
+    estimator = config.estimator
+    units = 2.0 ** -np.array([estimator.p_bits[0], *np.add(estimator.p_bits[1:], config.row.finer)])
+    for a in range(3):
+        more, less = (innovation(tuple(1 + change * (i == a) for i in range(3)))[0] for change in (0.001, -0.001))  # type: ignore[arg-type]
+        slope = (less - more) / (0.002 * estimator.start[a])
+        # of third order in 0.001, and an innovation rounded to a few units
+        rounding = 5 / (0.002 * estimator.start[a])
+        assert np.abs(gradient[a] * units[a] - slope).max() < 1e-4 * np.abs(slope).max() + rounding
 
 
 @both_cores

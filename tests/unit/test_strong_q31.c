@@ -9,141 +9,150 @@
 
 #include "pvid/pvid_q31.h"
 
-/* Shifts of 0: what fits is exact. */
+#define RATE(x) ((x) * (1 << PVID_KAPITZA_RATE_BITS))
+
+static const pvid_strong_row_q31 exact = {.phi3 = 1 << 30, .reference = 0};
+
+/* Rates that are whole numbers: what fits is exact. */
 static void a_row_is_the_formula(void **state)
 {
     (void)state;
-    const pvid_strong_row_q31 exact = {0};
     const int32_t phi[PVID_ORDERS] = {7, 1000, -11, 13, 17};
-    const int32_t u[PVID_Y_ORDERS_Q31] = {-5, 3, 19};
-    int32_t y;
-    int32_t n[PVID_KAPITZA_STRONG_THETA];
-    assert_true(pvid_kapitza_strong_row_q31(&exact, phi, u, &y, n));
-    /* Y = u^2 phi4 - 2 u u' phi3 + (2 u'^2 - u u'') phi2 */
-    assert_int_equal(y, (25 * 17) + (2 * 5 * 3 * 13) + ((18 + 95) * -11));
-    /* N_1 = -2 u phi4 + 2 u' phi3 + u'' phi2 */
-    assert_int_equal(n[0], (10 * 17) + (6 * 13) + (19 * -11));
+    const int32_t u[PVID_Y_ORDERS_Q31] = {RATE(-5), RATE(3), RATE(19)};
+    int32_t row[PVID_KAPITZA_ROW_Q31];
+    assert_true(pvid_kapitza_strong_row_q31(&exact, phi, u, row));
+    /* Y = G^2 phi4 - 2 G u' phi3 + (2 u'^2 - G u'') phi2 */
+    assert_int_equal(row[PVID_KAPITZA_ROW_Y], (25 * 17) + (2 * 5 * 3 * 13) + ((18 + 95) * -11));
+    /* N_1 = -2 G phi4 + 2 u' phi3 + u'' phi2 */
+    assert_int_equal(row[0], (10 * 17) + (6 * 13) + (19 * -11));
     const int32_t rest[10] = {-17, 125 * -11, -25 * -11, 5 * -11, 11, -625 * 7, 125 * 7, -25 * 7, 5 * 7, -7};
     for (size_t i = 0; i < 10u; i++) {
-        assert_int_equal(n[i + 1u], rest[i]);
+        assert_int_equal(row[i + 1u], rest[i]);
     }
+    assert_int_equal(row[PVID_KAPITZA_ROW_G], RATE(-5));
 }
 
-static void shifts_round_half_up(void **state)
+/* The reference of w moves u, the units shift each family, and phi3 has a factor. */
+static void a_row_has_its_formats(void **state)
 {
     (void)state;
-    const pvid_strong_row_q31 shifts = {
-        .n_a = 2, .n_e = 1, .n_phi2 = {1, 1, 1, 1}, .n_phi0 = {2, 0, 0, 0, 0}, .part = 1, .y = 3};
-    const int32_t phi[PVID_ORDERS] = {10, 0, 3, 0, 5};
-    const int32_t u[PVID_Y_ORDERS_Q31] = {3, 1, 1};
-    int32_t y;
-    int32_t n[PVID_KAPITZA_STRONG_THETA];
-    assert_true(pvid_kapitza_strong_row_q31(&shifts, phi, u, &y, n));
-    /* bracket 3 - 15 = -12, a = -6; b = 3/2 -> 2; Y = (4 + 18)/8 = 2.75 -> 3; N_1 = (-12 - 15)/4 = -6.75 -> -7 */
-    assert_int_equal(y, 3);
-    assert_int_equal(n[0], -7);
-    assert_int_equal(n[1], -2);  /* -2.5 */
-    assert_int_equal(n[5], -1);  /* -1.5 */
-    assert_int_equal(n[4], -1);  /* 3 (-1)/2 = -1.5 */
-    assert_int_equal(n[10], -2); /* -2.5 */
-    assert_int_equal(n[6], -2 * 81);
+    const pvid_strong_row_q31 formats = {
+        .phi_shift = {1, 0, 2, -1, 3}, .finer = {-1, 5}, .phi3 = 3 << 28, .reference = RATE(7)};
+    const int32_t phi[PVID_ORDERS] = {7, 1000, -11, 16, 17};
+    const int32_t u[PVID_Y_ORDERS_Q31] = {RATE(-5), RATE(3), RATE(19)};
+    int32_t row[PVID_KAPITZA_ROW_Q31];
+    assert_true(pvid_kapitza_strong_row_q31(&formats, phi, u, row));
+    assert_int_equal(row[PVID_KAPITZA_ROW_G], RATE(2));
+    assert_int_equal(row[0], (-4 * 136) + (6 * 6) + (19 * -44));
+    assert_int_equal(row[1], -136);
+    const int32_t rest[9] = {8 * 22, 4 * 22, 2 * 22, 22, -16 * 14, -8 * 14, -4 * 14, -2 * 14, -14};
+    for (size_t i = 0; i < 9u; i++) {
+        assert_int_equal(row[i + 2u], rest[i]);
+    }
 }
 
 static void a_row_that_does_not_fit_is_refused(void **state)
 {
     (void)state;
-    pvid_strong_row_q31 shifts = {0};
     int32_t phi[PVID_ORDERS] = {0, 0, 0, 0, PVID_ROW_LIMIT_Q31};
     int32_t u[PVID_Y_ORDERS_Q31] = {0, 0, 0};
-    int32_t y;
-    int32_t n[PVID_KAPITZA_STRONG_THETA];
-    assert_true(pvid_kapitza_strong_row_q31(&shifts, phi, u, &y, n));
+    int32_t row[PVID_KAPITZA_ROW_Q31];
+    assert_true(pvid_kapitza_strong_row_q31(&exact, phi, u, row));
     phi[4]++;
-    assert_false(pvid_kapitza_strong_row_q31(&shifts, phi, u, &y, n));
+    assert_false(pvid_kapitza_strong_row_q31(&exact, phi, u, row));
     phi[4] = 0;
     phi[0] = 1 << 8;
-    u[0] = 1 << 5; /* u^4 phi = 2^28 */
-    assert_true(pvid_kapitza_strong_row_q31(&shifts, phi, u, &y, n));
+    u[0] = RATE(1 << 5); /* G^4 phi = 2^28 */
+    assert_true(pvid_kapitza_strong_row_q31(&exact, phi, u, row));
     phi[0]++;
-    assert_false(pvid_kapitza_strong_row_q31(&shifts, phi, u, &y, n));
+    assert_false(pvid_kapitza_strong_row_q31(&exact, phi, u, row));
     /* every derivative at its limit: no product overflows, and the row is refused */
     for (size_t k = 0; k < PVID_ORDERS; k++) {
         phi[k] = ((k % 2u) == 0u) ? PVID_DERIVATIVE_LIMIT_Q31 : -PVID_DERIVATIVE_LIMIT_Q31;
     }
-    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
-        u[k] = (k == 1u) ? -PVID_DERIVATIVE_LIMIT_Q31 : PVID_DERIVATIVE_LIMIT_Q31;
-    }
-    assert_false(pvid_kapitza_strong_row_q31(&shifts, phi, u, &y, n));
+    u[0] = PVID_KAPITZA_RATE_LIMIT_Q31;
+    u[1] = -PVID_DERIVATIVE_LIMIT_Q31;
+    u[2] = PVID_DERIVATIVE_LIMIT_Q31;
+    assert_false(pvid_kapitza_strong_row_q31(&exact, phi, u, row));
 }
 
-/* theta and C are polynomials of p: with formats of whole numbers, their integers are exact up to their formats. */
-static void theta_and_its_jacobian_are_those_of_the_model(void **state)
+static const pvid_estimator_config_q31 of_estimator = {
+    .start = {3 << 25, 6 << 24, 5 << 24},
+    .start_sd = {1 << 25, 4 << 24, 2 << 24},
+    .lower = {1 << 22, 1 << 22, 1 << 22},
+    .upper = {60 << 25, 100 << 24, 100 << 24},
+    .p_bits = {PVID_KAPITZA_W_BITS, 24, 24},
+    .row_sd = 256,
+    .gain = 1 << 30,
+    .correlation = 65536u,
+    .row_weight = 65536u,
+    .step_limit = 19661u,
+    .kappa_min = 10737,
+    .divider = 1,
+};
+static const pvid_strong_row_q31 near_two = {.phi3 = 1 << 30, .reference = RATE(2) + (RATE(1) / 8)};
+
+/* Without a row nothing is known. Then rows that obey w = 2, d1 = 8, d2 = 4: p ends there, and its errors are small. */
+static void rows_of_a_model_identify_it(void **state)
 {
     (void)state;
-    const pvid_model_q31 *model = &pvid_kapitza_strong_q31;
-    const int8_t p_bits[3] = {26, 27, 27};
-    const double p[3] = {14.5, 8.75, 5.5};
-    const int32_t fixed[3] = {(int32_t)(p[0] * 67108864.0), (int32_t)(p[1] * 134217728.0),
-                              (int32_t)(p[2] * 134217728.0)};
-    int16_t theta_bits[PVID_KAPITZA_STRONG_THETA];
-    int16_t c_bits[18];
-    int64_t theta[PVID_KAPITZA_STRONG_THETA];
-    int64_t c[18];
-    model->formats(p_bits, theta_bits, c_bits);
-    model->theta(fixed, theta);
-    model->jacobian(fixed, c);
-    const double w = p[0];
-    const double expected[PVID_KAPITZA_STRONG_THETA] = {
-        w,
-        w * w,
-        p[1],
-        3 * p[1] * w,
-        3 * p[1] * w * w,
-        p[1] * w * w * w,
-        p[2],
-        4 * p[2] * w,
-        6 * p[2] * w * w,
-        4 * p[2] * w * w * w,
-        p[2] * w * w * w * w,
-    };
-    for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
-        const double ratio = (double)theta[i] / (expected[i] * (double)((int64_t)1 << theta_bits[i]));
-        assert_true((ratio > 1.0 - 1e-7) && (ratio < 1.0 + 1e-7));
+    static pvid_kapitza_estimator_q31 self;
+    pvid_estimate_q31 estimate;
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &of_estimator, &near_two), PVID_OK);
+    pvid_kapitza_estimator_assess_q31(&self, &estimate);
+    for (size_t a = 0; a < 3u; a++) {
+        const int32_t sd = of_estimator.start_sd[a];
+        assert_in_range((uintmax_t)estimate.se[a], (uintmax_t)(sd - (sd / 100)), (uintmax_t)(sd + (sd / 100)));
     }
-    const double entries[18] = {
-        1,
-        2 * w,
-        3 * p[1],
-        6 * p[1] * w,
-        3 * p[1] * w * w,
-        4 * p[2],
-        12 * p[2] * w,
-        12 * p[2] * w * w,
-        4 * p[2] * w * w * w,
-        1,
-        3 * w,
-        3 * w * w,
-        w * w * w,
-        1,
-        4 * w,
-        6 * w * w,
-        4 * w * w * w,
-        w * w * w * w,
-    };
-    for (size_t k = 0; k < 18u; k++) {
-        const double ratio = (double)c[k] / (entries[k] * (double)((int64_t)1 << c_bits[k]));
-        assert_true((ratio > 1.0 - 1e-7) && (ratio < 1.0 + 1e-7));
+    uint32_t random = 1;
+    for (uint32_t i = 0; i < 400u; i++) {
+        int32_t drawn[3];
+        for (size_t k = 0; k < 3u; k++) {
+            random = (random * 1664525u) + 1013904223u;
+            drawn[k] = (int32_t)(random >> 16) - 32768;
+        }
+        const int32_t u = drawn[2] * 256;                     /* |u| < 1/2 */
+        const double g = ((double)u / (double)RATE(1)) + 2.0; /* u + w; u' = u'' = 0 */
+        const double phi4 = -((8.0 * g * 8.0 * drawn[0]) + (4.0 * g * g * 8.0 * drawn[1]));
+        const int32_t phi[PVID_ORDERS] = {drawn[1] * 8, 0, drawn[0] * 8, 0, (int32_t)phi4};
+        const int32_t rates[PVID_Y_ORDERS_Q31] = {u, 0, 0};
+        int32_t row[PVID_KAPITZA_ROW_Q31];
+        int32_t gradient[PVID_KAPITZA_P];
+        int32_t e;
+        assert_true(pvid_kapitza_strong_row_q31(&near_two, phi, rates, row));
+        assert_true(pvid_kapitza_estimator_innovate_q31(&self, row, &e, gradient));
+        (void)pvid_kapitza_estimator_take_q31(&self, row, e, gradient);
     }
-    /* p at the end of its type: nothing wraps, all stays below 2^60 */
-    const int32_t largest[3] = {INT32_MAX, INT32_MAX, INT32_MAX};
-    model->theta(largest, theta);
-    model->jacobian(largest, c);
-    for (size_t i = 0; i < PVID_KAPITZA_STRONG_THETA; i++) {
-        assert_true((theta[i] > 0) && (theta[i] < ((int64_t)1 << 60)));
+    pvid_kapitza_estimator_assess_q31(&self, &estimate);
+    const int32_t truth[3] = {2 << 25, 8 << 24, 4 << 24};
+    for (size_t a = 0; a < 3u; a++) {
+        const int32_t most = truth[a] / 30000; /* mantissas of 28 bits */
+        assert_in_range((uintmax_t)estimate.p[a], (uintmax_t)(truth[a] - most), (uintmax_t)(truth[a] + most));
+        assert_in_range((uintmax_t)estimate.se[a], 0, (uintmax_t)most);
     }
-    for (size_t k = 0; k < 18u; k++) {
-        assert_true((c[k] > 0) && (c[k] < ((int64_t)1 << 60)));
-    }
+    assert_int_equal(estimate.weight, 400);
+}
+
+static void wrong_formats_are_refused(void **state)
+{
+    (void)state;
+    pvid_kapitza_estimator_q31 self;
+    pvid_estimator_config_q31 config = of_estimator;
+    config.p_bits[0]++;
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &config, &near_two), PVID_BAD_FORMAT);
+    config = of_estimator;
+    config.p_bits[2] = 61;
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &config, &near_two), PVID_BAD_FORMAT);
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &of_estimator, NULL), PVID_BAD_POINTER);
+    pvid_strong_row_q31 rows = near_two;
+    rows.phi3 = 0;
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &of_estimator, &rows), PVID_BAD_SHIFT);
+    rows = near_two;
+    rows.phi_shift[4] = 32;
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &of_estimator, &rows), PVID_BAD_SHIFT);
+    rows = near_two;
+    rows.reference = PVID_KAPITZA_RATE_LIMIT_Q31 + 1;
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &of_estimator, &rows), PVID_BAD_SHIFT);
 }
 
 static pvid_strong_config_q31 settings(void)
@@ -151,20 +160,18 @@ static pvid_strong_config_q31 settings(void)
     const pvid_strong_config_q31 config = {
         .bank =
             {.half = 2, .stride = 1, .phi_max = 80000, .y_max = 6000, .centre = 12, .weights = pvid_five_points_q31},
-        .row = {.n_a = 21, .n_phi2 = {0, 21, 28, 28}, .n_phi0 = {0, 24, 28, 28, 27}, .part = 20, .y = 29},
-        .u_multiplier = 1563749871,
-        .u_shift = 16,
+        .row = {.phi_shift = {4, 0, 3, 6, 9}, .finer = {4, 7}, .phi3 = 1 << 30, .reference = 14030227},
+        .u_multiplier = {1563749871, 1563749871, 1563749871},
+        .u_shift = {20, 17, 14},
         .drive_ticks = 50,
         .estimator =
             {
-                .start = {45256288, 165558848, 190184304},
-                .start_sd = {22628144, 82779424, 95092152},
-                .lower = {2806045, 4194304, 5033165},
-                .upper = {1122418085, 1677721600, 2013265920},
-                .p_bits = {32, 24, 25},
-                .n_bits = {13, 0, 25, 19, 13, 0, 29, 22, 16, 10, 0},
-                .y_bits = 19,
-                .row_sd = 331350,
+                .start = {28060454, 83886080, 100663296},
+                .start_sd = {14030227, 41943040, 50331648},
+                .lower = {1403023, 4194304, 5033165},
+                .upper = {561209043, 1677721600, 2013265920},
+                .p_bits = {25, 24, 25},
+                .row_sd = 3134227,
                 .gain = 1 << 30,
                 .correlation = 131072u,
                 .row_weight = 65536u,
@@ -233,7 +240,7 @@ static void frozen_form_accepts_no_row(void **state)
     }
     const uint32_t rows = self.estimator.counters.rows;
     assert_true(rows > 0u);
-    const pvid_estimator_q31 before = self.estimator;
+    const pvid_kapitza_estimator_q31 before = self.estimator;
     pvid_strong_freeze_q31(&self, true);
     for (int32_t i = 50; i < 100; i++) {
         assert_int_equal(pvid_strong_step_q31(&self, (i * 37) % 900, i % 40), PVID_HELD_FROZEN);
@@ -267,10 +274,10 @@ static void a_restored_run_continues_bit_for_bit(void **state)
         assert_memory_equal(&restored, &self, sizeof self);
     }
     assert_int_equal(pvid_snapshot_save_strong_q31(&self, &config, 1, image, sizeof image - 1u), 0);
-    config.row.part++;
+    config.row.finer[0]++;
     assert_int_equal(pvid_snapshot_restore_strong_q31(&restored, &config, image, sizeof image),
                      PVID_SNAPSHOT_OTHER_CONFIG);
-    config.row.part--;
+    config.row.finer[0]--;
     image[100] ^= 4u;
     assert_int_equal(pvid_snapshot_restore_strong_q31(&restored, &config, image, sizeof image), PVID_SNAPSHOT_DAMAGED);
     assert_memory_equal(&restored, &self, sizeof self);
@@ -280,9 +287,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_row_is_the_formula),
-        cmocka_unit_test(shifts_round_half_up),
+        cmocka_unit_test(a_row_has_its_formats),
         cmocka_unit_test(a_row_that_does_not_fit_is_refused),
-        cmocka_unit_test(theta_and_its_jacobian_are_those_of_the_model),
+        cmocka_unit_test(rows_of_a_model_identify_it),
+        cmocka_unit_test(wrong_formats_are_refused),
         cmocka_unit_test(limits_of_a_run_are_reported),
         cmocka_unit_test(a_still_pivot_is_no_drive),
         cmocka_unit_test(frozen_form_accepts_no_row),

@@ -50,14 +50,14 @@ pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
 
 uint32_t identifier_hash(uint32_t hash, pvid_reason reason)
 {
-    return pvid_fnv_estimator_q31(hash, &identifier.estimator, reason);
+    return STREAM_HASH(hash, &identifier.estimator, reason);
 }
 
 void identifier_estimate(uint8_t payload[PVID_ESTIMATE_Q31_BYTES], uint32_t session, pvid_reason reason)
 {
     pvid_estimate_q31 estimate;
     memset(payload, 0, PVID_ESTIMATE_Q31_BYTES);
-    pvid_estimator_assess_q31(&identifier.estimator, &estimate);
+    STREAM_ASSESS(&identifier.estimator, &estimate);
     pvid_put_u32(&payload[PVID_ESTIMATE_Q31_SESSION], session);
     pvid_put_u32(&payload[PVID_ESTIMATE_Q31_UPDATES], identifier.estimator.counters.updates);
     size_t at = PVID_ESTIMATE_Q31_CORRELATION;

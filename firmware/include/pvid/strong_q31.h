@@ -34,17 +34,17 @@ extern "C" {
 #endif
 
 typedef struct {
-    pvid_fir_bank_q31 bank;  /* filters of both channels; the weights must outlive the identifier */
-    pvid_strong_row_q31 row; /* shifts, each 0..62 */
-    int32_t u_multiplier;    /* u = (derivative of y) u_multiplier 2^-u_shift; > 0 */
-    uint8_t u_shift;         /* 0..62 */
-    int32_t phi_offset;      /* reading of the encoder at the equilibrium [counts] */
-    int32_t y_offset;        /* reading of the pivot's sensor at mid-travel [counts] */
-    int32_t drive_min;    /* least rms of u over drive_ticks, 0..PVID_DERIVATIVE_LIMIT_Q31 in the format of u: with less
-                             drive no row is used. 0: every row is used */
-    uint32_t drive_ticks; /* ticks in about one second, 1..2^30 */
+    pvid_fir_bank_q31 bank;                  /* filters of both channels; the weights must outlive the identifier */
+    pvid_strong_row_q31 row;                 /* formats of a row: kapitza_strong_q31.h */
+    int32_t u_multiplier[PVID_Y_ORDERS_Q31]; /* u, u', u'' = (derivative of y) u_multiplier 2^-u_shift; > 0 */
+    uint8_t u_shift[PVID_Y_ORDERS_Q31];      /* each 0..62 */
+    int32_t phi_offset;                      /* reading of the encoder at the equilibrium [counts] */
+    int32_t y_offset;                        /* reading of the pivot's sensor at mid-travel [counts] */
+    int32_t drive_min; /* least rms of u over drive_ticks, 0..PVID_DERIVATIVE_LIMIT_Q31 in the format of u: with less
+                          drive no row is used. 0: every row is used */
+    uint32_t drive_ticks;      /* ticks in about one second, 1..2^30 */
     pvid_gate_config_q31 gate; /* outlier gate on the innovation of a row; its scale averages over drive_ticks / 4 */
-    pvid_estimator_config_q31 estimator; /* init sets model */
+    pvid_estimator_config_q31 estimator; /* see pvid_kapitza_estimator_init_q31 */
 } pvid_strong_config_q31;
 
 /* State: detail/strong_state_q31.h, not API. Only the functions below write to it. */

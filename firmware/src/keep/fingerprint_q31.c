@@ -44,22 +44,23 @@ static uint32_t bank_of(uint32_t hash, const pvid_fir_bank_q31 *bank)
 
 static uint32_t row_of(uint32_t hash, const pvid_strong_row_q31 *row)
 {
-    const uint8_t single[] = {row->n_a, row->n_e, row->part, row->y};
-    uint32_t running = pvid_fingerprint_bytes(hash, single, sizeof single);
-    running = pvid_fingerprint_bytes(running, row->n_phi2, sizeof row->n_phi2);
-    return pvid_fingerprint_bytes(running, row->n_phi0, sizeof row->n_phi0);
+    const uint32_t running = pvid_fingerprint_formats(hash, row->phi_shift, sizeof row->phi_shift);
+    const int32_t single[] = {row->phi3, row->reference};
+    return pvid_fingerprint_words(pvid_fingerprint_formats(running, row->finer, sizeof row->finer), single,
+                                  sizeof single / sizeof single[0]);
 }
 
 uint32_t pvid_fingerprint_strong_q31(const pvid_strong_config_q31 *config)
 {
-    const int32_t scalars[] = {config->u_multiplier, config->phi_offset, config->y_offset, config->drive_min};
+    const int32_t scalars[] = {config->phi_offset, config->y_offset, config->drive_min};
     uint32_t hash = pvid_fingerprint_words(PVID_FNV_START, scalars, sizeof scalars / sizeof scalars[0]);
+    hash = pvid_fingerprint_words(hash, config->u_multiplier, PVID_Y_ORDERS_Q31);
     hash = bank_of(hash, &config->bank);
     hash = row_of(hash, &config->row);
-    hash = pvid_fnv_word(hash, config->u_shift);
+    hash = pvid_fingerprint_bytes(hash, config->u_shift, sizeof config->u_shift);
     hash = pvid_fnv_word(hash, config->drive_ticks);
     hash = pvid_fingerprint_gate_q31(hash, &config->gate);
-    return pvid_fingerprint_estimator_q31(hash, &config->estimator, PVID_KAPITZA_STRONG_THETA, PVID_KAPITZA_P);
+    return pvid_fingerprint_estimator_q31(hash, &config->estimator, 0, PVID_KAPITZA_P);
 }
 
 uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)

@@ -18,21 +18,15 @@ static const uint32_t layout[] = {
     PLACE(misfit),
     PLACE(misfit.block),
     PLACE(estimator),
-    PLACE(estimator.information.sums),
+    PLACE(estimator.sums),
     PLACE(estimator.p),
     PLACE(estimator.fresh),
     PLACE(estimator.counters),
     PVID_MAX_WINDOW,
     PVID_MAX_P,
-    PVID_MAX_THETA_Q31,
-    PVID_MAX_MOMENTS_Q31,
-    PVID_MAX_C_Q31,
 };
 
-static const pvid_snapshot_pointer pointers[] = {
-    {PLACE(differentiator.bank.weights), PVID_SNAPSHOT_OF_INIT},
-    {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
-};
+static const pvid_snapshot_pointer pointers[] = {{PLACE(differentiator.bank.weights), PVID_SNAPSHOT_OF_INIT}};
 static const pvid_snapshot_shape shape = {sizeof(pvid_strong_q31), pointers, sizeof pointers / sizeof pointers[0]};
 
 static pvid_snapshot_identity identity_of(const pvid_strong_config_q31 *config)
@@ -49,7 +43,7 @@ static pvid_snapshot_identity identity_of(const pvid_strong_config_q31 *config)
 /* Whether init has accepted a configuration. */
 static bool is_ready(const pvid_strong_q31 *self, const pvid_strong_config_q31 *config, const uint8_t image[])
 {
-    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->estimator.model != NULL);
+    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && self->estimator.ready;
     PVID_ASSERT(ready);
     return ready;
 }

@@ -17,6 +17,19 @@ int64_t pvid_product_in_halves_q31(int32_t a, int32_t b)
     return (int64_t)both;
 }
 
+/* The sum of the two mixed products stays below 2^31. */
+int64_t pvid_short_product_in_halves_q31(int32_t a, int32_t b)
+{
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = pvid_floor_shift_32_q31(a, 16);
+    const int32_t b_high = pvid_floor_shift_32_q31(b, 16);
+    const int32_t mixed = (a_high * (int32_t)b_low) + ((int32_t)a_low * b_high);
+    const int32_t high = (a_high * b_high) + pvid_floor_shift_32_q31(mixed, 16);
+    const uint64_t upper = ((uint64_t)(uint32_t)high << 32) | (((uint32_t)mixed & 0xFFFFu) << 16); /* two registers */
+    return (int64_t)(upper + (a_low * b_low));
+}
+
 int64_t pvid_scale_q31(int64_t x, int32_t s)
 {
     if (s >= 0) {

@@ -29,14 +29,22 @@ static inline int64_t pvid_product_q31(int32_t a, int32_t b)
 #endif
 }
 
+/* a b where |a| and |b| are 2^30 at most, or |a| 2^28 and |b| 3 2^29: ten instructions less on such a core. */
+int64_t pvid_short_product_in_halves_q31(int32_t a, int32_t b);
+
+static inline int64_t pvid_short_product_q31(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_6M__)
+    return pvid_short_product_in_halves_q31(a, b);
+#else
+    return (int64_t)a * b;
+#endif
+}
+
 /* a a. */
 static inline int64_t pvid_square_q31(int32_t a)
 {
-#if defined(__ARM_ARCH_6M__)
-    return pvid_product_in_halves_q31(a, a);
-#else
-    return (int64_t)a * a;
-#endif
+    return pvid_product_q31(a, a);
 }
 
 /* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0; |x| < INT64_MAX. */

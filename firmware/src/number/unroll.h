@@ -6,8 +6,10 @@
  * operations inside. */
 #if defined(__GNUC__) && (__GNUC__ >= 8) && !defined(__clang__)
 #define PVID_UNROLL _Pragma("GCC unroll 16")
+#define PVID_UNROLL_BY_FOUR _Pragma("GCC unroll 4")
 #else
 #define PVID_UNROLL
+#define PVID_UNROLL_BY_FOUR
 #endif
 
 /* Instead of `static inline`, for a function that is called with constants for which it becomes short, but looks long
@@ -16,6 +18,14 @@
 #define PVID_ALWAYS_INLINE static inline __attribute__((always_inline))
 #else
 #define PVID_ALWAYS_INLINE static inline
+#endif
+
+/* Before a function whose results go through memory on purpose: inlined, gcc keeps 32-bit numbers as 64 and multiplies
+ * them so. */
+#if defined(__GNUC__)
+#define PVID_APART __attribute__((noinline))
+#else
+#define PVID_APART
 #endif
 
 /* Before a function that few ticks need: kept out of its caller, whose other ticks would pay for its registers. */

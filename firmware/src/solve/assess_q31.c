@@ -9,25 +9,25 @@ pvid_scaled_q31 pvid_assess_row_variance_q31(const pvid_solve_settings_q31 *sett
 }
 
 /* Degrees of freedom of the residuals, Q16. */
-static int64_t freedom_of(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings)
+static int64_t freedom_of(const pvid_residual_q31 *sums, const pvid_solve_settings_q31 *settings)
 {
-    return sums->sums[sums->n_sums - 1u] - ((int64_t)settings->n_p << 16);
+    return sums->weight - ((int64_t)settings->n_p << 16);
 }
 
 /* Residual sum over the degrees of freedom, of which there is one at least. */
-static pvid_scaled_q31 found_variance(const pvid_information_q31 *sums, int64_t freedom)
+static pvid_scaled_q31 found_variance(const pvid_residual_q31 *sums, int64_t freedom)
 {
-    const int64_t residual = sums->sums[sums->n_sums - 2u];
+    const int64_t residual = sums->residual;
     return pvid_scaled_over_q31(pvid_scaled_of_q31(residual, 0), pvid_scaled_of_q31(freedom, -16));
 }
 
 /* The variance by the sensors' noise, divided as the sums are. */
-static pvid_scaled_q31 explained_variance(const pvid_information_q31 *sums, pvid_scaled_q31 expected)
+static pvid_scaled_q31 explained_variance(const pvid_residual_q31 *sums, pvid_scaled_q31 expected)
 {
     return pvid_scaled_shifted_q31(expected, -2 * (int32_t)sums->exponent);
 }
 
-pvid_scaled_q31 pvid_assess_variance_q31(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings,
+pvid_scaled_q31 pvid_assess_variance_q31(const pvid_residual_q31 *sums, const pvid_solve_settings_q31 *settings,
                                          pvid_scaled_q31 expected)
 {
     const int64_t freedom = freedom_of(sums, settings);
@@ -40,7 +40,7 @@ pvid_scaled_q31 pvid_assess_variance_q31(const pvid_information_q31 *sums, const
 }
 
 /* Residual variance over its expectation, Q16; 0: unknown. */
-static int32_t misfit_of(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings,
+static int32_t misfit_of(const pvid_residual_q31 *sums, const pvid_solve_settings_q31 *settings,
                          pvid_scaled_q31 expected)
 {
     const int64_t freedom = freedom_of(sums, settings);
@@ -52,11 +52,11 @@ static int32_t misfit_of(const pvid_information_q31 *sums, const pvid_solve_sett
     return (int32_t)pvid_clamp_q31(pvid_scaled_fixed_q31(misfit, 16), INT32_MAX);
 }
 
-void pvid_assess_residual_q31(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings,
+void pvid_assess_residual_q31(const pvid_residual_q31 *sums, const pvid_solve_settings_q31 *settings,
                               pvid_scaled_q31 expected, pvid_scaled_q31 *variance, pvid_root_q31 *wide,
                               pvid_estimate_q31 *estimate)
 {
-    const int64_t weight = pvid_floor_shift_q31(sums->sums[sums->n_sums - 1u], 16);
+    const int64_t weight = pvid_floor_shift_q31(sums->weight, 16);
     estimate->weight = (weight > (int64_t)UINT32_MAX) ? UINT32_MAX : (uint32_t)weight;
     estimate->misfit = misfit_of(sums, settings, expected);
     *variance = pvid_assess_variance_q31(sums, settings, expected);

@@ -10,18 +10,32 @@
 #include "solve/cholesky_q31.h"
 #include "solve/system_q31.h"
 
+/* What the rows in the sums leave: sum of squares of the residuals, divided by 4^exponent, and the rows' weight, Q16.
+ */
+typedef struct {
+    int64_t residual;
+    int64_t weight;
+    uint8_t exponent;
+} pvid_residual_q31;
+
+static inline pvid_residual_q31 pvid_residual_of_q31(const pvid_information_q31 *sums)
+{
+    const pvid_residual_q31 residual = {sums->sums[sums->n_sums - 2u], sums->sums[sums->n_sums - 1u], sums->exponent};
+    return residual;
+}
+
 /* row_sd^2, divided by 4^exponent as the sums are. */
 pvid_scaled_q31 pvid_assess_row_variance_q31(const pvid_solve_settings_q31 *settings, int32_t exponent);
 
 /* s^2 of a row: residual sum of squares over degrees of freedom, at least `expected`; row_sd^2 if there is none.
  * Divided by 4^exponent as the sums are. expected: variance of a row by the sensors' noise [units of Y's integer
  * squared]; 0: unknown. Cost: a division of 64 bits. */
-pvid_scaled_q31 pvid_assess_variance_q31(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings,
+pvid_scaled_q31 pvid_assess_variance_q31(const pvid_residual_q31 *sums, const pvid_solve_settings_q31 *settings,
                                          pvid_scaled_q31 expected);
 
 /* Writes weight, misfit and residual_sd of the estimate, *variance = s^2, and *wide = root of correlation s^2. Cost:
  * two square roots, two divisions of 64 bits. */
-void pvid_assess_residual_q31(const pvid_information_q31 *sums, const pvid_solve_settings_q31 *settings,
+void pvid_assess_residual_q31(const pvid_residual_q31 *sums, const pvid_solve_settings_q31 *settings,
                               pvid_scaled_q31 expected, pvid_scaled_q31 *variance, pvid_root_q31 *wide,
                               pvid_estimate_q31 *estimate);
 

@@ -9,12 +9,11 @@
 #include "number/count.h"
 #include "solve/information_q31.h"
 #include "solve/scaled_model_q31.h"
+#include "solve/settings_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 
 #define FORMAT_MAX 64
-#define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
-#define DEAD_ZONE_MAX ((uint32_t)100 << 16)
 
 /* ---- configuration ---- */
 
@@ -57,23 +56,6 @@ static bool formats_are_valid(const pvid_estimator_config_q31 *config)
     return valid;
 }
 
-static pvid_status parameters_are_valid(const pvid_estimator_config_q31 *config)
-{
-    for (size_t i = 0; i < config->model->n_p; i++) {
-        if ((config->lower[i] >= config->upper[i]) || (config->lower[i] == INT32_MIN) ||
-            (pvid_is_positive_q31(config->model, i) && (config->lower[i] <= 0))) {
-            return PVID_BAD_BOUNDS;
-        }
-        if ((config->start[i] < config->lower[i]) || (config->start[i] > config->upper[i])) {
-            return PVID_BAD_START;
-        }
-        if (config->start_sd[i] <= 0) {
-            return PVID_BAD_START_SD;
-        }
-    }
-    return PVID_OK;
-}
-
 static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
 {
     if (!model_is_valid(config->model)) {
@@ -82,39 +64,7 @@ static pvid_status config_is_valid(const pvid_estimator_config_q31 *config)
     if (!formats_are_valid(config)) {
         return PVID_BAD_FORMAT;
     }
-    const pvid_status parameters = parameters_are_valid(config);
-    if (parameters != PVID_OK) {
-        return parameters;
-    }
-    if (config->row_sd <= 0) {
-        return PVID_BAD_ROW_SD;
-    }
-    if ((config->forgetting_groups != 0u) &&
-        ((config->forgetting_groups < 4u) || (config->forgetting_groups > ((uint32_t)1 << 24)))) {
-        return PVID_BAD_FORGETTING;
-    }
-    if ((config->gain < 0) || (config->gain > PVID_ONE_Q30)) {
-        return PVID_BAD_FEEDBACK;
-    }
-    if ((config->correlation < ((uint32_t)1 << 16)) || (config->correlation > ((uint32_t)1 << 31))) {
-        return PVID_BAD_CORRELATION;
-    }
-    if ((config->row_weight < 1u) || (config->row_weight > ((uint32_t)1 << 16))) {
-        return PVID_BAD_ROW_WEIGHT;
-    }
-    if ((config->step_limit < 1u) || (config->step_limit > 58982u)) {
-        return PVID_BAD_STEP_LIMIT;
-    }
-    if ((config->kappa_min < 0) || (config->kappa_min > (PVID_ONE_Q30 - (PVID_ONE_Q30 / 1000)))) {
-        return PVID_BAD_KAPPA_MIN;
-    }
-    if (config->noise_margin > NOISE_MARGIN_MAX) {
-        return PVID_BAD_NOISE_MARGIN;
-    }
-    if (config->dead_zone > DEAD_ZONE_MAX) {
-        return PVID_BAD_DEAD_ZONE;
-    }
-    return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
+    return pvid_settings_are_valid_q31(config, config->model->n_p, config->model->positive);
 }
 
 static void init_formats(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
@@ -145,28 +95,14 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
     memset(self, 0, sizeof *self);
     self->model = config->model;
     pvid_information_init_q31(&self->information, config->model, config->forgetting_groups, config->row_weight);
-    memcpy(self->settings.p_bits, config->p_bits, sizeof self->settings.p_bits);
     init_formats(self, config);
+    pvid_settings_init_q31(&self->settings, config, config->model->n_p, config->model->positive);
     for (size_t i = 0; i < config->model->n_p; i++) {
         self->p[i] = config->start[i];
-        self->settings.start_sd[i] = config->start_sd[i];
-        self->settings.lower[i] = config->lower[i];
-        self->settings.upper[i] = config->upper[i];
-        self->settings.prior_exponent[i] = (int16_t)pvid_square_ratio_q31(
-            config->row_sd, -PVID_ROW_SD_BITS, config->start_sd[i], &self->settings.prior[i]);
     }
     int64_t theta[PVID_MAX_THETA_Q31];
     pvid_estimator_theta_q31(self, self->p, theta);
     pvid_estimator_set_theta_q31(self, theta);
-    self->settings.row_sd = config->row_sd;
-    self->settings.gain = config->gain;
-    self->settings.correlation = config->correlation;
-    self->settings.step_limit = config->step_limit;
-    self->settings.kappa_min = config->kappa_min;
-    self->settings.noise_margin = config->noise_margin;
-    self->settings.dead_zone = config->dead_zone;
-    self->settings.n_p = config->model->n_p;
-    self->settings.positive = (uint8_t)(config->model->positive & 0xFFu);
     self->divider = config->divider;
     return PVID_OK;
 }

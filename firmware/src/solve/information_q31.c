@@ -25,6 +25,18 @@ static int32_t decay(uint32_t block, uint32_t groups)
     return (int32_t)((sum > KEEP) ? KEEP : sum);
 }
 
+int32_t pvid_information_retention_q31(uint32_t forgetting_groups, uint16_t *block)
+{
+    *block = BLOCK_MAX;
+    if (forgetting_groups == 0u) {
+        return KEEP;
+    }
+    if (forgetting_groups < (16u * BLOCK_MAX)) {
+        *block = (uint16_t)((forgetting_groups < 32u) ? 1u : (forgetting_groups / 16u));
+    }
+    return decay(*block, forgetting_groups);
+}
+
 void pvid_information_block_q31(const pvid_model_q31 *model, size_t i, pvid_block *block)
 {
     block->first = 0;
@@ -42,15 +54,8 @@ void pvid_information_init_q31(pvid_information_q31 *self, const pvid_model_q31 
     self->n_theta = model->n_theta;
     self->n_sums =
         (uint16_t)(pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end) + model->n_theta + 2u);
-    self->block = BLOCK_MAX;
-    self->retention = KEEP;
+    self->retention = pvid_information_retention_q31(forgetting_groups, &self->block);
     self->row_weight = row_weight;
-    if (forgetting_groups > 0u) {
-        if (forgetting_groups < (16u * BLOCK_MAX)) {
-            self->block = (uint16_t)((forgetting_groups < 32u) ? 1u : (forgetting_groups / 16u));
-        }
-        self->retention = decay(self->block, forgetting_groups);
-    }
 }
 
 void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *block, const int32_t n[], int32_t e,

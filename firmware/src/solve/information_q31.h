@@ -19,6 +19,10 @@ static inline size_t pvid_information_end_of_q31(const pvid_model_q31 *model, si
     return (model->n_kinds > 1u) ? model->kind_end[kind] : model->n_theta;
 }
 
+/* The factor on the past, Q31, after every *block groups of rows: a time constant of forgetting_groups, 0: 2^31 - 1,
+ * everything is kept. */
+int32_t pvid_information_retention_q31(uint32_t forgetting_groups, uint16_t *block);
+
 /* Empty sums; forgetting_groups as in pvid_estimator_config_q31. */
 void pvid_information_init_q31(pvid_information_q31 *self, const pvid_model_q31 *model, uint32_t forgetting_groups,
                                uint32_t row_weight);

@@ -171,7 +171,8 @@ static bool solve_in_dead_zone(const pvid_estimator_q31 *self, const pvid_estima
     if (self->settings.dead_zone == 0u) {
         return false;
     }
-    return pvid_step_is_in_dead_zone_q31(&self->information, &self->settings, self->expected,
+    const pvid_residual_q31 residual = pvid_residual_of_q31(&self->information);
+    return pvid_step_is_in_dead_zone_q31(&residual, &self->settings, self->expected,
                                          newton_decrement_square(self, solve));
 }
 
@@ -455,6 +456,13 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
     return finish_stage(solve, next, all);
 }
 
+static void residual_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_estimate_q31 *estimate)
+{
+    const pvid_residual_q31 residual = pvid_residual_of_q31(&self->information);
+    pvid_assess_residual_q31(&residual, &self->settings, self->expected, &solve->variance, &solve->inverse.wide,
+                             estimate);
+}
+
 static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
 {
     if (part == 0u) {
@@ -489,8 +497,7 @@ bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_esti
     size_t all = n_p;
     switch (solve->stage) {
     case STAGE_RESIDUAL:
-        pvid_assess_residual_q31(&self->information, &self->settings, self->expected, &solve->variance,
-                                 &solve->inverse.wide, estimate);
+        residual_stage(self, solve, estimate);
         all = 1;
         break;
     case STAGE_KAPPA:

@@ -31,9 +31,8 @@ static inline bool pvid_step_is_excited_q31(const pvid_system_q31 *system, const
 
 /* Whether p is within the dead zone of estimator.h: decrement = F^T (S + H0)^-1 F <= dead_zone^2 correlation s^2, in
  * the unit of the sums. expected: as in pvid_assess_variance_q31. */
-static inline bool pvid_step_is_in_dead_zone_q31(const pvid_information_q31 *sums,
-                                                 const pvid_solve_settings_q31 *settings, pvid_scaled_q31 expected,
-                                                 pvid_scaled_q31 decrement)
+static inline bool pvid_step_is_in_dead_zone_q31(const pvid_residual_q31 *sums, const pvid_solve_settings_q31 *settings,
+                                                 pvid_scaled_q31 expected, pvid_scaled_q31 decrement)
 {
     const pvid_scaled_q31 found = pvid_assess_variance_q31(sums, settings, expected);
     const pvid_scaled_q31 configured = pvid_assess_row_variance_q31(settings, sums->exponent);

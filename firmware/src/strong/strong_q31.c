@@ -7,8 +7,6 @@
 #include "number/init.h"
 #include "number/count.h"
 #include "solve/assess_q31.h"
-#include "solve/row_q31.h"
-#include "solve/state_q31.h"
 #include "number/integer_q31.h"
 #include "judge/misfit_q31.h"
 #include "number/scaled_q31.h"
@@ -22,44 +20,45 @@
 #define GATE_FLOOR_BITS 20 /* 1e-6 of its square */
 
 /* The gate's least scale: a part of row_sd^2, at least the rounding of a row's dozen terms. */
-static pvid_scaled_q31 gate_floor(const pvid_estimator_q31 *estimator)
+static pvid_scaled_q31 gate_floor(const pvid_kapitza_estimator_q31 *estimator)
 {
     const pvid_scaled_q31 rounding = pvid_scaled_of_q31(1, 0);
     return pvid_scaled_plus_q31(
-        pvid_scaled_shifted_q31(pvid_assess_row_variance_q31(&estimator->settings, estimator->information.exponent),
-                                -GATE_FLOOR_BITS),
-        rounding);
+        pvid_scaled_shifted_q31(pvid_assess_row_variance_q31(&estimator->settings, 0), -GATE_FLOOR_BITS), rounding);
 }
 
-static bool shifts_are_valid(const uint8_t shift[], size_t n)
+static bool shifts_are_valid(const uint8_t shift[PVID_Y_ORDERS_Q31])
 {
     bool valid = true;
-    for (size_t i = 0; i < n; i++) {
-        valid = valid && (shift[i] <= SHIFT_MAX);
+    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
+        valid = valid && (shift[k] <= SHIFT_MAX);
     }
     return valid;
 }
 
-static bool row_is_valid(const pvid_strong_row_q31 *row)
+static bool multipliers_are_valid(const int32_t multiplier[PVID_Y_ORDERS_Q31])
 {
-    return (row->n_a <= SHIFT_MAX) && (row->n_e <= SHIFT_MAX) && (row->part <= SHIFT_MAX) && (row->y <= SHIFT_MAX) &&
-           shifts_are_valid(row->n_phi2, 4) && shifts_are_valid(row->n_phi0, 5);
+    bool valid = true;
+    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
+        valid = valid && (multiplier[k] > 0);
+    }
+    return valid;
 }
 
 /* Whether init has accepted a configuration. */
 static inline bool is_ready(const pvid_strong_q31 *self)
 {
-    const bool ready = (self != NULL) && (self->estimator.model != NULL);
+    const bool ready = (self != NULL) && self->estimator.ready;
     PVID_ASSERT(ready);
     return ready;
 }
 
 static pvid_status prepare(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
 {
-    if (!row_is_valid(&config->row) || (config->u_shift > SHIFT_MAX)) {
+    if (!shifts_are_valid(config->u_shift)) {
         return PVID_BAD_SHIFT;
     }
-    if (config->u_multiplier <= 0) {
+    if (!multipliers_are_valid(config->u_multiplier)) {
         return PVID_BAD_U_MULTIPLIER;
     }
     if ((config->drive_min < 0) || (config->drive_min > PVID_DERIVATIVE_LIMIT_Q31)) {
@@ -74,15 +73,13 @@ static pvid_status prepare(pvid_strong_q31 *self, const pvid_strong_config_q31 *
         return status;
     }
     self->row = config->row;
-    self->u_multiplier = config->u_multiplier;
-    self->u_shift = config->u_shift;
+    memcpy(self->u_multiplier, config->u_multiplier, sizeof self->u_multiplier);
+    memcpy(self->u_shift, config->u_shift, sizeof self->u_shift);
     self->phi_offset = config->phi_offset;
     self->y_offset = config->y_offset;
     self->drive_min = (int64_t)config->drive_min * config->drive_min;
     self->drive_forgetting = (int32_t)(INT32_MAX / config->drive_ticks);
-    pvid_estimator_config_q31 estimator = config->estimator;
-    estimator.model = &pvid_kapitza_strong_q31;
-    status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    status = pvid_kapitza_estimator_init_q31(&self->estimator, &config->estimator, &config->row);
     if (status != PVID_OK) {
         return status;
     }
@@ -131,8 +128,9 @@ static pvid_reason refuse(pvid_strong_q31 *self)
 static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int32_t u[])
 {
     for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
-        const int64_t exact = pvid_round_shift_q31(pvid_product_q31(d_y[k], self->u_multiplier), self->u_shift);
-        if (!is_within(exact, PVID_DERIVATIVE_LIMIT_Q31)) {
+        const int64_t exact = pvid_round_shift_q31(pvid_product_q31(d_y[k], self->u_multiplier[k]), self->u_shift[k]);
+        const int64_t limit = (k == 0u) ? PVID_KAPITZA_RATE_LIMIT_Q31 : PVID_DERIVATIVE_LIMIT_Q31;
+        if ((exact > limit) || (exact < -limit)) {
             return false;
         }
         u[k] = (int32_t)exact;
@@ -146,28 +144,25 @@ static bool passes(pvid_strong_q31 *self, int64_t square)
     return (self->gate.limit.m == 0) || pvid_gate_passes_q31(&self->gate, pvid_scaled_of_q31(square, 0));
 }
 
-static const pvid_block whole = {0, PVID_KAPITZA_STRONG_THETA, 0}; /* of M: rows of one kind */
-
 /* Judges a row, adds it if the gate accepts it, and solves. */
-static pvid_reason take_row(pvid_strong_q31 *self, const int32_t n[PVID_KAPITZA_STRONG_THETA], int32_t y)
+static pvid_reason take_row(pvid_strong_q31 *self, const int32_t row[PVID_KAPITZA_ROW_Q31])
 {
-    pvid_estimator_q31 *estimator = &self->estimator;
-    int64_t term[PVID_KAPITZA_STRONG_THETA];
-    int64_t e;
-    if (!pvid_estimator_terms_q31(estimator, &whole, n, y, term, &e)) {
+    pvid_kapitza_estimator_q31 *estimator = &self->estimator;
+    int32_t gradient[PVID_KAPITZA_P];
+    int32_t e;
+    if (!pvid_kapitza_estimator_innovate_q31(estimator, row, &e, gradient)) {
         return refuse(self);
     }
-    const int32_t innovation = (int32_t)e;
-    const int64_t square = pvid_square_q31(innovation);
-    if (pvid_misfit_add_q31(&self->misfit, square, pvid_kapitza_strong_sensitivity_q31(term))) {
+    const int64_t square = pvid_square_q31(e);
+    const int64_t sensitivity = pvid_product_q31(gradient[PVID_KAPITZA_W], estimator->p[PVID_KAPITZA_W]);
+    if (pvid_misfit_add_q31(&self->misfit, square, pvid_round_shift_q31(sensitivity, PVID_KAPITZA_W_BITS))) {
         self->alarm = pvid_misfit_judge_q31(&self->misfit);
     }
     if (!passes(self, square)) {
         pvid_count_up(&estimator->counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    pvid_estimator_add_row_q31(estimator, &whole, n, innovation, square);
-    const pvid_reason reason = pvid_estimator_update_q31(estimator);
+    const pvid_reason reason = pvid_kapitza_estimator_take_q31(estimator, row, e, gradient);
     if ((reason != PVID_UPDATED) || !self->alarm) {
         return reason;
     }
@@ -204,10 +199,9 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
-    int32_t n[PVID_KAPITZA_STRONG_THETA];
-    int32_t row_y;
-    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, &row_y, n)) {
+    int32_t row[PVID_KAPITZA_ROW_Q31];
+    if (!pvid_kapitza_strong_row_q31(&self->row, d_phi, u, row)) {
         return refuse(self);
     }
-    return take_row(self, n, row_y);
+    return take_row(self, row);
 }

@@ -86,11 +86,6 @@ class Case(ABC):
         """Form and core as a frame numbers them."""
         return frames.Form[self.form.upper()], frames.Core[self.core.upper()]
 
-    @property
-    def hash_function(self) -> str:
-        """The function in C that continues the running hash over the estimator."""
-        return f"pvid_fnv_{'strong' if (self.form, self.core) == ('strong', 'f32') else 'estimator'}_{self.core}"
-
     # ---- settings
 
     @abstractmethod
@@ -144,6 +139,18 @@ class Case(ABC):
         period = config.hop * config.design.decimation
         settled = 3 * period + config.design.taps
         return int(ticks - max((ticks - settled) // period, 1) * period)
+
+    @property
+    def hash_function(self) -> str:
+        """The function in C that continues the running hash over the estimator: the strong forms have their own."""
+        own = {"f32": "strong", "q31": f"{DEFAULT}_estimator"}[self.core] if self.form == "strong" else "estimator"
+        return f"pvid_fnv_{own}_{self.core}"
+
+    @property
+    def assess_function(self) -> str:
+        """The function in C that assesses the estimator."""
+        own = f"{DEFAULT}_estimator" if (self.form, self.core) == ("strong", "q31") else "estimator"
+        return f"pvid_{own}_assess_{self.core}"
 
     # ---- samples
 

@@ -8,8 +8,8 @@
 struct pvid_strong_q31 {
     pvid_differentiator_q31 differentiator;
     pvid_strong_row_q31 row;
-    int32_t u_multiplier;
-    uint8_t u_shift;
+    int32_t u_multiplier[PVID_Y_ORDERS_Q31];
+    uint8_t u_shift[PVID_Y_ORDERS_Q31];
     int32_t phi_offset;
     int32_t y_offset;
     int64_t drive;            /* mean square of u over about drive_ticks */
@@ -19,7 +19,7 @@ struct pvid_strong_q31 {
     bool alarm; /* the last block of rows was a misfit: see misfit.h */
     pvid_gate_q31 gate;
     pvid_misfit_q31 misfit;
-    pvid_estimator_q31 estimator;
+    pvid_kapitza_estimator_q31 estimator;
 };
 
 #endif

@@ -150,7 +150,7 @@ def header(run: ReplayRun, samples: Path | None = None) -> str:
             f"#define REPLAY_TYPE pvid_{run.form}_{run.core}",
             f"#define REPLAY_INIT pvid_{run.form}_init_{run.core}",
             f"#define REPLAY_STEP(self, sample) pvid_{run.form}_step_{run.core}(self, (sample)[0], (sample)[1])",
-            f"#define REPLAY_HASH {case_of(run.config).hash_function}",
+            f"#define REPLAY_HASH {case.hash_function}",
             f"#define REPLAY_SAMPLE {'float' if _is_float(run) else 'int32_t'}",
             "#define REPLAY_COUNT int16_t",
             "#define REPLAY_CHANNELS 2u",

@@ -41,6 +41,8 @@ def _macros(rig: StreamRig) -> list[str]:
         f"#define STREAM_CONFIG pvid_{form}_config_{core}",
         f"#define STREAM_INIT pvid_{form}_init_{core}",
         f"#define STREAM_STEP pvid_{form}_step_{core}",
+        f"#define STREAM_HASH {rig.case.hash_function}",
+        f"#define STREAM_ASSESS {rig.case.assess_function}",
         f"#define STREAM_N_P {rig.n_p}u",
         f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(rig.sample_rate))}",
         f"#define STREAM_PHI_LSB {float_literal(np.float32(rig.phi_lsb))}",

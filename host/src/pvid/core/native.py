@@ -19,7 +19,7 @@ from pvid.settings.forms import FORMS
 from pvid.settings.kinds import Settings
 from pvid.settings.q31 import EstimatorConfigQ31, ScaleQ31
 from pvid.settings.record import Record
-from pvid.settings.tables import FirBankQ31, RowShiftsQ31
+from pvid.settings.tables import FirBankQ31, RowFormatQ31
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
@@ -43,7 +43,6 @@ _ARITHMETIC: dict[Core, _Arithmetic] = {
 _MODELS_Q31 = {
     (4, 8): f"pvid_{DEFAULT}_weak_q31",
     (3, 5): f"pvid_{DEFAULT}_weak_zeroed_q31",
-    (3, 11): f"pvid_{DEFAULT}_strong_q31",
 }
 
 
@@ -106,17 +105,21 @@ class Native:
         self.library.pvid_replay_strong_rows_f32(len(phi32), *map(self.headers.pointer, (phi32, u32, n, y)))
         return n, y
 
+    def strong_estimator_q31(self, config: EstimatorConfigQ31, row_format: RowFormatQ31) -> StrongEstimatorQ31:
+        """An initialised fixed-point estimator of the strong form, for rows of this format."""
+        return StrongEstimatorQ31(self, config, row_format)
+
     def strong_rows_q31(
-        self, shifts: RowShiftsQ31, phi: npt.ArrayLike, u: npt.ArrayLike
-    ) -> tuple[Int32, Int32, npt.NDArray[np.bool_]]:
-        """Likewise in fixed point, and whether each row fits."""
-        filled = self.headers.filled("pvid_strong_row_q31", shifts)
+        self, row_format: RowFormatQ31, phi: npt.ArrayLike, u: npt.ArrayLike
+    ) -> tuple[Int32, npt.NDArray[np.bool_]]:
+        """Rows [ticks, 13] of the fixed-point strong form, and whether each fits."""
+        filled = self.headers.filled("pvid_strong_row_q31", row_format)
         given = [np.ascontiguousarray(x, np.int32) for x in (phi, u)]
         ticks = len(given[0])
-        out = np.zeros((ticks, 11), np.int32), np.zeros(ticks, np.int32), np.zeros(ticks, np.uint8)
+        out = np.zeros((ticks, 13), np.int32), np.zeros(ticks, np.uint8)
         pointers = map(self.headers.pointer, (*given, *out))
         self.library.pvid_replay_strong_rows_q31(self.headers.ffi.addressof(filled.struct), ticks, *pointers)
-        return out[0], out[1], out[2].astype(np.bool_)
+        return out[0], out[1].astype(np.bool_)
 
     def derivatives_q31(
         self, bank: FirBankQ31, phi: npt.ArrayLike, y: npt.ArrayLike
@@ -169,13 +172,15 @@ class Stepper:
         Fields of the C configuration that the settings do not have.
     """
 
+    _configured: str | None = None  # pvid_<..>_config_<core> is the configuration's type; None: <name>
+
     def __init__(self, native: Native, name: str, core: Core, config: Any, *, replay: str, **given: Any) -> None:
         ffi = native.headers.ffi
         self.native = native
         self.core = core
         self._name = name
         self._replay = replay
-        self._filled = self._filled_with(native, f"pvid_{name}_config_{core}", config)
+        self._filled = self._filled_with(native, f"pvid_{self._configured or name}_config_{core}", config)
         for field, value in given.items():
             setattr(self.config_struct, field, value)
         self._hash = np.array([0x811C9DC5], np.uint32)
@@ -198,7 +203,7 @@ class Stepper:
         """Number of parameters and of sums."""
         estimator = self.estimator
         if not hasattr(estimator, "model"):  # the strong form's own
-            return len(estimator.p), len(estimator.sums.low)
+            return len(estimator.p), len(estimator.sums if self.core == "q31" else estimator.sums.low)
         sums = estimator.information
         n_sums = sums.n_sums if self.core == "q31" else sums.n_moments + sums.n_theta + 2
         return int(estimator.model.n_p), int(n_sums)
@@ -305,8 +310,12 @@ class Stepper:
         headers = self.native.headers
         out = np.empty((), self._estimate_type)
         own = not hasattr(self.estimator, "model")
-        assess = getattr(self.native.library, f"pvid_{'strong' if own else 'estimator'}_assess_{self.core}")
-        assess(self.state if own else headers.ffi.addressof(self.estimator), headers.pointer(out))
+        if own and self.core == "f32":
+            self.native.library.pvid_strong_assess_f32(self.state, headers.pointer(out))
+            return out
+        owner = f"{DEFAULT}_estimator" if own else "estimator"
+        assess = getattr(self.native.library, f"pvid_{owner}_assess_{self.core}")
+        assess(headers.ffi.addressof(self.estimator), headers.pointer(out))
         return out
 
 
@@ -317,6 +326,28 @@ class StrongStepper(Stepper):
     def estimator(self) -> Any:
         """pvid_strong_estimator_f32 in it."""
         return self.state.estimator
+
+
+class StrongEstimatorQ31(Stepper):
+    """The fixed-point estimator of the strong form; its input are rows."""
+
+    _configured = "estimator"
+
+    def __init__(self, native: Native, config: EstimatorConfigQ31, row_format: RowFormatQ31) -> None:
+        self._row_format = native.headers.filled("pvid_strong_row_q31", row_format)
+        super().__init__(native, f"{DEFAULT}_estimator", "q31", config, replay=f"{DEFAULT}_rows")
+
+    def initialise(self) -> Status:
+        """Runs init on the present configuration."""
+        formats = self.native.headers.ffi.addressof(self._row_format.struct)
+        return Status(self._call("init", self.config_pointer, formats))
+
+    def run_rows(
+        self, rows: npt.ArrayLike, *, sums: bool = True, hashes: bool = True, estimate_every: int = 0
+    ) -> Record:
+        """Steps through rows [ticks, 13]."""
+        own = np.ascontiguousarray(rows, np.int32)
+        return self._recorded(len(own), [own], sums, hashes, estimate_every)
 
 
 class Publisher(Stepper):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from pvid.settings.enums import Core, Form
-from pvid.settings.tables import FirBankQ31, RowShiftsQ31, StrongDesignQ31, WeakTablesQ31
+from pvid.settings.tables import FirBankQ31, RowFormatQ31, StrongDesignQ31, WeakTablesQ31
 
 
 @dataclass(frozen=True)
@@ -118,17 +118,17 @@ class StrongConfigQ31:
         return self.design.bank
 
     @property
-    def row(self) -> RowShiftsQ31:
+    def row(self) -> RowFormatQ31:
         """The design's."""
         return self.design.row
 
     @property
-    def u_multiplier(self) -> int:
+    def u_multiplier(self) -> tuple[int, ...]:
         """The design's."""
         return self.design.u_multiplier
 
     @property
-    def u_shift(self) -> int:
+    def u_shift(self) -> tuple[int, ...]:
         """The design's."""
         return self.design.u_shift
 

@@ -94,16 +94,25 @@ class FirBankQ31(Folded):
     margins: dict[str, float]
 
 
-@dataclass(frozen=True)
-class RowShiftsQ31:
-    """pvid_strong_row_q31."""
+RATE_BITS = 24  # after the point of u, u', u'' and w_r in fixed point; w has one more
 
-    n_a: int
-    n_e: int
-    n_phi2: tuple[int, ...]
-    n_phi0: tuple[int, ...]
-    part: int
-    y: int
+
+@dataclass(frozen=True)
+class RowFormatQ31:
+    """pvid_strong_row_q31.
+
+    Attributes
+    ----------
+    phi_shift : left shifts of the derivatives 0..4 of phi to their units; negative: right
+    finer : bits that -G^k phi'' and -G^k phi have more than the other entries
+    phi3 : factor on phi''', Q30
+    reference : w_r, in 2^-24 / T^2
+    """
+
+    phi_shift: tuple[int, ...]
+    finer: tuple[int, int]
+    phi3: int
+    reference: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,22 +122,21 @@ class StrongDesignQ31:
     Attributes
     ----------
     bank : the integer bank of both channels
-    row : shifts of a row
-    u_multiplier, u_shift : from the derivatives of y to u, u', u''
-    u_bits : format of u [1/tau^2]
-    n_bits, y_bits : formats of N_1..N_11 and Y in units of angle_unit, 1/tau^2 and so on
-    angle_unit : one unit of phi [rad]
-    dt : the time unit tau [s]
+    row : formats of a row
+    u_multiplier, u_shift : from the derivatives of y to u, u', u'' in 2^-24 per T
+    angle_unit : one unit of the derivatives of phi [rad]
+    tau : time unit of the derivatives of phi [s]
+    row_angle : one unit of N_1, N_2 and Y [rad]
+    dt : time unit T of a row [s]
     """
 
     bank: FirBankQ31
-    row: RowShiftsQ31
-    u_multiplier: int
-    u_shift: int
-    u_bits: int
-    n_bits: tuple[int, ...]
-    y_bits: int
+    row: RowFormatQ31
+    u_multiplier: tuple[int, ...]
+    u_shift: tuple[int, ...]
     angle_unit: float
+    tau: float
+    row_angle: float
     dt: float
 
     @property
@@ -143,8 +151,8 @@ class StrongDesignQ31:
 
     def integers(self, phi: Float, u: Float) -> tuple[Int64, Int64]:
         """What the core takes for derivatives that are known otherwise: phi [n, 5] and u, u', u'' [n, 3], in SI."""
-        own_phi = np.rint(phi * self.dt ** np.arange(5) / self.angle_unit)
-        own_u = np.rint(u * self.dt ** np.arange(2, 5) * 2.0**self.u_bits)
+        own_phi = np.rint(phi * self.tau ** np.arange(5) / self.angle_unit)
+        own_u = np.rint(u * self.dt ** np.arange(2, 5) * 2.0**RATE_BITS)
         return own_phi.astype(np.int64), own_u.astype(np.int64)
 
 

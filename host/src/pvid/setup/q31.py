@@ -24,7 +24,7 @@ from pvid.settings.q31 import (
     TrustConfigQ31,
     WeakConfigQ31,
 )
-from pvid.settings.tables import StrongDesignQ31, WeakTablesQ31
+from pvid.settings.tables import RATE_BITS, StrongDesignQ31, WeakTablesQ31
 from pvid.setup.f32 import bank_of, nominal_start, strong_config, weak_config, weak_design_of
 from pvid.setup.ranges_q31 import Beyond, beyond_ranges, middle_of_travel, reach, with_default_ranges, with_ranges_of
 
@@ -82,6 +82,8 @@ def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
         sensor.y_range,
         sensor.acceleration_range,
         fastest,
+        w,
+        float(strong_config(rig, sample_rate).estimator.upper[0]),
     )
 
 
@@ -135,6 +137,7 @@ def _estimator_q31(
     n_bits: tuple[int, ...],
     y_bits: int,
     row_unit: float,
+    w_bits: int | None = None,
     **own: int,
 ) -> EstimatorConfigQ31:
     """Settings of the estimator in integers.
@@ -151,6 +154,8 @@ def _estimator_q31(
         Formats of a row.
     row_unit
         What Y is counted in, in SI.
+    w_bits
+        Format of p[0]; by default the one that its bounds fill.
     own
         Settings that the forms see differently.
     """
@@ -160,6 +165,7 @@ def _estimator_q31(
         for x in (nominal.lower, nominal.upper, settings.start, settings.start_sd)
     )
     bits = [format_of(x) for x in np.maximum(np.abs(lower), upper)]
+    bits[0] = bits[0] if w_bits is None else w_bits
 
     def integers(x: Float) -> tuple[int, ...]:
         return tuple(int(np.rint(v * 2.0**b)) for v, b in zip(x, bits, strict=True))
@@ -267,9 +273,10 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
         e,
         strong_config(rig, sample_rate).estimator,
         design.p_units,
-        design.n_bits,
-        design.y_bits,
-        design.angle_unit / design.dt**8,
+        (0,),
+        0,
+        design.row_angle / design.dt**8,
+        w_bits=RATE_BITS + 1,
         forgetting_groups=forgetting_groups_q31(e.forgetting_s, sample_rate),
         gain=0 if e.law is Law.PSEUDOVELOCITY else round(min(gain, 1.0) * 2**30),
         correlation=round(e.correlation * 2**16),
@@ -279,7 +286,7 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
         estimator=estimator,
         drive_ticks=min(max(round(sample_rate), 1), 2**30),
         gate=gate_config_q31(config.gate, sample_rate),
-        drive_min=min(round(config.drive_min * design.dt**2 * 2.0**design.u_bits), 2**30),
+        drive_min=min(round(config.drive_min * design.dt**2 * 2.0**RATE_BITS), 2**29),
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -11,16 +12,16 @@ from pvid.base.errors import PvidError
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31, StrongConfigQ31
 from pvid.twin.kapitza import strong_q31 as model
+from pvid.twin.kapitza.estimator_q31 import W_BITS, KapitzaEstimatorQ31
 from pvid.twin.q31.differentiator import derivatives
-from pvid.twin.q31.estimator import EstimatorQ31
 from pvid.twin.q31.gate import GateQ31
-from pvid.twin.q31.integer import Int, clamp, integers, times_q31
+from pvid.twin.q31.integer import Int, clamp, integers, round_shift, times_q31
 from pvid.twin.q31.misfit import MisfitQ31
 from pvid.twin.q31.scaled import scaled
-from pvid.twin.record import After, Mask, Reasons, Twin
-from pvid.twin.rows import follow_rows
+from pvid.twin.record import After, Mask, Reasons, Recorder, Twin, TwinRecord
 
 DERIVATIVE_LIMIT = 2**30
+RATE_LIMIT = 2**29
 
 
 class StrongTwinQ31(Twin):
@@ -28,23 +29,23 @@ class StrongTwinQ31(Twin):
 
     def __init__(self, config: StrongConfigQ31, estimators: Sequence[EstimatorConfigQ31] | None = None) -> None:
         self.config = config
-        self.estimator = EstimatorQ31(estimators or [config.estimator], model.STRONG)
+        self.estimator = KapitzaEstimatorQ31(estimators or [config.estimator], config.row)
         floor = self.estimator.expected_variance.shifted(-20).plus(scaled(1, 0))
         self.gate = GateQ31(config.gate, config.drive_ticks // 4, floor)
         forgetting = [one.forgetting_groups for one in estimators or [config.estimator]]
         self.misfit = MisfitQ31(config.drive_ticks, forgetting)
 
-    def rows(self, phi: Int, y: Int) -> tuple[Int, Int, Reasons]:
-        """N [ticks, 11], Y [ticks] and the reason of each tick: ACCUMULATED if it has a row."""
+    def rows(self, phi: Int, y: Int) -> tuple[Int, Reasons]:
+        """Rows [ticks, 13] and the reason of each tick: ACCUMULATED if it has a row."""
         config, design = self.config, self.config.design
         phi = phi - config.phi_offset
         y = y - config.y_offset
         within = (np.abs(phi) <= design.bank.phi_max) & (np.abs(y) <= design.bank.y_max)
         d_phi, d_y, ready = derivatives(phi, y, within, design.bank)
         u = model.accelerations(d_y, design.u_multiplier, design.u_shift)
-        usable = ready & (np.abs(u) <= DERIVATIVE_LIMIT).all(axis=1)
+        usable = ready & (np.abs(u) <= (RATE_LIMIT, DERIVATIVE_LIMIT, DERIVATIVE_LIMIT)).all(axis=1)
         u[~usable] = 0
-        n, row_y, fits = model.rows(design.row, d_phi, u)
+        rows, fits = model.rows(design.row, d_phi, u)
         driven = self._driven(u[:, 0], usable)
         row_reason = np.full(len(phi), Reason.ACCUMULATED, np.uint8)
         row_reason[~fits] = Reason.REJECTED_SATURATED
@@ -54,7 +55,7 @@ class StrongTwinQ31(Twin):
         row_reason[~usable] = Reason.REJECTED_SATURATED
         row_reason[~ready] = Reason.WARMING_UP
         row_reason[~within] = Reason.REJECTED_SATURATED
-        return n, row_y, row_reason
+        return rows, row_reason
 
     def _driven(self, u: Int, usable: Mask) -> Mask:
         """Whether the mean square of u over about a second reaches its threshold [ticks]."""
@@ -72,38 +73,65 @@ class StrongTwinQ31(Twin):
         """Ticks from a sample until the identifier has processed it completely."""
         return self.config.design.bank.window
 
-    def step(self, n: Int, y: Int) -> Reasons:
+    def step(self, row: Int) -> Reasons:
         """A row of all lanes."""
-        return step(self.estimator, n, y, self.gate, self.misfit)
+        return step(self.estimator, row, self.gate, self.misfit)
 
     def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
         """See Twin."""
         return follow_rows(self.estimator, self.step, *self.rows(integers(phi), integers(y)), after)
 
 
-def step(
-    estimator: EstimatorQ31, n: Int, y: Int, gate: GateQ31 | None = None, misfit: MisfitQ31 | None = None
+def follow_rows(
+    estimator: KapitzaEstimatorQ31,
+    taking: Callable[[Int], Reasons],
+    rows: Int,
+    row_reason: Reasons | None,
+    after: After,
 ) -> Reasons:
-    """Adds a row and solves if a solve is due; the gate must accept the same rows in all lanes."""
-    terms, e, fits = estimator.terms(n, y)
-    held = np.where(fits, e, 0)
-    if misfit is not None and fits.all():
-        misfit.take(held * held, model.sensitivity(terms))
+    """Steps an estimator through rows [ticks, 13] that all lanes share; calls `after` after every tick.
+
+    row_reason: outcome of a tick before it reached the estimator [ticks]: ACCUMULATED where it has a row, as all by
+    default. Returns the reason of every tick [ticks, lanes].
+    """
+    reason = np.empty((len(rows), estimator.lanes), np.uint8)
+    for tick in range(len(rows)):
+        if row_reason is None or row_reason[tick] == Reason.ACCUMULATED:
+            reason[tick] = taking(rows[tick])
+        else:
+            reason[tick] = row_reason[tick]
+            if row_reason[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
+                estimator.counters[Reason(row_reason[tick]).name.lower()] += 1
+        after(tick, reason[tick])
+    return reason
+
+
+def run_rows(estimator: KapitzaEstimatorQ31, rows: Int) -> TwinRecord:
+    """Steps an estimator through rows [ticks, 13] without gate and verdict."""
+    recorder = Recorder(estimator, len(rows))
+    return recorder.finished(follow_rows(estimator, partial(step, estimator), rows, None, recorder))
+
+
+def step(
+    estimator: KapitzaEstimatorQ31, row: Int, gate: GateQ31 | None = None, misfit: MisfitQ31 | None = None
+) -> Reasons:
+    """Adds a row and solves if a solve is due; all lanes must accept the same rows."""
+    e, gradient, fits = estimator.innovation(row)
+    if not fits.all():
+        if fits.any():
+            raise PvidError("lanes of one twin must take the same rows in: step those that do not apart")
+        estimator.counters["rejected_saturated"] += 1
+        return np.full(estimator.lanes, Reason.REJECTED_SATURATED, np.uint8)
+    if misfit is not None:
+        misfit.take(e * e, round_shift(gradient[0] * estimator.p[0], W_BITS))
     if gate is not None and gate.is_on:
-        passes = gate.passes(scaled(held * held, 0), fits)
+        passes = gate.passes(scaled(e * e, 0), fits)
         if passes.any() != passes.all():
             raise PvidError("lanes of one twin must accept the same rows: their estimates differ too much")
         if not passes.all():
             estimator.counters["rejected_outlier"] += 1
             return np.full(estimator.lanes, Reason.REJECTED_OUTLIER, np.uint8)
-    reason = estimator.take_row(n, e, fits)
-    taken = reason == Reason.ACCUMULATED
-    if not taken.any():
-        return reason
-    if not taken.all():
-        raise PvidError("lanes of one twin must take the same rows in: step those that do not apart")
-    for reported in estimator.solve(ends_group=True):
-        reason = reason if reported is None else reported
+    reason = estimator.take(row, e, gradient)
     if misfit is None:
         return reason
     doubted = misfit.alarm & (reason == Reason.UPDATED)

@@ -1,8 +1,14 @@
-/* pvid/kapitza_strong_q31.h - the strong form of Kapitza's pendulum in integers (theory.md 2).
+/* pvid/kapitza_strong_q31.h - the strong form of Kapitza's pendulum in integers (theory.md 2): its rows, and its
+ * estimator of w, d1, d2.
  *
- * A row consists of derivatives in one time unit: all orders of phi in one format, u, u', u'' in another, so that
- * products with equal total order have equal formats. Each entry of the row is shifted to its own format, which
- * the design tool chooses from its expected size; a row with an entry that does not fit is refused, never clamped.
+ * Time is counted in a unit T in which the rates u + w are about 1, w from a reference w_r: with G = u + w_r in place
+ * of u the row is the one of theory.md 2 and w - w_r takes the place of w. Rates have 24 bits after the point, all
+ * other entries of a row one unit, that of an angle. An entry that does not fit refuses the row; nothing is clamped.
+ *
+ * The estimator keeps 57 repeated moments as exact 64-bit sums. A solve shifts them from G to the present u + w in 28
+ * bits and a common power of two for each family of columns, and factors S = L D L^T with one division of 32 bits a
+ * pivot. Law, reasons and settings are those of estimator_q31.h. For every row no sum wraps, no division is by 0, and p
+ * stays within its bounds. Not thread-safe.
  */
 #ifndef PVID_KAPITZA_STRONG_Q31_H
 #define PVID_KAPITZA_STRONG_Q31_H
@@ -11,48 +17,76 @@
 #include <stdint.h>
 
 #include "pvid/differentiator_q31.h"
+#include "pvid/estimator_q31.h"
 #include "pvid/kapitza_parameters.h"
-#include "pvid/model_q31.h"
 
 #if !defined(PVID_PLAIN_NAMES) /* see sized.h */
-#define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
+#define pvid_kapitza_estimator_init_q31 PVID_SIZED(pvid_kapitza_estimator_init_q31)
+#define pvid_kapitza_estimator_innovate_q31 PVID_SIZED(pvid_kapitza_estimator_innovate_q31)
+#define pvid_kapitza_estimator_take_q31 PVID_SIZED(pvid_kapitza_estimator_take_q31)
+#define pvid_kapitza_estimator_assess_q31 PVID_SIZED(pvid_kapitza_estimator_assess_q31)
+#define pvid_fnv_kapitza_estimator_q31 PVID_SIZED(pvid_fnv_kapitza_estimator_q31)
 #endif
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Right shifts, 0..62, rounding half up, that bring a row to its formats. With phi in units of 2^-f and u in units
- * of 2^-g:
- *
- *   N_2 has -n_e + f bits after the point, N_1 f + g - n_a,
- *   N_6 has f - n_phi2[0], N_5 .. N_3 each g - n_phi2[k] more than the one before, N_11 .. N_7 likewise with n_phi0,
- *   Y has f + 2 g - part - y. */
+/* Entries of a row: those of theory.md 2, N_1 .. N_11 with G in place of u, then Y and G. N_1, N_2 and Y have one unit,
+ * -G^k phi'' and -G^k phi have finer ones. */
+#define PVID_KAPITZA_ROW_Q31 13
+enum { PVID_KAPITZA_ROW_Y = 11, PVID_KAPITZA_ROW_G = 12 };
+
+#define PVID_KAPITZA_RATE_BITS 24                        /* after the point of u, u', u'', w_r and G */
+#define PVID_KAPITZA_RATE_LIMIT_Q31 ((int32_t)1 << 29)   /* of |u| and w_r: 32 / T^2 */
+#define PVID_KAPITZA_W_BITS (PVID_KAPITZA_RATE_BITS + 1) /* of w */
+
 typedef struct {
-    uint8_t n_a;       /* of N_1 */
-    uint8_t n_e;       /* of N_2 = -phi'''' */
-    uint8_t n_phi2[4]; /* of -phi'', -u phi'', -u^2 phi'', -u^3 phi'': N_6 .. N_3 */
-    uint8_t n_phi0[5]; /* of -phi .. -u^4 phi: N_11 .. N_7 */
-    uint8_t part;      /* of the two parts of Y */
-    uint8_t y;
+    int8_t phi_shift[PVID_ORDERS]; /* left shift of each derivative to its unit, -31..31; negative: right. Order 0: that
+                                      of -G^k phi, 2 to 4: that of N_1, N_2 and Y */
+    int8_t finer[2];               /* bits that -G^k phi'' and -G^k phi have more than N_1, -31..31 */
+    int32_t phi3;                  /* factor on phi''', Q30, 2^30 or 2^30.5: T^2 is a power of two */
+    int32_t reference;             /* w_r, 0..PVID_KAPITZA_RATE_LIMIT_Q31 */
 } pvid_strong_row_q31;
 
-/* One row from phi[k] = d^k phi/dt^k and u = y_A''/l1, u', u'', all within +-PVID_DERIVATIVE_LIMIT_Q31. Writes Y
- * and N[11] in the order of pvid_kapitza_strong_row_f32, with the binomial coefficients in theta. Fails (returns
- * false, Y and N undefined) iff an entry or a part of Y exceeds +-PVID_ROW_LIMIT_Q31. Cost: 13 products of 32 by
- * 32 bits. */
-bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *shifts, const int32_t phi[PVID_ORDERS],
-                                 const int32_t u[PVID_Y_ORDERS_Q31], int32_t *y, int32_t n[PVID_KAPITZA_STRONG_THETA]);
+/* One row from phi[k] = d^k phi/dt^k within +-PVID_DERIVATIVE_LIMIT_Q31 and u = y_A''/l1 within
+ * +-PVID_KAPITZA_RATE_LIMIT_Q31, u', u'' within twice that. Fails (returns false, row undefined) iff an entry or a part
+ * of Y exceeds +-PVID_ROW_LIMIT_Q31. Cost: 13 products of 32 by 32 bits. */
+bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS],
+                                 const int32_t u[PVID_Y_ORDERS_Q31], int32_t row[PVID_KAPITZA_ROW_Q31]);
 
-/* Sensitivity of N^T theta: w times its gradient in w, from term[i] = N_i theta_i; each term counts with the power
- * of w in theta_i. */
-int64_t pvid_kapitza_strong_sensitivity_q31(const int64_t term[PVID_KAPITZA_STRONG_THETA]);
+/* State: detail/kapitza_strong_state_q31.h, not API. Only the functions below write to it. */
+typedef struct pvid_kapitza_estimator_q31 pvid_kapitza_estimator_q31;
 
-/* The strong form as a model: 11 entries of theta, p = (w, d1, d2). */
-extern const pvid_model_q31 pvid_kapitza_strong_q31;
+/* Initialises `self`; of the configuration model, n_bits, y_bits, row_weight and noise_margin are not read, and row_sd
+ * is in 2^-8 of Y's unit. rows: their formats. Fails iff
+ *   - a pointer is NULL (PVID_BAD_POINTER), or
+ *   - a field of config or rows is out of its range (the status names it; PVID_BAD_FORMAT: p_bits[0] is not
+ *     PVID_KAPITZA_W_BITS, or another with the bits of `finer` is not 0..60). */
+pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self, const pvid_estimator_config_q31 *config,
+                                            const pvid_strong_row_q31 *rows);
+
+/* *e = Y - N^T theta at the present p and gradient[a] = d(N^T theta)/dp_a. Returns whether the row can be taken: e and
+ * what it is made of fit. */
+bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
+                                         const int32_t row[PVID_KAPITZA_ROW_Q31], int32_t *e,
+                                         int32_t gradient[PVID_KAPITZA_P]);
+
+/* Adds such a row and, every `divider` rows, solves and moves p. Returns PVID_UPDATED, PVID_ACCUMULATED (no solve due),
+ * PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT. */
+pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, const int32_t row[PVID_KAPITZA_ROW_Q31],
+                                            int32_t e, const int32_t gradient[PVID_KAPITZA_P]);
+
+/* Standard errors, kappa and residual of the present p, as pvid_estimator_assess_f32. Changes nothing. */
+void pvid_kapitza_estimator_assess_q31(const pvid_kapitza_estimator_q31 *self, pvid_estimate_q31 *estimate);
+
+/* Continues `hash` with p, the sums, their exponent and the reason: as pvid_fnv_estimator_q31. */
+uint32_t pvid_fnv_kapitza_estimator_q31(uint32_t hash, const pvid_kapitza_estimator_q31 *estimator, pvid_reason reason);
 
 #ifdef __cplusplus
 }
 #endif
+
+#include "pvid/detail/kapitza_strong_state_q31.h"
 
 #endif

@@ -63,6 +63,66 @@ def decay(groups: int, block: int) -> int:
     return total
 
 
+def forgetting(groups: int) -> tuple[int, int]:
+    """Groups of rows between two forgettings, and the factor on the past then, Q31."""
+    if groups == 0:
+        return 64, 2**31 - 1
+    block = 1 if groups < 32 else min(groups // 16, 64)
+    return block, min(decay(groups, block), 2**31 - 1)
+
+
+def square_ratio(sd: Int, exponent: Int, start_sd: Int) -> tuple[Int, Int]:
+    """(sd 2^exponent / start_sd)^2 = prior 2^-prior_exponent, prior of 31 bits."""
+    ratio = (sd << 31) // start_sd
+    up = 31 - bit_length(ratio)
+    mantissa = np.minimum(scale(ratio, -up), 1 << 31)
+    prior = np.minimum(round_shift(mantissa * mantissa, 31), 2**31 - 1)
+    return prior, 2 * ((31 + up) - exponent) - 31
+
+
+def in_units_of_s(prior: Int, prior_exponent: Int, f: Int) -> Int:
+    """prior 2^-prior_exponent in the unit of s, whose exponent is f."""
+    return np.minimum(scale(prior, prior_exponent + 2 * f + 32), WIDE // 2)
+
+
+def equilibrated_system(s: Int) -> tuple[Int, Int]:
+    """(S in Q30, g): s_ab = S_ab 2^(g_a + g_b)."""
+    g = cholesky.half_exponent(np.stack([s[a, a] for a in range(len(s))]))
+    return clamp(scale(s, g[:, None] + g[None]), ONE), g
+
+
+def assess_errors(out: npt.NDArray[np.void], s: Int, f: Int, start_sd: Int, root: Int, root_e: Int) -> None:
+    """kappa, least pivot, standard errors and correlations of estimates [lanes].
+
+    From the upper triangle of S [n_p, n_p, lanes] in units of 2^(f_a + f_b + 32), to which it adds the start's
+    information; root 2^root_e is the root of a row's variance times the correlation [lanes].
+    """
+    n_p = len(s)
+    alone = cholesky.factor(equilibrated_system(s)[0])
+    out["kappa"] = alone.first_pivot
+    out["least_pivot"] = alone.least_pivot
+    prior, prior_exponent = square_ratio(root, root_e, start_sd)
+    for a in range(n_p):
+        s[a, a] = s[a, a] + in_units_of_s(prior[a], prior_exponent[a], f[a])
+    q, g = equilibrated_system(s)
+    factor = cholesky.factor(q)
+    units = [np.zeros((n_p, len(root)), np.int64) for _ in range(n_p)]
+    for a in range(n_p):
+        units[a][a] = 1 << UNIT_BITS
+    columns = [cholesky.lower_solve(factor, unit) for unit in units]
+    roots = [root_of(np.maximum(np.sum(column * column, axis=0), 1), integers(0)) for column in columns]
+    for a, (r, e) in enumerate(roots):
+        se = clamp(scale(root * r, f[a] + g[a] - (root_e + e) + 31 + UNIT_BITS), 2**31 - 1)
+        out["se"][:, a] = np.where(factor.ok, se, start_sd[a])
+        out["correlation"][:, a, a] = ONE
+        for b in range(a):
+            r_b, e_b = roots[b]
+            x = scale(np.sum(columns[a] * columns[b], axis=0), e + e_b)
+            part = np.sign(x) * np.minimum(((np.abs(x) // r) << 30) // r_b, ONE)
+            out["correlation"][:, a, b] = np.where(factor.ok, part, 0)
+            out["correlation"][:, b, a] = out["correlation"][:, a, b]
+
+
 class EstimatorQ31:
     """pvid_estimator_q31 in every lane; all lanes share model, formats, divider and whether the law is a rate.
 
@@ -119,7 +179,7 @@ class EstimatorQ31:
         self.gain = lane("gain")
         self.is_rate = first.gain < ONE  # a law that does not iterate
         self.divider = first.divider
-        self.block, self.retention = integers([self._forgetting(c.forgetting_groups) for c in configs]).T
+        self.block, self.retention = integers([forgetting(c.forgetting_groups) for c in configs]).T
         self._p_bits = integers(first.p_bits)[:, None]
         theta_bits, c_bits = self._formats(first.p_bits)
         # e = Y - sum N_i theta_i 2^-align_i;  C in units of e per N_i per p_a is c_k 2^c_exponent_k
@@ -137,7 +197,7 @@ class EstimatorQ31:
         self.fresh = np.zeros((model.n_theta, lanes), np.int64)
         self.counters = {name: np.zeros(lanes, np.int64) for name in COUNTERS}
         self.was_due = True
-        self.prior, self.prior_exponent = self._square_ratio(self.row_sd, integers(-8))
+        self.prior, self.prior_exponent = square_ratio(self.row_sd, integers(-8), self.start_sd)
 
     def _numbers(self, p: Int) -> Scaled:
         """p in its unit."""
@@ -164,25 +224,6 @@ class EstimatorQ31:
             raise PvidError("lanes of one twin must share the formats of theta: their starts differ too much")
         bits = clamp(_THETA_BITS - lengths[:, 0], 500)
         return [int(one) for one in bits], [0] * len(model.c_row)
-
-    def _square_ratio(self, sd: Int, exponent: Int) -> tuple[Int, Int]:
-        """(sd 2^exponent / start_sd)^2 = prior 2^-prior_exponent, prior of 31 bits."""
-        ratio = (sd << 31) // self.start_sd
-        up = 31 - bit_length(ratio)
-        mantissa = np.minimum(scale(ratio, -up), 1 << 31)
-        prior = np.minimum(round_shift(mantissa * mantissa, 31), 2**31 - 1)
-        return prior, 2 * ((31 + up) - exponent) - 31
-
-    @staticmethod
-    def _in_units_of_s(prior: Int, prior_exponent: Int, f: Int) -> Int:
-        return np.minimum(scale(prior, prior_exponent + 2 * f + 32), WIDE // 2)
-
-    @staticmethod
-    def _forgetting(groups: int) -> tuple[int, int]:
-        if groups == 0:
-            return 64, 2**31 - 1
-        block = 1 if groups < 32 else min(groups // 16, 64)
-        return block, min(decay(groups, block), 2**31 - 1)
 
     @property
     def lanes(self) -> int:
@@ -396,12 +437,6 @@ class EstimatorQ31:
                 s[a, b] = (c[there] * t[rows[there]]).sum(axis=0)
         return s
 
-    def _equilibrated_system(self, s: Int) -> tuple[Int, Int]:
-        """(S in Q30, g): s_ab = S_ab 2^(g_a + g_b)."""
-        n_p = self.model.n_p
-        g = cholesky.half_exponent(np.stack([s[a, a] for a in range(n_p)]))
-        return clamp(scale(s, g[:, None] + g[None]), ONE), g
-
     def _above_noise(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
         """Whether S minus noise_margin times the information of noise of this variance is positive definite."""
         model = self.model
@@ -422,7 +457,7 @@ class EstimatorQ31:
             t = [round_shift(noise[i] * rows[0, a] + noise[i + 1] * rows[1, a], 32) for i in range(2)]
             for b in range(a, model.n_p):
                 rest[a, b] = rest[a, b] - (rows[0, b] * t[0] + rows[1, b] * t[1])
-        return np.asarray((self.noise_margin == 0) | cholesky.factor(self._equilibrated_system(rest)[0]).ok)
+        return np.asarray((self.noise_margin == 0) | cholesky.factor(equilibrated_system(rest)[0]).ok)
 
     def _commit(self, fallback: tuple[Mask, Int] | None) -> Reasons:
         model = self.model
@@ -430,10 +465,10 @@ class EstimatorQ31:
         c, f = self._jacobian(h)
         s = self._project(c, m)
         above_noise = self._above_noise(s, c, h, self.expected_variance)
-        prior = self._in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
+        prior = in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
         for a in range(model.n_p):
             s[a, a] = s[a, a] + prior[a]
-        q, g = self._equilibrated_system(s)
+        q, g = equilibrated_system(s)
         factor = cholesky.factor(q)
         own = round_shift(factor.first_pivot * q[0, 0], 31) >= scale(prior[0], 2 * g[0])
         excited = (factor.first_pivot >= self.kappa_min) & (own | (self.kappa_min == 0))
@@ -575,32 +610,9 @@ class EstimatorQ31:
         variance = self._row_variance()
         residual, residual_e = root_of(*variance)
         out["residual_sd"] = clamp(scale(residual, -(residual_e + self.exponent + 8)), 2**31 - 1)
-        root, root_e = root_of(*variance.times(scaled(self.correlation, -16)))
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
         above_noise = self._above_noise(s, c, h, variance)
-        alone = cholesky.factor(self._equilibrated_system(s)[0])
-        out["kappa"] = alone.first_pivot
-        out["least_pivot"] = alone.least_pivot
-        prior, prior_exponent = self._square_ratio(root, root_e)
-        for a in range(n_p):
-            s[a, a] = s[a, a] + self._in_units_of_s(prior[a], prior_exponent[a], f[a])
-        q, g = self._equilibrated_system(s)
-        factor = cholesky.factor(q)
-        units = [np.zeros((n_p, self.lanes), np.int64) for _ in range(n_p)]
-        for a in range(n_p):
-            units[a][a] = 1 << UNIT_BITS
-        columns = [cholesky.lower_solve(factor, unit) for unit in units]
-        roots = [root_of(np.maximum(np.sum(column * column, axis=0), 1), integers(0)) for column in columns]
-        for a, (r, e) in enumerate(roots):
-            se = clamp(scale(root * r, f[a] + g[a] - (root_e + e) + 31 + UNIT_BITS), 2**31 - 1)
-            out["se"][:, a] = np.where(factor.ok, se, self.start_sd[a])
-            out["correlation"][:, a, a] = ONE
-            for b in range(a):
-                r_b, e_b = roots[b]
-                x = scale(np.sum(columns[a] * columns[b], axis=0), e + e_b)
-                part = np.sign(x) * np.minimum(((np.abs(x) // r) << 30) // r_b, ONE)
-                out["correlation"][:, a, b] = np.where(factor.ok, part, 0)
-                out["correlation"][:, b, a] = out["correlation"][:, a, b]
+        assess_errors(out, s, f, self.start_sd, *root_of(*variance.times(scaled(self.correlation, -16))))
         return out, above_noise
