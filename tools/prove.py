@@ -262,6 +262,7 @@ PROOFS = (
             *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c"),
         ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
+        taken=("pvid_square_root_q31",),
     ),
     Proof(
         "fingerprint_q31",
@@ -402,19 +403,28 @@ def unexplained(proof: Proof, said: str) -> list[str]:
 
 
 def engine_design(folder: Path) -> None:
-    """Writes engine_design_q31.h: the generated functions and tables of the pendulum that tests/twin plays, and the
-    reach of its jets."""
-    sys.path.insert(0, str(ROOT / "tests" / "twin"))
-    from fourier_q31 import rig
+    """Writes engine_design_q31.h: functions and tables of the pendulum's shipped rig, the reach of its jets."""
+    from pvid.codegen import files_fourier_q31
+    from pvid.models.mechanisms import compiled_of
+    from pvid.run.engine_design_q31 import engine_for_simulated_rig
 
-    from pvid.codegen.files_fourier_q31 import source
-
-    one = rig("kapitza", 3000)
-    text = source(one.fixed, one.parameters, one.design, "engine")
+    engine = engine_for_simulated_rig(compiled_of("kapitza"))
+    name, made_by = engine.name, "tools/prove.py"
+    text = files_fourier_q31.source(engine.made, engine.parameters, made_by)
     reach = re.search(r"limits\[\d+\] = (\{[^}]*\})", text)
     assert reach is not None, "the generated function refuses no input"
-    lines = [text, f"static const int32_t engine_reach[] = {reach[1]};", ""]
-    (folder / "engine_design_q31.h").write_text("\n".join(lines), encoding="utf-8")
+    sizes = {"PVID_MAX_P": 3}  # those of the proofs are the defaults
+    own = [
+        f"#define engine_design_q31 {name}_design_q31",
+        f"static const int32_t engine_reach[] = {reach[1]};",
+    ]
+    files = {
+        f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, made_by),
+        f"{name}_design_q31.h": files_fourier_q31.design_header(engine.config, name, sizes, made_by, []),
+        "engine_design_q31.h": "\n".join([text, f'#include "{name}_design_q31.h"', *own, ""]),
+    }
+    for file, content in files.items():
+        (folder / file).write_text(content, encoding="utf-8")
 
 
 def program_of(proof: Proof) -> Path:

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "pvid/fourier_q31.h"
+#include "pvid/snapshot_fourier_q31.h"
 #include "replay_q31.h"
 
 /* Steps an initialised identifier through readings[ticks][samples]. */

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bench.refine import Case, bound_of, row_of, run_case
 
+from bench.refine import Case, bound_of, row_of, run_case
 from pvid.core.native import Native
 
 

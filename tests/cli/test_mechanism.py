@@ -50,6 +50,19 @@ def test_a_simulated_run_is_identified_with_the_rig_file_beside_it(motor: Path, 
         assert abs(one["value"] - truth) < 4 * one["se"] or shown["warning"], name
 
 
+def test_a_run_is_refined_and_shown_beside_its_simulation(motor: Path, tmp_path: Path) -> None:
+    figure = tmp_path / "refined.svg"
+    answer = pvid("identify", motor, "--refine", "--figure", figure)
+    assert answer.return_value == DONE and "refined over" in answer.stdout and figure.stat().st_size > 10_000
+    shown = json.loads(pvid("identify", motor, "--refine", "--json").stdout)
+    assert "refined over" in shown["refinement"]["text"] and shown["refinement"]["slow_chi2"] < 2
+    for name, truth in TRUTH.items():
+        one = shown["parameters"][name]
+        assert abs(one["value"] - truth) < 4 * one["se"], name
+    with pytest.raises(PvidError, match="--refine is in float64"):
+        pvid("identify", motor, "--refine", "--core", "f32")
+
+
 def test_a_run_of_the_pendulum_is_identified_without_loading_sympy() -> None:
     """It takes a third of a second, for nothing there."""
     loaded = "import sys, pvid.cli.identify, pvid.cli.tune; print('sympy' in sys.modules)"

@@ -99,13 +99,14 @@ def wrapped(made: RefineFunctions) -> str:
 
 
 class InC:
-    """The header on this computer."""
+    """The header on this computer: the printed one, or that which the core is shipped with."""
 
-    def __init__(self, made: RefineFunctions, folder: Path) -> None:
+    def __init__(self, made: RefineFunctions, folder: Path, shipped: bool = False) -> None:
         self.made = made
-        (folder / "pvid").mkdir()
-        (folder / "pvid" / "refine_shape.h").write_text(files_refine.shape(made, "test"), encoding="utf-8")
-        (folder / "refine_model_f32.h").write_text(files_refine.header(made, "test"), encoding="utf-8")
+        if not shipped:
+            (folder / "pvid").mkdir()
+            (folder / "pvid" / "refine_shape.h").write_text(files_refine.shape(made, "test"), encoding="utf-8")
+            (folder / "refine_model_f32.h").write_text(files_refine.header(made, "test"), encoding="utf-8")
         (folder / "each.c").write_text(wrapped(made), encoding="utf-8")
         library = folder / "each.so"
         flags = (
@@ -182,7 +183,8 @@ def test_c_and_twin_have_the_same_bits(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", mechanisms.names())
 def test_the_motion_solves_the_equations_of_the_description(name: str) -> None:
     """With values of float64 in the equations themselves, which the printer took apart."""
-    made, model = functions(name), compiled_of(name)
+    made = functions(name)
+    model = made.model
     given = {key: value.astype(np.float64) for key, value in given_of(name).items()}
     (given["m"],) = evaluated(made, "constants", given)
     (a,), (z,) = evaluated(made, "motion", given), evaluated(made, "output", given)
@@ -321,6 +323,33 @@ def test_the_pendulums_are_as_lean_as_those_by_hand() -> None:
         one for one in made.functions["jacobian"].program.values if isinstance(one, Operation) and one.kind == "/"
     ]
     assert len(divisions) == 1
+
+
+def test_the_shipped_header_has_the_values_of_the_printed_one_to_rounding(tmp_path: Path) -> None:
+    """The pendulum's equations by hand; both read and write the same arrays, but for the constants."""
+    made = functions("kapitza")
+    (tmp_path / "by_hand").mkdir()
+    by_hand, twin, given = (
+        InC(made, tmp_path / "by_hand", shipped=True),
+        refine_twin.loaded(made),
+        dict(given_of("kapitza")),
+    )
+    (given["m"],) = twin.constants(given["r"])
+    own = {**given, "m": by_hand("constants", given)["m"]}
+    given["row"] = own["row"] = (
+        np.random.default_rng(1).normal(size=(made.moving - made.skew, VECTORS)).astype(np.float32)
+    )
+    for name in ("motion", "jacobian", "output", "chart"):
+        function = made.functions[name]
+        want = getattr(twin, name)(*(given[key] for key, _ in function.given))
+        got = by_hand(name, own)
+        for (key, _), one in zip(function.written, want, strict=True):
+            for row, wanted in zip(got[key], one, strict=False):
+                np.testing.assert_allclose(row, wanted, rtol=0, atol=2e-5 * np.abs(one).max(), err_msg=f"{name} {key}")
+    r = np.ascontiguousarray(given["r"].T)
+    found = np.zeros(VECTORS, bool)
+    by_hand.library.each_region(VECTORS, *(x.ctypes.data_as(ctypes.c_void_p) for x in (r, found)))
+    assert (found == twin.region(given["r"])).all()
 
 
 def test_a_sign_without_a_width_is_refused_by_name() -> None:

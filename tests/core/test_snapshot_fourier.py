@@ -65,9 +65,9 @@ def test_a_pointer_into_the_object_points_into_the_restored_one() -> None:
     seen = 0
     for tick in still:
         one.run(tick[np.newaxis])
-        if one.state.finish.solve.fallback != one.ffi.NULL:
+        if one.state.finish.work.solve.fallback != one.ffi.NULL:
             assert other.restore(one.save()) is SnapshotStatus.RESTORED
-            assert other.state.finish.solve.fallback == one.ffi.addressof(other.state.trust.estimate, "p")[0]
+            assert other.state.finish.work.solve.fallback == one.ffi.addressof(other.state.trust.estimate, "p")[0]
             seen += 1
     assert seen > 0
 
@@ -76,11 +76,11 @@ def test_every_byte_is_saved_and_restored_but_those_of_pointers() -> None:
     rig = engine_rig("kapitza")
     one, other, _ = engines(rig, rig.config)
     ffi, size = one.ffi, one.ffi.sizeof("void *")
-    solve = [ffi.offsetof(one.type, "finish", "solve", name) for name in ("fallback", "noise", "estimate")]
+    solve = [ffi.offsetof(one.type, "finish", "work", "solve", name) for name in ("fallback", "noise", "estimate")]
     for place in assert_every_byte_is_kept(one, other):
         assert any(first <= place < first + size for first in solve), place
-    assert other.state.finish.solve.fallback == ffi.addressof(other.state.trust.estimate, "p")[0]
-    assert other.state.finish.solve.estimate == ffi.addressof(other.state.finish, "candidate")
+    assert other.state.finish.work.solve.fallback == ffi.addressof(other.state.trust.estimate, "p")[0]
+    assert other.state.finish.work.solve.estimate == ffi.addressof(other.state.finish, "candidate")
 
 
 @pytest.mark.parametrize("core", ["f32", "q31"])

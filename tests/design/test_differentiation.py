@@ -71,7 +71,10 @@ BANKS = [
 ]
 
 
-@pytest.mark.parametrize("bank", BANKS, ids=lambda b: f"{b.kind}-{b.window}-{b.degree}-{b.stride}")
+BLOCKS = [savitzky_golay(35, 10, 9, 9), savitzky_golay(31, 12, 5, 7)]
+
+
+@pytest.mark.parametrize("bank", [*BANKS, *BLOCKS], ids=lambda b: f"{b.kind}-{b.window}-{b.degree}-{b.stride}")
 def test_exact_on_polynomials_up_to_the_degree(bank: FirBank) -> None:
     # Time runs over -1..1 in one window, so every monomial is of size 1.
     rate = float(bank.delay)
@@ -91,6 +94,26 @@ def test_a_constant_and_a_line_are_exact_in_bits(bank: FirBank) -> None:
     assert derivatives.shape == (ORDERS, 4)
     assert np.all(derivatives[0] == 0.1)
     assert np.all(derivatives[1:] == 0.0)
+
+
+def kernel_of(bank: FirBank, order: int) -> npt.NDArray[np.float64]:
+    """The whole filter of an order on the samples of a window, per sample^order."""
+    unit = np.eye(bank.window)
+    taps = np.array([bank.apply(one, 1.0)[order, 0] for one in unit])
+    assert taps.shape == (bank.window,)
+    return taps
+
+
+@pytest.mark.parametrize("order", [0, 2, 3, 4])
+def test_blocks_add_at_most_a_seventh_to_the_noise(order: int) -> None:
+    """35 points of 9 samples against all 315 samples, degree 12: 2 % in the value, 14 % in the fourth derivative."""
+    noise = [np.linalg.norm(kernel_of(bank, order)) for bank in (savitzky_golay(35, 12, 9, 9), savitzky_golay(315, 12))]
+    assert 1.0 < noise[0] / noise[1] < 1.15
+
+
+def test_a_block_is_odd() -> None:
+    with pytest.raises(PvidError, match="must be odd, not 8 samples"):
+        savitzky_golay(35, 10, 9, 8)
 
 
 def test_finite_differences_converge_at_their_order() -> None:

@@ -2,6 +2,8 @@
  * functions keep. */
 #include "prove.h"
 
+#include "contracts.h"
+
 #include "pvid/kapitza_weak_q31.h"
 #include "pvid/trust_q31.h"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from collections.abc import Sequence
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -297,13 +296,13 @@ _OPTIONS = (
 
 
 class Core:
-    """The C of the engine with `more` sources, compiled once; signed overflow ends the program."""
+    """The C of the engine, compiled once; signed overflow ends the program."""
 
-    def __init__(self, folder: Path, more: Sequence[Path] = ()) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
         (folder / "driver.c").write_text(_DRIVER, encoding="utf-8")
         rooms = ("fourier", "number", "solve", "judge")
-        core = [str(one) for one in (*(own for own in sources_of("q31") if own.parent.name in rooms), *more)]
+        core = [str(one) for one in sources_of("q31") if one.parent.name in rooms]
         self._run([*_OPTIONS, "-c", *core, str(folder / "driver.c")])
         self.libraries: dict[str, ctypes.CDLL] = {}
 

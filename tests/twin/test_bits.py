@@ -11,6 +11,7 @@ import pytest
 from lanes import assert_lanes_equal
 
 from pvid.core.native import Native
+from pvid.design.fir import savitzky_golay
 from pvid.rig.file import Differentiator, RigFile
 from pvid.run.compare import compare_run, first_difference
 from pvid.settings.enums import Law, Reason
@@ -94,6 +95,19 @@ def test_every_schedule_equals_the_twin(
     lane = replace(config.estimator, **estimator)
     (compared,) = assert_lanes_equal([native], config, run.phi[:900], run.y[:900], [lane])
     assert compared.counters["updates"] + compared.counters["at_rest"] > 0
+
+
+@pytest.mark.parametrize(("points", "stride", "block"), [(35, 9, 9), (31, 5, 7), (13, 3, 1)])
+def test_a_window_of_blocks_equals_the_twin(
+    points: int, stride: int, block: int, native: Native, standard_20_bits: Simulation
+) -> None:
+    run, bank = standard_20_bits.run, savitzky_golay(points, 10, stride, block)
+    config = replace(configuration("savitzky-golay"), weights=bank.weights32, stride=stride, block=block)
+    phi = run.phi[:1500].copy()
+    phi[[20, 700]] = np.nan
+    (compared,) = assert_lanes_equal([native], config, phi, run.y[:1500])
+    assert compared.counters["rejected_not_finite"] == 2
+    assert compared.counters["rows"] == sum(max(samples - bank.window + 1, 0) for samples in (20, 679, 799))
 
 
 def test_a_schedule_changes_the_estimate_by_less_than_a_thirtieth_of_its_error(native: Native) -> None:

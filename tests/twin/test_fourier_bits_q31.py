@@ -16,6 +16,7 @@ from pvid.settings.q31 import GateConfigQ31
 from pvid.settings.record import Array
 from pvid.setup.fourier_q31 import row_formats
 from pvid.twin.fourier_q31 import FourierTwinQ31
+from pvid.twin.q31.elementary import tanh
 from pvid.twin.q31.integer import Int
 
 Frozen = npt.NDArray[np.uint8]
@@ -77,6 +78,16 @@ def test_hostile_readings_have_the_bits_of_the_twin(one: Rig, core: Core) -> Non
     )
     reasons, _ = assert_equal(one, core, config, readings, frozen)
     assert np.sum(reasons == Reason.REJECTED_SATURATED) >= 2
+
+
+def test_soft_signs_have_the_bits_of_the_twin_and_are_tanh(core: Core) -> None:
+    one = rig("dc_motor", TICKS)
+    bits = one.fixed.formats.arguments[0]
+    soft = replace(one.design, sign_width=(round(0.5 * 2.0**bits),) * one.design.model.signs)
+    assert_equal(one, core, replace(one.config, design=soft), one.counts)
+    v = np.concatenate([np.arange(-300, 300), np.geomspace(1, 2**31 - 1, 2000).astype(np.int64)])
+    for width in (1, 77, 10**6, 2**31 - 1):
+        assert np.max(np.abs(tanh(v, width) * 2.0**-30 - np.tanh(v / width))) < 2.0**-26
 
 
 def test_rows_beyond_fixed_point_are_refused_by_name() -> None:

@@ -90,12 +90,44 @@ static void reset_equals_a_fresh_start(void **state)
     }
 }
 
+/* What a window of blocks returns depends on its samples and those of one block before them alone: nothing adds up. */
+static void blocks_forget_all_but_their_window(void **state)
+{
+    (void)state;
+    enum { HALF = 4, BLOCK = 9, STRIDE = 9, WINDOW = (2 * HALF * STRIDE) + BLOCK, LONG = 100000 * BLOCK };
+    float weights[PVID_ORDERS * HALF];
+    for (int i = 0; i < PVID_ORDERS * HALF; i++) {
+        weights[i] = (float)((i % 7) - 3);
+    }
+    const pvid_fir_bank_f32 bank = {.half = HALF, .stride = STRIDE, .block = BLOCK, .weights = weights};
+    static pvid_differentiator_f32 old;
+    static pvid_differentiator_f32 fresh;
+    assert_int_equal(pvid_differentiator_init_f32(&old, &bank, 1000.0f), PVID_OK);
+    assert_int_equal(pvid_differentiator_init_f32(&fresh, &bank, 1000.0f), PVID_OK);
+    uint32_t generator = 1u;
+    int compared = 0;
+    for (int tick = 0; tick < LONG + (3 * WINDOW); tick++) {
+        generator = (generator * 1664525u) + 1013904223u;
+        const float sample = ((float)(generator >> 8) / 8388608.0f) - 1.0f;
+        float a[PVID_ORDERS];
+        float b[PVID_ORDERS];
+        const bool ready = pvid_differentiator_step_f32(&old, sample, a);
+        assert_int_equal(ready, tick >= WINDOW - 1);
+        if ((tick >= LONG) && pvid_differentiator_step_f32(&fresh, sample, b) && (tick >= LONG + WINDOW + BLOCK)) {
+            assert_memory_equal(a, b, sizeof a);
+            compared++;
+        }
+    }
+    assert_true(compared > WINDOW);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(quartic_is_differentiated_exactly_at_the_centre),
         cmocka_unit_test(constant_has_no_derivative_not_even_by_rounding),
         cmocka_unit_test(reset_equals_a_fresh_start),
+        cmocka_unit_test(blocks_forget_all_but_their_window),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

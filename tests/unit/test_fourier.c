@@ -328,8 +328,8 @@ static void sums_are_those_of_the_definition(void **state)
         for (int h = 0; h <= HIGHEST; h++) {
             double sum[2];
             sum_of(channel[c], h, sum);
-            assert_true(fabs((double)self.window[c][0][h] - sum[0]) < 3e-6 * size);
-            assert_true(fabs((double)self.window[c][1][h] - sum[1]) < 3e-6 * size);
+            assert_true(fabs((double)self.finish.work.rows.window[c][0][h] - sum[0]) < 3e-6 * size);
+            assert_true(fabs((double)self.finish.work.rows.window[c][1][h] - sum[1]) < 3e-6 * size);
         }
     }
 }
@@ -382,9 +382,9 @@ static void solve(double r[FUNCTIONS][FUNCTIONS], double x[5][FUNCTIONS])
 /* Of a white row: theta's columns, then Y, in whose place is e at the start of p. */
 static double row_entry(int column, size_t row)
 {
-    double entry = (double)self.finish.column[column][row];
+    double entry = (double)self.finish.work.rows.column[column][row];
     for (int j = 0; (column == 4) && (j < 4); j++) {
-        entry += (double)self.estimator.theta[j] * (double)self.finish.column[j][row];
+        entry += (double)self.estimator.theta[j] * (double)self.finish.work.rows.column[j][row];
     }
     return entry;
 }
@@ -399,11 +399,15 @@ static void rows_have_the_moments_of_generalised_least_squares(void **state)
     plant rig = {.generator = 9u};
     static float given[4 * HOP][2];
     int ticks = 0;
-    while (self.estimator.counters.rows < FUNCTIONS) { /* all rows of the first window */
+    while (self.finish.stage == PVID_FOURIER_IDLE) {
         assert_true(ticks < 4 * HOP);
         next_sample(&rig, given[ticks]);
         (void)pvid_fourier_step_f32(&self, given[ticks]);
         ticks++;
+    }
+    while (self.estimator.counters.rows < FUNCTIONS) { /* all rows of the first window, and no stage behind them */
+        pvid_reason reason = PVID_ACCUMULATED;
+        pvid_fourier_finish_step_f32(&self, &reason);
     }
     double psi[5][2 * HOP]; /* what the functions, or for the last column their derivatives, multiply */
     for (int k = 0; k < 2 * HOP; k++) {

@@ -119,13 +119,20 @@ def bench_mechanisms(chosen: tuple[str, ...], seeds: int, imperfect: int, update
 @bench.command(name="engine")
 @click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
 @click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@click.option("--fixed", is_flag=True, help="In fixed point, beside those of float32.")
 @UPDATE
-def bench_engine(chosen: tuple[str, ...], seeds: int, update: Path | None) -> int:
+def bench_engine(chosen: tuple[str, ...], seeds: int, fixed: bool, update: Path | None) -> int:
     """Errors of the weak engine in C beside those of the float64 oracle on the shipped mechanisms."""
-    from bench import engine
+    from bench import engine, engine_q31
     from pvid.models.mechanisms import names
 
     some = chosen or names()
+    if fixed:
+        with progress_bar("engine", seeds * len(engine.cases(some))) as advance:
+            done = iter(range(1, seeds * len(engine.cases(some)) + 1))
+            rows = list(engine_q31.table(some, seeds, lambda: advance(next(done))))
+        put_table(update, "engine-q31", markdown(engine_q31.HEADER, rows))
+        return DONE
     with progress_bar("engine", seeds * len(engine.cases(some))) as advance:
         done = iter(range(1, seeds * len(engine.cases(some)) + 1))
         rows = list(engine.table(some, seeds, lambda: advance(next(done))))
@@ -175,6 +182,18 @@ def bench_cell(folder: Path | None, update: Path | None) -> int:
             write_stderr(f"{path} written")
         return DONE
     put_table(update, "cell", markdown(cell.HEADER, [one.cells() for one in cell.outcomes()]))
+    return DONE
+
+
+@bench.command(name="tick-methods")
+@UPDATE
+def bench_tick_methods(update: Path | None) -> int:
+    """A tick of recursive least squares, U-D, a Kalman filter and the strong form, on a Cortex-M4F."""
+    from bench import tick_methods
+
+    with progress_bar("methods", tick_methods.STEPS) as advance:
+        rows = list(tick_methods.rows_of(Native(), progress=advance))
+    put_table(update, "tick-methods", markdown(tick_methods.HEADER, rows))
     return DONE
 
 

@@ -24,8 +24,8 @@
 #ifndef PVID_MAX_THETA
 #define PVID_MAX_THETA 11
 #endif
-#if PVID_MAX_THETA < 11 || PVID_MAX_THETA > 32
-#error "PVID_MAX_THETA must lie in 11..32"
+#if PVID_MAX_THETA < 1 || PVID_MAX_THETA > 32
+#error "PVID_MAX_THETA must lie in 1..32"
 #endif
 
 /* Largest number of free parameters p: 3 in the strong form, 4 in the weak, 6 in the weak with friction (with
@@ -42,8 +42,8 @@
 #ifndef PVID_MAX_MOMENTS
 #define PVID_MAX_MOMENTS 45
 #endif
-#if PVID_MAX_MOMENTS < 45 || PVID_MAX_MOMENTS > 528
-#error "PVID_MAX_MOMENTS must lie in 45..528"
+#if PVID_MAX_MOMENTS < 1 || PVID_MAX_MOMENTS > 528
+#error "PVID_MAX_MOMENTS must lie in 1..528"
 #endif
 
 /* Longest smoothing window of the weak form's front end [samples]. */

@@ -28,6 +28,10 @@ int32_t pvid_sign_q31(int32_t v);
 /* v / (|v| + width) in Q30, width > 0 in the format of v, |v| <= 2^30. */
 int32_t pvid_soft_sign_q31(int32_t v, int32_t width);
 
+/* tanh(v / width) in Q30, width > 0, v > INT32_MIN. Error: below 2^-26. Method: (1 - e) / (1 + e), e = 2^-t with
+ * t = 2 |v| / (width ln 2), by a polynomial of degree 6 in the fraction of t. */
+int32_t pvid_tanh_q31(int32_t v, int32_t width);
+
 /* Whether |x[i]| <= limit[i] for all i < n. */
 bool pvid_within_limits_q31(const int32_t x[], const int32_t limit[], size_t n);
 

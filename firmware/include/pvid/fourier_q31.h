@@ -10,7 +10,7 @@
  *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
  *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
  * twice integrals      exact int64 in dt/24 (once) and dt^2/48 (twice), that of 1 in dt/2; rounded to int32 channels
- * int32 within +-2^28 sums           of four steps exact (16-bit cosine times 29 bits), then shifted to int32 and added
+ * int32 within +-2^28 sums           of four steps exact (24-bit cosine times 29 bits), then shifted to int32 and added
  *   S_h            int32, with the window's own start of every integral
  */
 #ifndef PVID_FOURIER_Q31_H
@@ -112,17 +112,17 @@ typedef struct {
     uint8_t functions;         /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
     uint8_t power;             /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation;        /* D, ticks a step, 1..PVID_MAX_DECIMATION */
-    uint8_t sum_shift;         /* of four steps' products 2^-14 before they are added, 1..30 */
+    uint8_t sum_shift;         /* of four steps' products 2^-22 before they are added, 1..30 */
     uint16_t hop;              /* steps of half a window, a multiple of 4; H < hop */
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
     const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
     const pvid_fourier_filter_q31 *filter; /* [jets] */
     const pvid_fourier_rescale_q31 *run;   /* [runs] from twice the sum over the steps to the input of `values` */
-    const int32_t *sign_width;             /* [signs] of the soft sign, in the format of its argument; 0: the mean of
-                                              sgn over a step */
+    const int32_t *sign_width;             /* [signs] of the soft sign tanh(v / width), in the format of its argument;
+                                              0: the mean of sgn over a step */
     const pvid_fourier_integral_q31 *integral; /* [integrands] */
     const pvid_fourier_format_q31 *format;     /* [channels] */
-    const PVID_TABLE int16_t *circle;          /* [2 hop] 32767 cos(pi j / hop) */
+    const PVID_TABLE int32_t *circle;          /* [2 hop] (2^23 - 1) cos(pi j / hop) */
     const pvid_scaled_q31 *factor; /* of each term, of (h/H)^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_fourier_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;

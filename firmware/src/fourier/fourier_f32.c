@@ -19,6 +19,9 @@
 #include "number/init.h"
 #include "number/unroll.h"
 
+/* Bits of the largest finite number. */
+#define FINITE 0x7F7FFFFFu
+
 /* No reasons of a tick: there is work; the channels of a step are to be formed. */
 #define BUSY 255u
 #define FORM 254u
@@ -152,7 +155,10 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
                                (float)pvid_fourier_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_fourier_watch_init_f32(&self->watch, config, delay_of(design));
     self->watches = (config->range != NULL) || (config->drive_min != NULL);
-    self->plain = (self->front.plain && (config->range == NULL)) ? design->model->samples : 0u;
+    self->plain = self->front.plain ? design->model->samples : 0u;
+    for (size_t i = 0; i < design->model->samples; i++) {
+        self->front.limit[i] = (config->range != NULL) ? pvid_bits_f32(config->range[i]) : FINITE;
+    }
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
     self->stages_per_tick =
@@ -238,24 +244,6 @@ PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[]
     return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
 }
 
-/* Harmonics of the last block; a window that is joined begins. */
-PVID_SELDOM static void advance_sums(pvid_fourier_f32 *self)
-{
-    for (uint8_t i = 0; i < self->items_per_tick; i++) {
-        if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
-                                          self->window)) {
-            pvid_fourier_finish_begin_f32(&self->finish);
-        }
-    }
-}
-
-PVID_SELDOM static void advance_finish(pvid_fourier_f32 *self, pvid_reason *reason)
-{
-    for (uint8_t left = self->stages_per_tick; left > 0u; left--) {
-        pvid_fourier_finish_step_f32(self, reason);
-    }
-}
-
 /* A sample that is not finite. */
 PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
 {
@@ -264,14 +252,21 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
     return PVID_REJECTED_NOT_FINITE;
 }
 
-/* Work on the sums, else on the last whole window. */
+/* Harmonics of the last block are added or joined, else stages of the last whole window run. */
 PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
 {
     pvid_reason reason = idle(self);
     if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
-        advance_sums(self);
+        for (uint32_t left = self->items_per_tick; left > 0u; left--) {
+            if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
+                                              self->finish.work.rows.window)) {
+                pvid_fourier_finish_begin_f32(&self->finish);
+            }
+        }
     } else {
-        advance_finish(self, &reason);
+        for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
+            pvid_fourier_finish_step_f32(self, &reason);
+        }
     }
     rest(self);
     return reason;
@@ -328,8 +323,12 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
     if ((plain == 0u) || (sample == NULL)) {
         return other_tick(self, sample);
     }
-    if (!pvid_fourier_front_add_f32(&self->front, plain, sample)) {
+    bool beyond = false;
+    if (!pvid_fourier_front_add_f32(&self->front, plain, sample, &beyond)) {
         return reject(self);
+    }
+    if (beyond) {
+        self->watch.beyond = self->watch.delay;
     }
     self->front.wait--;
     if (self->front.wait == 0u) {

@@ -113,7 +113,7 @@ void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self)
     self->expected = 0.0f;
     self->free = 0.0f;
     self->square = 0.0f;
-    memset(self->score, 0, sizeof self->score);
+    memset(self->work.rows.score, 0, sizeof self->work.rows.score);
     begin_kind(self);
 }
 
@@ -183,7 +183,7 @@ static bool noise_stage(pvid_fourier_f32 *self)
 static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_fourier_white_basis_f32(&finish->white, finish->index, finish->part, finish->leverage);
+    pvid_fourier_white_basis_f32(&finish->white, finish->index, finish->work.rows.part, finish->work.rows.leverage);
     finish->index++;
     return finish->index < pvid_fourier_basis_stages(self->design);
 }
@@ -194,7 +194,7 @@ static bool share_stage(pvid_fourier_f32 *self)
     const size_t parts = pvid_fourier_parts(self->design);
     const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
     const size_t last = (end < parts) ? end : parts;
-    pvid_fourier_white_share_f32(&finish->white, self->design, finish->leverage, finish->index, last);
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.leverage, finish->index, last);
     finish->index = (uint16_t)last;
     return last < parts;
 }
@@ -207,10 +207,11 @@ static void gather_column(pvid_fourier_f32 *self)
     const pvid_fourier_term_f32 *term = design->model->term;
     const uint16_t end = kind_of(self)->end;
     uint16_t place = finish->term;
-    memset(finish->part, 0, finish->white.parts * sizeof finish->part[0]);
+    memset(finish->work.rows.part, 0, finish->white.parts * sizeof finish->work.rows.part[0]);
     for (; (place < end) && (term[place].column == finish->index); place++) {
         pvid_fourier_columns_add_f32(design, &term[place], &finish->white,
-                                     (const float (*)[2][PVID_MAX_HARMONICS])self->window, finish->part);
+                                     (const float (*)[2][PVID_MAX_HARMONICS])finish->work.rows.window,
+                                     finish->work.rows.part);
     }
     finish->term = place;
 }
@@ -229,9 +230,9 @@ static bool column_stage(pvid_fourier_f32 *self)
     const size_t vectors = white->vectors;
     const size_t cosines = white->cosines;
     const size_t rows = (family == 0u) ? (cosines - vectors) : ((white->parts - cosines) - vectors);
-    pvid_fourier_white_reflect_f32(white, family, finish->part);
-    memcpy(&finish->column[finish->index][(family == 0u) ? 0u : (cosines - vectors)],
-           &finish->part[((family == 0u) ? 0u : cosines) + vectors], rows * sizeof(float));
+    pvid_fourier_white_reflect_f32(white, family, finish->work.rows.part);
+    memcpy(&finish->work.rows.column[finish->index][(family == 0u) ? 0u : (cosines - vectors)],
+           &finish->work.rows.part[((family == 0u) ? 0u : cosines) + vectors], rows * sizeof(float));
     if (family == 0u) {
         finish->phase = 2;
         return true;
@@ -256,18 +257,21 @@ static bool project_stage(pvid_fourier_f32 *self)
     if (finish->phase == 0u) {
         if (finish->index == 0u) {
             for (size_t i = first; i < columns_of(kind); i++) {
-                finish->own[i] = pvid_product_f32(finish->column[i], finish->column[i], rows);
+                finish->work.rows.own[i] =
+                    pvid_product_f32(finish->work.rows.column[i], finish->work.rows.column[i], rows);
             }
         }
-        const bool kept = pvid_fourier_columns_keep_f32(rows, finish->column[nuisance], finish->own[nuisance],
-                                                        &finish->own[nuisance]);
+        const bool kept =
+            pvid_fourier_columns_keep_f32(rows, finish->work.rows.column[nuisance], finish->work.rows.own[nuisance],
+                                          &finish->work.rows.own[nuisance]);
         finish->live = (uint8_t)(finish->live + (kept ? 1u : 0u));
         finish->phase = 1;
         return true;
     }
     const size_t place = finish->phase - 1u;
     const size_t column = (place < first) ? place : (place + finish->index + 1u);
-    pvid_fourier_columns_project_f32(rows, finish->column[nuisance], finish->own[nuisance], finish->column[column]);
+    pvid_fourier_columns_project_f32(rows, finish->work.rows.column[nuisance], finish->work.rows.own[nuisance],
+                                     finish->work.rows.column[column]);
     finish->phase++;
     if (finish->phase > (first + kind->nuisances) - (finish->index + 1u)) {
         finish->phase = 0;
@@ -297,12 +301,12 @@ static bool residual_stage(pvid_fourier_f32 *self)
     const size_t rows = self->design->functions;
     const size_t end = (size_t)finish->index + rows_per_stage(kind);
     const size_t last = (end < rows) ? end : rows;
-    float *e = finish->column[kind->thetas];
+    float *e = finish->work.rows.column[kind->thetas];
     float rss = finish->rss;
     for (size_t k = finish->index; k < last; k++) {
         float left = e[k];
         for (size_t j = 0; j < kind->thetas; j++) {
-            left -= theta[j] * finish->column[j][k];
+            left -= theta[j] * finish->work.rows.column[j][k];
         }
         e[k] = left;
         rss += left * left;
@@ -319,7 +323,8 @@ static bool squares_stage(pvid_fourier_f32 *self)
     const size_t end = (size_t)finish->index + products_per_stage(self->design);
     const size_t last = (end < thetas) ? end : thetas;
     for (size_t j = finish->index; j < last; j++) {
-        finish->own[j] = pvid_product_f32(finish->column[j], finish->column[j], self->design->functions);
+        finish->work.rows.own[j] =
+            pvid_product_f32(finish->work.rows.column[j], finish->work.rows.column[j], self->design->functions);
     }
     finish->index = (uint16_t)last;
     return last < thetas;
@@ -336,11 +341,11 @@ static bool pull_stage(pvid_fourier_f32 *self)
     pvid_fourier_finish_f32 *finish = &self->finish;
     const size_t end = entries_end(self);
     if (finish->index == 0u) {
-        memset(finish->pull, 0, sizeof finish->pull);
+        memset(finish->work.rows.pull, 0, sizeof finish->work.rows.pull);
     }
     if (finish->compensation) {
         pvid_fourier_white_pull_f32(&finish->white, self->design, finish->kind, &self->estimator.theta[finish->theta],
-                                    finish->index, end, &finish->pull[finish->theta]);
+                                    finish->index, end, &finish->work.rows.pull[finish->theta]);
     }
     finish->index = (uint16_t)end;
     if (end < self->design->n_noise) {
@@ -348,10 +353,10 @@ static bool pull_stage(pvid_fourier_f32 *self)
     }
     const size_t thetas = kind_of(self)->thetas;
     for (size_t j = finish->theta; j < finish->theta + thetas; j++) {
-        finish->score[j] += finish->pull[j];
+        finish->work.rows.score[j] += finish->work.rows.pull[j];
     }
     if (finish->compensation) {
-        (void)pvid_estimator_add_to_b_f32(&self->estimator, finish->pull);
+        (void)pvid_estimator_add_to_b_f32(&self->estimator, finish->work.rows.pull);
     }
     finish->expected += pvid_fourier_white_sensors_f32(&finish->white, self->design);
     return false;
@@ -370,11 +375,12 @@ static bool add_stage(pvid_fourier_f32 *self)
     for (size_t left = products_per_stage(self->design); left > 0u; left--) {
         const size_t i = finish->index;
         if (finish->other == 0u) {
-            low[block.moment + finish->moment] += finish->own[i];
+            low[block.moment + finish->moment] += finish->work.rows.own[i];
             finish->moment++;
             finish->other = (uint8_t)(i + 1u);
         }
-        const float product = pvid_product_f32(finish->column[i], finish->column[finish->other], rows);
+        const float product =
+            pvid_product_f32(finish->work.rows.column[i], finish->work.rows.column[finish->other], rows);
         if (finish->other < thetas) {
             low[block.moment + finish->moment] += product;
             finish->moment++;
@@ -382,12 +388,12 @@ static bool add_stage(pvid_fourier_f32 *self)
             continue;
         }
         low[(size_t)self->estimator.model->n_moments + finish->theta + i] += product;
-        finish->gradient[i] = product;
-        finish->score[finish->theta + i] += product;
+        finish->work.rows.gradient[i] = product;
+        finish->work.rows.score[finish->theta + i] += product;
         finish->other = 0;
         finish->index++;
         if (finish->index == thetas) {
-            pvid_products_end_f32(&self->estimator, &block, finish->gradient, finish->rss, (uint32_t)rows);
+            pvid_products_end_f32(&self->estimator, &block, finish->work.rows.gradient, finish->rss, (uint32_t)rows);
             return false;
         }
     }
@@ -399,9 +405,9 @@ static bool add_stage(pvid_fourier_f32 *self)
 static void begin_solve(pvid_fourier_f32 *self, bool ends_group)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_estimator_begin_f32(&self->estimator, &finish->solve, ends_group);
+    pvid_estimator_begin_f32(&self->estimator, &finish->work.solve, ends_group);
     if (checks_noise(self)) {
-        finish->solve.noise = (const float (*)[PVID_MAX_P])finish->candidate.covariance;
+        finish->work.solve.noise = (const float (*)[PVID_MAX_P])finish->candidate.covariance;
     }
 }
 
@@ -410,18 +416,18 @@ static void begin_solves(pvid_fourier_f32 *self)
     pvid_fourier_finish_f32 *finish = &self->finish;
     pvid_estimator_set_expected_f32(&self->estimator, finish->expected / (float)finish->used);
     begin_solve(self, true);
-    finish->solve.fallback = pvid_trust_fallback_f32(&self->trust);
+    finish->work.solve.fallback = pvid_trust_fallback_f32(&self->trust);
 }
 
 static bool solve_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    if (!pvid_estimator_advance_f32(&self->estimator, &finish->solve)) {
+    if (!pvid_estimator_advance_f32(&self->estimator, &finish->work.solve)) {
         return true;
     }
     finish->iteration++;
-    finish->reason = finish->solve.reason;
-    finish->size = finish->solve.size;
+    finish->reason = finish->work.solve.reason;
+    finish->size = finish->work.solve.size;
     /* ACCUMULATED: the divider allows no solve after this window */
     if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED)) {
         return false;
@@ -437,7 +443,7 @@ static bool cluster_stage(pvid_fourier_f32 *self)
     pvid_estimate_f32 *estimate = &finish->candidate;
     const size_t n_p = self->estimator.model->n_p;
     const size_t a = finish->index;
-    const float wide = finish->solve.variance * self->estimator.settings.correlation;
+    const float wide = finish->work.solve.variance * self->estimator.settings.correlation;
     const float variance =
         pvid_fourier_scores_variance_f32(&finish->scores, n_p, a, (const float (*)[PVID_MAX_P])estimate->covariance,
                                          wide, estimate->weight / rows_of(self));
@@ -465,9 +471,9 @@ static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
         }
     }
     const float expected = finish->expected / (float)finish->used;
-    const float variance_ratio = finish->solve.group_rss / (finish->free * expected);
+    const float variance_ratio = finish->work.solve.group_rss / (finish->free * expected);
     *reason = pvid_trust_judge_f32(&self->trust, &self->estimator, finish->reason, finish->size,
-                                   finish->solve.above_noise, variance_ratio, estimate);
+                                   finish->work.solve.above_noise, variance_ratio, estimate);
 }
 
 /* ---- the order of the stages ---- */
@@ -478,7 +484,7 @@ static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
     pvid_fourier_finish_f32 *finish = &self->finish;
     const float freedom = freedom_of(self);
     const pvid_reason accepted =
-        pvid_products_accept_f32(&self->estimator, kind_of(self)->thetas, finish->own, finish->rss);
+        pvid_products_accept_f32(&self->estimator, kind_of(self)->thetas, finish->work.rows.own, finish->rss);
     if (accepted != PVID_ACCUMULATED) {
         *reason = accepted;
         return STAGE_SCORE; /* that is, the next kind */
@@ -547,7 +553,7 @@ static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
     } else if (finish->stage == (uint8_t)STAGE_SOLVE) {
         begin_solves(self);
     } else if (finish->stage == (uint8_t)STAGE_ASSESS) {
-        pvid_estimator_begin_assessment_f32(&self->estimator, &finish->solve, &finish->candidate);
+        pvid_estimator_begin_assessment_f32(&self->estimator, &finish->work.solve, &finish->candidate);
     } else {
         /* nothing to begin */
     }
@@ -592,13 +598,13 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         repeat = add_stage(self);
         break;
     case STAGE_SCORE:
-        pvid_fourier_scores_take_f32(&finish->scores, &self->estimator, finish->score);
+        pvid_fourier_scores_take_f32(&finish->scores, &self->estimator, finish->work.rows.score);
         break;
     case STAGE_SOLVE:
         repeat = solve_stage(self);
         break;
     case STAGE_ASSESS:
-        repeat = !pvid_estimator_assess_advance_f32(&self->estimator, &finish->solve);
+        repeat = !pvid_estimator_assess_advance_f32(&self->estimator, &finish->work.solve);
         break;
     case STAGE_MEAN:
         pvid_fourier_scores_add_f32(&finish->scores, self->estimator.model->n_p, finish->square / finish->free);

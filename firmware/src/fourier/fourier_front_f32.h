@@ -33,21 +33,27 @@ void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_four
  */
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[]);
 
-/* Adds this number of samples of a tick, at least 1, to the block. Returns false if one is not finite; the front end
- * must then be reset. */
-static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[])
+/* Adds this number of samples of a tick, at least 1, to the block; sets *beyond if one is beyond its limit. Returns
+ * false if one is not finite; the front end must then be reset. */
+static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[],
+                                              bool *beyond)
 {
     float *sums = self->line;
+    const uint32_t *limit = self->limit;
     const float *end = &sample[number];
     do {
         const float x = *sample;
-        if (!pvid_finite_f32(x)) {
-            return false;
+        if ((pvid_bits_f32(x) & 0x7FFFFFFFu) > *limit) {
+            if (!pvid_finite_f32(x)) {
+                return false;
+            }
+            *beyond = true;
         }
         const float once = sums[0] + x;
         sums[0] = once;
         sums[1] += once;
         sample++;
+        limit++;
         sums += 2;
     } while (sample != end);
     return true;

@@ -31,19 +31,6 @@ void pvid_fourier_noise_shares_f32(const pvid_fourier_white_f32 *white, const pv
     }
 }
 
-/* The non-zeros of a row of C. Returns their number. */
-static size_t row_of(const pvid_model_f32 *model, size_t row, uint8_t place[PVID_MAX_P])
-{
-    size_t n = 0;
-    for (size_t k = 0; (k < model->n_c) && (n < (size_t)PVID_MAX_P); k++) {
-        if (model->c_row[k] == row) {
-            place[n] = (uint8_t)k;
-            n++;
-        }
-    }
-    return n;
-}
-
 void pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, const pvid_fourier_noise_f32 *one, size_t first,
                                 const float share[PVID_MAX_POWER], float rows, const float c[], float s[][PVID_MAX_P])
 {
@@ -57,8 +44,20 @@ void pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, const pvi
     const float own = same ? whole : (0.5f * whole);
     uint8_t of_a[PVID_MAX_P];
     uint8_t of_b[PVID_MAX_P];
-    const size_t n_a = row_of(model, first + one->a, of_a);
-    const size_t n_b = row_of(model, first + one->b, of_b);
+    size_t n_a = 0; /* non-zeros of these rows of C */
+    size_t n_b = 0;
+    const uint8_t *c_row = model->c_row;
+    for (size_t k = 0; k < model->n_c; k++) {
+        const size_t row = (size_t)c_row[k] - first;
+        if ((row == one->a) && (n_a < (size_t)PVID_MAX_P)) {
+            of_a[n_a] = (uint8_t)k;
+            n_a++;
+        }
+        if ((row == one->b) && (n_b < (size_t)PVID_MAX_P)) {
+            of_b[n_b] = (uint8_t)k;
+            n_b++;
+        }
+    }
     for (size_t k = 0; k < n_a; k++) {
         for (size_t l = 0; l < n_b; l++) {
             const size_t i = model->c_column[of_a[k]];

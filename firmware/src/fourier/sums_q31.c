@@ -5,7 +5,7 @@
 #include "number/unroll.h"
 
 #define BLOCK ((size_t)PVID_FOURIER_BLOCK_Q31)
-#define DOWN 14u
+#define DOWN 22u
 
 enum { RE = 0, IM = 1 };
 
@@ -36,20 +36,30 @@ void pvid_fourier_sums_next_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_
     }
 }
 
-/* A sum of four products of 16 by 29 bits, 2^-14 of it rounded down, which fits 32 bits. */
+/* A sum of four products of 24 by 29 bits, 2^-22 of it rounded down, which fits 32 bits. */
 #if defined(__ARM_ARCH_6M__)
-/* Without a long multiplication: x = high 2^14 + low; four products of each fit 32 bits. */
+/* Without a long multiplication: a factor is high 2^12 + low, x is high 2^14 + low; four products of each fit 32 bits.
+ */
 static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
 {
     int32_t high = 0;
+    int32_t first = 0;
+    int32_t second = 0;
     int32_t low = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
         const int32_t one = x[j * PVID_MAX_CHANNELS];
-        high += factor[j] * pvid_floor_shift_32_q31(one, DOWN);
-        low += factor[j] * (int32_t)((uint32_t)one & 0x3FFFu);
+        const int32_t factor_high = pvid_floor_shift_32_q31(factor[j], 12);
+        const int32_t factor_low = (int32_t)((uint32_t)factor[j] & 0xFFFu);
+        const int32_t x_high = pvid_floor_shift_32_q31(one, 14);
+        const int32_t x_low = (int32_t)((uint32_t)one & 0x3FFFu);
+        high += factor_high * x_high;
+        first += factor_low * x_high;
+        second += factor_high * x_low;
+        low += factor_low * x_low;
     }
-    return high + pvid_floor_shift_32_q31(low, DOWN);
+    const int32_t below = (4 * first) + second + pvid_floor_shift_32_q31(low, 12);
+    return (16 * high) + pvid_floor_shift_32_q31(below, 10);
 }
 #else
 static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)

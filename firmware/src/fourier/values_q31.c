@@ -54,7 +54,7 @@ static void complete_inputs(pvid_fourier_values_q31 *self, const pvid_fourier_de
         const int32_t width = design->sign_width[i];
         const int32_t next = newest[model->runs + i];
         const int64_t before = (self->known > 1u) ? self->v[1][i] : ((2 * (int64_t)v) - next);
-        sign[i] = (width > 0) ? pvid_soft_sign_q31(v, width) : mean_sign(before, v, next);
+        sign[i] = (width > 0) ? pvid_tanh_q31(v, width) : mean_sign(before, v, next);
     }
 }
 

@@ -181,7 +181,7 @@ uint32_t pvid_fingerprint_fourier_design_q31(const pvid_fourier_design_q31 *desi
     }
     hash = pvid_fingerprint_words(hash, design->sign_width, model->signs);
     hash = formats_of(hash, design);
-    hash = pvid_fingerprint_short_table(hash, design->circle, 2u * (size_t)design->hop);
+    hash = pvid_fingerprint_table(hash, design->circle, 2u * (size_t)design->hop);
     hash = scaled_of(hash, design->factor, terms_end(model));
     hash = pvid_fnv_word(hash, design->n_noise);
     hash = noise_of(hash, design->noise, design->n_noise);

@@ -46,6 +46,32 @@ int32_t pvid_cos_q31(int32_t x, uint32_t bits)
     return sine_of_half_turns((x * HALF_TURNS) + quarter_turn, bits + HALF_TURNS_BITS);
 }
 
+/* 2 / ln 2 in Q26. */
+#define TWO_OVER_LN_2 INT32_C(193635251)
+#define POWER_BITS 26u
+#define POWER_MAX ((int64_t)31 << POWER_BITS) /* 2^-31 is below half a unit */
+
+/* 2^-f in powers of f, 0 <= f < 1, Q30: within 5.1e-9. */
+static const int32_t power_of_half[7] = {117454, -1369790, 10286509, -59583045, 257938938, -744260975, 1073741823};
+
+int32_t pvid_tanh_q31(int32_t v, int32_t width)
+{
+    const int64_t size = (v < 0) ? -(int64_t)v : (int64_t)v;
+    const int64_t t = (size * TWO_OVER_LN_2) / width;
+    int32_t whole = PVID_ONE_Q30;
+    if (t < POWER_MAX) {
+        const int32_t f = (int32_t)((uint64_t)t & (((uint64_t)1 << POWER_BITS) - 1u));
+        int32_t sum = power_of_half[0];
+        for (size_t k = 1; k < (sizeof power_of_half / sizeof power_of_half[0]); k++) {
+            sum = (int32_t)pvid_floor_shift_q31(pvid_product_q31(sum, f), POWER_BITS) + power_of_half[k];
+        }
+        const int32_t e = pvid_floor_shift_32_q31(sum, (uint32_t)pvid_floor_shift_q31(t, POWER_BITS));
+        const int64_t above = ((int64_t)PVID_ONE_Q30 - e) * PVID_ONE_Q30;
+        whole = (int32_t)(above / ((int64_t)PVID_ONE_Q30 + e));
+    }
+    return (v < 0) ? -whole : whole;
+}
+
 int32_t pvid_sign_q31(int32_t v)
 {
     if (v > 0) {

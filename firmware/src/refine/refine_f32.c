@@ -209,7 +209,7 @@ static void end_block(pvid_refine_f32 *self)
     self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
     if (taken) {
         take(self, square);
-        self->verdict = PVID_UPDATED;
+        self->verdict = (self->taken > 1u) ? PVID_UPDATED : PVID_HELD_UNCERTAIN; /* one block proves little */
     } else {
         self->verdict = (self->taken > 0u) ? PVID_HELD_BLOCK : PVID_HELD_SEARCHING;
         refuse(self, self->sane);
@@ -229,6 +229,7 @@ static void pass_job(pvid_refine_f32 *self)
         const uint32_t entry = self->begin + first;
         if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < (3 + PVID_REFINE_REACH)) {
             self->waiting = true;
+            self->due = entry + (3u + PVID_REFINE_REACH);
             return;
         }
         pvid_refine_front_read_f32(&self->front, entry, &signals);
@@ -433,7 +434,7 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
         return PVID_HELD_FROZEN;
     }
     if (entry == PVID_REFINE_ENTERED) {
-        self->waiting = false;
+        self->waiting = self->waiting && (pvid_refine_front_end_f32(&self->front) < self->due);
     }
     const bool works = (entry == PVID_REFINE_NOTHING) || (self->config.ratio == 1u);
     if (works && !self->waiting) {

@@ -124,7 +124,7 @@ PVID_ALWAYS_INLINE void push(pvid_refine_pass_f32 *self, const float a[])
     }
 }
 
-/* Accelerations without derivatives, out of line: for the seldom first steps. */
+/* Accelerations without derivatives, out of line: one copy of the model. */
 PVID_SELDOM static void accelerations(const float m[], const float state[], const float u[], float a[])
 {
     pvid_refine_motion(m, state, &state[V], u, a);
@@ -362,7 +362,7 @@ PVID_ALWAYS_INLINE void output_derivatives(const pvid_refine_pass_f32 *self, con
 }
 
 /* What the columns need, at the middle of the big step; `a`: the accelerations there. */
-PVID_ALWAYS_INLINE void derivatives(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
+PVID_SELDOM static void derivatives(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
                                     const float u[], float a[])
 {
     float K[N_Q * N_Q];
@@ -398,31 +398,26 @@ PVID_ALWAYS_INLINE void derivatives(pvid_refine_pass_f32 *self, const float r[],
 #endif
 }
 
-/* Two steps; the first two of a big step end at its middle, where the derivatives are needed. */
-PVID_ALWAYS_INLINE void pair(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
-                             bool to_middle)
+/* A step of the motion to the second (`at` 1) or third of the three steps. */
+PVID_SELDOM static void step_to(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
+                                size_t at, bool to_middle)
 {
     float a[N_Q];
     float u[PVID_REFINE_INPUTS];
-    input(self, signals, 1, u);
+    input(self, signals, at, u);
     adams_bashforth(self);
-    residuals(self, r, self->state, u, signals->z[1]);
-    pvid_refine_motion(self->constants, self->state, &self->state[V], u, a);
-    push(self, a);
-    input(self, signals, 2, u);
-    adams_bashforth(self);
+    residuals(self, r, self->state, u, signals->z[at]);
     if (to_middle) {
         derivatives(self, r, signals, u, a);
     } else {
-        pvid_refine_motion(self->constants, self->state, &self->state[V], u, a);
+        accelerations(self->constants, self->state, u, a);
     }
     push(self, a);
-    residuals(self, r, self->state, u, signals->z[2]);
 }
 
-/* The same behind Runge-Kutta. */
-PVID_SELDOM static void first_pair(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
-                                   bool to_middle)
+/* Two steps behind Runge-Kutta. */
+static void first_pair(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
+                       bool to_middle)
 {
     float a[N_Q];
     float u[PVID_REFINE_INPUTS];
@@ -432,14 +427,25 @@ PVID_SELDOM static void first_pair(pvid_refine_pass_f32 *self, const float r[], 
     push(self, a);
     input(self, signals, 2, u);
     memcpy(self->state, self->scratch[0], sizeof self->state);
+    residuals(self, r, self->state, u, signals->z[2]);
     if (to_middle) {
         derivatives(self, r, signals, u, a);
     } else {
         accelerations(self->constants, self->state, u, a);
     }
     push(self, a);
-    residuals(self, r, self->state, u, signals->z[2]);
     self->starts--;
+}
+
+/* Two steps; the first two of a big step end at its middle, where the derivatives are needed. */
+static void pair(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals, bool to_middle)
+{
+    if (self->starts > 0u) {
+        first_pair(self, r, signals, to_middle);
+    } else {
+        step_to(self, r, signals, 1, false);
+        step_to(self, r, signals, 2, to_middle);
+    }
 }
 
 /* ---- columns and rows ---- */
@@ -640,19 +646,11 @@ void pvid_refine_pass_job_f32(pvid_refine_pass_f32 *self, const float r[], const
         self->job++;
         break;
     case FIRST:
-        if (self->starts > 0u) {
-            first_pair(self, r, signals, true);
-        } else {
-            pair(self, r, signals, true);
-        }
+        pair(self, r, signals, true);
         self->job = job_of_pair(self, SECOND_A, SECOND);
         break;
     case SECOND:
-        if (self->starts > 0u) {
-            first_pair(self, r, signals, false);
-        } else {
-            pair(self, r, signals, false);
-        }
+        pair(self, r, signals, false);
         self->job = COLUMNS;
         break;
     case COLUMNS:

@@ -166,7 +166,7 @@ static void begin_rows(const pvid_weak_finish_f32 *self, pvid_estimator_f32 *est
 /* Adds a row to the estimator; sets *reason if the estimator rejects it. */
 static void add_row(const float column[PVID_WEAK_TERMS], pvid_estimator_f32 *estimator, pvid_reason *reason)
 {
-    float n[PVID_MAX_THETA];
+    float n[PVID_KAPITZA_FRICTION_THETA];
     memcpy(n, &column[PVID_WEAK_COLUMN_N], PVID_KAPITZA_WEAK_THETA * sizeof n[0]);
     n[PVID_KAPITZA_WEAK_THETA] = column[PVID_WEAK_COLUMN_C1];
     n[PVID_KAPITZA_WEAK_THETA + 1] = column[PVID_WEAK_COLUMN_C2];

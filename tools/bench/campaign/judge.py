@@ -20,6 +20,7 @@ from pvid.rig.run import Recording
 from pvid.run.identify import Identification, Publications, identify
 from pvid.run.mechanism import identify_mechanism, model_of
 from pvid.run.mechanism_core import CoreAnswer, identify_in_c
+from pvid.run.refined_identify import refined_identification
 
 Float = npt.NDArray[np.float64]
 
@@ -123,13 +124,18 @@ class Answer:
 
 
 def identify_rig(
-    native: Native, simulated: SimulatedRig, core: Core = "f32", *, tuned: bool = False
+    native: Native, simulated: SimulatedRig, core: Core = "f32", *, tuned: bool = False, refine: bool = False
 ) -> tuple[Record, Identification | None]:
-    """Identifies a rig as `pvid identify` (and, before it, `pvid tune`) does; the record of `judge`, and the answer."""
+    """Identifies a rig as `pvid identify` does, with `pvid tune` before it and --refine where they are asked for; the
+    record of `judge`, and the answer."""
     file = replace(simulated.file, identifier=replace(simulated.file.identifier, core=core))
-    return _judged(
-        simulated, lambda: identify(simulated.run, _tuned(native, simulated, file) if tuned else file, native)
-    )
+
+    def identified() -> Identification:
+        used = _tuned(native, simulated, file) if tuned else file
+        result = identify(simulated.run, used, native)
+        return refined_identification(simulated.run, used, result) if refine else result
+
+    return _judged(simulated, identified)
 
 
 def identify_by_engine(simulated: SimulatedRig) -> tuple[Record, CoreAnswer | None]:

@@ -28,7 +28,7 @@ _WORKERS_S = 30  # until a running scheduler must have a worker
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is run: rigs 0 to `rigs` - 1 of a seed, identified by a core, tuned before or not.
+    """What is run: rigs 0 to `rigs` - 1 of a seed, identified by a core, tuned before or not, refined or not.
 
     `engine`: from the description of the mechanism, by the weak engine.
 
@@ -40,6 +40,7 @@ class Campaign:
     seed: int = 1
     core: Core = "f32"
     tuned: bool = False
+    refine: bool = False
     engine: bool = False
     cache: Path | None = None
 
@@ -52,6 +53,7 @@ class Campaign:
             self.seed,
             self.core,
             self.tuned,
+            self.refine,
             self.engine,
             code_version(),
             core_version(),
@@ -115,7 +117,7 @@ def _work(rig: int, *, campaign: Campaign, code: str) -> Record:
         simulated = kept_rig(native, campaign.population, campaign.seed, rig, campaign.cache)
     if campaign.engine:
         return identify_by_engine(simulated)[0]
-    return identify_rig(native, simulated, campaign.core, tuned=campaign.tuned)[0]
+    return identify_rig(native, simulated, campaign.core, tuned=campaign.tuned, refine=campaign.refine)[0]
 
 
 @lru_cache(maxsize=1)

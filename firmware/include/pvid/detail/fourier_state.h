@@ -22,6 +22,7 @@ typedef struct {
     float ticks;                       /* D */
     float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
+    uint32_t limit[PVID_MAX_SAMPLES];  /* bits of the largest absolute value of each sample that needs no attention */
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
@@ -109,28 +110,11 @@ typedef struct {
     float neighbour[PVID_MAX_P][PVID_MAX_P];
 } pvid_fourier_scores_f32;
 
-/* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
+/* What the rows of a window need until the last of them is added. */
 typedef struct {
-    bool compensation;
-    bool shares; /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
-    bool alone;  /* the next window has no neighbour before it */
-    uint8_t stage;
-    uint8_t phase; /* of a column's stages */
-    uint8_t kind;
-    uint8_t theta;                      /* first one of the kind */
-    uint8_t used;                       /* kinds whose rows have been added */
-    uint8_t live;                       /* nuisances of the kind that are projected out */
-    uint8_t iteration;                  /* solves done for this window */
-    uint8_t other;                      /* column of the next product */
-    uint16_t index;                     /* within the stage */
-    uint16_t term;                      /* next one of the kind */
-    uint16_t moment;                    /* next one of the kind */
-    pvid_reason reason;                 /* of the last solve, then of the window */
-    float size;                         /* of the last step, relative */
-    float rss;                          /* of the kind's rows before the steps */
-    float expected;                     /* sum over the kinds of the rows' variance by the sensors alone */
-    float free;                         /* rows less nuisances of the kinds that were added */
-    float square;                       /* sum of squares of their residuals before the steps */
+    pvid_reason reason; /* of the solve, with its pointers: they keep their place (pvid/snapshot_fourier.h) */
+    const void *pointer[3];
+    float window[PVID_MAX_CHANNELS][2][PVID_MAX_HARMONICS]; /* S_h: real parts, imaginary parts */
     float own[PVID_MAX_COLUMNS];        /* square of each nuisance before projection, then inverse of what remains; then
                                            squares of theta's columns */
     float pull[PVID_MAX_THETA];         /* g: what the sensors' noise takes from B */
@@ -139,10 +123,40 @@ typedef struct {
     float part[PVID_FOURIER_PARTS];     /* of a direction, then of the present column */
     float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of the directions */
     float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
+} pvid_fourier_rows_f32;
+
+/* The rows of a window, and behind them the solve and the assessment. */
+typedef union {
+    pvid_fourier_rows_f32 rows;
+    pvid_estimator_solve_f32 solve;
+} pvid_fourier_work_f32;
+
+/* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
+typedef struct {
+    bool compensation;
+    bool shares; /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
+    bool alone;  /* the next window has no neighbour before it */
+    uint8_t stage;
+    uint8_t phase; /* of a column's stages */
+    uint8_t kind;
+    uint8_t theta;      /* first one of the kind */
+    uint8_t used;       /* kinds whose rows have been added */
+    uint8_t live;       /* nuisances of the kind that are projected out */
+    uint8_t iteration;  /* solves done for this window */
+    uint8_t other;      /* column of the next product */
+    uint16_t index;     /* within the stage */
+    uint16_t term;      /* next one of the kind */
+    uint16_t moment;    /* next one of the kind */
+    pvid_reason reason; /* of the last solve, then of the window */
+    float size;         /* of the last step, relative */
+    float rss;          /* of the kind's rows before the steps */
+    float expected;     /* sum over the kinds of the rows' variance by the sensors alone */
+    float free;         /* rows less nuisances of the kinds that were added */
+    float square;       /* sum of squares of their residuals before the steps */
     pvid_gate_f32 gate[PVID_MAX_KINDS];
     pvid_fourier_white_f32 white;
     pvid_fourier_scores_f32 scores;
-    pvid_estimator_solve_f32 solve;
+    pvid_fourier_work_f32 work;
     pvid_estimate_f32 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_fourier_finish_f32;
 
@@ -165,8 +179,6 @@ struct pvid_fourier_f32 {
     pvid_fourier_history_f32 history;
     pvid_fourier_watch_f32 watch;
     pvid_fourier_sums_f32 sums;
-    float window[PVID_MAX_CHANNELS][2]
-                [PVID_MAX_HARMONICS]; /* S_h of the last whole window: real parts, imaginary parts */
     pvid_fourier_finish_f32 finish;
     pvid_estimator_f32 estimator;
     pvid_trust_f32 trust;

@@ -12,7 +12,7 @@ import click
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import FigurePath, form_options, print_notes, read_input, with_overrides
-from pvid.cli.result import identified, print_result, print_warning, write_figure
+from pvid.cli.result import identified, print_result, print_warning, write_figure, write_refined_figure
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
@@ -35,6 +35,11 @@ from pvid.run.survey import fitted
     "noise of the sensors; or that noise alone.  [default: residuals]",
 )
 @click.option(
+    "--refine",
+    is_flag=True,
+    help="Fit the full equations to the whole run, from this answer on, in float64: any angle, friction, skew.",
+)
+@click.option(
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -49,6 +54,7 @@ def command(
     form: str | None,
     core: str | None,
     weights: Literal["residuals", "sensors"] | None,
+    refine: bool,
     target: str | None,
     as_json: bool,
     figure: Path | None,
@@ -60,6 +66,8 @@ def command(
 
     With --model, or a rig file with [model], the run is one of another mechanism (host/docs/models.md): its columns are
     t and the signals of the model. It is identified in float64; with --core f32 also by the C core, compiled for it.
+
+    --refine fits the full equations to the whole run; --figure then shows the measured signals against the simulated.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
     reported tick and at the end.
@@ -73,7 +81,14 @@ def command(
 
         options = {"core": core, "form": form, "law": law, "on": target}
         return identify_run(
-            run_path, described, columns, as_json=as_json, figure=figure, weights=weights or "residuals", **options
+            run_path,
+            described,
+            columns,
+            as_json=as_json,
+            figure=figure,
+            weights=weights or "residuals",
+            refine=refine,
+            **options,
         )
     if weights is not None:
         raise PvidError(f"--weights {weights} is for a described mechanism, --model; the pendulum has its own weights")
@@ -84,6 +99,10 @@ def command(
     print_notes(notes)
     native = Native()
     result = identified(replace(run, notes=(*run.notes, *notes)), rig, native)
+    if refine:
+        from pvid.run.refined_identify import refined_identification  # loads SymPy
+
+        result = refined_identification(run, rig, result)
     if target is not None:
         from pvid.board.stream_rig import played_samples, stream_rig
         from pvid.board.target import verify
@@ -101,7 +120,11 @@ def command(
     else:
         print_result(result, rig)
     if figure is not None:
-        write_figure(result, figure, None)
+        outcome = None if result.refinement is None else result.refinement.outcome
+        if outcome is not None:
+            write_refined_figure(outcome, figure)
+        else:
+            write_figure(result, figure, None)
     print_warning(result)
     if not result.identified:
         write_stderr(f"pvid: nothing identified: {result.verdict}")

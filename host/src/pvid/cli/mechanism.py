@@ -80,6 +80,7 @@ def identify_run(
     as_json: bool,
     figure: Path | None,
     weights: Weights = "residuals",
+    refine: bool = False,
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
@@ -87,6 +88,7 @@ def identify_run(
     Parameters
     ----------
     weights : of the rows, as in pvid.oracle.fourier.identify
+    refine : the equations are fitted to the whole run, from the answer on
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = _model_of(rig).name
@@ -99,8 +101,12 @@ def identify_run(
     in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
     if weights != "residuals" and in_c:
         raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
+    if refine and in_c:
+        raise PvidError(f"--refine is in float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
     answer = identify_mechanism(recording, model, weights)
+    if refine:
+        return _refined(answer, as_json=as_json, figure=figure)
     core: CoreAnswer | None = None
     if in_c:
         from pvid.run.mechanism_core import identify_in_c
@@ -123,6 +129,27 @@ def identify_run(
     if not shown.identified:
         reason = f": {core.reason.text}" if core is not None and not core.published else ""
         write_stderr(f"pvid: nothing identified{reason}")
+        return NOTHING_IDENTIFIED
+    return DONE
+
+
+def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> int:
+    """Refines an answer and prints it."""
+    from pvid.cli.result import write_refined_figure
+    from pvid.run.refined_mechanism import refined_answer
+
+    answer, refined, text = refined_answer(answer)
+    if as_json:
+        found = None if refined is None else refined.found
+        shown = None if found is None else {"chi2": found.chi2, "slow_chi2": found.slow_chi2}
+        click.echo(json.dumps({**answer.as_json(), "refinement": {"text": text, **(shown or {})}}))
+    else:
+        _print(answer)
+        click.echo(text)
+    if figure is not None and refined is not None:
+        write_refined_figure(refined, figure)
+    if not answer.identified:
+        write_stderr("pvid: nothing identified")
         return NOTHING_IDENTIFIED
     return DONE
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from rich.console import Console
@@ -15,6 +16,10 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run import answer
 from pvid.run.identify import Identification, identify
+
+if TYPE_CHECKING:
+    from pvid.run.refined_mechanism import RefinedMechanism
+    from pvid.run.refined_pendulum import RefinedPendulum
 
 
 def identified(run: Run, rig: RigFile, native: Native) -> Identification:
@@ -35,11 +40,19 @@ def write_figure(result: Identification, path: Path, truths: dict[str, float] | 
     click.echo(f"figure: {path}")
 
 
+def write_refined_figure(outcome: RefinedPendulum | RefinedMechanism, path: Path) -> None:
+    """Measured against simulated signals."""
+    from pvid.show.refined_figure import measured_and_simulated  # loads matplotlib
+
+    measured_and_simulated(outcome.problem, outcome.found, path)
+    click.echo(f"figure: {path}")
+
+
 def print_result(result: Identification, rig: RigFile, truths: dict[str, float] | None = None) -> None:
     table = answer.table(result, truths)
     if table is not None:
         Console().print(table)
-    for line in (answer.error_line(result, rig), answer.status_line(result)):
+    for line in (answer.error_line(result, rig), answer.status_line(result), answer.refinement_line(result)):
         if line is not None:
             click.echo(line)
 

@@ -18,7 +18,7 @@ from pvid.rig.file import load
 from pvid.settings.forms import FORMS
 
 _NAMES = {"weak": "weak_config", "strong": "strong_config", "fir": "fir_bank"}
-_FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1}
+_FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1, "block": 1}
 
 
 @click.command(name="tables")
@@ -34,6 +34,7 @@ _FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1}
 @click.option("--degree", type=int, help="fir: degree of its polynomial, 4 to 12.  [default: 12]")
 @click.option("--difference", is_flag=True, default=None, help="fir: five-point central differences instead.")
 @click.option("--stride", type=int, help="fir: samples between points.  [default: 1]")
+@click.option("--block", type=int, help="fir: samples whose mean is a point, odd.  [default: 1]")
 def command(
     form: str,
     core: str | None,
@@ -60,7 +61,7 @@ def command(
         given = {key: value for key, value in fir.items() if value is not None}
         return _print_header(_fir(name, **{**_FIR, **given}), check)
     if any(value is not None for value in fir.values()):
-        raise PvidError("--points, --degree, --difference and --stride are for --form fir")
+        raise PvidError("--points, --degree, --difference, --stride and --block are for --form fir")
     if rig_path is None:
         raise PvidError(f"--form {form} needs --rig FILE")
     core = core or "f32"
@@ -92,10 +93,13 @@ def schema() -> int:
     return DONE
 
 
-def _fir(name: str, points: int, degree: int, difference: bool, stride: int) -> str:
-    bank = finite_difference(stride) if difference else savitzky_golay(points, degree, stride)
+def _fir(name: str, points: int, degree: int, difference: bool, stride: int, block: int) -> str:
+    if difference and block != 1:
+        raise PvidError("--block is for Savitzky-Golay windows: omit it or --difference")
+    bank = finite_difference(stride) if difference else savitzky_golay(points, degree, stride, block)
     kind = "--difference" if difference else f"--points {points} --degree {degree}"
-    return bank_header(bank, name, f"pvid tables --form fir {kind} --stride {stride} --name {name}")
+    blocks = f" --block {block}" if block > 1 else ""
+    return bank_header(bank, name, f"pvid tables --form fir {kind} --stride {stride}{blocks} --name {name}")
 
 
 def _print_header(header: str, check: Path | None) -> int:

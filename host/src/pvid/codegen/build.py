@@ -26,7 +26,7 @@ from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches, reaches_of
-from pvid.codegen.refine import RefineFunctions, default_widths, has_skew, refine_functions_of
+from pvid.codegen.refine import RefineFunctions, default_widths, has_skew, refine_functions_of, without_optional
 from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
@@ -176,8 +176,9 @@ def _weak_files(compiled: CompiledModel, command: str, options: Options) -> dict
 
 def refine_functions(compiled: CompiledModel, options: Options | None = None) -> RefineFunctions:
     """Of the refinement in float32, with the chosen widths of signs and those of the description."""
-    widths = {**default_widths(compiled), **(options or Options()).soft_signs}
-    return refine_functions_of(compiled, widths, has_skew(compiled))
+    model = without_optional(compiled)
+    widths = {**default_widths(model), **(options or Options()).soft_signs}
+    return refine_functions_of(model, widths, has_skew(model))
 
 
 def refine_refusal(compiled: CompiledModel) -> str | None:

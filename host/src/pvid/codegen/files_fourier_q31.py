@@ -73,6 +73,19 @@ def source(made: FixedFourier, parameters: ParametersQ31, command: str) -> str:
     )
 
 
+def together(made: FixedFourier, parameters: ParametersQ31, design: FourierDesignQ31, prefix: str) -> str:
+    """Functions, PREFIX_fourier_q31 and PREFIX_design_q31 in one text, for proofs."""
+    return "\n\n".join(
+        [
+            '#include "pvid/fourier_q31.h"\n#include "pvid/elementary_q31.h"\n\n#include <stddef.h>',
+            c_functions(made, prefix).rstrip(),
+            c_parameters(parameters, prefix).rstrip(),
+            *_model(made, prefix),
+            *_design(design, prefix),
+        ]
+    )
+
+
 def design_header(
     config: FourierConfigQ31, name: str, needed: Mapping[str, int], command: str, about: Sequence[str]
 ) -> str:
@@ -189,7 +202,7 @@ def _design(design: FourierDesignQ31, prefix: str) -> list[str]:
         ),
         "error_order": _numbers("uint8_t", f"{prefix}_error_order", design.error_order),
         "error_variance": _structs("pvid_scaled_q31", f"{prefix}_error_variance", design.error_variance),
-        "circle": _numbers("PVID_TABLE int16_t", f"{prefix}_circle", design.circle.tolist()),
+        "circle": _numbers("PVID_TABLE int32_t", f"{prefix}_circle", design.circle.tolist()),
     }
     sizes = ("functions", "power", "decimation", "sum_shift", "hop")
     struct = [

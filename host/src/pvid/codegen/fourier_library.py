@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from pvid.codegen import files_fourier
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_twin import fourier_model_of
@@ -11,6 +13,15 @@ from pvid.core.sizes import raised
 from pvid.model.compiled import CompiledModel
 from pvid.settings.fourier import FourierDesign32
 from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+
+# Sizes that depend on the design alone are rounded up to multiples of these.
+_STEPS = {
+    "PVID_MAX_RING": 512,
+    "PVID_MAX_HARMONICS": 25,
+    "PVID_MAX_FUNCTIONS": 40,
+    "PVID_MAX_POWER": 8,
+    "PVID_MAX_DECIMATION": 64,
+}
 
 
 def fourier_native(compiled: CompiledModel, design: FourierDesign32 | None = None) -> FourierNative:
@@ -27,4 +38,9 @@ def fourier_native(compiled: CompiledModel, design: FourierDesign32 | None = Non
         f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), "identification"),
         f"{made.name}_weak_f32.c": files_fourier.source(made, model, "identification"),
     }
-    return FourierNative(made.name, model_library(made.name, texts, raised(needed)))
+    return FourierNative(made.name, model_library(made.name, texts, raised(_roomy(needed))))
+
+
+def _roomy(needed: Mapping[str, int]) -> dict[str, int]:
+    """The same or more, of few kinds: designs of several recordings share a library, which takes seconds to compile."""
+    return {macro: _STEPS.get(macro, 1) * -(-size // _STEPS.get(macro, 1)) for macro, size in needed.items()}

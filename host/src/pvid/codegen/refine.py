@@ -6,6 +6,7 @@
     m, q, v, u -> z, Zq, Zv, Zr    what the sensors measure, and its derivatives
     r -> region                    whether the mechanism is possible
     r, row -> row                  derivatives by the motion's steps to those by the steps of r: the chart
+    m, q, v, u -> g                arguments of the signs, where widths are settings
 
 A refinement with a skew has one more moving entry behind the others: the time by which the sensors are late on the
 inputs. Its column is U times the derivative of u; the kernel makes it, and its entries of B are not written.
@@ -17,8 +18,8 @@ solution: with A h = b, A dh = db - dA h for every column, so that A is inverted
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
@@ -155,6 +156,18 @@ def refine_functions_of(
         Where the equations do not determine a motion, or a sign has no width.
     """
     return _Refine(model, widths, skew).functions()
+
+
+def without_optional(model: CompiledModel, kept: Collection[str] = ()) -> CompiledModel:
+    """The model with its optional extras 0, but for those that are kept."""
+    own = model.refinement
+    left = {one.symbol: _ZERO for one in own.extras if one.optional and one.name not in kept}
+    if not left:
+        return model
+    equations = tuple(one.xreplace(left) for one in own.equations)
+    outputs = {name: one.xreplace(left) for name, one in own.outputs.items()}
+    extras = tuple(one for one in own.extras if one.symbol not in left)
+    return replace(model, refinement=replace(own, equations=equations, outputs=outputs, extras=extras))
 
 
 def _equations(model: CompiledModel) -> tuple[sp.Expr, ...]:
@@ -499,6 +512,8 @@ class _Refine:
             "output": [("z", list(self.z))],
             "output_jacobian": [(key, e) for key, e in readings.items() if e],
         }
+        if self.settings and signs_of(self.model):
+            groups["signs"] = [("g", list(signs_of(self.model)))]
         return self._generated(groups)
 
     def _reading(

@@ -27,9 +27,9 @@ from pvid.settings.fourier_q31 import (
 Float = npt.NDArray[np.float64]
 
 BLOCK = 4  # steps that are added together
-CIRCLE = 32767  # 1 in the table of cosines
+CIRCLE = 2**23 - 1  # 1 in the table of cosines
 CHANNEL_BITS = 28  # of a channel
-DOWN = 14  # of a block's products, to 32 bits
+DOWN = 22  # of a block's products, to 32 bits
 _WORD = 30  # bits of a rounded sum or integral: one is spare
 _BLOCK_BITS = 28  # of a block sum: a pair of differences fits a word
 
@@ -139,7 +139,7 @@ def fixed_design(
         twice = 28.0 * sizes.hop**2 * most + 8.0 * sizes.hop * most
         margins.take("a double integral", twice, 62)
         integral.append((max(1, shift_to(once, _WORD)), max(1, shift_to(twice, _WORD))))
-    sum_shift = max(1, shift_to(sizes.hop * (2.0 ** (CHANNEL_BITS + 15 - DOWN) + 2), _WORD - 1e-6))
+    sum_shift = max(1, shift_to(sizes.hop * (2.0 ** (CHANNEL_BITS + 23 - DOWN) + 2), _WORD - 1e-6))
     channels = _Channels(model, sizes.hop, sum_shift, formats, tuple(integral), margins)
     units = tuple(channels.unit(k, dt) for k in range(len(model.channel)))
     omega = math.pi / (sizes.hop * dt)
@@ -159,7 +159,7 @@ def fixed_design(
         sign_width=widths,
         integral=tuple(integral),
         format=tuple(channels.format(k) for k in range(len(model.channel))),
-        circle=np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * sizes.hop) / sizes.hop)).astype(np.int16),
+        circle=np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * sizes.hop) / sizes.hop)).astype(np.int32),
         factor=tuple(
             scaled_number(float(theirs.factor) * units[mine.channel] * (highest * omega) ** mine.order)
             for theirs, mine in terms

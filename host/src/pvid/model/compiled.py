@@ -145,11 +145,13 @@ class Extra:
     symbol : in the equations of the refinement
     unit : as in "1/s"
     sd : how far from 0 it can be [unit]
+    optional : it is 0 but where the refinement on the host asks for it
     """
 
     symbol: sp.Symbol
     unit: str
     sd: float
+    optional: bool = False
 
     @property
     def name(self) -> str:

@@ -45,6 +45,7 @@ def as_json(result: Identification) -> dict[str, Any]:
         "form": result.form,
         "law": result.law,
         "on": result.on,
+        **({} if result.refinement is None else {"refinement": result.refinement.as_json()}),
     }
 
 
@@ -65,7 +66,9 @@ def table(result: Identification, truths: dict[str, float] | None = None) -> Tab
     """The parameters, rounded to their errors; None if the run is not identified."""
     if not result.identified:
         return None
-    out = Table(title=f"{result.form} form, {result.law} law, core {result.core} on {result.on}")
+    refined = result.refinement is not None and result.refinement.adopted
+    made = f"{result.form} form, {result.law} law, core {result.core} on {result.on}"
+    out = Table(title=f"refinement in float64 after the {made}" if refined else made)
     out.add_column("parameter")
     if truths:
         out.add_column("truth", justify="right")
@@ -101,6 +104,16 @@ def status_line(result: Identification) -> str:
         f"status {result.status}{since};{chi2} kappa {result.kappa:.2g}; {result.ticks} ticks, "
         f"{result.updates} updates, {result.lost} lost; hash {'none' if result.hash is None else f'{result.hash:08x}'}"
     )
+
+
+def refinement_line(result: Identification) -> str | None:
+    """What became of the refinement, with what it found beside the parameters; None where none was asked for."""
+    found = result.refinement
+    if found is None:
+        return None
+    extras = {} if found.outcome is None or not found.adopted else found.outcome.extras
+    shown = [f"{name} {value:.3g} +- {se:.1g}" for name, (value, se) in extras.items() if se > 0]
+    return "; ".join([found.text, *([", ".join(shown)] if shown else [])])
 
 
 def error_line(result: Identification, rig: RigFile) -> str | None:

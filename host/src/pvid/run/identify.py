@@ -159,6 +159,8 @@ class Identification:
         of the weak form's C cores; their standard errors contain those of the scales
     hash
         None where the core has none (f64)
+    refinement
+        pvid.run.refined_identify.RefinementVerdict; None where none was asked for
     """
 
     model: Model
@@ -193,6 +195,7 @@ class Identification:
     beyond_words: str | None = None
     notes: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
+    refinement: Any = None
 
     @property
     def identified(self) -> bool:
@@ -655,7 +658,7 @@ def _identification(
     se, parts = noise, {}
     answered = _is_answer(rig.identifier.form, trusted_s, updates, status, noise[names[0]], value[names[0]])
     if answered:
-        parts = _parts(noise, p, rig)
+        parts = parts_of(noise, p, rig)
         se = {name: one.whole for name, one in parts.items()}
     elif beyond is not None and beyond.share >= _BEYOND_FATAL:
         status = SATURATED
@@ -706,7 +709,7 @@ def _widened(published: Publications, rig: RigFile) -> Publications:
     return Publications(published.t, published.p, se, published.alarm)
 
 
-def _parts(noise: Mapping[str, float], p: Float, rig: RigFile) -> dict[str, ErrorParts]:
+def parts_of(noise: Mapping[str, float], p: Float, rig: RigFile) -> dict[str, ErrorParts]:
     """Parts of the standard error of every parameter in `noise`."""
     model, scales = rig.mechanism.model, rig.mechanism.scale_errors(p, rig.scale_sd)
     order = (*model.mapped_names, *model.physical_names)

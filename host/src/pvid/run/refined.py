@@ -7,7 +7,7 @@ all blocks, with the prior, gives the step of r. Steps that do not lower the sum
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +41,8 @@ class Measured:
     inputs : of a skew [s]: inputs and their rates at begin, middle and end of each step, [steps, 3, inputs] each
     rate : of the samples [Hz]
     sub : steps a sample
+    coarse : steps that are taken as one where no friction reverses
+    grown : variance of a sample over that at low frequencies, sd^2: of samples that went through a filter
     """
 
     z: Float
@@ -48,6 +50,8 @@ class Measured:
     inputs: Inputs
     rate: float
     sub: int
+    grown: float = 1.0
+    coarse: int = 1
 
     @property
     def h(self) -> float:
@@ -159,12 +163,14 @@ class Problem:
     def simulated(self, r: Float, cut: Cut, starts: Float) -> Float:
         """Readings [blocks, samples, outputs]."""
         m = self.measured
-        return self.kernel.blocks(r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, False)[0]
+        return self.kernel.blocks(r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, False, m.coarse)[0]
 
     def block(self, r: Float, cut: Cut, starts: Float, use: Bool) -> Block | None:
         """One pass; None where the motion is no number."""
         m = self.measured
-        z, jacobian, _ = self.kernel.blocks(r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts)
+        z, jacobian, _ = self.kernel.blocks(
+            r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, True, m.coarse
+        )
         assert jacobian is not None
         if not (np.isfinite(z).all() and np.isfinite(jacobian).all()):
             return None
@@ -187,12 +193,14 @@ class Problem:
     def _prior_cost(self, r: Float, prior: Prior) -> float:
         return float(np.sum((self.step_between(prior.r, r)[prior.free] / prior.sd[prior.free]) ** 2))
 
-    def searched(self, r: Float, prior: Prior, cut: Cut, starts: Float, use: Bool, move: bool = True) -> Refined:
-        """Gauss-Newton from r and these starts; `move` False: of the starts alone."""
+    def searched(
+        self, r: Float, prior: Prior, cut: Cut, starts: Float, use: Bool, move: bool = True, most: int = PASSES
+    ) -> Refined:
+        """Gauss-Newton from r and these starts, at most so many passes; `move` False: of the starts alone."""
         free = np.flatnonzero(prior.free) if move else np.zeros(0, int)
         cost = self.cost(r, cut, starts, use, prior)
         converged, passes = False, 0
-        while passes < PASSES:
+        while passes < most:
             passes += 1
             found = self.block(r, cut, starts, use)
             if found is None:
@@ -249,6 +257,12 @@ class Problem:
             relative = float(np.sqrt(np.mean(right**2)))
         return d_r, d_starts, whole, relative
 
+    def step(self, block: Block, r: Float, prior: Prior) -> tuple[Float, Float, Float]:
+        """Gauss-Newton's step of r [parameters] and of the starts [blocks, states], and the information on r's free
+        entries with the prior."""
+        d_r, d_starts, triangle, _ = self._step(block.triangle, r, prior, np.flatnonzero(prior.free))
+        return d_r, d_starts, triangle.T @ triangle
+
     def _judged(
         self, r: Float, prior: Prior, cut: Cut, starts: Float, use: Bool, converged: bool, passes: int, cost: float
     ) -> Refined:
@@ -261,7 +275,7 @@ class Problem:
         _, _, triangle, _ = self._step(found.triangle, r, prior, free)
         count = int(use.sum())
         freedom = max(count - len(cut.first) * states - len(free), 1)
-        chi2 = float(np.sum(found.error**2)) / freedom
+        chi2 = float(np.sum(found.error**2)) / freedom / self.measured.grown
         slow = self._slow_chi2(found.error, use, len(cut.first) * states + len(free))
         inverse = np.linalg.pinv(triangle, rcond=1e-14)
         information = inverse @ inverse.T
@@ -293,6 +307,23 @@ class Problem:
         many = int(there.sum())
         total = float(np.sum(sums[there] ** 2 / counts[there]))
         return total / max(many - parameters, 1)
+
+    def gain(self, found: Refined, prior: Prior, more: npt.NDArray[np.intp]) -> tuple[float, Float]:
+        """What the search would gain with these parameters free as well, to first order: the fall of the sum of
+        squares, and the factor on each standard error of those that are free."""
+        block = self.block(found.r, found.cut, found.starts, self.used(found.cut))
+        free = np.flatnonzero(prior.free)
+        if block is None:
+            return 0.0, np.full(len(free), np.inf)
+        both = np.concatenate([free, more])
+        errors = []
+        falls = []
+        for columns in (free, both):
+            _, _, triangle, relative = self._step(block.triangle, found.r, prior, columns)
+            inverse = np.linalg.pinv(triangle, rcond=1e-14)
+            errors.append(np.sqrt((inverse**2).sum(1))[: len(free)])
+            falls.append(relative**2)
+        return falls[1] - falls[0], errors[1] / np.maximum(errors[0], 1e-300)
 
     def first_starts(self, cut: Cut, r: Float, guess: Float | None = None) -> Float:
         """Starts: measured coordinates and their rates from the samples about each block's first; the rest from
@@ -344,7 +375,7 @@ class Problem:
                 out[k] = before.starts[b]
                 continue
             at = old.first[b : b + 1]
-            out[k] = self.kernel.blocks(r, at, gap, m.sub, m.h, *u, before.starts[b : b + 1], False)[2][0]
+            out[k] = self.kernel.blocks(r, at, gap, m.sub, m.h, *u, before.starts[b : b + 1], False, m.coarse)[2][0]
         return out
 
 
@@ -357,8 +388,21 @@ def gated(problem: Problem, found: Refined) -> Bool:
         return np.asarray(np.abs(error) <= _GATE * np.maximum(spread, 1.0))
 
 
-def refined(problem: Problem, prior: Prior, lengths: tuple[int, ...], start: Float | None = None) -> Refined:
-    """Blocks of each length [samples] in turn, each from the outcome of the one before; then without outliers.
+def refined(
+    problem: Problem,
+    prior: Prior,
+    lengths: Sequence[int],
+    r: Float | None = None,
+    before: Refined | None = None,
+    most: int = PASSES,
+) -> Refined:
+    """Blocks of each length [samples] in turn, each from the outcome of the one before.
+
+    Parameters
+    ----------
+    r : to start from; that of the prior, or of `before`, by default
+    before : an outcome whose motion gives the first starts
+    most : passes for each length
 
     Raises
     ------
@@ -368,19 +412,27 @@ def refined(problem: Problem, prior: Prior, lengths: tuple[int, ...], start: Flo
     total = len(problem.measured.z)
     if total < lengths[0]:
         raise PvidError(f"the run has {total} samples and a block of the refinement {lengths[0]}")
-    r = prior.r.copy() if start is None else start.copy()
-    found: Refined | None = None
+    found = before
+    if r is None:
+        r = prior.r.copy() if found is None else found.r
     for samples in lengths:
         cut = Cut.of(total, samples)
         use = problem.used(cut)
-        starts = problem.first_starts(cut, r) if found is None else problem.starts_along(r, found, cut)
         if found is None:
+            starts = problem.first_starts(cut, r)
             starts = problem.searched(r, prior, cut, starts, use, move=False).starts
-        found = problem.searched(r, prior, cut, starts, use)
+        else:
+            starts = problem.starts_along(r, found, cut)
+        found = problem.searched(r, prior, cut, starts, use, most=most)
         r = found.r
     assert found is not None
-    use = gated(problem, found)
-    if not use.all() and np.isfinite(found.chi2):
-        again = problem.searched(found.r, prior, found.cut, found.starts, use & problem.used(found.cut))
-        found = replace(again, passes=found.passes + again.passes)
     return found
+
+
+def without_outliers(problem: Problem, prior: Prior, found: Refined) -> Refined:
+    """The same without the samples beyond the gate."""
+    use = gated(problem, found) & problem.used(found.cut)
+    if not np.isfinite(found.chi2) or use.all():
+        return found
+    again = problem.searched(found.r, prior, found.cut, found.starts, use)
+    return replace(again, passes=found.passes + again.passes)

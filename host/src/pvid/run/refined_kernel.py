@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from functools import lru_cache
 from importlib.resources import files
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen.files_refine import DOUBLE, function
-from pvid.codegen.refine import RefineFunctions, has_skew, refine_functions_of
+from pvid.codegen.refine import RefineFunctions, has_skew, refine_functions_of, without_optional
 from pvid.model.compiled import CompiledModel
 from pvid.sim.compiled_plant import loaded
 
@@ -44,6 +43,7 @@ class RefinedKernel:
         du: Float,
         starts: Float,
         derivatives: bool = True,
+        coarse: int = 1,
     ) -> tuple[Float, Float | None, Float]:
         """Readings, derivatives, ends.
 
@@ -55,6 +55,7 @@ class RefinedKernel:
         sub : steps a sample, of h [s]
         u, du : inputs and their rates at begin, middle and end of each step [steps, 3, inputs]
         starts : [blocks, states]
+        coarse : steps, an even number or 1, that are taken as one where no friction reverses
 
         Returns
         -------
@@ -71,6 +72,7 @@ class RefinedKernel:
             np.ascontiguousarray(first, np.int32).ctypes.data_as(ctypes.c_void_p),
             samples,
             sub,
+            coarse,
             ctypes.c_double(h),
             _pointer(u),
             _pointer(du),
@@ -129,6 +131,8 @@ def _code(made: RefineFunctions) -> str:
         "NM": made.moving - made.skew,
         "NT": len(made.parameters) - made.moving,
         "SKEW": int(made.skew),
+        "NS": dict(made.functions["signs"].written)["g"] if "signs" in made.functions else 0,
+        "WIDTHS": len(made.parameters),
         "NUMBER_OF_CONSTANTS": len(made.constants),
     }
     jacobian = [key for key, _ in made.functions["jacobian"].written]
@@ -152,14 +156,16 @@ def _code(made: RefineFunctions) -> str:
     )
 
 
-@lru_cache(maxsize=32)
-def _kept(model_id: int) -> list[RefinedKernel]:
-    return []
+_KEPT = 32
+_made: dict[tuple[int, tuple[str, ...]], tuple[CompiledModel, RefinedKernel]] = {}
 
 
-def kernel_of(model: CompiledModel) -> RefinedKernel:
-    """The kernel of a compiled model; made once for each object."""
-    found = _kept(id(model))
-    if not found or found[0].made.model is not model:
-        found[:] = [RefinedKernel(model)]
-    return found[0]
+def kernel_of(model: CompiledModel, optional: tuple[str, ...] = ()) -> RefinedKernel:
+    """The kernel of a compiled model with these of its optional extras; made once for each object."""
+    key = (id(model), optional)
+    found = _made.get(key)
+    if found is None or found[0] is not model:
+        found = _made[key] = (model, RefinedKernel(without_optional(model, optional)))
+        while len(_made) > _KEPT:
+            del _made[next(iter(_made))]
+    return found[1]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.refine import LOG_SD, signs_of, width_name
+from pvid.base.errors import PvidError
+from pvid.codegen.refine import LOG_SD, has_skew, signs_of, width_name
 from pvid.model.compiled import CompiledModel
-from pvid.run.refined import Measured, Prior, Problem, Refined, refined
+from pvid.run.mechanism import MechanismAnswer, gains_of, values_of
+from pvid.run.refined import Measured, Prior, Problem, Refined, refined, without_outliers
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
 
@@ -18,7 +20,7 @@ Float = npt.NDArray[np.float64]
 
 _STEP = 0.1  # of a step times the fastest eigenvalue: the error of RK4 is below 1e-7 of a period
 _MOST_SUB = 16
-_SIGN_SUB = 4  # steps a sample where there are signs: their width follows from these
+_SIGN_SUB = 16  # steps a sample where there are signs: their width follows from these
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,9 @@ class RefinedMechanism:
         return {one.name: float(sd[k] * (self.found.r[k] if one.log else 1.0)) for k, one in enumerate(made.parameters)}
 
 
+GOOD = 3.0  # slow chi^2 up to which the refined answer is preferred to the weak one
+
+
 def start_of(kernel: RefinedKernel, p: Float) -> Float:
     """r, with settings, from p of the weak form."""
     made = kernel.made
@@ -58,7 +63,6 @@ def problem_of(
     kernel = kernel_of(model)
     made = kernel.made
     signs = signs_of(model)
-    sub = _SIGN_SUB if signs else 1
     r = r.copy()
     names = list(made.settings)
     places = {str(one): len(made.parameters) + names.index(width_name(one)) for one in signs}
@@ -67,7 +71,9 @@ def problem_of(
     for place in places.values():
         r[place] = 1e6  # out of the way
     fastest = float(np.abs(np.linalg.eigvals(kernel.slopes(r, zero, u))).max())
-    sub = min(max(sub, int(np.ceil(fastest / rate / _STEP))), _MOST_SUB)
+    smooth = min(max(1, int(np.ceil(fastest / rate / _STEP))), _MOST_SUB)
+    coarse = max(2, _SIGN_SUB // smooth // 2 * 2) if signs else 1
+    sub = smooth * coarse
     for sign, place in places.items():
         r[place] = (widths or {}).get(sign) or _width(kernel, r, place, sub, rate)
     inputs = inputs_of(model, made, signals, rate, sub)
@@ -77,6 +83,7 @@ def problem_of(
         lambda _: inputs,
         rate,
         sub,
+        coarse=coarse,
     )
     return Problem(kernel, measured), r
 
@@ -105,9 +112,44 @@ def refine_mechanism(
     block_s : length of a block [s]
     widths : of signs, by argument; from the sampling by default
     """
-    kernel = kernel_of(model)
-    problem, r = problem_of(model, signals, rate, start_of(kernel, p), widths)
-    sd = np.array([LOG_SD if one.log else one.prior_sd for one in kernel.made.parameters])
+    if has_skew(model):
+        raise PvidError(f"{model.name} is refined from its own weak form: omit --form and --model")
+    problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
+    sd = np.array([LOG_SD if one.log else one.prior_sd for one in problem.kernel.made.parameters])
     prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), np.ones(problem.n, bool))
     samples = max(8, round(block_s * rate))
-    return RefinedMechanism(problem, refined(problem, prior, (max(8, samples // 3), samples)))
+    found = refined(problem, prior, (max(8, samples // 3), samples))
+    return RefinedMechanism(problem, without_outliers(problem, prior, found))
+
+
+def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMechanism | None, str]:
+    """The answer after a refinement that starts from it, the refinement, and what became of it in a clause."""
+    weak, model, recording = answer.found, answer.model, answer.recording
+    try:
+        refined = refine_mechanism(model, recording.signals, recording.sample_rate, weak.p, 2 * weak.design.window_s)
+    except PvidError as error:
+        return answer, None, f"not refined: {error}"
+    found = refined.found
+    if not found.converged:
+        return answer, refined, "the refinement did not converge: the weak form's answer stands"
+    if found.slow_chi2 > GOOD and not _better(refined, weak.p, weak.se):
+        text = (
+            f"slow residuals have {found.slow_chi2:.2g} times the variance of the noise: the weak form's answer stands"
+        )
+        return answer, refined, text
+    made = refined.problem.kernel.made
+    places = [next(k for k, one in enumerate(made.parameters) if one.place == n) for n in range(len(weak.p))]
+    p = found.r[places]
+    units = np.array([p[n] if made.parameters[k].log else 1.0 for n, k in enumerate(places)])
+    covariance = found.covariance[np.ix_(places, places)] * np.outer(units, units)
+    values = values_of(model, p, covariance, gains_of(model, weak), identified=answer.identified)
+    text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
+    return replace(answer, values=values), refined, text
+
+
+def _better(refined: RefinedMechanism, p: Float, se: Float) -> bool:
+    """Whether the refined answer agrees with the weak one and its standard errors are smaller."""
+    names = refined.problem.kernel.made.model.p_names
+    value = np.array([refined.values[name] for name in names])
+    error = np.array([refined.errors[name] for name in names])
+    return bool((np.abs(value - p) <= 3 * np.hypot(error, se)).all() and (error <= se).all())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,20 +12,34 @@ from pvid.base.errors import PvidError
 from pvid.codegen.refine import LOG_SD
 from pvid.design.second_derivative import second_derivative
 from pvid.models.mechanisms import compiled_of
+from pvid.models.registry import DEFAULT, MODELS
 from pvid.oracle.weak import sample_sd
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.refined import Inputs, Measured, Prior, Problem, Refined, refined
+from pvid.run.refined import Inputs, Measured, Prior, Problem, Refined, refined, without_outliers
 from pvid.run.refined_kernel import kernel_of
 
 Float = npt.NDArray[np.float64]
 
 _PERIODS = 2.0  # of the slow mode in a block
-_SEARCH = 0.35  # of that: the first blocks
-_EDGE = 3.2  # times the fast mode: the least pass band of the drive
-_LEAST_HZ = 5.0
+_SEARCH = (0.15, 0.4)  # of that: blocks of the search for w, d1, d2 and the zero alone
+_SEARCH_PASSES = 12
+_BOUND = 1.5  # slow chi^2 of a search that needs no other start
+_EDGE = 1.25  # times the drive's: the pass band
 _STEP = 0.1  # of a step times the fast mode's angular frequency
-_SD = {"k1": 2.0, "k2": 2.0, "tau": 0.02, "c": 1.0}  # what is known before: little
+_A_PERIOD = 60  # decimated samples in a period of the fast mode
+_SD = {"k1": 0.5, "k2": 0.5, "tau": 5e-3, "c": 1.0, "f1": 1.0, "f2": 1.0, "slant": 0.1}  # what is known before: little
+_SAME = 0.02  # two searches agree: relative difference of all parameters
+_SIGN_COARSE = 8  # steps in a smooth one where dry friction may reverse
+_WIDTH = 0.02  # of the sign of a dry friction: share of the joint's speed, over the steps
+_FIRST = tuple(one.name for one in MODELS[DEFAULT].published)
+_OPTIONS = (("slant",), ("f1", "f2"), ("slant", "f1", "f2"))
+_OPTION_PASSES = 10
+_SHORTER = (0.5, 0.25)  # of a block: tried where the residuals are larger than the sensors' noise
+_CHEAP = 1.3  # growth of the others' standard errors up to which an extra is free
+_TOLD = 9.0  # fall of the sum of squares from which it is free in any case
+_ASKED = 1.3  # slow chi^2 from which options are tried
+_GAINED = 25.0  # fall of the sum of squares over chi^2 that an option needs
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,46 +50,215 @@ class RefinedPendulum:
     found: Refined
     first: int
 
+    @property
+    def names(self) -> list[str]:
+        """Of the refined parameters."""
+        return [one.name for one in self.problem.kernel.made.parameters]
 
-def refine_pendulum(run: Run, rig: RigFile, p: Float, c: float) -> RefinedPendulum:
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters by name."""
+        return dict(zip(self.names, map(float, self.found.r), strict=False))
+
+    @property
+    def extras(self) -> dict[str, tuple[float, float]]:
+        """Those that the weak form does not have: value and standard error."""
+        sd = np.sqrt(np.diag(self.found.covariance))
+        made = self.problem.kernel.made
+        return {
+            one.name: (float(self.found.r[k]), float(sd[k])) for k, one in enumerate(made.parameters) if one.place < 0
+        }
+
+
+class _Search:
+    """One run; problems differ in the optional extras."""
+
+    def __init__(self, run: Run, rig: RigFile, p: Float) -> None:
+        self.run, self.rig = run, rig
+        self.slow, self.fast = rig.mechanism.model.modes_hz(p)
+        rate = run.sample_rate
+        edge = max(_EDGE * drive_edge_hz(run, rig), self.slow)
+        front = second_derivative(rate, min(edge, 0.4 * rate))
+        there = np.isfinite(run.y)
+        y = np.interp(np.arange(len(run.y)), np.flatnonzero(there), run.y[there])
+        times, acceleration = front.apply(y, rate)
+        if len(times) < 12:
+            raise PvidError(f"the run of {len(y) / rate:.3g} s is too short for the refinement")
+        self.first, last = int(np.ceil(times[0] * rate)), int(times[-1] * rate)
+        self.mean = max(1, int(rate / (_A_PERIOD * self.fast)))
+        self.samples = (last - self.first + 1) // self.mean
+        self.rate = rate / self.mean
+        middle = self.first + (self.mean - 1) / 2  # of the first average
+        self._track = times - middle / rate, acceleration / rig.l1
+        self._problems: dict[tuple[str, ...], Problem] = {}
+
+    def problem(self, optional: tuple[str, ...] = ()) -> Problem:
+        """With these extras."""
+        if optional not in self._problems:
+            rate = self.rate
+            sub = max(1, int(np.ceil(2 * np.pi * self.fast / rate / _STEP)))
+            coarse = _SIGN_COARSE if "f1" in optional else 1
+            sub *= coarse
+            inputs = _inputs(*self._track, rate, sub, self.samples)
+            phi, grown = averages(self.run.phi[self.first :][: self.samples * self.mean], self.mean)
+            sd = np.array([sample_sd(self.rig.sensor.phi_lsb, 0.5) / np.sqrt(self.mean)])
+            kernel = kernel_of(compiled_of(DEFAULT), optional)
+            self._problems[optional] = Problem(kernel, Measured(phi[:, None], sd, inputs, rate, sub, grown, coarse))
+        return self._problems[optional]
+
+    def r(self, problem: Problem, values: Mapping[str, float]) -> Float:
+        """r and its settings from values by name."""
+        made = problem.kernel.made
+        width = _WIDTH * 2 * np.pi * self.fast * float(np.nanstd(self.run.phi)) / problem.measured.sub
+        settings = {"l1": self.rig.l1, **{name: width for name in made.settings if name.startswith("width")}}
+        names = [*(one.name for one in made.parameters), *made.settings]
+        return np.array([{**settings, **values}.get(name, 0.0) for name in names])
+
+    def prior(self, problem: Problem, r: Float, free: Sequence[str] | None = None) -> Prior:
+        """About r, wide; of these parameters, or of all."""
+        made = problem.kernel.made
+        sd = np.array([3 * LOG_SD if one.log else _SD[one.name] for one in made.parameters])
+        searched = np.array([free is None or one.name in free for one in made.parameters])
+        return Prior(r, sd, searched)
+
+    def lengths(self, slow_hz: float, shares: Sequence[float]) -> list[int]:
+        """Of blocks [samples]."""
+        return [max(8, round(share * _PERIODS / slow_hz * self.rate)) for share in shares]
+
+
+def averages(x: Float, mean: int) -> tuple[Float, float]:
+    """Averages of so many samples with their droop undone to second order, and the variance of one over that of an
+    average."""
+    if mean == 1:
+        return x, 1.0
+    c = (mean * mean - 1) / (24 * mean * mean)
+    found = x.reshape(-1, mean).mean(1)
+    found[1:-1] = (1 + 2 * c) * found[1:-1] - c * (found[2:] + found[:-2])
+    return found, (1 + 2 * c) ** 2 + 2 * c * c
+
+
+def refine_pendulum(
+    run: Run, rig: RigFile, starts: Sequence[Mapping[str, float]], sure: bool = False
+) -> RefinedPendulum:
     """Refines an estimate.
 
     Parameters
     ----------
-    p, c : w, d1, d2 and the encoder's reading at rest to start from
+    starts : values of w, d1, d2, c to start from, the likeliest first
+    sure : the first one is an estimate that was published: others are tried where it leads nowhere. Else the search
+        goes on until two of them agree on the best
 
     Raises
     ------
     PvidError
-        When the run is too short.
+        When the run is too short, or no start leads anywhere.
     """
-    model = compiled_of("kapitza")
-    kernel = kernel_of(model)
-    made = kernel.made
-    mechanism = rig.mechanism.model
-    slow, fast = mechanism.modes_hz(p)
-    rate = run.sample_rate
-    edge = max(_EDGE * fast, _LEAST_HZ, 1.1 * drive_edge_hz(run, rig))
-    front = second_derivative(rate, min(edge, 0.4 * rate))
-    y = np.interp(np.arange(len(run.y)), np.flatnonzero(np.isfinite(run.y)), run.y[np.isfinite(run.y)])
-    times, acceleration = front.apply(y, rate)
-    if len(times) < 12:
-        raise PvidError(f"the run of {len(run.y) / rate:.3g} s is too short for the refinement")
-    first, last = int(np.ceil(times[0] * rate)), int(times[-1] * rate)
-    sub = max(1, int(np.ceil(2 * np.pi * fast / rate / _STEP)))
-    samples = last - first + 1
-    inputs = _inputs(times - first / rate, acceleration / rig.l1, rate, sub, samples)
-    sd = sample_sd(rig.sensor.phi_lsb, 0.5)
-    measured = Measured(run.phi[first : last + 1, None], np.array([sd]), inputs, rate, sub)
-    problem = Problem(kernel, measured)
-    values = {"w": p[0], "d1": p[1], "d2": p[2], "c": c, "l1": rig.l1}
-    names = [*(one.name for one in made.parameters), *made.settings]
-    r = np.array([values.get(name, 0.0) for name in names])
-    prior_sd = np.array([3 * LOG_SD if one.log else _SD[one.name] for one in made.parameters])
-    prior = Prior(r, prior_sd, np.ones(problem.n, bool))
-    block = _PERIODS / slow * rate
-    lengths = tuple(max(8, round(share * block)) for share in (_SEARCH, 1.0))
-    return RefinedPendulum(problem, refined(problem, prior, lengths), first)
+    model = rig.mechanism.model
+    likeliest = np.array([starts[0][name] for name in model.mapped_names])
+    search = _Search(run, rig, likeliest)
+    problem = search.problem()
+    outcomes: list[Refined] = []
+    for values in starts:
+        found = _searched(search, problem, values)
+        if found is None:
+            continue
+        outcomes.append(found)
+        best = min(outcomes, key=lambda one: one.chi2)
+        agreeing = sum(bool((np.abs(one.r[:3] / best.r[:3] - 1) < _SAME).all()) for one in outcomes)
+        if best.slow_chi2 < _BOUND and (sure or agreeing > 1):
+            break
+    if not outcomes:
+        raise PvidError("the refinement finds no motion that is like the run's")
+    found = min(outcomes, key=lambda one: one.chi2)
+    slow = model.modes_hz(found.r[:3])[0]
+    found, prior = _whole(search, problem, found, slow)
+    found = without_outliers(problem, prior, found)
+    if found.slow_chi2 > _ASKED:
+        problem, found = _with_options(search, problem, found)
+    if found.slow_chi2 > _ASKED:
+        found = _shorter(problem, search.prior(problem, found.r), found, search.lengths(slow, _SHORTER))
+    return RefinedPendulum(problem, found, search.first)
+
+
+def _whole(search: _Search, problem: Problem, found: Refined, slow_hz: float) -> tuple[Refined, Prior]:
+    """Blocks of full length; skew and frictions are free where that costs the others little, or explains much."""
+    first = list(_FIRST)
+    prior = search.prior(problem, found.r, first)
+    found = refined(problem, prior, search.lengths(slow_hz, (1.0,)), before=found)
+    names = [one.name for one in problem.kernel.made.parameters]
+    for extras in (("tau", "k1", "k2"), ("k1", "k2"), ("tau",)):
+        if any(one in first for one in extras):
+            continue
+        wide = search.prior(problem, found.r, first)
+        fall, grown = problem.gain(found, wide, np.array([names.index(one) for one in extras]))
+        factor = max(1.0, found.slow_chi2) if found.slow_chi2 < _BOUND else 1.0
+        if grown[:3].max() < _CHEAP or fall > _TOLD * len(extras) * factor:
+            first += extras
+            prior = search.prior(problem, found.r, first)
+            cut = found.cut
+            found = problem.searched(found.r, prior, cut, found.starts, problem.used(cut))
+    return found, prior
+
+
+def _shorter(problem: Problem, prior: Prior, found: Refined, lengths: Sequence[int]) -> Refined:
+    """Shorter blocks, in which an error of the drive grows less, where the standard errors fall."""
+    free = np.diag(found.covariance) > 0
+    prior = Prior(prior.r, prior.sd, free)
+    best = found
+    for samples in lengths:
+        again = refined(problem, prior, [samples], before=found, most=_OPTION_PASSES)
+        if np.isfinite(again.chi2) and _largest_error(again) < _largest_error(best):
+            best = again
+    return best
+
+
+def _largest_error(found: Refined) -> float:
+    """Of the logarithms of w, d1, d2."""
+    return float(np.sqrt(np.diag(found.covariance)[:3]).max())
+
+
+def _searched(search: _Search, problem: Problem, values: Mapping[str, float]) -> Refined | None:
+    """w, d1, d2 and the zero from a start by short blocks; None where it leads nowhere."""
+    model = search.rig.mechanism.model
+    p = np.array([values[name] for name in model.mapped_names])
+    if not model.is_plausible(p):
+        return None
+    r = search.r(problem, values)
+    prior = search.prior(problem, r, _FIRST)
+    wide = Prior(r, np.maximum(prior.sd, 1.0), prior.free)
+    try:
+        found = refined(problem, wide, search.lengths(model.modes_hz(p)[0], _SEARCH), most=_SEARCH_PASSES)
+    except (PvidError, np.linalg.LinAlgError):
+        return None
+    if not np.isfinite(found.chi2) or not model.is_plausible(found.r[:3]):
+        return None
+    fits = search.lengths(model.modes_hz(found.r[:3])[0], (1.0,))[0] <= search.samples
+    return found if fits else None
+
+
+def _with_options(search: _Search, problem: Problem, found: Refined) -> tuple[Problem, Refined]:
+    """With the optional extras that explain most, where they explain enough."""
+    made = problem.kernel.made
+    values = dict(zip([one.name for one in made.parameters], map(float, found.r), strict=False))
+    best = problem, found
+    for optional in _OPTIONS:
+        other = search.problem(optional)
+        r = search.r(other, values)
+        prior = search.prior(other, r)
+        use = other.used(found.cut)
+        again = other.searched(r, prior, found.cut, found.starts, use, most=_OPTION_PASSES)
+        now = best[1]
+        factor = max(again.chi2, again.slow_chi2, 1.0)
+        if np.isfinite(again.chi2) and now.sum_of_squares - again.sum_of_squares > _GAINED * factor * len(optional):
+            best = other, without_outliers(other, prior, again)
+        if best[1].slow_chi2 < _ASKED:
+            break
+    problem, found = best
+    if not found.converged:
+        prior = search.prior(problem, found.r)
+        found = problem.searched(found.r, prior, found.cut, found.starts, problem.used(found.cut))
+        found = without_outliers(problem, prior, found)
+    return problem, found
 
 
 def _inputs(t: Float, u: Float, rate: float, sub: int, samples: int) -> Inputs:
@@ -106,10 +290,9 @@ def drive_edge_hz(run: Run, rig: RigFile) -> float:
     n = len(y)
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((y - y.mean()) * window)) ** 2
-    noise = rig.sensor.y_lsb**2 * (1 / 12 + rig.sensor.y_noise**2 if hasattr(rig.sensor, "y_noise") else 1 / 4)
-    floor = noise * float(np.sum(window**2))
+    floor = sample_sd(rig.sensor.y_lsb, 0.5) ** 2 * float(np.sum(window**2))
     hz = np.fft.rfftfreq(n, 1 / run.sample_rate)
     weighted = spectrum * hz**4
-    total = weighted[spectrum > 30 * floor].sum()
-    above = np.flatnonzero((spectrum > 30 * floor) & (weighted > 1e-5 * total))
+    shown = spectrum > 30 * floor
+    above = np.flatnonzero(shown & (weighted > 1e-5 * weighted[shown].sum()))
     return float(hz[above[-1]]) if len(above) else 0.0

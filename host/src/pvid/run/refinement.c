@@ -1,6 +1,6 @@
 /* Blocks of a run under the equations of a model, with their derivatives by each block's start and by r: RK4.
  *
- * Before this text: N, ORDER, NU, NZ, NM, NT, SKEW and pvid_refine_ constants, motion, jacobian, output, output_jacobian.
+ * Before this text: N, ORDER, NU, NZ, NM, NT, SKEW, NS, WIDTHS (place in r) and pvid_refine_ constants, motion, jacobian, output, output_jacobian.
  * Derivatives are those of the steps as they are computed, so that a search by them converges to rounding. */
 #define NX (ORDER * N)
 #define NC (NX + NM + SKEW) /* columns that are integrated */
@@ -100,22 +100,58 @@ static void read_out(const double *m, const double *x, const double *u, const do
     }
 }
 
+#if NS
+/* Whether a friction may reverse within the next sample: its argument is near 0, beside its last change. */
+static int is_near(const double *m, const double *r, const double *x, const double *u, double *before)
+{
+    double g[NS];
+    int near = 0;
+    pvid_refine_signs(m, x, x + NX - N, u, g);
+    for (int i = 0; i < NS; i++) {
+        near |= !(fabs(g[i]) > 2 * fabs(g[i] - before[i]) + 20 * r[WIDTHS + i]);
+        before[i] = g[i];
+    }
+    return near;
+}
+#endif
+
 /* u, du: at begin, middle and end of each step [steps][3][NU]; z [blocks][samples][NZ]; J [blocks][samples][NZ][NW] or
- * NULL; ends [blocks][NX] */
-void refine_blocks(const double *r, int blocks, const int *first, int samples, int sub, double h, const double *u,
+ * NULL; ends [blocks][NX]; coarse: an even number of steps, or 1, that may be taken as one */
+void refine_blocks(const double *r, int blocks, const int *first, int samples, int sub, int coarse, double h, const double *u,
                    const double *du, const double *starts, double *z, double *J, double *ends)
 {
+    (void)coarse;
     double m[NUMBER_OF_CONSTANTS + 1];
     pvid_refine_constants(r, m);
     for (int b = 0; b < blocks; b++) {
         double x[NX], s[NX * NC];
         for (int i = 0; i < NX; i++) x[i] = starts[b * NX + i];
         for (int i = 0; i < NX * NC; i++) s[i] = i / NC == i % NC;
+#if NS
+        double before[NS];
+        for (int i = 0; i < NS; i++) before[i] = 1e300;
+#endif
         for (int k = 0; k < samples; k++) {
             const long at = ((long)first[b] + k) * sub;
             const long row = (long)b * samples + k;
             read_out(m, x, u + at * 3 * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0);
-            for (int j = 0; j < sub; j++) step(m, x, s, u + (at + j) * 3 * NU, du + (at + j) * 3 * NU, h, J != 0);
+            int together = 1; /* steps: as many as `coarse` in one where no friction reverses */
+#if NS
+            if (!is_near(m, r, x, u + at * 3 * NU, before)) together = coarse;
+#endif
+            for (int j = 0; j < sub; j += together) {
+                double wide[2][3 * NU];
+                const double *from[2] = {u + (at + j) * 3 * NU, du + (at + j) * 3 * NU};
+                for (int i = 0; i < 2 && together > 1; i++) {
+                    for (int n = 0; n < NU; n++) {
+                        wide[i][n] = from[i][n];
+                        wide[i][NU + n] = from[i][(together / 2) * 3 * NU + n];
+                        wide[i][2 * NU + n] = from[i][(together - 1) * 3 * NU + 2 * NU + n];
+                    }
+                    from[i] = wide[i];
+                }
+                step(m, x, s, from[0], from[1], together * h, J != 0);
+            }
         }
         for (int i = 0; i < NX; i++) ends[b * NX + i] = x[i];
     }

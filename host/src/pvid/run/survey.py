@@ -139,7 +139,7 @@ def _search_all(rig: RigFile, run: Run) -> _Outcome | None:
         return None
     outcomes: list[tuple[RigFile, Fit]] = []
     tried = 0
-    for start in _starts(rig):
+    for start in starts_about(rig):
         tried += 1
         try:
             outcome = _search(start, run)
@@ -175,7 +175,8 @@ def sized_for(rig: RigFile, run: Run) -> RigFile:
     return rig if window_s is None else replace(rig, identifier=replace(rig.identifier, window_s=_rounded(window_s, 3)))
 
 
-def _starts(rig: RigFile) -> Iterator[RigFile]:
+def starts_about(rig: RigFile) -> Iterator[RigFile]:
+    """Rig files with guesses about that of the rig file, itself first."""
     guess = rig.nominal
     for l2 in _SCALES:
         for rho2 in _SCALES:

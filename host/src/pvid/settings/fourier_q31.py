@@ -11,7 +11,6 @@ import numpy.typing as npt
 from pvid.settings.fourier import FourierChannel, FourierJet, FourierKind, FourierSignal
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 
-Int16 = npt.NDArray[np.int16]
 Int32 = npt.NDArray[np.int32]
 Int64 = npt.NDArray[np.int64]
 Function = Callable[[Int64], tuple[Int64, npt.NDArray[np.bool_]]]
@@ -111,7 +110,7 @@ class FourierDesignQ31:
     power : n of sin^n
     decimation : D, ticks a step
     hop : steps of half a window, a multiple of 4
-    sum_shift : of four steps' products 2^-14 before they are added
+    sum_shift : of four steps' products 2^-22 before they are added
     full_scale : of the counts about their offsets [samples]
     down : shift of the block sums of each signal to 28 bits
     filter : of each jet, at the steps: its compensator
@@ -119,7 +118,7 @@ class FourierDesignQ31:
     sign_width : of the soft sign, in the format of its argument [signs]; 0: the mean of sgn over a step
     integral : shifts (once, twice) of each integrand
     format : of each channel
-    circle : int16 32767 cos(pi j / hop) [2 hop]
+    circle : int32 (2^23 - 1) cos(pi j / hop) [2 hop]
     factor : of each term (m, e), of (h/H)^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
@@ -141,7 +140,7 @@ class FourierDesignQ31:
     sign_width: tuple[int, ...]
     integral: tuple[tuple[int, int], ...]
     format: tuple[FourierFormatQ31, ...]
-    circle: Int16
+    circle: Int32
     factor: tuple[tuple[int, int], ...]
     noise: tuple[FourierNoiseQ31, ...]
     error_order: tuple[int, ...]

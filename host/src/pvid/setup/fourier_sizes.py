@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pvid.settings.fourier import FourierDesign32, FourierModel
+from pvid.settings.fourier import NONE, FourierDesign32, FourierModel
 from pvid.settings.fourier_q31 import FourierDesignQ31
 
 
@@ -15,7 +15,7 @@ def sizes_of_model(model: FourierModel) -> dict[str, int]:
         "PVID_MAX_MOMENTS": sum(n * (n + 1) // 2 for n in thetas),
         "PVID_MAX_SAMPLES": model.samples,
         "PVID_MAX_INPUTS": model.jets + model.runs + model.signs,
-        "PVID_MAX_CHANNELS": max(model.channels, model.gains),
+        "PVID_MAX_CHANNELS": max(sum(one.gain != NONE for one in model.channel), model.gains),
         "PVID_MAX_INTEGRANDS": max(model.integrands, model.runs, model.signs),
         "PVID_MAX_KINDS": model.kinds,
         "PVID_MAX_COLUMNS": max(one.columns for one in model.kind),

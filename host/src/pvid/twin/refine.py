@@ -202,7 +202,7 @@ class RefineTwin:
         self.begin += self.work.step * BIG_STEP
         if taken:
             self._take(square)
-            self.verdict = Reason.UPDATED
+            self.verdict = Reason.UPDATED if self.taken > 1 else Reason.HELD_UNCERTAIN
         else:
             self.verdict = Reason.HELD_BLOCK if self.taken > 0 else Reason.HELD_SEARCHING
             self._refuse()
@@ -248,7 +248,7 @@ class RefineTwin:
         if first is not None:
             entry = self.begin + first
             if self.front.end - entry < 3 + self.shape.reach:
-                self.waiting = True
+                self.waiting, self.due = True, entry + 3 + self.shape.reach
                 return
             signals = self.front.read(entry)
         self.work.do(self.linear, self.weight, signals)
@@ -346,7 +346,7 @@ class RefineTwin:
         if self.frozen:
             return Reason.HELD_FROZEN
         if entry is Entry.ENTERED:
-            self.waiting = False
+            self.waiting = self.waiting and self.front.end < self.due
         works = entry is Entry.NOTHING or self.config.ratio == 1
         if works and not self.waiting:
             return self._do()

@@ -57,6 +57,25 @@ def soft_sign(v: npt.ArrayLike, width: int) -> Int:
     return _towards_0(given << 30, np.abs(given) + width)
 
 
+_TWO_OVER_LN_2 = 193635251
+_POWER_BITS = 26
+_POWER_OF_HALF = (117454, -1369790, 10286509, -59583045, 257938938, -744260975, 1073741823)
+
+
+def tanh(v: npt.ArrayLike, width: int) -> Int:
+    """pvid_tanh_q31: tanh(v / width) in Q30."""
+    given = integers(v)
+    t = np.abs(given) * _TWO_OVER_LN_2 // width
+    near = np.minimum(t, 31 << _POWER_BITS)
+    f = near & (2**_POWER_BITS - 1)
+    total = np.full_like(f, _POWER_OF_HALF[0])
+    for coefficient in _POWER_OF_HALF[1:]:
+        total = ((total * f) >> _POWER_BITS) + coefficient
+    e = total >> (near >> _POWER_BITS)
+    whole = np.where(t < 31 << _POWER_BITS, ((ONE - e) * ONE) // (ONE + e), ONE)
+    return np.sign(given) * whole
+
+
 def shift(x: npt.ArrayLike, s: int) -> Int:
     """pvid_fixed_shift_q31: x 2^-s rounded half up."""
     return round_shift(integers(x), s)

@@ -9,7 +9,7 @@ from pvid.settings.fourier_q31 import FourierDesignQ31
 from pvid.twin.q31.fourier_values import Steps
 from pvid.twin.q31.integer import Int, round_shift
 
-_BLOCK, _DOWN = 4, 14
+_BLOCK, _DOWN = 4, 22
 
 
 def half_sums(channels: Int, design: FourierDesignQ31) -> Int:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pvid.settings.fourier import NONE, FourierChannel
 from pvid.settings.fourier_q31 import FourierDesignQ31
-from pvid.twin.q31.elementary import sign, soft_sign
+from pvid.twin.q31.elementary import sign, tanh
 from pvid.twin.q31.fourier_front import rescaled
 from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
 
@@ -70,9 +70,7 @@ def steps(jets: Int, design: FourierDesignQ31, runs: Int, lead: int = 0) -> Step
         jets[:, :-1],
         *(rescaled(sums[i : i + 1, :-1], one) for i, one in enumerate(design.run)),
         *(
-            soft_sign(now[i : i + 1], width)
-            if width
-            else mean_sign(before[i : i + 1], now[i : i + 1], v[i : i + 1, 1:])
+            tanh(now[i : i + 1], width) if width else mean_sign(before[i : i + 1], now[i : i + 1], v[i : i + 1, 1:])
             for i, width in enumerate(design.sign_width)
         ),
     ]

@@ -1,0 +1,140 @@
+"""`pvid identify --refine` of the pendulum: the refined answer in place of the weak one where it is worth more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.rig.sensor_steps import resolved
+from pvid.run.identify import Identification, largest_angle, parts_of
+from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
+from pvid.run.survey import starts_about
+from pvid.settings.enums import Reason
+from pvid.setup.f32 import nominal_start
+
+Float = npt.NDArray[np.float64]
+
+GOOD = 3.0  # slow chi^2 up to which the refined answer is preferred to a published one
+BEARABLE = 5.0  # and up to which it is published where there is no other
+LARGEST_SE = 0.05  # relative, of w, d1, d2: beyond, the run does not determine them
+
+
+@dataclass(frozen=True, eq=False)
+class RefinementVerdict:
+    """What became of the refinement of a run.
+
+    Attributes
+    ----------
+    adopted : the answer is the refined one
+    text : why, in a clause
+    outcome : the fit; None where there is none
+    """
+
+    adopted: bool
+    text: str
+    outcome: RefinedPendulum | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """For `identify --json`; other parameters by name with value and standard error."""
+        found = None if self.outcome is None else self.outcome.found
+        extras = {} if self.outcome is None else self.outcome.extras
+        return {
+            "adopted": self.adopted,
+            "text": self.text,
+            "chi2": None if found is None else found.chi2,
+            "slow_chi2": None if found is None else found.slow_chi2,
+            "blocks": None if found is None else len(found.cut.first),
+            "parameters": {name: {"value": value, "se": se} for name, (value, se) in extras.items() if se > 0},
+        }
+
+
+def refined_identification(run: Run, rig: RigFile, weak: Identification) -> Identification:
+    """The answer after a refinement of the whole run, which starts from the weak one."""
+    rig = resolved(rig, run)
+    rest = float(np.nanmedian(run.phi))
+    model = weak.model
+    names = (*model.mapped_names, model.offset_name)
+    starts = [{model.offset_name: rest, **{name: weak.value[name] for name in names if name in weak.value}}]
+    for guess in starts_about(rig):
+        starts.append(dict(zip(names, map(float, (*nominal_start(guess), rest)), strict=True)))
+    try:
+        outcome = refine_pendulum(run, rig, starts, sure=weak.identified)
+    except PvidError as error:
+        return replace(weak, refinement=RefinementVerdict(False, f"not refined: {error}"))
+    adopted, text = _judged(outcome, weak)
+    verdict = RefinementVerdict(adopted, text, outcome)
+    return _answer(run, rig, weak, verdict) if adopted else replace(weak, refinement=verdict)
+
+
+def _judged(outcome: RefinedPendulum, weak: Identification) -> tuple[bool, str]:
+    found = outcome.found
+    worst = float(np.sqrt(np.diag(found.covariance)[: weak.model.n_mapped]).max())
+    limit = GOOD if weak.identified else BEARABLE
+    kept = "the weak form's answer stands" if weak.identified else "nothing is identified"
+    if not found.converged:
+        return False, f"the refinement did not converge: {kept}"
+    if not worst <= LARGEST_SE:
+        return False, f"the refined parameters have a standard error of {100 * worst:.2g} %: {kept}"
+    if not found.slow_chi2 <= limit:
+        apart = _apart(outcome, weak) if weak.identified else ""
+        return False, f"slow residuals have {found.slow_chi2:.2g} times the variance of the noise: {kept}{apart}"
+    return (
+        True,
+        f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}",
+    )
+
+
+def _apart(outcome: RefinedPendulum, weak: Identification) -> str:
+    """How far the two answers are apart, where that is more than both standard errors explain."""
+    model, sd = weak.model, np.sqrt(np.diag(outcome.found.covariance))
+    far = []
+    for k, name in enumerate(model.mapped_names):
+        value = outcome.found.r[k]
+        both = float(np.hypot(sd[k] * value, weak.se[name]))
+        if abs(value - weak.value[name]) > 3 * both:
+            far.append(f"{name} by {100 * (value / weak.value[name] - 1):+.2g} %")
+    return f"; the two differ in {', '.join(far)}" if far else ""
+
+
+def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVerdict) -> Identification:
+    """The refined parameters with their errors, those of the scales among them."""
+    assert verdict.outcome is not None
+    outcome, found = verdict.outcome, verdict.outcome.found
+    model, mechanism = weak.model, rig.mechanism
+    names = (*model.mapped_names, model.offset_name)
+    places = [outcome.names.index(name) for name in names]
+    p = found.r[places]
+    units = np.array([p[k] if outcome.problem.log[place] else 1.0 for k, place in enumerate(places)])
+    covariance = found.covariance[np.ix_(places, places)] * np.outer(units, units)
+    value = dict(zip(names, map(float, p), strict=True))
+    noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    physical = mechanism.physical(p)
+    if np.isfinite(physical).all():
+        value.update(zip(model.physical_names, map(float, physical), strict=True))
+        noise.update(zip(model.physical_names, map(float, mechanism.physical_errors(p, covariance)), strict=True))
+    parts = parts_of(noise, p, rig)
+    return replace(
+        weak,
+        value=value,
+        se={name: one.whole for name, one in parts.items()},
+        parts=parts,
+        friction=(),
+        trusted_s=float(run.t[-1]),
+        first_publication_s=weak.first_publication_s if weak.first_publication_s is not None else float(run.t[-1]),
+        chi2=found.slow_chi2,
+        alarm=found.slow_chi2 > GOOD,
+        status=Reason.UPDATED.text,
+        unexplained=None,
+        parts_disagree=False,
+        skew=0.0,
+        judged=True,
+        linear_error=0.0,
+        largest_angle=largest_angle(run, value[model.offset_name]),
+        refinement=verdict,
+    )

@@ -1,0 +1,61 @@
+"""Searches of a design and of p that start far off, or with filters that blur a measured drive."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pvid.models.mechanisms import compiled_of
+from pvid.oracle.fourier.blur import blur_of, rates_of_drives
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.identify import neglected, ready
+from pvid.oracle.fourier.starts import starts_about
+
+PENDULUM = ready(compiled_of("kapitza"))
+MOTOR = ready(compiled_of("dc_motor"))
+
+
+def sine(
+    hz: float, noise: float = 0.0, rate: float = 200.0
+) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
+    t = np.arange(4000) / rate
+    y = 5e-3 * np.sin(2 * np.pi * hz * t) + noise * np.random.default_rng(0).normal(size=t.size)
+    return {"y": y, "phi": 0.05 * np.cos(t)}
+
+
+def test_starts_are_spread_over_the_positive_parameters_alone() -> None:
+    guess = np.array([30.0, 9.0, 5.0, 0.02])
+    found = np.array(list(starts_about(PENDULUM.parameters, guess)))
+    assert (found[:, 3] == 0.02).all()
+    steps = np.log(found[:, :3] / guess[:3]) / np.log(3.0)
+    assert (np.abs(steps) <= 1).all() and (steps.max(axis=0) > 0.6).all() and (steps.min(axis=0) < -0.6).all()
+    apart = np.abs(steps[:, np.newaxis] - steps).max(axis=2) + 10 * np.eye(len(steps))
+    assert apart.min() > 0.3
+
+
+@pytest.mark.parametrize(("taps", "degree"), [(21, 3), (31, 4), (61, 6)])
+def test_blur_is_the_relative_error_of_the_drives_second_derivative(taps: int, degree: int) -> None:
+    """Of a sine: one less the filter's gain at its frequency, whatever the noise."""
+    design = FourierDesign(200.0, 1.0, rate_taps=taps, rate_degree=degree)
+    hz = 4.0
+    run = sine(hz)
+    half = taps // 2
+    t = np.arange(-half, half + 1) / 200.0
+    fit = np.polynomial.Polynomial.fit(t, np.cos(2 * np.pi * hz * t), degree).convert().coef
+    gain = 2 * fit[2] / -((2 * np.pi * hz) ** 2)
+    assert blur_of(PENDULUM, run, design) == pytest.approx(abs(1 - gain), rel=0.02)
+    assert blur_of(PENDULUM, sine(hz, noise=5e-6), design) == pytest.approx(abs(1 - gain), rel=0.05)
+
+
+def test_only_measured_drives_blur() -> None:
+    assert [(one.of, one.order) for one in rates_of_drives(PENDULUM)] == [("y", 2)]
+    assert rates_of_drives(MOTOR) == []
+    run = {name: np.random.default_rng(1).normal(size=500) for name in ("V", "i", "phi")}
+    assert blur_of(MOTOR, run, FourierDesign(1000.0, 0.1)) == 0.0
+
+
+def test_small_angles_neglect_the_square_of_the_largest() -> None:
+    run = sine(1.0)
+    largest = np.max(np.abs(run["phi"] - np.mean(run["phi"])))
+    assert neglected(compiled_of("kapitza"), run) == pytest.approx(largest**2)
+    assert neglected(compiled_of("dc_motor"), run) == 0.0

@@ -1,0 +1,187 @@
+"""Refinement in float64: derivatives, the pendulum at large angles with friction and skew, described mechanisms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.base.errors import PvidError
+from pvid.core.native import Native
+from pvid.design.second_derivative import second_derivative
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.run.answer import as_json, refinement_line
+from pvid.run.identify import identify
+from pvid.run.refined import Cut, Prior
+from pvid.run.refined_identify import refined_identification
+from pvid.run.refined_kernel import kernel_of
+from pvid.run.refined_mechanism import refine_mechanism
+from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
+from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.sim.simulated_run import simulation_of
+
+Float = npt.NDArray[np.float64]
+
+TRUTH = STANDARD_PENDULUM.linear
+DAMPED = replace(STANDARD_PENDULUM, damping1=2e-3, damping2=5e-4)  # [m^2/s]
+NAMES = ("w", "d1", "d2")
+
+
+@cache
+def run_of(skew: float = 0.0, duration: float = 20.0) -> Run:
+    """The standard rig released at 0.3 rad, with friction, full equations, 16 bits."""
+    sensors = replace(standard_sensors(16), phi_zero=0.02, skew_s=skew)
+    return simulate(DAMPED, STANDARD_DRIVE, sensors, 1000.0, duration, (0.17, 0.4), "full", 1).run
+
+
+def rig() -> RigFile:
+    standard = RigFile.standard()
+    return replace(standard, sensor=replace(standard.sensor, phi_lsb=standard_sensors(16).phi_lsb))
+
+
+def start(factor: float) -> dict[str, float]:
+    return {**dict(zip(NAMES, TRUTH * np.array([factor, 1 / factor, factor]), strict=True)), "c": 0.02}
+
+
+@cache
+def refined(skew: float = 0.0) -> RefinedPendulum:
+    return refine_pendulum(run_of(skew), rig(), [start(1.05)], sure=True)
+
+
+@pytest.mark.parametrize("name", ["kapitza", "dc_motor", "battery_2rc"])
+def test_derivatives_are_those_of_finite_differences(name: str) -> None:
+    """Of the steps as they are computed, to the error of the differences; order 2, order 1, outputs with inputs."""
+    kernel = kernel_of(compiled_of(name))
+    made, rng = kernel.made, np.random.default_rng(2)
+    truth = simulated_rig(name).truth
+    r = np.array([truth.get(one.name, 0.1) for one in made.parameters] + [0.5 for _ in made.settings])
+    u, du = rng.normal(size=(2, 600, 3, len(made.inputs)))
+    first, starts = np.array([0, 200], np.int32), 0.1 * rng.normal(size=(2, kernel.states))
+    _, found, _ = kernel.blocks(r, first, 300, 1, 2e-3, u, du, starts)
+    assert found is not None
+    for column in range(kernel.columns):
+        ends = []
+        for sign in (1e-5, -1e-5):
+            near, begun, driven = r.copy(), starts.copy(), u
+            entry = column - kernel.states
+            if entry < 0:
+                begun[:, column] += sign
+            elif made.parameters[entry].name == "tau":
+                driven = u + sign * du
+            else:
+                near[entry] += sign * (r[entry] if made.parameters[entry].log else 1.0)
+            ends.append(kernel.blocks(near, first, 300, 1, 2e-3, driven, du, begun, False)[0])
+        wanted = (ends[0] - ends[1]) / 2e-5
+        np.testing.assert_allclose(found[..., column], wanted, atol=1e-5 * np.abs(wanted).max() + 1e-9)
+
+
+def test_a_pendulum_with_friction_at_0_4_rad_is_refined_to_its_standard_errors() -> None:
+    found = refined().found
+    errors = found.r[:3] / TRUTH - 1
+    se = np.sqrt(np.diag(found.covariance))[:3]
+    assert found.converged and 0.9 < found.chi2 < 1.1 and found.slow_chi2 < 1.5
+    assert (np.abs(errors) < 3 * se).all() and (np.abs(errors) < 2e-4).all() and (se < 2e-4).all()
+    l1 = STANDARD_PENDULUM.l1
+    for name, damping in (("k1", DAMPED.damping1), ("k2", DAMPED.damping2)):
+        value, error = refined().extras[name]
+        assert abs(value - damping / l1**2) < 4 * error < damping / l1**2
+
+
+def test_a_skew_is_found_and_costs_no_accuracy() -> None:
+    found = refined(1e-3)
+    value, error = found.extras["tau"]
+    assert abs(abs(value) - 1e-3) < max(4 * error, 5e-6)
+    assert (np.abs(found.found.r[:3] / TRUTH - 1) < 3e-4).all()
+
+
+def test_other_starts_are_tried_where_the_first_one_is_not_sure() -> None:
+    wild = {**start(1.0), "w": 12.0, "d1": 20.0, "d2": 3.0}
+    found = refine_pendulum(run_of(), rig(), [wild, start(0.9), start(1.1)])
+    assert (np.abs(found.found.r[:3] / TRUTH - 1) < 3e-4).all()
+
+
+def test_the_quantities_of_a_pass_are_exposed_and_agree_with_one_another() -> None:
+    """J, e and R of each block, and the step from them: an oracle for other implementations."""
+    outcome = refined()
+    problem, found = outcome.problem, outcome.found
+    block = problem.block(found.r, found.cut, found.starts, problem.used(found.cut))
+    assert block is not None
+    stacked = np.concatenate([block.jacobian[0, :, 0], block.error[0]], axis=1)
+    np.testing.assert_allclose(block.triangle[0].T @ block.triangle[0], stacked.T @ stacked, rtol=1e-9, atol=1e-6)
+    prior = Prior(found.r, np.full(problem.n, 10.0), np.ones(problem.n, bool))
+    step, starts, information = problem.step(block, found.r, prior)
+    assert np.abs(step / np.sqrt(np.diag(np.linalg.inv(information)))).max() < 0.1
+    assert starts.shape == found.starts.shape
+
+
+@cache
+def answers() -> tuple[RigFile, object]:
+    native = Native()
+    return rig(), identify(run_of(), rig(), native)
+
+
+def test_identify_takes_the_refined_answer_where_the_weak_one_is_refused() -> None:
+    given, weak = answers()
+    found = refined_identification(run_of(), given, weak)  # type: ignore[arg-type]
+    assert found.identified and found.refinement.adopted
+    values = np.array([found.value[name] for name in NAMES])
+    assert (np.abs(values / TRUTH - 1) < 5e-4).all()
+    assert all(found.se[name] >= found.parts[name].noise > 0 for name in NAMES)
+    shown = as_json(found)["refinement"]
+    assert shown["adopted"] and set(shown["parameters"]) == {"k1", "k2", "tau"}
+    line = refinement_line(found)
+    assert line is not None and "k1 0.02" in line
+
+
+def test_the_weak_answer_stands_where_the_sensor_is_not_that_of_the_model() -> None:
+    """A backlash of 5 mrad: residuals far above the noise, and it says so."""
+    given, weak = answers()
+    run = run_of()
+    played = run.phi.copy()
+    for k in range(1, len(played)):
+        played[k] = min(max(played[k - 1], run.phi[k] - 2.5e-3), run.phi[k] + 2.5e-3)
+    found = refined_identification(replace(run, phi=played), given, weak)  # type: ignore[arg-type]
+    assert not found.refinement.adopted and found.value == weak.value  # type: ignore[attr-defined]
+    assert "slow residuals" in found.refinement.text or "converge" in found.refinement.text
+
+
+def test_a_run_that_is_too_short_says_so() -> None:
+    run = run_of()
+    short = replace(run, t=run.t[:200], phi=run.phi[:200], y=run.y[:200])
+    with pytest.raises(PvidError, match="too short|like the run"):
+        refine_pendulum(short, rig(), [start(1.0)], sure=True)
+
+
+def test_sharp_friction_of_a_motor_is_refined_to_its_standard_errors() -> None:
+    simulation = simulation_of("dc_motor")
+    model, truth = simulation.model, simulation.truth
+    p = truth * np.where([one.positive for one in model.unknowns], 1.03, 1.0)
+    signals = {name: values[:6000] for name, values in simulation.run(0).items()}
+    found = refine_mechanism(model, signals, simulation.rig.sample_rate, p, 1.0)
+    z = [(found.values[name] - truth[k]) / found.errors[name] for k, name in enumerate(model.p_names)]
+    assert found.found.converged and found.found.slow_chi2 < 1.5
+    assert np.abs(z).max() < 4 and abs(found.values["Tc"] / truth[model.p_names.index("Tc")] - 1) < 5e-3
+
+
+def test_the_second_derivative_is_exact_in_its_band_and_quiet_beyond() -> None:
+    rate, edge = 1000.0, 8.0
+    front = second_derivative(rate, edge)
+    t = np.arange(6000) / rate
+    for hz in (0.5, 3.0, 7.5):
+        times, found = front.apply(np.sin(2 * np.pi * hz * t), rate)
+        wanted = -((2 * np.pi * hz) ** 2) * np.sin(2 * np.pi * hz * times)
+        assert np.abs(found - wanted).max() < 2e-4 * (2 * np.pi * edge) ** 2
+    _, noise = front.apply(np.random.default_rng(0).normal(size=60_000), rate)
+    white = np.sqrt(3 * 2.0**4) * rate**2 / np.sqrt(5)  # a plain second difference has sqrt(6) rate^2
+    assert noise.std() < 1e-2 * white
+
+
+def test_blocks_fill_the_run() -> None:
+    cut = Cut.of(1000, 260)
+    assert cut.samples == 250 and cut.first.tolist() == [0, 250, 500, 750]
