@@ -203,7 +203,7 @@ class Stepper:
         """Number of parameters and of sums."""
         estimator = self.estimator
         if not hasattr(estimator, "model"):  # the strong form's own
-            return len(estimator.p), len(estimator.sums if self.core == "q31" else estimator.sums.low)
+            return len(estimator.p), len(getattr(estimator.sums, "low", estimator.sums))
         sums = estimator.information
         n_sums = sums.n_sums if self.core == "q31" else sums.n_moments + sums.n_theta + 2
         return int(estimator.model.n_p), int(n_sums)
@@ -310,7 +310,7 @@ class Stepper:
         headers = self.native.headers
         out = np.empty((), self._estimate_type)
         own = not hasattr(self.estimator, "model")
-        if own and self.core == "f32":
+        if own and hasattr(self.estimator.sums, "low"):  # in float32 it needs the settings beside it
             self.native.library.pvid_strong_assess_f32(self.state, headers.pointer(out))
             return out
         owner = f"{DEFAULT}_estimator" if own else "estimator"
