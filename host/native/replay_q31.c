@@ -23,7 +23,7 @@ static void record_strong_tick(const pvid_record_q31 *record, uint32_t tick,
         record->reason[tick] = (uint8_t)reason;
     }
     if (record->hash != NULL) {
-        *record->running_hash = pvid_fnv_kapitza_estimator_q31(*record->running_hash, estimator, reason);
+        *record->running_hash = pvid_fnv_strong_q31(*record->running_hash, estimator, reason);
         record->hash[tick] = *record->running_hash;
     }
 }

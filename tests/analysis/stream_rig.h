@@ -29,12 +29,19 @@
 #if (STREAM_CORE == 1) && (STREAM_FORM == 1)
 #define STREAM_HASH pvid_fnv_estimator_q31
 #define STREAM_ASSESS pvid_estimator_assess_q31
+#define STREAM_ASSESSED identifier.estimator
 #elif STREAM_CORE == 1
-#define STREAM_HASH pvid_fnv_kapitza_estimator_q31
+#define STREAM_HASH pvid_fnv_strong_q31
 #define STREAM_ASSESS pvid_kapitza_estimator_assess_q31
-#else
+#define STREAM_ASSESSED identifier.estimator
+#elif STREAM_FORM == 1
 #define STREAM_HASH pvid_fnv_estimator_f32
 #define STREAM_ASSESS pvid_estimator_assess_f32
+#define STREAM_ASSESSED identifier.estimator
+#else
+#define STREAM_HASH pvid_fnv_strong_f32
+#define STREAM_ASSESS pvid_strong_assess_f32
+#define STREAM_ASSESSED identifier
 #endif
 
 #define STREAM_SETTINGS 0x12345678u

@@ -315,7 +315,7 @@ def evaluated(made: RefineFunctions, name: str, given: Given) -> list[Float]:
 
 
 def test_the_pendulums_are_as_lean_as_those_by_hand() -> None:
-    """The prototype's C has 41 operations in the accelerations, 122 with all derivatives (evidence/refinement.md)."""
+    """The prototype's C has 41 operations in the accelerations, 122 with all derivatives."""
     made = functions("kapitza")
     counts = {name: one.program.operations for name, one in made.functions.items()}
     assert (counts["motion"], counts["jacobian"]) == (42, 125)

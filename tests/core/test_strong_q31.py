@@ -191,7 +191,7 @@ int main(void)
     int phi, y;
     if (pvid_strong_init_q31(&identifier, &strong) != PVID_OK) return 1;
     while (scanf("%d %d", &phi, &y) == 2) {
-        hash = pvid_fnv_kapitza_estimator_q31(hash, &identifier.estimator, pvid_strong_step_q31(&identifier, phi, y));
+        hash = pvid_fnv_strong_q31(hash, &identifier.estimator, pvid_strong_step_q31(&identifier, phi, y));
         if (hash % 64u == 0u) {
             pvid_kapitza_estimator_assess_q31(&identifier.estimator, &estimate);
             (void)pvid_kapitza_physical_q31(&estimate, &scale, &value, &se);

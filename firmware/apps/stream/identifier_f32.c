@@ -31,21 +31,13 @@ pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
 
 uint32_t identifier_hash(uint32_t hash, pvid_reason reason)
 {
-#if STREAM_FORM == 1
-    return pvid_fnv_estimator_f32(hash, &identifier.estimator, reason);
-#else
-    return pvid_fnv_strong_f32(hash, &identifier.estimator, reason);
-#endif
+    return STREAM_HASH(hash, &identifier.estimator, reason);
 }
 
 void identifier_estimate(uint8_t payload[PVID_ESTIMATE_BYTES], uint32_t session, pvid_reason reason)
 {
     pvid_estimate_f32 estimate;
-#if STREAM_FORM == 1
-    pvid_estimator_assess_f32(&identifier.estimator, &estimate);
-#else
-    pvid_strong_assess_f32(&identifier, &estimate);
-#endif
+    STREAM_ASSESS(&STREAM_ASSESSED, &estimate);
     put_estimate(payload, &estimate, session, identifier.estimator.counters.updates, reason);
 }
 

@@ -57,7 +57,7 @@ void identifier_estimate(uint8_t payload[PVID_ESTIMATE_Q31_BYTES], uint32_t sess
 {
     pvid_estimate_q31 estimate;
     memset(payload, 0, PVID_ESTIMATE_Q31_BYTES);
-    STREAM_ASSESS(&identifier.estimator, &estimate);
+    STREAM_ASSESS(&STREAM_ASSESSED, &estimate);
     pvid_put_u32(&payload[PVID_ESTIMATE_Q31_SESSION], session);
     pvid_put_u32(&payload[PVID_ESTIMATE_Q31_UPDATES], identifier.estimator.counters.updates);
     size_t at = PVID_ESTIMATE_Q31_CORRELATION;

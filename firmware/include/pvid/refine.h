@@ -103,8 +103,8 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
  *     (An output that is not finite is a missing row.)
  *   - PVID_HELD_FROZEN while frozen,
  *   - at the end of a block PVID_UPDATED if an estimate was published, else PVID_HELD_SEARCHING (no block fits yet),
- *     PVID_HELD_BLOCK (the block does not fit to its past), PVID_HELD_UNCERTAIN (standard errors, or one block alone) or
- *     PVID_HELD_DISAGREES (the estimate differs from the weak form's beyond the errors of both),
+ *     PVID_HELD_BLOCK (the block does not fit to its past), PVID_HELD_UNCERTAIN (standard errors, or one block alone)
+ * or PVID_HELD_DISAGREES (the estimate differs from the weak form's beyond the errors of both),
  *   - PVID_ACCUMULATED at all other ticks. */
 pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak);
 

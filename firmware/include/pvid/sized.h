@@ -171,6 +171,7 @@
 /* strong_q31.h */
 #define pvid_strong_init_q31 PVID_SIZED(pvid_strong_init_q31)
 #define pvid_strong_step_q31 PVID_SIZED(pvid_strong_step_q31)
+#define pvid_fnv_strong_q31 PVID_SIZED(pvid_fnv_strong_q31)
 #define pvid_strong_gap_q31 PVID_SIZED(pvid_strong_gap_q31)
 #define pvid_strong_freeze_q31 PVID_SIZED(pvid_strong_freeze_q31)
 

@@ -67,6 +67,10 @@ void pvid_strong_gap_q31(pvid_strong_q31 *self);
 /* Freezes the identifier (true) or resumes it (false), as pvid_strong_freeze_f32. */
 void pvid_strong_freeze_q31(pvid_strong_q31 *self, bool frozen);
 
+/* The running hash of fnv.h for this estimator: continues hash over p, the sums (low word first), their exponent and
+ * the reason, after a tick with this reason. */
+uint32_t pvid_fnv_strong_q31(uint32_t hash, const pvid_kapitza_estimator_q31 *estimator, pvid_reason reason);
+
 #ifdef __cplusplus
 }
 #endif

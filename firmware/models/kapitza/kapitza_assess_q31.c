@@ -3,7 +3,6 @@
 
 #include "kapitza_integer_q31.h"
 #include "kapitza_sums_q31.h"
-#include "pvid/fnv_word.h"
 #include "solve/assess_q31.h"
 
 #define FINER_BITS 24 /* of S, so that it has room for the information of the start alone */
@@ -64,19 +63,4 @@ void pvid_kapitza_estimator_assess_q31(const pvid_kapitza_estimator_q31 *self, p
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
         pvid_assess_errors_q31(&system, &self->settings, &inverse, a, estimate);
     }
-}
-
-uint32_t pvid_fnv_kapitza_estimator_q31(uint32_t hash, const pvid_kapitza_estimator_q31 *estimator, pvid_reason reason)
-{
-    uint32_t running = hash;
-    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
-        running = pvid_fnv_word(running, (uint32_t)estimator->p[a]);
-    }
-    for (size_t i = 0; i < PVID_KAPITZA_SUMS_Q31; i++) {
-        const uint64_t sum = (uint64_t)estimator->sums[i];
-        running = pvid_fnv_word(running, (uint32_t)(sum & 0xFFFFFFFFu));
-        running = pvid_fnv_word(running, (uint32_t)(sum >> 32));
-    }
-    running = pvid_fnv_word(running, estimator->exponent);
-    return pvid_fnv_word(running, (uint32_t)reason);
 }

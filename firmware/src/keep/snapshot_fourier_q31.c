@@ -55,8 +55,8 @@ static const uint32_t layout[] = {
 };
 
 static const pvid_snapshot_pointer pointers[] = {
-    {PLACE(design), PVID_SNAPSHOT_OF_INIT},          {PLACE(drive_min), PVID_SNAPSHOT_OF_INIT},       {PLACE(collect.design), PVID_SNAPSHOT_OF_INIT},
-    {PLACE(collect.front.offset), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(design), PVID_SNAPSHOT_OF_INIT},          {PLACE(drive_min), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(collect.design), PVID_SNAPSHOT_OF_INIT},  {PLACE(collect.front.offset), PVID_SNAPSHOT_OF_INIT},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
 };
 static const pvid_snapshot_shape shape = {sizeof(pvid_fourier_q31), pointers, sizeof pointers / sizeof pointers[0]};

@@ -143,14 +143,16 @@ class Case(ABC):
     @property
     def hash_function(self) -> str:
         """The function in C that continues the running hash over the estimator: the strong forms have their own."""
-        own = {"f32": "strong", "q31": f"{DEFAULT}_estimator"}[self.core] if self.form == "strong" else "estimator"
+        own = "strong" if self.form == "strong" else "estimator"
         return f"pvid_fnv_{own}_{self.core}"
 
     @property
-    def assess_function(self) -> str:
-        """The function in C that assesses the estimator."""
-        own = f"{DEFAULT}_estimator" if (self.form, self.core) == ("strong", "q31") else "estimator"
-        return f"pvid_{own}_assess_{self.core}"
+    def assess_call(self) -> tuple[str, str]:
+        """The function in C that assesses the estimator, and what of `identifier` it takes."""
+        return {
+            ("strong", "f32"): ("pvid_strong_assess_f32", "identifier"),
+            ("strong", "q31"): (f"pvid_{DEFAULT}_estimator_assess_q31", "identifier.estimator"),
+        }.get((self.form, self.core), (f"pvid_estimator_assess_{self.core}", "identifier.estimator"))
 
     # ---- samples
 

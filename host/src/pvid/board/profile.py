@@ -11,8 +11,7 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
-from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
-from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
+from pvid.board.engine_image import engine_image
 from pvid.board.replay_image import build_image, parse_report, standard_run
 from pvid.core.sources import ROOT
 from pvid.settings.enums import Core
@@ -96,11 +95,8 @@ def profile(board: Board, form: str, core: str = "f32", ticks: int = TICKS) -> P
 
 def profile_mechanism(board: Board, name: str, core: Core = "f32") -> Profile:
     """The same of the weak engine with a shipped mechanism."""
-    if core == "q31":
-        fixed = fixed_run(name)
-        return _counted(board, build_fixed_image(board, fixed)[0], "pvid_fourier_step_q31", fixed.measure_from)
-    run = mechanism_run(name)
-    return _counted(board, build_mechanism_image(board, run)[0], "pvid_fourier_step_f32", run.measure_from)
+    made = engine_image(board, name, core)
+    return _counted(board, made.image, f"pvid_fourier_step_{core}", made.measure_from)
 
 
 def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profile:

@@ -11,11 +11,11 @@ from pathlib import Path
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
-from pvid.board.mechanism_image import MechanismRun, build_mechanism_image, mechanism_run
-from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image, fixed_run
+from pvid.board.engine_image import engine_image
 from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
 from pvid.board.stack_bound import stack_bound
 from pvid.models.registry import DEFAULT
+from pvid.settings.engine_cores import ENGINE_CORES
 
 TICKS = 5000
 TIMEOUT_S = 300.0
@@ -139,18 +139,13 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
 def _measure_engine(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     """The weak engine of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
     board = configuration.board
-    run: MechanismRun | FixedRun
-    if configuration.core == "q31":
-        run = fixed_run(configuration.model)
-        image, tree = build_fixed_image(board, run)
-    else:
-        run = mechanism_run(configuration.model)
-        image, tree = build_mechanism_image(board, run)
+    made = engine_image(board, configuration.model, ENGINE_CORES[configuration.core].name)
+    image, tree = made.image, made.tree
     map_text = image.with_suffix(".map").read_text(encoding="utf-8")
     report = play(board, image, TIMEOUT_S)
     code = _bytes_of(map_text, _CODE, _CORE) + _bytes_of(map_text, r"\.text", _MODEL)
     tables = _bytes_of(map_text, r"\.s?rodata", _MODEL)
-    tables += _bytes_of(map_text, rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.{run.name}_", r"replay")
+    tables += _bytes_of(map_text, rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.{made.name}_", r"replay")
     footprint = Footprint(
         text=code,
         arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),

@@ -33,6 +33,7 @@ def _macros(rig: StreamRig) -> list[str]:
     """stream_rig.h but for the number of it all."""
     units = ", ".join(float_literal(np.float32(unit)) for unit in rig.p_unit[: len(MODELS[DEFAULT].parameters)])
     form, core = rig.case.form, rig.case.core
+    assess, assessed = rig.case.assess_call
     sensor = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
     return [
         f"#define STREAM_CORE {int(rig.core)}",
@@ -42,7 +43,8 @@ def _macros(rig: StreamRig) -> list[str]:
         f"#define STREAM_INIT pvid_{form}_init_{core}",
         f"#define STREAM_STEP pvid_{form}_step_{core}",
         f"#define STREAM_HASH {rig.case.hash_function}",
-        f"#define STREAM_ASSESS {rig.case.assess_function}",
+        f"#define STREAM_ASSESS {assess}",
+        f"#define STREAM_ASSESSED {assessed}",
         f"#define STREAM_N_P {rig.n_p}u",
         f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(rig.sample_rate))}",
         f"#define STREAM_PHI_LSB {float_literal(np.float32(rig.phi_lsb))}",

@@ -205,7 +205,7 @@ class Stepper:
         if not hasattr(estimator, "model"):  # the strong form's own
             return len(estimator.p), len(getattr(estimator.sums, "low", estimator.sums))
         sums = estimator.information
-        n_sums = sums.n_sums if self.core == "q31" else sums.n_moments + sums.n_theta + 2
+        n_sums = sums.n_sums if hasattr(sums, "n_sums") else sums.n_moments + sums.n_theta + 2
         return int(estimator.model.n_p), int(n_sums)
 
     def initialise(self) -> Status:

@@ -36,8 +36,8 @@ class RefineRecord:
 
 
 def weak_candidates(weak: Identifier, samples: npt.ArrayLike) -> tuple[Float32, Float32]:
-    """Steps the pendulum's weak form through (phi, y) [ticks, 2]: its assessed p and standard errors, trusted or not, at
-    the ticks at which they are new [ticks, p]; NaN at all others."""
+    """Steps the pendulum's weak form through (phi, y) [ticks, 2]: its assessed p and standard errors, trusted or not,
+    at the ticks at which they are new [ticks, p]; NaN at all others."""
     given = np.asarray(samples, np.float32)
     phi, y = np.ascontiguousarray(given[:, 0]), np.ascontiguousarray(given[:, 1])
     p, se = np.full((len(given), weak.n_p), np.nan, np.float32), np.full((len(given), weak.n_p), np.nan, np.float32)
@@ -93,8 +93,8 @@ class RefineNative:
         return self.native.headers.viewed(self.state.estimate) if number else None
 
     def run(self, samples: npt.ArrayLike, weak_p: npt.ArrayLike, weak_se: npt.ArrayLike) -> RefineRecord:
-        """Steps through samples [ticks, samples] with the weak form's estimates at the ticks at which they are new [ticks, p],
-        NaN at all others."""
+        """Steps through samples [ticks, samples] with the weak form's estimates at the ticks at which they are new
+        [ticks, p], NaN at all others."""
         pointer = self.native.headers.pointer
         given = [np.ascontiguousarray(x, np.float32) for x in (samples, weak_p, weak_se)]
         ticks, entries, n = len(given[0]), given[0].shape[1], self.shape["parameters"]

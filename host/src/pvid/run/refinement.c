@@ -1,7 +1,8 @@
 /* Blocks of a run under the equations of a model, with their derivatives by each block's start and by r: RK4.
  *
- * Before this text: N, ORDER, NU, NZ, NM, NT, SKEW, NS, WIDTHS (place in r) and pvid_refine_ constants, motion, jacobian, output, output_jacobian.
- * Derivatives are those of the steps as they are computed, so that a search by them converges to rounding. */
+ * Before this text: N, ORDER, NU, NZ, NM, NT, SKEW, NS, WIDTHS (place in r) and pvid_refine_ constants, motion,
+ * jacobian, output, output_jacobian. Derivatives are those of the steps as they are computed, so that a search by them
+ * converges to rounding. */
 #define NX (ORDER * N)
 #define NC (NX + NM + SKEW) /* columns that are integrated */
 #define NW (NC + NT)        /* and those of the outputs alone */
@@ -33,12 +34,15 @@ static void rates(const double *m, const double *x, const double *u, const doubl
                 }
                 row[c] = sum;
             }
-            for (int k = 0; k < NM; k++) row[NX + k] += B[k * N + i];
+            for (int k = 0; k < NM; k++)
+                row[NX + k] += B[k * N + i];
 #if SKEW
-            for (int k = 0; k < NU; k++) row[NX + NM] += U[i * NU + k] * du[k];
+            for (int k = 0; k < NU; k++)
+                row[NX + NM] += U[i * NU + k] * du[k];
 #endif
 #if ORDER == 2
-            for (int c = 0; c < NC; c++) ds[i * NC + c] = s[(N + i) * NC + c];
+            for (int c = 0; c < NC; c++)
+                ds[i * NC + c] = s[(N + i) * NC + c];
 #endif
         }
     }
@@ -55,27 +59,41 @@ static void step(const double *m, double *x, double *s, const double *u, const d
     static const double along[3] = {0.5, 0.5, 1}, weight[4] = {1. / 6, 1. / 3, 1. / 3, 1. / 6};
     static const int place[4] = {0, 1, 1, 2};
     double t[NX], f[NX], sum[NX], st[NX * NC], ds[NX * NC], ssum[NX * NC];
-    for (int i = 0; i < NX; i++) { t[i] = x[i]; sum[i] = 0; }
-    if (columns) for (int i = 0; i < NX * NC; i++) { st[i] = s[i]; ssum[i] = 0; }
+    for (int i = 0; i < NX; i++) {
+        t[i] = x[i];
+        sum[i] = 0;
+    }
+    if (columns)
+        for (int i = 0; i < NX * NC; i++) {
+            st[i] = s[i];
+            ssum[i] = 0;
+        }
     for (int stage = 0; stage < 4; stage++) {
         rates(m, t, u + place[stage] * NU, du + place[stage] * NU, st, f, columns ? ds : 0);
         for (int i = 0; i < NX; i++) {
             sum[i] += weight[stage] * f[i];
-            if (stage < 3) t[i] = x[i] + along[stage] * h * f[i];
+            if (stage < 3)
+                t[i] = x[i] + along[stage] * h * f[i];
         }
-        if (columns) for (int i = 0; i < NX * NC; i++) {
-            ssum[i] += weight[stage] * ds[i];
-            if (stage < 3) st[i] = s[i] + along[stage] * h * ds[i];
-        }
+        if (columns)
+            for (int i = 0; i < NX * NC; i++) {
+                ssum[i] += weight[stage] * ds[i];
+                if (stage < 3)
+                    st[i] = s[i] + along[stage] * h * ds[i];
+            }
     }
-    for (int i = 0; i < NX; i++) x[i] += h * sum[i];
-    if (columns) for (int i = 0; i < NX * NC; i++) s[i] += h * ssum[i];
+    for (int i = 0; i < NX; i++)
+        x[i] += h * sum[i];
+    if (columns)
+        for (int i = 0; i < NX * NC; i++)
+            s[i] += h * ssum[i];
 }
 
 static void read_out(const double *m, const double *x, const double *u, const double *s, double *z, double *J)
 {
     pvid_refine_output(m, x, x + NX - N, u, z);
-    if (!J) return;
+    if (!J)
+        return;
     double Zq[NZ * N], Zr[NZ * (NM + NT) + 1];
 #if ORDER == 2
     double Zv[NZ * N];
@@ -95,8 +113,10 @@ static void read_out(const double *m, const double *x, const double *u, const do
             }
             row[c] = sum;
         }
-        for (int k = 0; k < NM; k++) row[NX + k] += Zr[o * (NM + NT) + k];
-        for (int k = 0; k < NT; k++) row[NC + k] = Zr[o * (NM + NT) + NM + k];
+        for (int k = 0; k < NM; k++)
+            row[NX + k] += Zr[o * (NM + NT) + k];
+        for (int k = 0; k < NT; k++)
+            row[NC + k] = Zr[o * (NM + NT) + NM + k];
     }
 }
 
@@ -117,19 +137,22 @@ static int is_near(const double *m, const double *r, const double *x, const doub
 
 /* u, du: at begin, middle and end of each step [steps][3][NU]; z [blocks][samples][NZ]; J [blocks][samples][NZ][NW] or
  * NULL; ends [blocks][NX]; coarse: an even number of steps, or 1, that may be taken as one */
-void refine_blocks(const double *r, int blocks, const int *first, int samples, int sub, int coarse, double h, const double *u,
-                   const double *du, const double *starts, double *z, double *J, double *ends)
+void refine_blocks(const double *r, int blocks, const int *first, int samples, int sub, int coarse, double h,
+                   const double *u, const double *du, const double *starts, double *z, double *J, double *ends)
 {
     (void)coarse;
     double m[NUMBER_OF_CONSTANTS + 1];
     pvid_refine_constants(r, m);
     for (int b = 0; b < blocks; b++) {
         double x[NX], s[NX * NC];
-        for (int i = 0; i < NX; i++) x[i] = starts[b * NX + i];
-        for (int i = 0; i < NX * NC; i++) s[i] = i / NC == i % NC;
+        for (int i = 0; i < NX; i++)
+            x[i] = starts[b * NX + i];
+        for (int i = 0; i < NX * NC; i++)
+            s[i] = i / NC == i % NC;
 #if NS
         double before[NS];
-        for (int i = 0; i < NS; i++) before[i] = 1e300;
+        for (int i = 0; i < NS; i++)
+            before[i] = 1e300;
 #endif
         for (int k = 0; k < samples; k++) {
             const long at = ((long)first[b] + k) * sub;
@@ -137,7 +160,8 @@ void refine_blocks(const double *r, int blocks, const int *first, int samples, i
             read_out(m, x, u + at * 3 * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0);
             int together = 1; /* steps: as many as `coarse` in one where no friction reverses */
 #if NS
-            if (!is_near(m, r, x, u + at * 3 * NU, before)) together = coarse;
+            if (!is_near(m, r, x, u + at * 3 * NU, before))
+                together = coarse;
 #endif
             for (int j = 0; j < sub; j += together) {
                 double wide[2][3 * NU];
@@ -153,6 +177,7 @@ void refine_blocks(const double *r, int blocks, const int *first, int samples, i
                 step(m, x, s, from[0], from[1], together * h, J != 0);
             }
         }
-        for (int i = 0; i < NX; i++) ends[b * NX + i] = x[i];
+        for (int i = 0; i < NX; i++)
+            ends[b * NX + i] = x[i];
     }
 }

@@ -25,7 +25,6 @@
 #define pvid_kapitza_estimator_innovate_q31 PVID_SIZED(pvid_kapitza_estimator_innovate_q31)
 #define pvid_kapitza_estimator_take_q31 PVID_SIZED(pvid_kapitza_estimator_take_q31)
 #define pvid_kapitza_estimator_assess_q31 PVID_SIZED(pvid_kapitza_estimator_assess_q31)
-#define pvid_fnv_kapitza_estimator_q31 PVID_SIZED(pvid_fnv_kapitza_estimator_q31)
 #endif
 
 #ifdef __cplusplus
@@ -79,9 +78,6 @@ pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, co
 
 /* Standard errors, kappa and residual of the present p, as pvid_estimator_assess_f32. Changes nothing. */
 void pvid_kapitza_estimator_assess_q31(const pvid_kapitza_estimator_q31 *self, pvid_estimate_q31 *estimate);
-
-/* Continues `hash` with p, the sums, their exponent and the reason: as pvid_fnv_estimator_q31. */
-uint32_t pvid_fnv_kapitza_estimator_q31(uint32_t hash, const pvid_kapitza_estimator_q31 *estimator, pvid_reason reason);
 
 #ifdef __cplusplus
 }

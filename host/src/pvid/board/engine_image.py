@@ -1,0 +1,53 @@
+"""The replay image of the weak engine with a shipped mechanism, in either arithmetic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pvid.board.boards import Board
+from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
+from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
+from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.enums import Core
+
+
+@dataclass(frozen=True)
+class EngineImage:
+    """An image that is built.
+
+    Attributes
+    ----------
+    image, tree : the file, and where it was built
+    name : of the mechanism, in C
+    measure_from : first tick that counts in the mean cost of a tick
+    """
+
+    image: Path
+    tree: Path
+    name: str
+    measure_from: int
+
+
+def engine_image(board: Board, model: str, core: Core) -> EngineImage:
+    """Builds it for a board.
+
+    Raises
+    ------
+    PvidError
+        Where there is no such mechanism, or it does not build.
+    """
+    return _IMAGES[core](board, model)
+
+
+def _in_float(board: Board, model: str) -> EngineImage:
+    run = mechanism_run(model)
+    return EngineImage(*build_mechanism_image(board, run), run.name, run.measure_from)
+
+
+def _in_fixed_point(board: Board, model: str) -> EngineImage:
+    run = fixed_run(model)
+    return EngineImage(*build_fixed_image(board, run), run.name, run.measure_from)
+
+
+_IMAGES = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
