@@ -179,8 +179,8 @@ PROOFS = (
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             "-eva-slevel-function",
-            "main:50,any_configuration:50,any_row:50,any_compensation:50,config_is_valid:100,model_is_valid:50,parameters_are_valid:200,"
-            "prepare:200,pvid_estimator_init_q31:200,pvid_estimator_add_kind_q31:20,pvid_estimator_add_to_b_q31:20,pvid_estimator_innovation_q31:200,"
+            "main:50,any_configuration:50,any_row:50,any_compensation:50,config_is_valid:100,model_is_valid:50,"
+            "pvid_settings_are_valid_q31:200,parameters_are_valid:200,prepare:200,pvid_estimator_init_q31:200,pvid_estimator_add_kind_q31:20,pvid_estimator_add_to_b_q31:20,pvid_estimator_innovation_q31:200,"
             "pvid_estimator_terms_q31:200",
         ),
         taken=(

@@ -73,32 +73,92 @@ static void a_place_is_a_number_within_the_bounds(void **state)
 
 /* ---- rows of the fixed-point strong form: each entry may be the one that does not fit ---- */
 
-static bool row_fits(int32_t phi0, int32_t phi2, int32_t phi4, int32_t u0, int32_t u1, int32_t u2)
+static const pvid_strong_row_q31 exact = {.phi3 = 1 << 30};
+
+/* Whether phi and its derivatives of orders 2, 3 and 4 make a row at these whole rates u, u' and u''. */
+static bool row_fits(const pvid_strong_row_q31 *format, const int32_t given[4], int32_t u0, int32_t u1, int32_t u2)
 {
-    const pvid_strong_row_q31 exact = {0};
-    const int32_t phi[PVID_ORDERS] = {phi0, 0, phi2, 0, phi4};
-    const int32_t u[PVID_Y_ORDERS_Q31] = {u0, u1, u2};
-    int32_t n[PVID_KAPITZA_STRONG_THETA];
-    int32_t y;
-    return pvid_kapitza_strong_row_q31(&exact, phi, u, &y, n);
+    const int32_t phi[PVID_ORDERS] = {given[0], 0, given[1], given[2], given[3]};
+    const int32_t one = (int32_t)1 << PVID_KAPITZA_RATE_BITS;
+    const int32_t u[PVID_Y_ORDERS_Q31] = {u0 * one, u1 * one, u2 * one};
+    int32_t row[PVID_KAPITZA_ROW_Q31];
+    return pvid_kapitza_strong_row_q31(format, phi, u, row);
 }
+
+/* That this is the largest of one of them, the others 0, with which a row fits. */
+static void assert_largest(const pvid_strong_row_q31 *format, size_t which, int32_t largest, int32_t u0, int32_t u1,
+                           int32_t u2)
+{
+    for (int32_t sign = -1; sign <= 1; sign += 2) {
+        int32_t given[4] = {0};
+        given[which] = sign * largest;
+        assert_true(row_fits(format, given, u0, u1, u2));
+        given[which] += sign;
+        assert_false(row_fits(format, given, u0, u1, u2));
+    }
+}
+
+enum { PHI0, PHI2, PHI3, PHI4 };
 
 static void each_entry_of_a_row_may_be_too_large(void **state)
 {
     (void)state;
     const int32_t limit = PVID_ROW_LIMIT_Q31;
-    assert_true(row_fits(1, 1, 1, 1, 1, 1));
-    assert_true(row_fits(0, limit, 0, 1, 0, 0));
-    assert_false(row_fits(0, limit + 1, 0, 1, 0, 0)); /* u phi2 */
-    assert_true(row_fits(limit, 0, 0, 1, 0, 0));
-    assert_false(row_fits(limit + 1, 0, 0, 1, 0, 0));     /* phi */
-    assert_false(row_fits(0, 0, limit + 1, 0, 0, 0));     /* phi4 */
-    assert_false(row_fits(0, 1 << 15, 0, 0, 1 << 15, 0)); /* u1 phi2 */
-    assert_false(row_fits(0, 1 << 9, 0, 0, 1 << 10, 0));  /* 2 u1 u1 phi2: Y */
-    assert_false(row_fits(0, 1 << 15, 0, 0, 0, 1 << 15)); /* u2 phi2: the bracket */
-    assert_false(row_fits(0, 0, 1 << 14, 1 << 14, 0, 0)); /* u phi4 */
-    assert_false(row_fits(0, 1 << 10, 0, 1 << 7, 0, 0));  /* u^3 phi2 = 2^31 */
-    assert_false(row_fits(1 << 9, 0, 0, 1 << 5, 0, 0));   /* u^4 phi = 2^29 */
+    const int32_t ones[4] = {1, 1, 1, 1};
+    assert_true(row_fits(&exact, ones, 1, 1, 1));
+    for (size_t which = PHI0; which <= PHI4; which++) {
+        assert_largest(&exact, which, limit, 0, 0, 0);
+    }
+    assert_largest(&exact, PHI0, limit / 16, 2, 0, 0);   /* u^4 phi */
+    assert_largest(&exact, PHI0, limit >> 20, 32, 0, 0); /* the same */
+    assert_largest(&exact, PHI2, limit / 8, 2, 0, 0);    /* u^3 phi2 */
+    assert_largest(&exact, PHI2, limit >> 15, 32, 0, 0); /* the same */
+    assert_largest(&exact, PHI2, limit / 16, 0, 0, 16);  /* u2 phi2: the bracket */
+    assert_largest(&exact, PHI3, limit / 32, 0, 16, 0);  /* 2 u1 phi3 of it */
+    assert_largest(&exact, PHI4, limit / 2, 1, 0, 0);    /* 2 u phi4 of it */
+    assert_largest(&exact, PHI4, limit >> 10, 32, 0, 0); /* u u phi4: Y */
+    assert_largest(&exact, PHI2, limit / 128, 0, 8, 0);  /* 2 u1 u1 phi2: Y */
+}
+
+/* Parts of an entry that leave their own range, where the entry would be within it again or 0. */
+static void each_part_of_a_row_may_be_too_large(void **state)
+{
+    (void)state;
+    const int32_t u1_phi2[4] = {0, (1 << 24) + 1, 0, 0};
+    assert_false(row_fits(&exact, u1_phi2, 0, 64, 0)); /* 2^30 + 64 */
+    pvid_strong_row_q31 coarse = exact;                /* powers of u times phi2 are 0 */
+    coarse.finer[0] = -31;
+    const int32_t bracket[4] = {0, (1 << 25) + 1, 0, 1 << 25};
+    assert_false(row_fits(&coarse, bracket, 32, 0, 64)); /* 2^31 + 64 - 2^30; without u phi4 it is 64 */
+    coarse.phi_shift[3] = -31;
+    const int32_t phi3[4] = {0, 0, 1 << 30, 0};
+    assert_true(row_fits(&coarse, phi3, 0, 0, 0));
+    coarse.phi3 = 1518500250; /* 2^30.5 */
+    assert_false(row_fits(&coarse, phi3, 0, 0, 0));
+}
+
+/* Each derivative is shifted to its unit. */
+static void a_shifted_derivative_may_be_too_large(void **state)
+{
+    (void)state;
+    const int32_t limit = PVID_ROW_LIMIT_Q31;
+    static const size_t order[] = {0, 2, 3, 4};
+    for (size_t which = PHI0; which <= PHI4; which++) {
+        pvid_strong_row_q31 format = exact;
+        format.phi_shift[order[which]] = 4;
+        assert_largest(&format, which, limit / 16, 0, 0, 0);
+        format.phi_shift[order[which]] = 31;
+        assert_largest(&format, which, 0, 0, 0, 0);
+        format.phi_shift[order[which]] = -1;
+        const int32_t largest = (which == PHI2) ? (limit - 1) : (2 * limit);
+        format.finer[0] = (which == PHI2) ? 1 : 0; /* as fine as before */
+        int32_t given[4] = {0};
+        given[which] = largest;
+        assert_true(row_fits(&format, given, 0, 0, 0));
+    }
+    pvid_strong_row_q31 finer = exact;
+    finer.finer[0] = 4;
+    assert_largest(&finer, PHI2, limit / 16, 0, 0, 0);
 }
 
 static pvid_weak_q31 identifier;
@@ -150,7 +210,10 @@ static void rows_that_do_not_fit_are_counted_tick_by_tick(void **state)
     (void)state;
     pvid_strong_config_q31 config = strong_unit;
     config.drive_min = 0;
-    memset(&config.row, 0, sizeof config.row); /* products as they are: 60 bits */
+    for (int k = 0; k < PVID_ORDERS; k++) {
+        config.row.phi_shift[k] = 31; /* far more than an entry holds */
+    }
+    config.row.finer[0] = 0;
     run_strong(&config);
     config = strong_unit;
     config.drive_min = 0;
@@ -240,6 +303,8 @@ int main(void)
         cmocka_unit_test(physical_parameters_are_finite_or_none),
         cmocka_unit_test(a_place_is_a_number_within_the_bounds),
         cmocka_unit_test(each_entry_of_a_row_may_be_too_large),
+        cmocka_unit_test(each_part_of_a_row_may_be_too_large),
+        cmocka_unit_test(a_shifted_derivative_may_be_too_large),
         cmocka_unit_test(rows_that_do_not_fit_are_counted_tick_by_tick),
         cmocka_unit_test(a_snapshot_of_another_form_is_of_another_kind),
         cmocka_unit_test(a_weight_beyond_its_counter_is_its_end),

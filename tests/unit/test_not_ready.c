@@ -79,11 +79,11 @@ static void call_all(pvid_weak_f32 *one, pvid_strong_f32 *other, pvid_weak_q31 *
     memset(&estimate, 0x5A, sizeof estimate);
     memset(&estimate_q31, 0x5A, sizeof estimate_q31);
     pvid_strong_assess_f32(other, &estimate);
-    pvid_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, &estimate_q31);
+    pvid_kapitza_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, &estimate_q31);
     assert_memory_equal(&estimate, &none, sizeof none);
     assert_memory_equal(&estimate_q31, &none_q31, sizeof none_q31);
     pvid_strong_assess_f32(other, NULL);
-    pvid_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, NULL);
+    pvid_kapitza_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, NULL);
 
     memset(image, 0, sizeof image);
     assert_int_equal(pvid_snapshot_save_weak_f32(one, &config, 1, image, sizeof image), 0);
@@ -129,7 +129,8 @@ static void init_refuses_null(void **state)
     assert_int_equal(pvid_weak_init_q31(NULL, &weak_unit), PVID_BAD_POINTER);
     assert_int_equal(pvid_strong_init_q31(NULL, &strong_unit), PVID_BAD_POINTER);
     assert_int_equal(pvid_estimator_init_f32(NULL, &other.estimator), PVID_BAD_POINTER);
-    assert_int_equal(pvid_estimator_init_q31(NULL, &strong_unit.estimator), PVID_BAD_POINTER);
+    assert_int_equal(pvid_estimator_init_q31(NULL, &weak_unit.estimator), PVID_BAD_POINTER);
+    assert_int_equal(pvid_kapitza_estimator_init_q31(NULL, &strong_unit.estimator, &strong_unit.row), PVID_BAD_POINTER);
     assert_int_equal(pvid_differentiator_init_f32(NULL, &other.bank, 1.0f), PVID_BAD_POINTER);
     assert_int_equal(pvid_differentiator_init_q31(NULL, &strong_unit.bank), PVID_BAD_POINTER);
     assert_int_equal(pvid_gate_init_f32(NULL, &other.gate, 1.0f, 1.0f, 1.0f), PVID_BAD_POINTER);
@@ -137,12 +138,16 @@ static void init_refuses_null(void **state)
     assert_int_equal(pvid_trust_init_f32(NULL, &config.trust, &weak.estimator), PVID_BAD_POINTER);
     assert_int_equal(pvid_trust_init_q31(NULL, &weak_unit.trust, &weak_q31.estimator), PVID_BAD_POINTER);
     static pvid_estimator_f32 estimator;
+    static pvid_estimator_q31 estimator_q31;
     static pvid_differentiator_f32 differentiator;
     static pvid_differentiator_q31 bank;
     static pvid_gate_f32 gate;
     static pvid_gate_q31 gate_q31;
     assert_int_equal(pvid_estimator_init_f32(&estimator, NULL), PVID_BAD_POINTER);
-    assert_int_equal(pvid_estimator_init_q31(&strong_q31.estimator, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_estimator_init_q31(&estimator_q31, NULL), PVID_BAD_POINTER);
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&strong_q31.estimator, NULL, &strong_unit.row), PVID_BAD_POINTER);
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&strong_q31.estimator, &strong_unit.estimator, NULL),
+                     PVID_BAD_POINTER);
     assert_int_equal(pvid_differentiator_init_f32(&differentiator, NULL, 1.0f), PVID_BAD_POINTER);
     assert_int_equal(pvid_differentiator_init_q31(&bank, NULL), PVID_BAD_POINTER);
     assert_int_equal(pvid_gate_init_f32(&gate, NULL, 1.0f, 1.0f, 1.0f), PVID_BAD_POINTER);
@@ -217,7 +222,7 @@ static void a_refused_init_leaves_an_object_that_does_nothing(void **state)
             third.iterations = (how == 0) ? 1u : 0u;
             third.drive_min = (how == 0) ? -1 : third.drive_min;
             fourth.gate.sigmas = (how == 0) ? 0u : 1u;
-            fourth.u_multiplier = (how == 0) ? 0 : fourth.u_multiplier;
+            fourth.u_multiplier[0] = (how == 0) ? 0 : fourth.u_multiplier[0];
             assert_int_not_equal(pvid_weak_init_f32(&weak, &config), PVID_OK);
             assert_int_not_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
             assert_int_not_equal(pvid_weak_init_q31(&weak_q31, &third), PVID_OK);

@@ -43,12 +43,12 @@ static pvid_system_q31 known_system(int64_t first)
 }
 
 /* 34 rows of weight one, 32 degrees of freedom, and this residual. */
-static pvid_information_q31 sums_with(int64_t residual)
+static pvid_residual_q31 sums_with(int64_t residual)
 {
     pvid_information_q31 sums = {.n_theta = 2, .n_sums = 7};
     sums.sums[5] = residual;
     sums.sums[6] = (int64_t)34 << 16;
-    return sums;
+    return pvid_residual_of_q31(&sums);
 }
 
 static const pvid_scaled_q31 unknown = {0, 0};
@@ -141,7 +141,7 @@ static void the_dead_zone_is_measured_in_standard_errors(void **state)
 {
     (void)state;
     pvid_solve_settings_q31 settings = wide_settings();
-    pvid_information_q31 sums = sums_with(4000000);
+    pvid_residual_q31 sums = sums_with(4000000);
     settings.dead_zone = UNIT_Q16 / 2;
     assert_true(pvid_step_is_in_dead_zone_q31(&sums, &settings, unknown, pvid_scaled_of_q31(62499, 0)));
     assert_false(pvid_step_is_in_dead_zone_q31(&sums, &settings, unknown, pvid_scaled_of_q31(62501, 0)));
@@ -157,7 +157,7 @@ static void the_residual_gives_the_variance(void **state)
     (void)state;
     const pvid_solve_settings_q31 settings = wide_settings();
     const pvid_scaled_q31 expected = pvid_scaled_of_q31(62500, 0);
-    pvid_information_q31 sums = sums_with(4000000);
+    pvid_residual_q31 sums = sums_with(4000000);
     pvid_estimate_q31 estimate;
     pvid_scaled_q31 variance;
     pvid_root_q31 wide;
@@ -167,11 +167,11 @@ static void the_residual_gives_the_variance(void **state)
     assert_int_equal(estimate.residual_sd, 90510); /* sqrt(125000) 2^8, rounded */
     assert_int_equal(estimate.misfit, 2 * UNIT_Q16);
     assert_int_equal(estimate.weight, 34);
-    sums.sums[5] = 1000000; /* less than the sensors explain */
+    sums.residual = 1000000; /* less than the sensors explain */
     pvid_assess_residual_q31(&sums, &settings, expected, &variance, &wide, &estimate);
     assert_float_equal(ldexp(variance.m, variance.e), 62500.0, 0.001);
     assert_int_equal(estimate.misfit, UNIT_Q16 / 2);
-    sums.sums[6] = (int64_t)2 << 16; /* no degree of freedom: row_sd^2 */
+    sums.weight = (int64_t)2 << 16; /* no degree of freedom: row_sd^2 */
     pvid_assess_residual_q31(&sums, &settings, expected, &variance, &wide, &estimate);
     assert_float_equal(ldexp(variance.m, variance.e), 1.0e6, 0.01);
     assert_int_equal(estimate.misfit, 0);

@@ -65,5 +65,7 @@ pvid_snapshot_status pvid_snapshot_restore_strong_q31(pvid_strong_q31 *self, con
         return PVID_SNAPSHOT_NOT_READY;
     }
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
+    const pvid_snapshot_status status = pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
+    self->estimator.ready = true; /* as it was, whatever the bytes say */
+    return status;
 }

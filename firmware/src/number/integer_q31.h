@@ -44,7 +44,11 @@ static inline int64_t pvid_short_product_q31(int32_t a, int32_t b)
 /* a a. */
 static inline int64_t pvid_square_q31(int32_t a)
 {
-    return pvid_product_q31(a, a);
+#if defined(__ARM_ARCH_6M__)
+    return pvid_product_in_halves_q31(a, a);
+#else
+    return (int64_t)a * a; /* not by the function above: the proofs see that it is no less than 0 */
+#endif
 }
 
 /* x 2^-s: rounded half up where s > 0, saturated at +-PVID_WIDE where s < 0; |x| < INT64_MAX. */

@@ -95,8 +95,8 @@ static pvid_status prepare(pvid_estimator_q31 *self, const pvid_estimator_config
     memset(self, 0, sizeof *self);
     self->model = config->model;
     pvid_information_init_q31(&self->information, config->model, config->forgetting_groups, config->row_weight);
-    init_formats(self, config);
     pvid_settings_init_q31(&self->settings, config, config->model->n_p, config->model->positive);
+    init_formats(self, config); /* of a model in numbers of any size they follow the settings */
     for (size_t i = 0; i < config->model->n_p; i++) {
         self->p[i] = config->start[i];
     }
