@@ -90,9 +90,9 @@ static inline pvid_reason pvid_kapitza_move_f32(pvid_strong_estimator_f32 *self,
 {
     const uint32_t first = pvid_kapitza_relative_f32(self, 0, dp[0]);
     const uint32_t second = pvid_kapitza_relative_f32(self, 1, dp[1]);
-    const uint32_t third = pvid_kapitza_relative_f32(self, 2, dp[2]);
+    const uint32_t last = pvid_kapitza_relative_f32(self, 2, dp[2]);
     const uint32_t larger = (second > first) ? second : first;
-    const uint32_t size = (third > larger) ? third : larger;
+    const uint32_t size = (last > larger) ? last : larger;
     float part = 1.0f;
     if (size > pvid_bits_f32(self->step_limit)) {
         if (!pvid_finite_f32(pvid_from_bits_f32(size))) {

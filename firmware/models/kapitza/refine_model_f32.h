@@ -54,11 +54,20 @@ static inline void pvid_refine_constants(const float r[], float m[])
 typedef struct {
     float gravity;
     float vr;
-    float s1, c1, s2, c2;
-    float sf, cf;
-    float lv, vv;
-    float i11, i12, i22; /* of the inverse of the matrix of inertia */
-    float a1, big, a2;
+    float s1;
+    float c1;
+    float s2;
+    float c2;
+    float sf;
+    float cf;
+    float lv;
+    float vv;
+    float i11; /* and i12, i22: of the inverse of the matrix of inertia */
+    float i12;
+    float i22;
+    float a1;
+    float big;
+    float a2;
 } refine_common;
 
 PVID_ALWAYS_INLINE refine_common refine_accelerations(const float m[], const float q[], const float v[],

@@ -44,7 +44,9 @@ void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_f
     for (size_t t = own->first; t < own->end; t++) {
         const int32_t e = exponent_of(self, design, t);
         int16_t *top = &self->exponent[model->term[t].column];
-        *top = ((design->factor[t].m != 0) && (e > *top)) ? (int16_t)e : *top;
+        if ((design->factor[t].m != 0) && (e > *top)) {
+            *top = (int16_t)e;
+        }
     }
 }
 

@@ -192,7 +192,7 @@ bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourie
         carry[i] = (self->ticks * once) - twice;
         sums[0] = 0.0f;
         sums[1] = 0.0f;
-        sums += 2;
+        sums = &sums[2];
         place[i] = output;
         place[(length * signals) + i] = output;
     }

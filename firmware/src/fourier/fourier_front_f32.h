@@ -54,7 +54,7 @@ static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint
         sums[1] += once;
         sample++;
         limit++;
-        sums += 2;
+        sums = &sums[2];
     } while (sample != end);
     return true;
 }

@@ -99,7 +99,7 @@ static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float d
         }
         integral[0] = once;
         integral[1] = twice;
-        integral += 2;
+        integral = &integral[2];
         self->f[1][i] = last;
         self->f[0][i] = f;
     }

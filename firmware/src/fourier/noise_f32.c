@@ -15,10 +15,10 @@
 void pvid_fourier_noise_shares_f32(const pvid_fourier_white_f32 *white, const pvid_fourier_design_f32 *design,
                                    float share[PVID_MAX_POWER])
 {
-    const size_t highest = (size_t)white->cosines - 1u;
-    const size_t sines = ((size_t)design->functions + design->power) - white->cosines;
+    const size_t cosines = white->cosines;
+    const size_t sines = ((size_t)design->functions + design->power) - cosines;
     memset(share, 0, PVID_MAX_POWER * sizeof share[0]);
-    for (size_t h = 0; h <= highest; h++) {
+    for (size_t h = 0; h < cosines; h++) {
         const float rate = (float)h * white->omega;
         const float square = rate * rate;
         const bool both = (h > 0u) && (h <= sines); /* W_0 is twice the others: it has no imaginary part */

@@ -27,7 +27,8 @@ int64_t pvid_short_product_in_halves_q31(int32_t a, int32_t b)
     const int32_t mixed = (a_high * (int32_t)b_low) + ((int32_t)a_low * b_high);
     const int32_t high = (a_high * b_high) + pvid_floor_shift_32_q31(mixed, 16);
     const uint64_t upper = ((uint64_t)(uint32_t)high << 32) | (((uint32_t)mixed & 0xFFFFu) << 16); /* two registers */
-    return (int64_t)(upper + (a_low * b_low));
+    const uint32_t low = a_low * b_low;
+    return (int64_t)(upper + low);
 }
 
 int64_t pvid_scale_q31(int64_t x, int32_t s)
@@ -93,7 +94,8 @@ uint32_t pvid_square_root_q31(uint64_t x)
         return 0;
     }
     const uint32_t up = (64u - pvid_bit_length_q31(x)) / 2u;
-    const uint64_t all = x << (2u * up);
+    const uint32_t even = 2u * up;
+    const uint64_t all = x << even;
     const uint32_t low = (uint32_t)(all & 0xFFFFFFFFu);
     uint32_t rest;
     const uint32_t upper = upper_root_of((uint32_t)(all >> 32), &rest); /* 2^15 or more, rest <= 2 upper */

@@ -38,10 +38,11 @@ void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const flo
                                    float variance)
 {
     float x[N];
+    const size_t end = column + 1u;
     pvid_refine_inverse_column_f32(triangle, column, x);
-    for (size_t i = 0; i <= column; i++) {
+    for (size_t i = 0; i < end; i++) {
         const float scaled = variance * x[i];
-        for (size_t j = 0; j <= column; j++) {
+        for (size_t j = 0; j < end; j++) {
             estimate->covariance[i][j] += scaled * x[j];
         }
     }

@@ -362,8 +362,8 @@ PVID_ALWAYS_INLINE void output_derivatives(const pvid_refine_pass_f32 *self, con
 }
 
 /* What the columns need, at the middle of the big step; `a`: the accelerations there. */
-PVID_SELDOM static void derivatives(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
-                                    const float u[], float a[])
+PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[],
+                                      const pvid_refine_signals_f32 *signals, const float u[], float a[])
 {
     float K[N_Q * N_Q];
     float D[N_Q * N_Q];
@@ -408,7 +408,7 @@ PVID_SELDOM static void step_to(pvid_refine_pass_f32 *self, const float r[], con
     adams_bashforth(self);
     residuals(self, r, self->state, u, signals->z[at]);
     if (to_middle) {
-        derivatives(self, r, signals, u, a);
+        differentiate(self, r, signals, u, a);
     } else {
         accelerations(self->constants, self->state, u, a);
     }
@@ -429,7 +429,7 @@ static void first_pair(pvid_refine_pass_f32 *self, const float r[], const pvid_r
     memcpy(self->state, self->scratch[0], sizeof self->state);
     residuals(self, r, self->state, u, signals->z[2]);
     if (to_middle) {
-        derivatives(self, r, signals, u, a);
+        differentiate(self, r, signals, u, a);
     } else {
         accelerations(self->constants, self->state, u, a);
     }

@@ -339,12 +339,13 @@ void pvid_refine_inverse_column_f32(const float triangle[], size_t column, float
     for (size_t i = 0; i < N; i++) {
         out[i] = 0.0f;
     }
+    const size_t end = column + 1u;
     out[column] = 1.0f / triangle[at(N, column, column)];
     for (size_t i = column; i > 0u; i--) {
         const size_t k = i - 1u;
         const float *entry = &triangle[at(N, k, k)];
         float sum = 0.0f;
-        for (size_t j = i; j <= column; j++) {
+        for (size_t j = i; j < end; j++) {
             sum -= entry[j - k] * out[j];
         }
         out[k] = sum / entry[0];

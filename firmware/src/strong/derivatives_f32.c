@@ -39,7 +39,7 @@ pvid_status pvid_strong_window_init_f32(pvid_strong_window_f32 *self, const pvid
 
 void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self)
 {
-    const uint32_t places = pvid_fir_places_f32(&self->bank);
+    const size_t places = (size_t)pvid_fir_places_f32(&self->bank);
     self->head = 0;
     self->at = 0;
     self->missing = (uint16_t)(self->length + self->bank.block - 1u);

@@ -79,7 +79,7 @@ pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pv
 
 void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 {
-    const uint32_t places = pvid_fir_places_f32(&self->bank);
+    const size_t places = (size_t)pvid_fir_places_f32(&self->bank);
     self->head = 0;
     self->at = 0;
     self->missing = (uint16_t)(self->length + self->bank.block - 1u);

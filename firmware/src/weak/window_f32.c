@@ -91,11 +91,11 @@ typedef struct {
     float chi0;
     float chi2;
     float chi4;
-} factors;
+} chi_values;
 
-static inline factors factors_of(const float row[], size_t functions, size_t k)
+static inline chi_values values_of(const float row[], size_t functions, size_t k)
 {
-    const factors of = {row[k], row[functions + k], row[(2u * functions) + k]};
+    const chi_values of = {row[k], row[functions + k], row[(2u * functions) + k]};
     return of;
 }
 
@@ -106,7 +106,8 @@ static inline float plus_two(float sum, float a, float x, float b, float z)
 }
 
 /* Adds two samples, x and then z, to the sums of a function. The term of Y is phi, that is -F. */
-static inline void add_two(const float *restrict x, factors a, const float *restrict z, factors b, float *restrict sum)
+static inline void add_two(const float *restrict x, chi_values a, const float *restrict z, chi_values b,
+                           float *restrict sum)
 {
     PVID_UNROLL
     for (size_t i = 0; i < PVID_WEAK_SAMPLE_TERMS; i++) {
@@ -135,6 +136,6 @@ void pvid_weak_window_add_f32(const pvid_weak_window_f32 *self, const pvid_weak_
     const float *now = &design->chi[3u * functions * index];
     const float *before = (index > 1u) ? (now - (3u * functions)) : no_weight;
     for (size_t k = first; k < last; k++) {
-        add_two(term[0], factors_of(before, functions, k), term[1], factors_of(now, functions, k), sums[k]);
+        add_two(term[0], values_of(before, functions, k), term[1], values_of(now, functions, k), sums[k]);
     }
 }
