@@ -42,7 +42,7 @@ pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pv
 pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self, const pvid_estimator_config_q31 *config,
                                             const pvid_strong_row_q31 *rows);
 
-/* Any state that prove_kapitza_estimator_q31.c takes. */
+/* Any state; that its solve keeps to its bounds is not proved (host/docs/proofs.md). */
 /*@ requires -0x10000000 <= e <= 0x10000000;
     assigns \result, *self \from row[0 .. 12], e, gradient[0 .. 2];
     ensures self->ready == 1; */

@@ -35,7 +35,7 @@ static pvid_strong_config_f32 strong_config(void)
     pvid_strong_config_f32 config = {
         .sample_rate_hz = 1000.0f,
         .l1 = 0.3f,
-        .bank = {2, 20, pvid_five_points_f32},
+        .bank = {.half = 2, .stride = 20, .weights = pvid_five_points_f32},
         .estimator = pvid_estimator_defaults_f32,
     };
     for (int i = 0; i < 3; i++) {

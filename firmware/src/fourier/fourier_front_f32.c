@@ -153,14 +153,13 @@ PVID_SELDOM void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, con
 /* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
 static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order, const float *x, size_t stride)
 {
-    const float *weight = filter->weights;
-    const float *end = &weight[filter->half];
+    const float *weight = filter->weights; /* NULL if there is none */
     const float *after = x;
     const float *before = x;
     const float centre = *x;
     float sum = 0.0f;
     if ((order % 2u) != 0u) {
-        while (weight != end) {
+        for (size_t left = filter->half; left > 0u; left--) {
             after += stride;
             before -= stride;
             sum += *weight * (*after - *before);
@@ -168,7 +167,7 @@ static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order,
         }
         return sum;
     }
-    while (weight != end) {
+    for (size_t left = filter->half; left > 0u; left--) {
         after += stride;
         before -= stride;
         sum += *weight * ((*after - centre) + (*before - centre));
