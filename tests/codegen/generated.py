@@ -68,6 +68,7 @@ class Generated:
         self.functions = functions
         self.files = files_of(functions.model, "test")
         for name, text in {**self.files, "loop.c": _LOOP}.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")
         code = [
             folder / name

@@ -28,7 +28,8 @@ int64_t pvid_short_product_in_halves_q31(int32_t a, int32_t b)
     const int32_t high = (a_high * b_high) + pvid_floor_shift_32_q31(mixed, 16);
     const uint64_t upper = ((uint64_t)(uint32_t)high << 32) | (((uint32_t)mixed & 0xFFFFu) << 16); /* two registers */
     const uint32_t low = a_low * b_low;
-    return (int64_t)(upper + low);
+    const uint64_t product = upper + low;
+    return (int64_t)product;
 }
 
 int64_t pvid_scale_q31(int64_t x, int32_t s)

@@ -21,6 +21,7 @@
 #include "pvid/kapitza_parameters.h"
 
 #if !defined(PVID_PLAIN_NAMES) /* see sized.h */
+#define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
 #define pvid_kapitza_estimator_init_q31 PVID_SIZED(pvid_kapitza_estimator_init_q31)
 #define pvid_kapitza_estimator_innovate_q31 PVID_SIZED(pvid_kapitza_estimator_innovate_q31)
 #define pvid_kapitza_estimator_take_q31 PVID_SIZED(pvid_kapitza_estimator_take_q31)
