@@ -98,7 +98,6 @@ def test_settings_reach_the_model(motor: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("--core", "q31"), "--core q31: dc_motor is identified in float64"),
         (("--on", "cortex-m4f"), "--on cortex-m4f: dc_motor is identified in float64"),
         (("--model", "dc_moter"), "dc_moter: no such model; give a .py file or one of battery_2rc"),
     ],

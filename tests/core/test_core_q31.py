@@ -26,9 +26,8 @@ from pvid.setup.q31 import counts_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 FIRMWARE = ROOT / "firmware"
-# What both cores need.
-SHARED = [source(name) for name in ("crc32.c", "fnv.c", "kinds.c", "publication.c", "snapshot.c")]
-SOURCES = sorted([*core_sources("*_q31.c"), *SHARED])
+# Of the fixed-point core, and what both cores need.
+SOURCES = sorted(path for path in core_sources() if not path.stem.endswith("_f32"))
 COMPILERS = {
     "arm-none-eabi": ["-mcpu=cortex-m0plus", "-mthumb"],
     "riscv64-unknown-elf": ["-march=rv32imac", "-mabi=ilp32"],

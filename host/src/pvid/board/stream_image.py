@@ -33,7 +33,6 @@ def _macros(rig: StreamRig) -> list[str]:
     """stream_rig.h but for the number of it all."""
     units = ", ".join(float_literal(np.float32(unit)) for unit in rig.p_unit[: len(MODELS[DEFAULT].parameters)])
     form, core = rig.case.form, rig.case.core
-    assess, assessed = rig.case.assess_call
     sensor = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
     return [
         f"#define STREAM_CORE {int(rig.core)}",
@@ -42,9 +41,6 @@ def _macros(rig: StreamRig) -> list[str]:
         f"#define STREAM_CONFIG pvid_{form}_config_{core}",
         f"#define STREAM_INIT pvid_{form}_init_{core}",
         f"#define STREAM_STEP pvid_{form}_step_{core}",
-        f"#define STREAM_HASH {rig.case.hash_function}",
-        f"#define STREAM_ASSESS {assess}",
-        f"#define STREAM_ASSESSED {assessed}",
         f"#define STREAM_N_P {rig.n_p}u",
         f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(rig.sample_rate))}",
         f"#define STREAM_PHI_LSB {float_literal(np.float32(rig.phi_lsb))}",
@@ -54,10 +50,14 @@ def _macros(rig: StreamRig) -> list[str]:
     ]
 
 
-def _described() -> list[str]:
-    """What no bit depends on, and is not in the number."""
+def _described(rig: StreamRig) -> list[str]:
+    """What follows from the rest, or no bit depends on, and is not in the number."""
     model = MODELS[DEFAULT]
+    assess, assessed = rig.case.assess_call
     return [
+        f"#define STREAM_HASH {rig.case.hash_function}",
+        f"#define STREAM_ASSESS {assess}",
+        f"#define STREAM_ASSESSED {assessed}",
         f"#define STREAM_SAMPLES {len(model.channels)}u",
         f"#define STREAM_NAMES {c_string(names_of(model).text)}",
     ]
@@ -115,7 +115,7 @@ def image_of(rig: StreamRig | Streamed) -> StreamImage:
         return rig.stream_image
     return StreamImage(
         number=settings_number(rig),
-        macros=[*_macros(rig), *_described()],
+        macros=[*_macros(rig), *_described(rig)],
         files={"stream_tables.h": _tables(rig)},
         core=rig.case.core,
         identifier=rig.case.core,
