@@ -1,5 +1,6 @@
-#include "number/short_loops.h"
 #include "number/uncontracted.h"
+
+#include "number/short_loops.h"
 
 /* A column of a test function chi is sum_k chi psi of terms factor D^m[channel] with the derivatives moved to chi. It
  * is a combination of the parts of

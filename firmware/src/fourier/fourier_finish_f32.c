@@ -1,5 +1,6 @@
-#include "number/short_loops.h"
 #include "number/uncontracted.h"
+
+#include "number/short_loops.h"
 
 #include "fourier/fourier_finish_f32.h"
 

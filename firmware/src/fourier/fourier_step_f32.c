@@ -1,5 +1,6 @@
-#include "number/short_loops.h"
 #include "number/uncontracted.h"
+
+#include "number/short_loops.h"
 
 /* Signs need the arguments of both neighbours, and an integral the next step's integrand. So with the jets of step k
  * the gains and integrands of step k - 1 follow, and with those the channels of step k - 2:

@@ -1,5 +1,6 @@
-#include "number/short_loops.h"
 #include "number/uncontracted.h"
+
+#include "number/short_loops.h"
 
 /* An entry of the noise table is a share of the variance D_h of the rows, and likewise the covariance that noise alone
  * has in two columns a and b, over theta_a theta_b. In white rows its sum is factor Q_j; half of it is each of (a, b)

@@ -1,5 +1,6 @@
-#include "number/short_loops.h"
 #include "number/uncontracted.h"
+
+#include "number/short_loops.h"
 
 /* s = C^T (sum N e + g) is a window's score at the p before its steps. With S^-1 = V a step is V sum s, so that its
  * variance over so many windows in the sums is

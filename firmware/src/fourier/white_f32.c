@@ -1,5 +1,6 @@
-#include "number/short_loops.h"
 #include "number/uncontracted.h"
+
+#include "number/short_loops.h"
 
 /* The sums S_h of a kind's residual Y - sum theta_j N_j have independent noise in their real and imaginary parts, of
  * variance

@@ -1,3 +1,5 @@
+#include "number/uncontracted.h"
+
 #include "pvid/fnv_refine.h"
 
 #include <stddef.h>
