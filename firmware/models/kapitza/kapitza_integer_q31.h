@@ -7,32 +7,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "kapitza_places.h"
 #include "number/integer_q31.h"
 #include "pvid/kapitza_strong_q31.h"
 
 /* Places in a row; the powers of G descend there, as in the paper. */
 enum { PVID_ROW_A = 0, PVID_ROW_E = 1, PVID_ROW_X = 2, PVID_ROW_Z = 6, PVID_ROW_Y = PVID_KAPITZA_ROW_Y };
-
-/* Places in the sums: A^2, A E, E^2, Y A, Y E, Y^2; A, E, Y times -G^k phi'' (k = 3..0) and -G^k phi (k = 4..0);
- * phi''^2 G^6.., phi'' phi G^7.., phi^2 G^8..; weight. */
-enum {
-    PVID_SUM_AA = 0,
-    PVID_SUM_AE = 1,
-    PVID_SUM_EE = 2,
-    PVID_SUM_YA = 3,
-    PVID_SUM_YE = 4,
-    PVID_SUM_YY = 5,
-    PVID_SUM_AX = 6,
-    PVID_SUM_EX = 10,
-    PVID_SUM_YX = 14,
-    PVID_SUM_AZ = 18,
-    PVID_SUM_EZ = 23,
-    PVID_SUM_YZ = 28,
-    PVID_SUM_XX = 33,
-    PVID_SUM_XZ = 40,
-    PVID_SUM_ZZ = 48,
-    PVID_SUM_WEIGHT = 57
-};
 
 /* x 2^-s rounded half up, |x| < 2^62, 1 <= s <= 62. */
 static inline int64_t pvid_nearest_q31(int64_t x, uint32_t s)

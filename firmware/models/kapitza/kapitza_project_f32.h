@@ -8,28 +8,9 @@
 
 #include <stddef.h>
 
+#include "kapitza_places.h"
 #include "number/unroll.h"
 #include "pvid/detail/strong_state.h"
-
-/* Places of the sums; families by descending powers of u. */
-enum {
-    PVID_SUM_AA = 0,
-    PVID_SUM_AE = 1,
-    PVID_SUM_EE = 2,
-    PVID_SUM_YA = 3,
-    PVID_SUM_YE = 4,
-    PVID_SUM_YY = 5,
-    PVID_SUM_A2 = 6,     /* 4: A (-u^k phi'') */
-    PVID_SUM_E2 = 10,    /* 4 */
-    PVID_SUM_Y2 = 14,    /* 4 */
-    PVID_SUM_A0 = 18,    /* 5: A (-u^k phi) */
-    PVID_SUM_E0 = 23,    /* 5 */
-    PVID_SUM_Y0 = 28,    /* 5 */
-    PVID_SUM_K22 = 33,   /* 7: phi''^2 u^k */
-    PVID_SUM_K20 = 40,   /* 8 */
-    PVID_SUM_K00 = 48,   /* 9 */
-    PVID_SUM_WEIGHT = 57 /* rows */
-};
 
 static inline float pvid_kapitza_sum_f32(const pvid_strong_sums_f32 *self, size_t i)
 {

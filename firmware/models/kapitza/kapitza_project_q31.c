@@ -163,26 +163,26 @@ PVID_APART static void shift_sums(const int64_t sums[], const pvid_kapitza_syste
     const int32_t x = scales->scale_x;
     const int32_t z = scales->scale_z;
     int32_t m[PVID_SUM_WEIGHT];
-    take_mantissas(sums, PVID_SUM_AA, PVID_SUM_AX, 2 * a, m);
-    take_mantissas(sums, PVID_SUM_AX, PVID_SUM_AZ, a + x, m);
-    take_mantissas(sums, PVID_SUM_AZ, PVID_SUM_XX, a + z, m);
-    take_mantissas(sums, PVID_SUM_XX, PVID_SUM_XZ, 2 * x, m);
-    take_mantissas(sums, PVID_SUM_XZ, PVID_SUM_ZZ, x + z, m);
-    take_mantissas(sums, PVID_SUM_ZZ, PVID_SUM_WEIGHT, 2 * z, m);
+    take_mantissas(sums, PVID_SUM_AA, PVID_SUM_A2, 2 * a, m);
+    take_mantissas(sums, PVID_SUM_A2, PVID_SUM_A0, a + x, m);
+    take_mantissas(sums, PVID_SUM_A0, PVID_SUM_K22, a + z, m);
+    take_mantissas(sums, PVID_SUM_K22, PVID_SUM_K20, 2 * x, m);
+    take_mantissas(sums, PVID_SUM_K20, PVID_SUM_K00, x + z, m);
+    take_mantissas(sums, PVID_SUM_K00, PVID_SUM_WEIGHT, 2 * z, m);
     out->aa = m[PVID_SUM_AA];
     out->ae = m[PVID_SUM_AE];
     out->ee = m[PVID_SUM_EE];
     out->ya = m[PVID_SUM_YA];
     out->ye = m[PVID_SUM_YE];
-    out->a2 = pair_of(&m[PVID_SUM_AX], c->r2, 2, c->d);
-    out->e2 = pair_of(&m[PVID_SUM_EX], c->r2, 2, c->d);
-    out->y2 = pair_of(&m[PVID_SUM_YX], c->r2, 2, c->d);
-    out->a0 = pair_of(&m[PVID_SUM_AZ], c->r3, 3, c->d);
-    out->e0 = pair_of(&m[PVID_SUM_EZ], c->r3, 3, c->d);
-    out->y0 = pair_of(&m[PVID_SUM_YZ], c->r3, 3, c->d);
-    out->k22 = triple_of(&m[PVID_SUM_XX], c->r4, 4, c->d);
-    out->k20 = triple_of(&m[PVID_SUM_XZ], c->r5, 5, c->d);
-    out->k00 = triple_of(&m[PVID_SUM_ZZ], c->r6, 6, c->d);
+    out->a2 = pair_of(&m[PVID_SUM_A2], c->r2, 2, c->d);
+    out->e2 = pair_of(&m[PVID_SUM_E2], c->r2, 2, c->d);
+    out->y2 = pair_of(&m[PVID_SUM_Y2], c->r2, 2, c->d);
+    out->a0 = pair_of(&m[PVID_SUM_A0], c->r3, 3, c->d);
+    out->e0 = pair_of(&m[PVID_SUM_E0], c->r3, 3, c->d);
+    out->y0 = pair_of(&m[PVID_SUM_Y0], c->r3, 3, c->d);
+    out->k22 = triple_of(&m[PVID_SUM_K22], c->r4, 4, c->d);
+    out->k20 = triple_of(&m[PVID_SUM_K20], c->r5, 5, c->d);
+    out->k00 = triple_of(&m[PVID_SUM_K00], c->r6, 6, c->d);
 }
 
 /* ---- S and F ---- */
@@ -268,8 +268,8 @@ static void relate(int32_t of_a, const int32_t lengths[2], pvid_kapitza_system_q
 static void scale_families(const int64_t sums[], const int32_t lengths[2], pvid_kapitza_system_q31 *out)
 {
     const int32_t of_ay = pvid_larger_q31(half_beyond(sums[PVID_SUM_AA]), half_beyond(sums[PVID_SUM_YY]));
-    out->scale_x = pvid_larger_q31(half_beyond(sums[PVID_SUM_XX + 6]), half_beyond(sums[PVID_SUM_XX]));
-    out->scale_z = pvid_larger_q31(half_beyond(sums[PVID_SUM_ZZ + 8]), half_beyond(sums[PVID_SUM_ZZ]));
+    out->scale_x = pvid_larger_q31(half_beyond(sums[PVID_SUM_K22 + 6]), half_beyond(sums[PVID_SUM_K22]));
+    out->scale_z = pvid_larger_q31(half_beyond(sums[PVID_SUM_K00 + 8]), half_beyond(sums[PVID_SUM_K00]));
     relate(pvid_larger_q31(half_beyond(sums[PVID_SUM_EE]), of_ay), lengths, out);
 }
 
@@ -329,11 +329,12 @@ static int32_t longer(int64_t a, int32_t less_a, int64_t b, int32_t less_b)
 /* The moments in units of a time 2^t: scales of their families, then 53 bits of each. */
 static void take_64(const int64_t sums[], int32_t t, pvid_kapitza_system_q31 *scales, int64_t m[])
 {
-    static const uint8_t last[6] = {PVID_SUM_AX, PVID_SUM_AZ, PVID_SUM_XX, PVID_SUM_XZ, PVID_SUM_ZZ, PVID_SUM_WEIGHT};
+    static const uint8_t last[6] = {PVID_SUM_A2,  PVID_SUM_A0,  PVID_SUM_K22,
+                                    PVID_SUM_K20, PVID_SUM_K00, PVID_SUM_WEIGHT};
     const int32_t of_a = longer(sums[PVID_SUM_AA], 2 * t, sums[PVID_SUM_YY], 4 * t);
     const int32_t a = half_of(pvid_larger_q31(length_64(sums[PVID_SUM_EE]), of_a), FAR_BITS);
-    const int32_t x = half_of(longer(sums[PVID_SUM_XX + 6], 0, sums[PVID_SUM_XX], 6 * t), FAR_BITS);
-    const int32_t z = half_of(longer(sums[PVID_SUM_ZZ + 8], 0, sums[PVID_SUM_ZZ], 8 * t), FAR_BITS);
+    const int32_t x = half_of(longer(sums[PVID_SUM_K22 + 6], 0, sums[PVID_SUM_K22], 6 * t), FAR_BITS);
+    const int32_t z = half_of(longer(sums[PVID_SUM_K00 + 8], 0, sums[PVID_SUM_K00], 8 * t), FAR_BITS);
     const int32_t shift[6] = {2 * a, a + x, a + z, 2 * x, x + z, 2 * z};
     size_t i = 0;
     for (size_t family = 0; family < 6u; family++) {
@@ -356,17 +357,19 @@ PVID_SELDOM static void shift_far(const int64_t sums[], int32_t beyond, const in
     int64_t m[PVID_SUM_WEIGHT];
     take_64(sums, t, scales, m);
     for (size_t k = 0; k < 3u; k++) {
-        shift_64(&m[PVID_SUM_AX + (4u * k)], 4, d);
-        shift_64(&m[PVID_SUM_AZ + (5u * k)], 5, d);
+        shift_64(&m[PVID_SUM_A2 + (4u * k)], 4, d);
+        shift_64(&m[PVID_SUM_A0 + (5u * k)], 5, d);
     }
-    shift_64(&m[PVID_SUM_XX], 7, d);
-    shift_64(&m[PVID_SUM_XZ], 8, d);
-    shift_64(&m[PVID_SUM_ZZ], 9, d);
+    shift_64(&m[PVID_SUM_K22], 7, d);
+    shift_64(&m[PVID_SUM_K20], 8, d);
+    shift_64(&m[PVID_SUM_K00], 9, d);
 
     const int32_t of_ay = longer(m[PVID_SUM_AA], 2 * FAR_TIME, m[PVID_SUM_YY], 4 * FAR_TIME);
     const int32_t more_a = half_of(pvid_larger_q31(length_64(m[PVID_SUM_EE]), of_ay), MANTISSA_BITS);
-    const int32_t of_x = half_of(longer(m[PVID_SUM_XX + 2], 4 * FAR_TIME, m[PVID_SUM_XX], 6 * FAR_TIME), MANTISSA_BITS);
-    const int32_t of_z = half_of(longer(m[PVID_SUM_ZZ + 2], 6 * FAR_TIME, m[PVID_SUM_ZZ], 8 * FAR_TIME), MANTISSA_BITS);
+    const int32_t of_x =
+        half_of(longer(m[PVID_SUM_K22 + 2], 4 * FAR_TIME, m[PVID_SUM_K22], 6 * FAR_TIME), MANTISSA_BITS);
+    const int32_t of_z =
+        half_of(longer(m[PVID_SUM_K00 + 2], 6 * FAR_TIME, m[PVID_SUM_K00], 8 * FAR_TIME), MANTISSA_BITS);
     const int32_t x = pvid_larger_q31(of_x, -scales->scale_x); /* no finer than the sums are */
     const int32_t z = pvid_larger_q31(of_z, -scales->scale_z);
     const int32_t before = scales->scale_a;
@@ -380,15 +383,15 @@ PVID_SELDOM static void shift_far(const int64_t sums[], int32_t beyond, const in
     out->ee = out_64(m[PVID_SUM_EE], 2 * a);
     out->ya = out_64(m[PVID_SUM_YA], (2 * a) + (3 * FAR_TIME));
     out->ye = out_64(m[PVID_SUM_YE], (2 * a) + (2 * FAR_TIME));
-    out->a2 = out_pair(&m[PVID_SUM_AX], a + x, 4);
-    out->e2 = out_pair(&m[PVID_SUM_EX], a + x, 3);
-    out->y2 = out_pair(&m[PVID_SUM_YX], a + x, 5);
-    out->a0 = out_pair(&m[PVID_SUM_AZ], a + z, 5);
-    out->e0 = out_pair(&m[PVID_SUM_EZ], a + z, 4);
-    out->y0 = out_pair(&m[PVID_SUM_YZ], a + z, 6);
-    out->k22 = out_triple(&m[PVID_SUM_XX], 2 * x, 6);
-    out->k20 = out_triple(&m[PVID_SUM_XZ], x + z, 7);
-    out->k00 = out_triple(&m[PVID_SUM_ZZ], 2 * z, 8);
+    out->a2 = out_pair(&m[PVID_SUM_A2], a + x, 4);
+    out->e2 = out_pair(&m[PVID_SUM_E2], a + x, 3);
+    out->y2 = out_pair(&m[PVID_SUM_Y2], a + x, 5);
+    out->a0 = out_pair(&m[PVID_SUM_A0], a + z, 5);
+    out->e0 = out_pair(&m[PVID_SUM_E0], a + z, 4);
+    out->y0 = out_pair(&m[PVID_SUM_Y0], a + z, 6);
+    out->k22 = out_triple(&m[PVID_SUM_K22], 2 * x, 6);
+    out->k20 = out_triple(&m[PVID_SUM_K20], x + z, 7);
+    out->k00 = out_triple(&m[PVID_SUM_K00], 2 * z, 8);
 }
 
 void pvid_kapitza_project_q31(const pvid_kapitza_estimator_q31 *self, pvid_kapitza_system_q31 *system)

@@ -15,15 +15,15 @@ static size_t place_of(size_t i, size_t j)
         return (i + j) + PVID_SUM_AA;
     }
     if (i < PVID_ROW_X) {
-        const size_t first = j_is_x ? PVID_SUM_AX : PVID_SUM_AZ;
+        const size_t first = j_is_x ? PVID_SUM_A2 : PVID_SUM_A0;
         const size_t count = j_is_x ? 4u : 5u;
         return first + (i * count) + (j - (j_is_x ? (size_t)PVID_ROW_X : (size_t)PVID_ROW_Z));
     }
     if (j_is_x) {
-        return ((i - PVID_ROW_X) + (j - PVID_ROW_X)) + PVID_SUM_XX;
+        return ((i - PVID_ROW_X) + (j - PVID_ROW_X)) + PVID_SUM_K22;
     }
-    return i_is_x ? (((i - PVID_ROW_X) + (j - PVID_ROW_Z)) + PVID_SUM_XZ)
-                  : (((i - PVID_ROW_Z) + (j - PVID_ROW_Z)) + PVID_SUM_ZZ);
+    return i_is_x ? (((i - PVID_ROW_X) + (j - PVID_ROW_Z)) + PVID_SUM_K20)
+                  : (((i - PVID_ROW_Z) + (j - PVID_ROW_Z)) + PVID_SUM_K00);
 }
 
 static size_t place_of_y(size_t i)
@@ -31,7 +31,7 @@ static size_t place_of_y(size_t i)
     if (i < PVID_ROW_X) {
         return i + PVID_SUM_YA;
     }
-    return (i < PVID_ROW_Z) ? ((i - PVID_ROW_X) + PVID_SUM_YX) : ((i - PVID_ROW_Z) + PVID_SUM_YZ);
+    return (i < PVID_ROW_Z) ? ((i - PVID_ROW_X) + PVID_SUM_Y2) : ((i - PVID_ROW_Z) + PVID_SUM_Y0);
 }
 
 /* theta_i = mantissa[i] 2^(returned - 31), with d = w - w_r in place of w. */

@@ -34,26 +34,26 @@ void pvid_kapitza_add_q31(pvid_kapitza_estimator_q31 *self, const int32_t row[PV
     add_products(e, &n[PVID_ROW_E], 1, &sums[PVID_SUM_EE]);
     add_products(y, n, 2, &sums[PVID_SUM_YA]);
     add_products(y, &n[PVID_ROW_Y], 1, &sums[PVID_SUM_YY]);
-    add_products(a, x, 4, &sums[PVID_SUM_AX]);
-    add_products(e, x, 4, &sums[PVID_SUM_EX]);
-    add_products(y, x, 4, &sums[PVID_SUM_YX]);
-    add_products(a, z, 5, &sums[PVID_SUM_AZ]);
-    add_products(e, z, 5, &sums[PVID_SUM_EZ]);
-    add_products(y, z, 5, &sums[PVID_SUM_YZ]);
-    add_products(x[0], x, 4, &sums[PVID_SUM_XX]); /* G^6 .. G^3, then G^2 .. 1 */
-    add_products(x[3], &x[1], 3, &sums[PVID_SUM_XX + 4]);
-    add_products(z[0], x, 4, &sums[PVID_SUM_XZ]); /* G^7 .. G^4, then G^3 .. 1 */
-    add_products(x[3], &z[1], 4, &sums[PVID_SUM_XZ + 4]);
-    add_products(z[0], z, 5, &sums[PVID_SUM_ZZ]); /* G^8 .. G^4, then G^3 .. 1 */
-    add_products(z[4], &z[1], 4, &sums[PVID_SUM_ZZ + 5]);
+    add_products(a, x, 4, &sums[PVID_SUM_A2]);
+    add_products(e, x, 4, &sums[PVID_SUM_E2]);
+    add_products(y, x, 4, &sums[PVID_SUM_Y2]);
+    add_products(a, z, 5, &sums[PVID_SUM_A0]);
+    add_products(e, z, 5, &sums[PVID_SUM_E0]);
+    add_products(y, z, 5, &sums[PVID_SUM_Y0]);
+    add_products(x[0], x, 4, &sums[PVID_SUM_K22]); /* G^6 .. G^3, then G^2 .. 1 */
+    add_products(x[3], &x[1], 3, &sums[PVID_SUM_K22 + 4]);
+    add_products(z[0], x, 4, &sums[PVID_SUM_K20]); /* G^7 .. G^4, then G^3 .. 1 */
+    add_products(x[3], &z[1], 4, &sums[PVID_SUM_K20 + 4]);
+    add_products(z[0], z, 5, &sums[PVID_SUM_K00]); /* G^8 .. G^4, then G^3 .. 1 */
+    add_products(z[4], &z[1], 4, &sums[PVID_SUM_K00 + 5]);
     sums[PVID_SUM_WEIGHT] += (int64_t)1 << 16;
 }
 
 /* The largest of the sums of squares, all >= 0: no other sum exceeds twice it. */
 static int64_t largest_of(const int64_t sums[])
 {
-    static const uint8_t squares[] = {PVID_SUM_AA,     PVID_SUM_EE, PVID_SUM_YY,    PVID_SUM_XX,
-                                      PVID_SUM_XX + 6, PVID_SUM_ZZ, PVID_SUM_ZZ + 8};
+    static const uint8_t squares[] = {PVID_SUM_AA,      PVID_SUM_EE,  PVID_SUM_YY,     PVID_SUM_K22,
+                                      PVID_SUM_K22 + 6, PVID_SUM_K00, PVID_SUM_K00 + 8};
     int64_t largest = 0;
     for (size_t i = 0; i < (sizeof squares / sizeof squares[0]); i++) {
         const int64_t own = sums[squares[i]];

@@ -15,14 +15,10 @@
 
 #include <string.h>
 
+#include "fourier/fourier_signals.h"
 #include "number/unroll.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
-
-/* Samples that the signals need beside those of their tick: none, the last one, or the next one and two before. */
-#define NOTHING 0u
-#define LAST 1u
-#define NEXT 2u
 
 uint16_t pvid_fourier_front_half_f32(const pvid_fourier_design_f32 *design)
 {
@@ -39,33 +35,14 @@ uint32_t pvid_fourier_front_length_f32(const pvid_fourier_design_f32 *design)
     return (uint32_t)design->model->signals * (3u + (2u * steps));
 }
 
-static uint8_t needs_of(const pvid_fourier_model_f32 *model)
-{
-    uint8_t needs = NOTHING;
-    for (size_t i = 0; i < model->signals; i++) {
-        const uint8_t source = model->signal[i].source;
-        if (source == (uint8_t)PVID_SIGNAL_HELD) {
-            needs = NEXT;
-        } else if ((source == (uint8_t)PVID_SIGNAL_JUMP) && (needs == NOTHING)) {
-            needs = LAST;
-        } else {
-            /* the sample itself */
-        }
-    }
-    return needs;
-}
-
 void pvid_fourier_front_init_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design,
                                  float sample_rate_hz)
 {
     const pvid_fourier_model_f32 *model = design->model;
     const float ticks = (float)design->decimation;
-    self->needs = needs_of(model);
+    self->needs = pvid_fourier_needs(model->signal, model->signals);
     self->signals = model->signals;
-    self->plain = (self->needs == NOTHING) && (model->signals == model->samples);
-    for (size_t i = 0; i < model->signals; i++) {
-        self->plain = self->plain && (model->signal[i].sample == i);
-    }
+    self->plain = pvid_fourier_signals_are_samples(model->signal, model->signals, model->samples);
     self->decimation = design->decimation;
     self->half = pvid_fourier_front_half_f32(design);
     self->ticks = ticks;
@@ -81,7 +58,7 @@ static uint16_t lost(const pvid_fourier_front_f32 *self)
     if (self->decimation > 1u) {
         return 1;
     }
-    return (uint16_t)(((self->needs != NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
+    return (uint16_t)(((self->needs != PVID_FOURIER_NEEDS_NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
 }
 
 uint16_t pvid_fourier_front_lead_f32(const pvid_fourier_front_f32 *self)
@@ -134,18 +111,19 @@ PVID_SELDOM void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, con
     if (first) {
         remember(self, model->samples, sample);
     }
-    if (first && (self->needs == NEXT)) {
+    if (first && (self->needs == PVID_FOURIER_NEEDS_NEXT)) {
         self->wait++; /* the next sample is missing */
     } else {
         for (size_t i = 0; i < model->signals; i++) {
             const pvid_fourier_signal *signal = &model->signal[i];
             const float x = sample[signal->sample];
             float *sums = &self->line[2u * i];
-            sums[0] += (self->needs == NEXT) ? held_signal(self, signal, x) : plain_signal(self, signal, x);
+            sums[0] +=
+                (self->needs == PVID_FOURIER_NEEDS_NEXT) ? held_signal(self, signal, x) : plain_signal(self, signal, x);
             sums[1] += sums[0];
         }
     }
-    if (self->needs != NOTHING) {
+    if (self->needs != PVID_FOURIER_NEEDS_NOTHING) {
         remember(self, model->samples, sample);
     }
 }

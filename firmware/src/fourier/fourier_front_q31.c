@@ -13,13 +13,9 @@
 
 #include <string.h>
 
+#include "fourier/fourier_signals.h"
 #include "fourier/rescale_q31.h"
 #include "number/unroll.h"
-
-/* Samples that the signals need beside those of their tick: none, the last one, or the next one and two before. */
-#define NOTHING 0u
-#define LAST 1u
-#define NEXT 2u
 
 uint16_t pvid_fourier_front_half_q31(const pvid_fourier_design_q31 *design)
 {
@@ -36,31 +32,12 @@ uint32_t pvid_fourier_front_length_q31(const pvid_fourier_design_q31 *design)
     return (uint32_t)design->model->signals * (3u + (2u * steps));
 }
 
-static uint8_t needs_of(const pvid_fourier_model_q31 *model)
-{
-    uint8_t needs = NOTHING;
-    for (size_t i = 0; i < model->signals; i++) {
-        const uint8_t source = model->signal[i].source;
-        if (source == (uint8_t)PVID_SIGNAL_HELD) {
-            needs = NEXT;
-        } else if ((source == (uint8_t)PVID_SIGNAL_JUMP) && (needs == NOTHING)) {
-            needs = LAST;
-        } else {
-            /* the sample itself */
-        }
-    }
-    return needs;
-}
-
 void pvid_fourier_front_init_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
                                  const int32_t offset[])
 {
     const pvid_fourier_model_q31 *model = design->model;
-    self->needs = needs_of(model);
-    self->plain = (self->needs == NOTHING) && (model->signals == model->samples);
-    for (size_t i = 0; i < model->signals; i++) {
-        self->plain = self->plain && (model->signal[i].sample == i);
-    }
+    self->needs = pvid_fourier_needs(model->signal, model->signals);
+    self->plain = pvid_fourier_signals_are_samples(model->signal, model->signals, model->samples);
     self->offset = offset;
     self->signals = model->signals;
     self->decimation = design->decimation;
@@ -75,7 +52,7 @@ static uint16_t lost(const pvid_fourier_front_q31 *self)
     if (self->decimation > 1u) {
         return 1;
     }
-    return (uint16_t)(((self->needs != NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
+    return (uint16_t)(((self->needs != PVID_FOURIER_NEEDS_NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
 }
 
 uint16_t pvid_fourier_front_lead_q31(const pvid_fourier_front_q31 *self)
@@ -107,7 +84,7 @@ static void remember(pvid_fourier_front_q31 *self, size_t samples, const int32_t
 static int32_t signal_of(const pvid_fourier_front_q31 *self, pvid_fourier_signal signal, const int32_t counts[])
 {
     const size_t i = signal.sample;
-    const bool held = self->needs == NEXT;
+    const bool held = self->needs == PVID_FOURIER_NEEDS_NEXT;
     const int32_t now = held ? self->before[0][i] : counts[i];
     const int32_t last = held ? self->before[1][i] : self->before[0][i];
     if (signal.source == (uint8_t)PVID_SIGNAL_HELD) {
@@ -131,7 +108,7 @@ PVID_SELDOM bool pvid_fourier_front_derive_q31(pvid_fourier_front_q31 *self, con
     if (first) {
         remember(self, model->samples, counts);
     }
-    if (first && (self->needs == NEXT)) {
+    if (first && (self->needs == PVID_FOURIER_NEEDS_NEXT)) {
         self->wait++; /* the next sample is missing */
     } else {
         for (size_t i = 0; i < model->signals; i++) {
@@ -140,7 +117,7 @@ PVID_SELDOM bool pvid_fourier_front_derive_q31(pvid_fourier_front_q31 *self, con
             sums[1] += sums[0];
         }
     }
-    if (self->needs != NOTHING) {
+    if (self->needs != PVID_FOURIER_NEEDS_NOTHING) {
         remember(self, model->samples, counts);
     }
     return true;

@@ -6,6 +6,7 @@
 #include <stddef.h>
 
 #include "fourier/fourier_front_f32.h"
+#include "fourier/fourier_signals.h"
 #include "number/finite_f32.h"
 
 static bool all_within(const float values[], size_t n, float low)
@@ -34,19 +35,6 @@ static bool tables_are_given(const pvid_fourier_model_f32 *model)
     return (model->signal != NULL) && (model->jet != NULL) && (model->channel != NULL) && (model->term != NULL) &&
            (model->kind != NULL) && (model->values != NULL) && (model->form != NULL) && (model->model != NULL) &&
            (!prepares || (model->prepare != NULL));
-}
-
-static bool signals_are_valid(const pvid_fourier_model_f32 *model)
-{
-    bool valid = true;
-    for (size_t i = 0; i < model->signals; i++) {
-        valid = valid && (model->signal[i].sample < model->samples) &&
-                (model->signal[i].source <= (uint8_t)PVID_SIGNAL_JUMP);
-    }
-    for (size_t i = 0; i < model->jets; i++) {
-        valid = valid && (model->jet[i].signal < model->signals) && (model->jet[i].order <= PVID_MAX_POWER);
-    }
-    return valid;
 }
 
 /* Channel `place` is summed and is this one. */
@@ -157,8 +145,10 @@ static bool noise_is_valid(const pvid_fourier_design_f32 *design)
 
 static pvid_status model_is_valid(const pvid_fourier_model_f32 *model)
 {
-    const bool valid = (model != NULL) && counts_fit(model) && tables_are_given(model) && signals_are_valid(model) &&
-                       channels_are_valid(model);
+    const bool valid =
+        (model != NULL) && counts_fit(model) && tables_are_given(model) &&
+        pvid_fourier_signals_are_valid(model->signal, model->signals, model->samples, model->jet, model->jets) &&
+        channels_are_valid(model);
     return valid ? PVID_OK : PVID_BAD_MODEL;
 }
 

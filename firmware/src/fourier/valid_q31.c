@@ -4,6 +4,7 @@
 #include <stddef.h>
 
 #include "fourier/fourier_front_q31.h"
+#include "fourier/fourier_signals.h"
 #include "fourier/sums_q31.h"
 #include "number/integer_q31.h"
 
@@ -31,19 +32,6 @@ static bool tables_are_given(const pvid_fourier_model_q31 *model)
     return (model->signal != NULL) && (model->jet != NULL) && (model->channel != NULL) && (model->term != NULL) &&
            (model->kind != NULL) && (model->values != NULL) && (model->model != NULL) &&
            (!prepares || (model->prepare != NULL));
-}
-
-static bool signals_are_valid(const pvid_fourier_model_q31 *model)
-{
-    bool valid = true;
-    for (size_t i = 0; i < model->signals; i++) {
-        valid = valid && (model->signal[i].sample < model->samples) &&
-                (model->signal[i].source <= (uint8_t)PVID_SIGNAL_JUMP);
-    }
-    for (size_t i = 0; i < model->jets; i++) {
-        valid = valid && (model->jet[i].signal < model->signals) && (model->jet[i].order <= PVID_MAX_POWER);
-    }
-    return valid;
 }
 
 /* Channel `place` is summed and is this one. */
@@ -263,7 +251,8 @@ pvid_status pvid_fourier_valid_q31(const pvid_fourier_design_q31 *design)
         return PVID_BAD_DESIGN;
     }
     const pvid_fourier_model_q31 *model = design->model;
-    if ((model == NULL) || !counts_fit(model) || !tables_are_given(model) || !signals_are_valid(model) ||
+    if ((model == NULL) || !counts_fit(model) || !tables_are_given(model) ||
+        !pvid_fourier_signals_are_valid(model->signal, model->signals, model->samples, model->jet, model->jets) ||
         !channels_are_valid(model)) {
         return PVID_BAD_MODEL;
     }
