@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
+from pvid.base.version import __version__
 from pvid.core.sources import public_headers
 
 CONSUMER = ROOT / "tests" / "consumer"
@@ -84,6 +85,10 @@ def version() -> str:
 def by_package(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     build = tmp_path_factory.mktemp("find_package")
     return built(build, "-DPVID_BY=find_package", f"-DCMAKE_PREFIX_PATH={prefix}")
+
+
+def test_the_python_package_has_the_same_version(version: str) -> None:
+    assert __version__ == version
 
 
 def test_find_package(by_package: list[str], version: str) -> None:

@@ -29,7 +29,7 @@ from pvid.setup.fourier import design_tables, for_engine
 from pvid.setup.fourier_q31 import config_of_q31, row_formats
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.q31.fourier_front import FrontTicks, jets
+from pvid.twin.q31.fourier_front import front_ticks, jets
 from pvid.twin.q31.fourier_values import steps
 from pvid.twin.q31.scaled import Scaled
 
@@ -107,7 +107,7 @@ class Rig:
         """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
         functions = self.oracle_design.test_functions
         # The oracle's first step is at the third sample or later; the engine's may be at the first one.
-        missing = max(2 - FrontTicks.of(self.design).lead, 0)
+        missing = max(2 - front_ticks(self.design).first, 0)
         padded = {name: np.concatenate([x[:1]] * missing + [x]) for name, x in self.exact.items()}
         record = record_of(self.compiled, padded, self.oracle_design) if missing else self.record
         sums = record.sums(functions)

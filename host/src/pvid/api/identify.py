@@ -19,8 +19,7 @@ from pvid.rig.columns import Columns, parsed
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Recording, Run, read_recording, recording_of_arrays
 from pvid.rig.sensor_steps import resolution_note, resolved
-from pvid.run.advice import advice, advice_on_refusal, behind
-from pvid.run.identify import identify as identify_pendulum
+from pvid.run.advised import identified
 from pvid.run.mechanism import identify_mechanism, model_of
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.skew import aligned
@@ -89,12 +88,7 @@ def identify(
         run = run.whole()
     given, file = file, resolved(file, run)
     run = replace(run, notes=(*run.notes, *resolution_note(given, file)))
-    native = Native()
-    try:
-        found = identify_pendulum(run, file, native)
-    except PvidError as error:
-        raise behind(advice_on_refusal(run, file, native), error) from error
-    return of_pendulum(replace(found, notes=run.notes, advice=advice(run, file, found, native)))
+    return of_pendulum(identified(run, file, Native()))
 
 
 def _recording(data: Data, path: Path | None, rate: float | None, columns: Columns) -> Recording:

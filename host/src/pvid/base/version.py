@@ -1,3 +1,3 @@
-"""The version: that of firmware/include/pvid/version.h (tests/tools)."""
+"""The version, that of firmware/include/pvid/version.h."""
 
 __version__ = "0.1.0"

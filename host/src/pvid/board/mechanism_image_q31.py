@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with
-from pvid.board.replay_image import REPORT_EVERY
+from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
 from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.models import mechanisms
 from pvid.run import engine_files_q31
@@ -98,12 +98,7 @@ def header(run: FixedRun) -> str:
             '#include "pvid/fnv_q31.h"',
             f'#include "{run.name}_design_q31.h"',
             "",
-            "#if defined(__AVR__)",
-            "#include <avr/pgmspace.h>",
-            "#define REPLAY_IN_FLASH PROGMEM",
-            "#else",
-            "#define REPLAY_IN_FLASH",
-            "#endif",
+            *IN_FLASH,
             "",
             "#define REPLAY_TYPE pvid_fourier_q31",
             "#define REPLAY_INIT pvid_fourier_init_q31",

@@ -32,6 +32,16 @@ MISSING = int(np.iinfo(np.int16).min)  # marks a missing sample; not in fixed po
 # From so many ticks on the samples are a file that the assembler takes in: a compiler is slow with so many numbers.
 MANY_TICKS = 100_000
 
+# REPLAY_IN_FLASH of replay_run.h: an AVR reads tables in flash by instructions of their own.
+IN_FLASH = (
+    "#if defined(__AVR__)",
+    "#include <avr/pgmspace.h>",
+    "#define REPLAY_IN_FLASH PROGMEM",
+    "#else",
+    "#define REPLAY_IN_FLASH",
+    "#endif",
+)
+
 
 class Sampling(NamedTuple):
     """How the standard run of a form is sampled: ticks a second, bits of the encoder."""
@@ -140,12 +150,7 @@ def header(run: ReplayRun, samples: Path | None = None) -> str:
             "",
             f'#include "{case.umbrella}"',
             "",
-            "#if defined(__AVR__)",
-            "#include <avr/pgmspace.h>",
-            "#define REPLAY_IN_FLASH PROGMEM",
-            "#else",
-            "#define REPLAY_IN_FLASH",
-            "#endif",
+            *IN_FLASH,
             "",
             f"#define REPLAY_TYPE pvid_{run.form}_{run.core}",
             f"#define REPLAY_INIT pvid_{run.form}_init_{run.core}",

@@ -12,7 +12,7 @@ import click
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import FigurePath, form_options, print_notes, read_input, with_overrides
-from pvid.cli.result import identified, print_result, print_warning, write_figure, write_refined_figure
+from pvid.cli.result import print_result, print_warning, write_figure, write_refined_figure
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
@@ -20,6 +20,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
+from pvid.run.advised import identified
 from pvid.run.survey import fitted
 
 

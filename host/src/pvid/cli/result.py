@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,27 +9,13 @@ import click
 from rich.console import Console
 
 from pvid.base.console import write_stderr
-from pvid.base.errors import PvidError
-from pvid.core.native import Native
 from pvid.rig.file import RigFile
-from pvid.rig.run import Run
 from pvid.run import answer
-from pvid.run.identify import Identification, identify
+from pvid.run.identify import Identification
 
 if TYPE_CHECKING:
     from pvid.run.refined_mechanism import RefinedMechanism
     from pvid.run.refined_pendulum import RefinedPendulum
-
-
-def identified(run: Run, rig: RigFile, native: Native) -> Identification:
-    """The answer with advice; a refusal has the advice in front of its sentence."""
-    from pvid.run.advice import advice, advice_on_refusal, behind
-
-    try:
-        result = identify(run, rig, native)
-    except PvidError as error:
-        raise behind(advice_on_refusal(run, rig, native), error) from error
-    return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
 
 
 def write_figure(result: Identification, path: Path, truths: dict[str, float] | None) -> None:

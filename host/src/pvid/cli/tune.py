@@ -11,13 +11,14 @@ from rich.console import Console
 from pvid.base.console import DONE, progress_bar
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, read_input, rig_options
-from pvid.cli.result import identified, print_warning
+from pvid.cli.result import print_warning
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
 from pvid.rig.file import rig_path_of
 from pvid.rig.sensor_steps import resolved
 from pvid.run import answer
+from pvid.run.advised import identified
 
 
 @click.command(name="tune")

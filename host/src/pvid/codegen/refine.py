@@ -347,7 +347,7 @@ class _Refine:
         self._definitions[sp.cos(mark)] = sp.cos(x) * sp.cos(y) - sign * sp.sin(x) * sp.sin(y)
 
     def _symbol(self, name: str, e: sp.Expr) -> sp.Expr:
-        """A symbol for an expression that several need; what is short stands for itself."""
+        """A symbol for an expression that several formulas contain; a short expression is returned unchanged."""
         if e.is_number or e.is_Symbol:
             return e
         mark = sp.Symbol(name)

@@ -16,7 +16,7 @@ from pvid.twin.f32 import fourier_front, fourier_step, fourier_sums, fourier_wat
 from pvid.twin.f32.differentiator import segments
 from pvid.twin.f32.estimator import RelativeEstimator
 from pvid.twin.f32.fourier_finish import Finish, Stages
-from pvid.twin.f32.fourier_front import FrontTicks
+from pvid.twin.f32.fourier_front import front_ticks
 from pvid.twin.f32.trust import Trust
 from pvid.twin.record import After, Progress, Reasons, Recorder, TwinRecord
 
@@ -100,7 +100,7 @@ class FourierTwin:
         self.trust = Trust(config.trust, self.estimator)
         self.dt = _F(design.decimation) / _F(config.sample_rate)
         self.finish = Finish(config, self.dt, self.estimator, self.trust)
-        self.ticks = FrontTicks.of(design)
+        self.ticks = front_ticks(design)
         self.schedule = FourierSchedule(self.ticks.free_ticks, design.hop, design.highest + 1)
         self.stages_per_tick = self.schedule.stages_per_tick(self.finish.stages)
         self.runs = fourier_step.Runs.of(design, _F(self.ticks.first) / _F(config.sample_rate))

@@ -9,47 +9,31 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.enums import Reason
-from pvid.twin.record import After, Progress, Reasons, Recorder, TwinRecord
+from pvid.twin.record import After, Reasons
 
 Array = npt.NDArray[Any]
-Step = Callable[[Array, Array], Reasons]
 
 
-def run_rows(
-    estimator: Any,
-    step: Step,
-    n: Array,
-    y: Array,
-    row_reason: Reasons | None = None,
-    *,
-    sums: bool = True,
-    progress: Progress | None = None,
-) -> TwinRecord:
-    """Steps an estimator through rows N [ticks, 11], Y [ticks] that all lanes share, or with an axis of lanes more.
+def follow_rows(
+    estimator: Any, step: Callable[[Array], Reasons], rows: Array, row_reason: Reasons | None, after: After
+) -> Reasons:
+    """Steps an estimator through rows [ticks, ...]; calls `after` after every tick.
 
     Parameters
     ----------
     step
-        Takes a row of all lanes and returns its reasons [lanes].
+        Takes a row and returns its reasons [lanes].
     row_reason
         Outcome of a tick before it reached the estimator [ticks]: ACCUMULATED where it has a row, as all by default.
+
+    Returns
+    -------
+    The reason of every tick [ticks, lanes].
     """
-    recorder = Recorder(estimator, len(y), sums, progress)
-    return recorder.finished(follow_rows(estimator, step, n, y, row_reason, recorder))
-
-
-def follow_rows(estimator: Any, step: Step, n: Array, y: Array, row_reason: Reasons | None, after: After) -> Reasons:
-    """Like `run_rows` without a record: calls `after` after every tick.
-
-    Returns the reason of every tick [ticks, lanes].
-    """
-    ticks, lanes = len(y), estimator.p.shape[1]
-    reason = np.empty((ticks, lanes), np.uint8)
-    wide_n = np.broadcast_to(n if n.ndim == 3 else n[:, :, None], (ticks, n.shape[1], lanes))
-    wide_y = np.broadcast_to(y if y.ndim == 2 else y[:, None], (ticks, lanes))
-    for tick in range(ticks):
+    reason = np.empty((len(rows), estimator.p.shape[1]), np.uint8)
+    for tick, row in enumerate(rows):
         if row_reason is None or row_reason[tick] == Reason.ACCUMULATED:
-            reason[tick] = step(wide_n[tick], wide_y[tick])
+            reason[tick] = step(row)
         else:
             reason[tick] = row_reason[tick]
             if row_reason[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):

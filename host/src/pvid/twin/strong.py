@@ -84,7 +84,8 @@ class StrongTwin(Twin):
     def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
         """See Twin."""
         rows, row_reason = self.rows(phi, y)
-        return follow_rows(self.estimator, lambda n, _: self.step(n), rows, rows[:, 0], row_reason, after)
+        of_all_lanes = np.broadcast_to(rows[:, :, None], (*rows.shape, self.estimator.p.shape[1]))
+        return follow_rows(self.estimator, self.step, of_all_lanes, row_reason, after)
 
 
 def lanes_of(config: EstimatorConfig, starts: npt.ArrayLike) -> list[EstimatorConfig]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -19,6 +19,7 @@ from pvid.twin.q31.integer import Int, clamp, integers, round_shift, times_q31
 from pvid.twin.q31.misfit import MisfitQ31
 from pvid.twin.q31.scaled import scaled
 from pvid.twin.record import After, Mask, Reasons, Recorder, Twin, TwinRecord
+from pvid.twin.rows import follow_rows
 
 DERIVATIVE_LIMIT = 2**30
 RATE_LIMIT = 2**29
@@ -80,30 +81,6 @@ class StrongTwinQ31(Twin):
     def follow(self, phi: npt.ArrayLike, y: npt.ArrayLike, after: After) -> Reasons:
         """See Twin."""
         return follow_rows(self.estimator, self.step, *self.rows(integers(phi), integers(y)), after)
-
-
-def follow_rows(
-    estimator: KapitzaEstimatorQ31,
-    taking: Callable[[Int], Reasons],
-    rows: Int,
-    row_reason: Reasons | None,
-    after: After,
-) -> Reasons:
-    """Steps an estimator through rows [ticks, 13] that all lanes share; calls `after` after every tick.
-
-    row_reason: outcome of a tick before it reached the estimator [ticks]: ACCUMULATED where it has a row, as all by
-    default. Returns the reason of every tick [ticks, lanes].
-    """
-    reason = np.empty((len(rows), estimator.lanes), np.uint8)
-    for tick in range(len(rows)):
-        if row_reason is None or row_reason[tick] == Reason.ACCUMULATED:
-            reason[tick] = taking(rows[tick])
-        else:
-            reason[tick] = row_reason[tick]
-            if row_reason[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
-                estimator.counters[Reason(row_reason[tick]).name.lower()] += 1
-        after(tick, reason[tick])
-    return reason
 
 
 def run_rows(estimator: KapitzaEstimatorQ31, rows: Int) -> TwinRecord:

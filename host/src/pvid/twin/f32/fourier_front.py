@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.fourier import FourierDesign32, FourierModel, Source
+from pvid.twin.fourier_ticks import FrontTicks
 
 Float32 = npt.NDArray[np.float32]
 Places = npt.NDArray[np.int64]
@@ -17,64 +16,9 @@ _HELD_SCALE = _F(1) / _F(24)
 _TWO_TICKS = 4  # least D whose jets and channels have a tick each
 
 
-@dataclass(frozen=True)
-class FrontTicks:
-    """Twin of the front end's counters: the work of the ticks of a stretch.
-
-    Ticks count from its first sample.
-
-    Attributes
-    ----------
-    half : of the longest compensator [steps]
-    decimation : D
-    held : a signal needs the next sample
-    lost : outputs before those of the first step
-    """
-
-    half: int
-    decimation: int
-    held: bool
-    lost: int
-
-    @classmethod
-    def of(cls, design: FourierDesign32) -> FrontTicks:
-        """Those of a design."""
-        sources = {one.source for one in design.model.signal}
-        half = design.half_steps
-        lost = 1 if design.decimation > 1 else max(2 - half, 0) if sources != {Source.SAMPLED} else 0
-        return cls(half, design.decimation, Source.HELD in sources, lost)
-
-    @property
-    def first(self) -> int:
-        """Sample to whose instant the first step refers."""
-        return self.decimation * (self.lost + self.half)
-
-    @property
-    def free_ticks(self) -> int:
-        """Ticks of a block of four steps that add harmonics or run stages."""
-        return 4 * max(self.decimation - 1 - self._apart, 1)
-
-    @property
-    def _apart(self) -> int:
-        """Ticks from a step's jets to its channels."""
-        return int(self.decimation >= _TWO_TICKS)
-
-    def tick_of(self, step: int) -> int:
-        """Tick that takes the jets of a step to the channels."""
-        return self.decimation * (self.lost + 2 * self.half + 1 + step) - 1 + self.held + self._apart
-
-    def steps(self, ticks: int) -> int:
-        """Steps whose jets have been taken after a stretch of so many ticks."""
-        return max(0, (ticks - 1 - self.tick_of(0)) // self.decimation + 1)
-
-    def free(self, ticks: int) -> npt.NDArray[np.bool_]:
-        """Which ticks add harmonics or run stages [ticks]."""
-        place = np.arange(1, ticks + 1) - self.held
-        used = (place > 0) & (place % self.decimation == 0)
-        forms = np.zeros_like(used)
-        if self._apart:
-            forms[self.tick_of(0) :: self.decimation] = True
-        return np.asarray((self.decimation == 1) | ~(used | forms))
+def front_ticks(design: FourierDesign32) -> FrontTicks:
+    """Those of a design: from some D on, jets and channels have a tick each."""
+    return FrontTicks.of(design, design.half_steps, int(design.decimation >= _TWO_TICKS))
 
 
 def signals(samples: Float32, model: FourierModel, sample_rate: float) -> Float32:
@@ -122,7 +66,7 @@ def filtered(x: Float32, weights: Float32, order: int, centres: Places) -> Float
 
 def jets(samples: Float32, design: FourierDesign32, sample_rate: float) -> Float32:
     """Jets [jets, steps] of one stretch of finite samples [ticks, samples]."""
-    ticks, model = FrontTicks.of(design), design.model
+    ticks, model = front_ticks(design), design.model
     centres = ticks.lost + ticks.half + np.arange(ticks.steps(len(samples)))
     of_ticks = signals(samples, model, sample_rate)
     outputs = block_means(of_ticks[: len(samples) - ticks.held], design.decimation)

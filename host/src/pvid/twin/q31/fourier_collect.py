@@ -8,7 +8,8 @@ from enum import IntEnum
 import numpy as np
 
 from pvid.settings.fourier_q31 import FourierDesignQ31
-from pvid.twin.q31.fourier_front import FrontTicks, jets
+from pvid.twin.fourier_ticks import FrontTicks
+from pvid.twin.q31.fourier_front import front_ticks, jets
 from pvid.twin.q31.fourier_sums import windows
 from pvid.twin.q31.fourier_values import LATER, steps
 from pvid.twin.q31.integer import Int
@@ -43,7 +44,7 @@ class Schedule:
     @classmethod
     def of(cls, design: FourierDesignQ31) -> Schedule:
         """Of a design."""
-        return cls(FrontTicks.of(design), design.hop, design.highest + 1)
+        return cls(front_ticks(design), design.hop, design.highest + 1)
 
     @property
     def _others(self) -> int:
@@ -101,7 +102,7 @@ def collect(counts: Int, design: FourierDesignQ31) -> Collected:
     runs = np.zeros(design.model.runs, np.int64)
     found, played = [np.zeros((0, len(design.model.channel), design.highest + 1, 2), np.int64)], []
     spreads = [np.zeros((0, len(counts)), np.int64)]
-    lead = plan.front.lead
+    lead = plan.front.first
     first = 0
     while first < total:
         beyond = np.flatnonzero(~within[first:])

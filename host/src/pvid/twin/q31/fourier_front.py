@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import numpy.typing as npt
 
 from pvid.settings.fourier import Source
 from pvid.settings.fourier_q31 import FourierDesignQ31, FourierFilterQ31, Rescale
+from pvid.twin.fourier_ticks import FrontTicks
 from pvid.twin.q31.integer import Int, clamp, round_shift
 
 _MOST = 2**31 - 1
@@ -42,47 +40,9 @@ def signals(counts: Int, design: FourierDesignQ31) -> Int:
     return np.stack(found)
 
 
-@dataclass(frozen=True)
-class FrontTicks:
-    """Counters of the front end. Ticks count from the first sample of a stretch.
-
-    Attributes
-    ----------
-    half : of the longest compensator [steps]
-    decimation : D
-    held : a signal needs the next sample
-    lost : outputs before those of the first step
-    """
-
-    half: int
-    decimation: int
-    held: bool
-    lost: int
-
-    @classmethod
-    def of(cls, design: FourierDesignQ31) -> FrontTicks:
-        """Those of a design."""
-        sources = {one.source for one in design.model.signal}
-        lost = 1 if design.decimation > 1 else max(2 - design.half, 0) if sources != {Source.SAMPLED} else 0
-        return cls(design.half, design.decimation, Source.HELD in sources, lost)
-
-    @property
-    def lead(self) -> int:
-        """Ticks from the first sample to the instant of the first step."""
-        return self.decimation * (self.lost + self.half)
-
-    def tick_of(self, step: int) -> int:
-        """Tick that takes the jets of a step."""
-        return self.decimation * (self.lost + 2 * self.half + 1 + step) - 1 + self.held
-
-    def steps(self, ticks: int) -> int:
-        """Whose jets have been taken after so many ticks."""
-        return max(0, (ticks - 1 - self.tick_of(0)) // self.decimation + 1)
-
-    def ends(self, ticks: int) -> npt.NDArray[np.bool_]:
-        """Which ticks end a step [ticks]."""
-        place = np.arange(1, ticks + 1) - self.held
-        return np.asarray((place > 0) & (place % self.decimation == 0))
+def front_ticks(design: FourierDesignQ31) -> FrontTicks:
+    """Those of a design."""
+    return FrontTicks.of(design, design.half)
 
 
 def block_sums(x: Int, design: FourierDesignQ31) -> Int:
@@ -107,7 +67,7 @@ def _sum(x: Int, one: FourierFilterQ31, order: int, centres: Int) -> Int:
 
 def jets(counts: Int, design: FourierDesignQ31) -> Int:
     """Of counts [samples, ticks] within full scale: [jets, steps]."""
-    ticks = FrontTicks.of(design)
+    ticks = front_ticks(design)
     steps = ticks.steps(counts.shape[1])
     if not steps:
         return np.zeros((len(design.model.jet), 0), np.int64)
