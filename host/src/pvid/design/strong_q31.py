@@ -72,10 +72,11 @@ def strong_design_q31(
     angle_unit = phi_lsb / integer.denominator * 2.0**-integer.phi_bits
     u_range = acceleration_range / l1
     most = min(W_LIKELY / w, W_MOST / w_upper, RATE_MOST / max(u_range, w))
+    u_unit = y_lsb / integer.denominator / l1 * 2.0 ** (RATE_BITS - integer.y_bits)
     octaves = math.floor(math.log2(most / tau**2 * (1 - 1e-9)))  # of the square of the time unit
+    octaves = min(octaves, (31 - math.frexp(u_unit)[1]) // 2)  # u'' is shifted to the right: points that are close
     dt = tau * 2.0 ** (octaves / 2)
 
-    u_unit = y_lsb / integer.denominator / l1 * 2.0 ** (RATE_BITS - integer.y_bits)
     u_parts = [math.frexp(u_unit * 2.0 ** (octaves * order / 2)) for order in (2, 3, 4)]
     u_multiplier = tuple(min(round(mantissa * 2.0**31), 2**31 - 1) for mantissa, _ in u_parts)
     u_shift = tuple(31 - exponent for _, exponent in u_parts)

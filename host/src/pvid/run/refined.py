@@ -29,6 +29,8 @@ _START_SD = 1e3  # of the outputs' spread: the starts are free
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
 _LONG_S = 0.016  # residuals are averaged over this for the chi^2 of slow residuals
 
+GOOD = 3.0  # slow chi^2 up to which a refined answer is preferred to a published one
+
 
 @dataclass(frozen=True, eq=False)
 class Measured:
@@ -154,6 +156,13 @@ class Problem:
         a, b = before[: self.n], after[: self.n]
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(self.log, np.log(b / a), b - a)
+
+    def values(self, found: Refined, places: Sequence[int]) -> tuple[Float, Float]:
+        """Some parameters [k] and their covariance [k, k], both in their units."""
+        chosen = list(places)
+        p = found.r[chosen]
+        units = np.where(self.log[chosen], p, 1.0)
+        return p, found.covariance[np.ix_(chosen, chosen)] * np.outer(units, units)
 
     def inputs(self, r: Float) -> tuple[Float, Float]:
         """u and du as the sensors' skew in r has them."""

@@ -13,6 +13,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
 from pvid.run.identify import Identification, largest_angle, parts_of
+from pvid.run.refined import GOOD
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
 from pvid.run.survey import starts_about
 from pvid.settings.enums import Reason
@@ -20,8 +21,7 @@ from pvid.setup.f32 import nominal_start
 
 Float = npt.NDArray[np.float64]
 
-GOOD = 3.0  # slow chi^2 up to which the refined answer is preferred to a published one
-BEARABLE = 5.0  # and up to which it is published where there is no other
+BEARABLE = 5.0  # slow chi^2 up to which a refined answer is published where there is no other
 LARGEST_SE = 0.05  # relative, of w, d1, d2: beyond, the run does not determine them
 
 
@@ -109,9 +109,7 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
     model, mechanism = weak.model, rig.mechanism
     names = (*model.mapped_names, model.offset_name)
     places = [outcome.names.index(name) for name in names]
-    p = found.r[places]
-    units = np.array([p[k] if outcome.problem.log[place] else 1.0 for k, place in enumerate(places)])
-    covariance = found.covariance[np.ix_(places, places)] * np.outer(units, units)
+    p, covariance = outcome.problem.values(found, places)
     value = dict(zip(names, map(float, p), strict=True))
     noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     physical = mechanism.physical(p)

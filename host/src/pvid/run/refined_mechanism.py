@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.refine import LOG_SD, has_skew, signs_of, width_name
 from pvid.model.compiled import CompiledModel
 from pvid.run.mechanism import MechanismAnswer, gains_of, values_of
-from pvid.run.refined import Measured, Prior, Problem, Refined, refined, without_outliers
+from pvid.run.refined import GOOD, Measured, Prior, Problem, Refined, refined, without_outliers
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
 
@@ -39,12 +39,9 @@ class RefinedMechanism:
     @property
     def errors(self) -> dict[str, float]:
         """Their standard errors, in their units."""
-        made = self.problem.kernel.made
-        sd = np.sqrt(np.diag(self.found.covariance))
-        return {one.name: float(sd[k] * (self.found.r[k] if one.log else 1.0)) for k, one in enumerate(made.parameters)}
-
-
-GOOD = 3.0  # slow chi^2 up to which the refined answer is preferred to the weak one
+        made, problem = self.problem.kernel.made, self.problem
+        _, covariance = problem.values(self.found, range(problem.n))
+        return {one.name: float(sd) for one, sd in zip(made.parameters, np.sqrt(np.diag(covariance)), strict=True)}
 
 
 def start_of(kernel: RefinedKernel, p: Float) -> Float:
@@ -139,9 +136,7 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
         return answer, refined, text
     made = refined.problem.kernel.made
     places = [next(k for k, one in enumerate(made.parameters) if one.place == n) for n in range(len(weak.p))]
-    p = found.r[places]
-    units = np.array([p[n] if made.parameters[k].log else 1.0 for n, k in enumerate(places)])
-    covariance = found.covariance[np.ix_(places, places)] * np.outer(units, units)
+    p, covariance = refined.problem.values(found, places)
     values = values_of(model, p, covariance, gains_of(model, weak), identified=answer.identified)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
     return replace(answer, values=values), refined, text
