@@ -94,11 +94,13 @@ def _functions(disassembly: str) -> dict[str, _Function]:
 
 
 def _frames(tree: Path) -> dict[str, int]:
-    """Frames by function [bytes]; of functions that share a name, the largest."""
+    """Frames by function [bytes]; of functions that share a name, the largest. A source that is gone has none."""
     frames: dict[str, int] = {}
     for path in tree.rglob("*.su"):
         for line in path.read_text(encoding="utf-8").splitlines():
             place, size, kind = line.split("\t")
+            if place.startswith("/") and not Path(place.rsplit(":", 3)[0]).exists():
+                continue
             if kind not in ("static", "dynamic,bounded"):  # the second: with what it pushes for its callees
                 raise PvidError(f"{place}: a frame whose size is not known before it runs ({kind})")
             name = place.rsplit(":", 1)[1]
