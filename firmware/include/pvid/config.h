@@ -134,6 +134,18 @@
 #error "PVID_FULL_ANGLE must be 0 or 1"
 #endif
 
+/* 0 leaves the texts of pvid/text.h out. */
+#ifndef PVID_TEXTS
+#if defined(__AVR__)
+#define PVID_TEXTS 0
+#else
+#define PVID_TEXTS 1
+#endif
+#endif
+#if PVID_TEXTS != 0 && PVID_TEXTS != 1
+#error "PVID_TEXTS must be 0 or 1"
+#endif
+
 /* ---- sizes of pvid/fourier.h ---- */
 
 /* Most samples of a tick. */
