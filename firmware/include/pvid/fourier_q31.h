@@ -123,7 +123,7 @@ typedef struct {
     const pvid_fourier_integral_q31 *integral; /* [integrands] */
     const pvid_fourier_format_q31 *format;     /* [channels] */
     const PVID_TABLE int32_t *circle;          /* [2 hop] (2^23 - 1) cos(pi j / hop) */
-    const pvid_scaled_q31 *factor; /* of each term, of (h/H)^order times a unit of S_h: [model->kind[kinds - 1].end] */
+    const pvid_scaled_q31 *factor; /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_fourier_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;
     const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */

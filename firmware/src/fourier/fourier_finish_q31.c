@@ -19,7 +19,8 @@ enum {
     STAGE_SPECTRUM, /* D_h, a few harmonics at a time */
     STAGE_INVERT,   /* 1 / sqrt(D_h), a harmonic at a time */
     STAGE_MIRROR,   /* n reflections that leave the white rows */
-    STAGE_COLUMN,   /* columns: they begin; each harmonic of all; the white rows of each */
+    STAGE_UNIT,     /* of the columns: a few harmonics */
+    STAGE_COLUMN,   /* columns: each harmonic of all; the white rows of each */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
     STAGE_FORMAT,   /* for theta's columns and Y: their format */
     STAGE_RESIDUAL, /* a few rows of e, in place of Y; at the end the gate accepts or rejects the kind */
@@ -35,6 +36,7 @@ enum {
 #define ENTRIES_PER_STAGE 4u
 #define HARMONICS_PER_STAGE 2u
 #define ROOTS_PER_STAGE 4u
+#define UNITS_PER_STAGE 4u
 #define RESIDUALS_PER_STAGE 2u
 
 /* Relative step of p behind which there is no other one on the same sums: 2^-7, Q22. The next is below the square of
@@ -148,19 +150,34 @@ static bool mirror_stage(pvid_fourier_q31 *self)
     return finish->index < pvid_fourier_mirrors_q31(self->design);
 }
 
+static bool unit_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_fourier_rows_q31 *rows = &finish->work.rows;
+    const size_t harmonics = rows->white.cosines;
+    const size_t end = lesser((size_t)finish->index + UNITS_PER_STAGE, harmonics);
+    if (finish->index == 0u) {
+        pvid_fourier_columns_begin_q31(&rows->columns, self->design, finish->kind);
+    }
+    for (size_t h = finish->index; h < end; h++) {
+        pvid_fourier_columns_scan_q31(&rows->columns, self->design, finish->kind, &rows->white, &self->collect.window,
+                                      h);
+    }
+    finish->index = (uint16_t)end;
+    return end < harmonics;
+}
+
 static bool column_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     const pvid_fourier_design_q31 *design = self->design;
     const pvid_fourier_kind *kind = kind_of(self);
     const size_t harmonics = finish->work.rows.white.cosines;
-    if (finish->index == 0u) {
-        pvid_fourier_columns_begin_q31(&finish->work.rows.columns, design, finish->kind, &self->collect.window);
-    } else if (finish->index <= harmonics) {
+    if (finish->index < harmonics) {
         pvid_fourier_columns_take_q31(&finish->work.rows.columns, design, finish->kind, &finish->work.rows.white,
-                                      &self->collect.window, (size_t)finish->index - 1u);
+                                      &self->collect.window, finish->index);
     } else {
-        const size_t place = finish->index - (harmonics + 1u);
+        const size_t place = finish->index - harmonics;
         pvid_fourier_columns_end_q31(&finish->work.rows.columns, design, &finish->work.rows.white, place);
         if (place > kind->thetas) {
             finish->work.rows.whole[place - kind->thetas - 1u] =
@@ -168,7 +185,7 @@ static bool column_stage(pvid_fourier_q31 *self)
         }
     }
     finish->index++;
-    return finish->index <= (harmonics + columns_of(kind));
+    return finish->index < (harmonics + columns_of(kind));
 }
 
 /* Of each nuisance in order: part 0 its reflection, then the columns without it, those of theta, Y and the nuisances
@@ -382,6 +399,9 @@ static bool advance_kind(pvid_fourier_q31 *self, pvid_reason *reason)
     case STAGE_MIRROR:
         more = mirror_stage(self);
         break;
+    case STAGE_UNIT:
+        more = unit_stage(self);
+        break;
     case STAGE_COLUMN:
         more = column_stage(self);
         break;
@@ -468,7 +488,8 @@ static uint32_t stages_of_kind(const pvid_fourier_q31 *self, const pvid_fourier_
     }
     return stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
            stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_fourier_mirrors_q31(design) +
-           (uint32_t)(1u + harmonics + columns_of(kind)) + (uint32_t)project + kind->thetas + 1u +
+           stages_of(harmonics, UNITS_PER_STAGE) +
+           (uint32_t)(harmonics + columns_of(kind)) + (uint32_t)project + kind->thetas + 1u +
            stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows;
 }
 

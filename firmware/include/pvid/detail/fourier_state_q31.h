@@ -57,7 +57,7 @@ typedef struct {
 
 /* S_h of a window, real and imaginary part. */
 typedef struct {
-    uint32_t bits[PVID_MAX_CHANNELS]; /* all of those of the magnitudes of a channel's sums */
+    uint8_t length[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS]; /* bits of the larger part */
     int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
 } pvid_fourier_window_q31;
 
@@ -68,17 +68,14 @@ typedef struct {
 typedef struct {
     uint8_t cosines;                                           /* real parts; the others are imaginary parts */
     uint8_t powers;                                            /* of h^2 in use */
-    int32_t rate;                                              /* 1 / H, Q30 */
-    int32_t exponent;                                          /* of 1 / sqrt(D_h) */
     pvid_scaled_q31 weight[PVID_MAX_POWER];                    /* c_j, variance at the power j of h^2 */
-    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                 /* D_h, then m 2^exponent = 1 / sqrt(D_h) */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                 /* D_h, then 1 / sqrt(D_h) */
     int32_t mirror[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
 } pvid_fourier_white_q31;
 
 /* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
 typedef struct {
-    uint8_t lift[PVID_MAX_CHANNELS]; /* bits that the sums of a channel are shifted up */
-    int16_t exponent[PVID_MAX_COLUMNS];
+    int32_t exponent[PVID_MAX_COLUMNS];
     int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
 } pvid_fourier_columns_q31;
 

@@ -143,7 +143,6 @@ def fixed_design(
     channels = _Channels(model, sizes.hop, sum_shift, formats, tuple(integral), margins)
     units = tuple(channels.unit(k, dt) for k in range(len(model.channel)))
     omega = math.pi / (sizes.hop * dt)
-    highest = sizes.functions // 2 + sizes.power // 2
     terms = zip(sizes.model.term, model.term, strict=True)
     return FourierDesignQ31(
         model=model,
@@ -161,7 +160,7 @@ def fixed_design(
         format=tuple(channels.format(k) for k in range(len(model.channel))),
         circle=np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * sizes.hop) / sizes.hop)).astype(np.int32),
         factor=tuple(
-            scaled_number(float(theirs.factor) * units[mine.channel] * (highest * omega) ** mine.order)
+            scaled_number(float(theirs.factor) * units[mine.channel] * omega**mine.order)
             for theirs, mine in terms
         ),
         noise=tuple(

@@ -119,7 +119,7 @@ class FourierDesignQ31:
     integral : shifts (once, twice) of each integrand
     format : of each channel
     circle : int32 (2^23 - 1) cos(pi j / hop) [2 hop]
-    factor : of each term (m, e), of (h/H)^order times a unit of S_h
+    factor : of each term (m, e), of h^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
     error_variance : of that noise at a step, of h^(2 order) (m, e) [kinds]; (0, 0): the sensors explain the rows

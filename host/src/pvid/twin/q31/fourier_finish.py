@@ -22,6 +22,7 @@ from pvid.twin.weak_schedule import Work
 _ENTRIES_PER_STAGE = 4
 _HARMONICS_PER_STAGE = 2
 _ROOTS_PER_STAGE = 4
+_UNITS_PER_STAGE = 4
 _RESIDUALS_PER_STAGE = 2
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
@@ -42,7 +43,7 @@ def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int =
         + _parts(harmonics, _HARMONICS_PER_STAGE)
         + _parts(harmonics, _ROOTS_PER_STAGE)
         + design.power
-        + 1
+        + _parts(harmonics, _UNITS_PER_STAGE)
         + harmonics
         + kind.columns
         + project
