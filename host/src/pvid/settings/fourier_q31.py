@@ -164,6 +164,11 @@ class FourierDesignQ31:
         return self.functions + self.power
 
     @property
+    def ticks_needed(self) -> int:
+        """Samples up to the first estimate, at most: as in float32."""
+        return self.decimation * (2 * self.half + 3 * self.hop + 9) + 3
+
+    @property
     def powers(self) -> int:
         """Of h^2 in the noise."""
         return 1 + max((*(one.power for one in self.noise), *self.error_order), default=0)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.settings.fourier_q31 import FourierDesignQ31
 from pvid.twin.q31.integer import Int, bit_length, round_shift
@@ -189,7 +190,9 @@ def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
     own = design.model.kind[kind]
     terms = [t for t in range(own.first, own.end) if design.model.term[t].column == place and design.factor[t][0]]
     lanes = window.shape[0]
-    found: list[tuple[int, int, Int, Int, Int]] = []  # term, harmonic, bits that its sums are lifted, exponent, in use
+    found: list[
+        tuple[int, int, Int, Int, npt.NDArray[np.bool_]]
+    ] = []  # term, harmonic, bits that its sums are lifted, exponent, in use
     for t in terms:
         term = design.model.term[t]
         length = bit_length(np.bitwise_or.reduce(np.abs(window[:, term.channel]), axis=-1))
