@@ -33,7 +33,8 @@ static bool exponent_of(const pvid_fourier_design_q31 *design, size_t t, const p
     if ((length == 0u) || ((h == 0u) && (term.order > 0u)) || (design->factor[t].m == 0)) {
         return false;
     }
-    *exponent = (design->factor[t].e - (int32_t)lift_of(length)) + pvid_fourier_white_exponent_q31(white, h, term.order);
+    *exponent =
+        (design->factor[t].e - (int32_t)lift_of(length)) + pvid_fourier_white_exponent_q31(white, h, term.order);
     return true;
 }
 

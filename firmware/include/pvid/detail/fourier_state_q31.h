@@ -101,6 +101,7 @@ typedef struct {
     pvid_scaled_q31 least;                        /* D_h */
     pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
     uint64_t whole[PVID_MAX_COLUMNS];             /* square of each nuisance before those before it are off */
+    pvid_scaled_q31 share[PVID_MAX_POWER];        /* Q_j, while the noise is computed anew */
     pvid_fourier_columns_q31 columns;
 } pvid_fourier_rows_q31;
 
@@ -110,6 +111,16 @@ typedef union {
     pvid_fourier_rows_q31 rows;
     pvid_estimator_solve_q31 solve;
 } pvid_fourier_work_q31;
+
+/* What the sensors' noise does to the rows, at the p of one of the last windows. */
+typedef struct {
+    bool used;               /* anything needs it */
+    bool renewed;            /* in the present window */
+    uint8_t age;             /* windows since it was computed */
+    bool compensates;        /* `pull` is added to b */
+    pvid_scaled_q31 sensors; /* part of the rows' variance that the sensors explain, summed over kinds */
+    pvid_scaled_q31 pull[PVID_MAX_THETA_Q31]; /* what it takes from b in a window, in units of b */
+} pvid_fourier_known_q31;
 
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
@@ -132,6 +143,7 @@ typedef struct {
     int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];
+    pvid_fourier_known_q31 known;
     pvid_fourier_work_q31 work;
     pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_fourier_finish_q31;

@@ -184,6 +184,7 @@ class FourierConfigQ31:
     estimator : rows are in standard deviations, row_sd 2^(8 + y_bits)
     offset : reading of each sensor at 0 [counts]
     drive_min : window dropped if the standard deviation of a sample is below [counts]; None: no check
+    compensation : b gets what the sensors' noise takes from it
     iterations : Gauss-Newton steps a window
     """
 
@@ -191,6 +192,7 @@ class FourierConfigQ31:
     estimator: EstimatorConfigQ31
     offset: tuple[int, ...]
     drive_min: tuple[int, ...] | None = None
+    compensation: bool = True
     iterations: int = 3
     trust: TrustConfigQ31 = TrustConfigQ31()
     gate: GateConfigQ31 = GateConfigQ31()

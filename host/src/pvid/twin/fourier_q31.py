@@ -40,7 +40,8 @@ class FourierTwinQ31:
         floor = scaled(np.ones(self.estimator.lanes, np.int64), 0)
         self.gates = [GateQ31(config.gate, _GATE_MEMORY, floor) for _ in design.model.kind]
         self.iterations = 1 if self.estimator.is_rate else config.iterations
-        stages = fourier_finish.number_of_stages(design, self.iterations, self.estimator)
+        self.noise = fourier_finish.NoiseOfWindows(design, self.estimator, config.compensation)
+        stages = fourier_finish.number_of_stages(design, self.iterations, self.estimator, self.noise.is_used)
         self.stages_per_tick = -(-stages // Schedule.of(design).free_ticks)
         self.frozen: Mask | None = None
 
@@ -74,6 +75,7 @@ class FourierTwinQ31:
             self.trust,
             self.gates,
             (own.n_bits, own.y_bits),
+            self.noise,
         )
 
     def _reject(self) -> Reason:

@@ -74,6 +74,7 @@ class White:
     design : of the weak form
     gain : [H + 1, lanes]
     exponent : [H + 1, lanes]
+    weight : c_j [powers][lanes]
     mirrors : of the real parts, of the imaginary parts [n/2][entries, lanes]
     """
 
@@ -81,6 +82,7 @@ class White:
     gain: Int
     exponent: Int
     mirrors: tuple[list[Int], list[Int]]
+    weight: list[Scaled]
 
     @property
     def cosines(self) -> int:
@@ -119,8 +121,8 @@ def _number(x: int, like: Int) -> Scaled:
     return scaled(np.full_like(like, x), 0)
 
 
-def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]:
-    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, at theta of the kind [thetas, lanes]."""
+def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int, list[Scaled]]:
+    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, and c_j [powers], at theta of the kind [thetas, lanes]."""
     like = theta.m[0]
     thetas = design.model.kind[kind].thetas
     powers = design.powers
@@ -152,7 +154,7 @@ def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> tuple[Int, I
     out = []
     for one_h in found:
         out.append(inverse_root(pick(least.exceeds(one_h), least, one_h)))
-    return np.stack([one.m for one in out]), np.stack([one.e for one in out])
+    return np.stack([one.m for one in out]), np.stack([one.e for one in out]), weight
 
 
 def _mirrors(design: FourierDesignQ31, gain: Int, exponent: Int, first: int, count: int) -> list[Int]:
@@ -172,13 +174,13 @@ def _mirrors(design: FourierDesignQ31, gain: Int, exponent: Int, first: int, cou
 
 def white(design: FourierDesignQ31, kind: int, theta: Scaled) -> White:
     """At theta of the kind [thetas, lanes]."""
-    gain, exponent = spectrum(design, kind, theta)
+    gain, exponent, weight = spectrum(design, kind, theta)
     cosines = design.highest + 1
     mirrors = (
         _mirrors(design, gain, exponent, 0, cosines),
         _mirrors(design, gain, exponent, 1, design.parts - cosines),
     )
-    return White(design, gain, exponent, mirrors)
+    return White(design, gain, exponent, mirrors, weight)
 
 
 def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
