@@ -119,7 +119,7 @@ static const pvid_fourier_model_f32 mechanism = {
 #define HIGHEST ((FUNCTIONS / 2) + (POWER / 2))
 #define SD 1.0e-4
 
-static float circle[2 * HOP];
+static float circle[(5 * HOP) / 2];
 static const pvid_fourier_filter_f32 filters[2] = {{0, NULL}, {0, NULL}};
 static const pvid_fourier_noise_f32 noise[2] = {{0, 0, 1, 1, (float)(SD * SD)}, {0, 1, 4, 4, (float)(SD * SD)}};
 static const uint8_t error_order[1] = {0};
@@ -129,9 +129,9 @@ static const double truth[4] = {3.0, 2.0, 0.5, 0.2};
 
 static pvid_fourier_design_f32 design_of(const pvid_fourier_model_f32 *model)
 {
-    for (int j = 0; j < 2 * HOP; j++) {
+    for (int j = 0; j < (5 * HOP) / 2; j++) {
         const double turn = PI * (double)j / (double)HOP;
-        circle[j] = ((j == HOP / 2) || (j == (3 * HOP) / 2)) ? 0.0f : (float)cos(turn);
+        circle[j] = ((j % HOP) == 0) ? 0.0f : (float)sin(turn);
     }
     const pvid_fourier_design_f32 design = {
         .model = model,
@@ -582,7 +582,14 @@ static void a_window_that_cannot_be_processed_in_time_is_refused(void **state)
     pvid_fourier_design_f32 design;
     pvid_fourier_config_f32 config;
     start(&design, &config);
-    design.hop = 8; /* one block of four ticks in which the window's work would have to be done */
+    static pvid_fourier_noise_f32 many[2100]; /* eight a stage, twice */
+    for (size_t i = 0; i < 2100u; i++) {
+        many[i] = noise[i % 2u];
+    }
+    design.noise = many;
+    design.n_noise = 2100;
+    design.hop =
+        16; /* one block of eight ticks in which the window's work would have to be done, less those for sums */
     config.iterations = PVID_MAX_ITERATIONS;
     assert_int_equal(pvid_fourier_init_f32(&self, &config), PVID_BAD_ITERATIONS);
 }
