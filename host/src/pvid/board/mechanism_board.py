@@ -146,6 +146,7 @@ class MechanismBoard:
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
             macros=macros,
             files={**code, "stream_recording.h": _recording(self.recording)},
+            form="fourier",
             core="f32",
             identifier="fourier_f32",
             sensor="sensor_recording.c",

@@ -6,17 +6,13 @@ The core's arrays get the sizes that the mechanism needs. Flags are those of too
 from __future__ import annotations
 
 import hashlib
-import os
-import subprocess
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
-from pvid.base.errors import PvidError
 from pvid.core.headers import HEADERS
-from pvid.core.host_compiler import host_compiler
+from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
@@ -102,11 +98,8 @@ def _build(
             (folder / name).write_text(text, encoding="utf-8")
         options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}", f"-I{folder}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            objects = list(
-                pool.map(lambda path: _object(compiler, options, path, Path(made)), [*code, *_sources(core)])
-            )
-        _run([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
+        objects = objects_of(compiler, options, [*code, *_sources(core)], Path(made))
+        run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
         declared = _declarations(compiler, headers, options, Path(made), core)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
         try:
@@ -114,12 +107,6 @@ def _build(
         except OSError:
             if not library.exists():
                 raise
-
-
-def _object(compiler: str, options: list[str], source: Path, folder: Path) -> str:
-    made = str(folder / f"{source.stem}.o")
-    _run([compiler, *options, "-c", str(source), "-o", made])
-    return made
 
 
 def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, core: Core) -> str:
@@ -131,13 +118,4 @@ def _declarations(compiler: str, headers: Sequence[str], options: list[str], fol
     own = [f'#include "{name}"' for name in headers]
     top = folder / "native.h"
     top.write_text("\n".join([f'#include "{ENGINE_CORES[core].replay}.h"', *own, ""]), encoding="utf-8")
-    return _run([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])
-
-
-def _run(command: list[str]) -> str:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
-        told = (lines or done.stderr.splitlines() or ["no output"])[0]
-        raise PvidError(f"{command[0]} refused the code of the mechanism: {told.strip()[:300]}")
-    return done.stdout
+    return run_compiler([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])

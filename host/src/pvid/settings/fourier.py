@@ -224,7 +224,7 @@ class FourierDesign32:
     filter : of each jet, at the samples: block sums and compensator in one
     compensator : of each jet, at the steps, behind the block sums; without a decimation the filter
     circle : sin(pi j / hop) [5 hop / 2], a turn and a quarter
-    noise : sorted by kind, then power
+    noise : sorted by kind, then by columns
     error_order : of each kind uint8 [kinds]: its own error is that derivative of white noise
     error_variance : of that noise at a step [kinds]; 0: the sensors explain the rows
     sign_width : of the soft sign [signs]; 0: the mean of sgn over a step

@@ -127,9 +127,9 @@ def _noise(rows: WeakRows, kind: int, p: Float) -> list[FourierNoise]:
     sized = np.abs(shares * np.outer(theta, theta))
     whole = np.einsum("jab,jh->h", shares * np.outer(theta, theta), powers)
     entries = []
-    for power in range(len(shares)):
-        for a in range(count):
-            for b in range(a, count):
+    for a in range(count):
+        for b in range(a, count):
+            for power in range(len(shares)):
                 factor = float(shares[power, a, b]) * (1 if a == b else 2)
                 share = 2 * sized[power, a, b] * powers[power]
                 if factor and np.any(share > _SHARE * whole):
