@@ -221,9 +221,9 @@
 #error "PVID_MAX_POWER must lie in 2..12"
 #endif
 
-/* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid model
- * build` prints with the design, exactly; init refuses others (PVID_BAD_DESIGN). Their loops are of constant length:
- * fewer instructions, more flash, the same bits. */
+/* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid
+ * model build` prints with the design, exactly; init refuses others (PVID_BAD_DESIGN). Their loops are of constant
+ * length: fewer instructions, more flash, the same bits. */
 #ifndef PVID_EXACT
 #define PVID_EXACT 0
 #endif
