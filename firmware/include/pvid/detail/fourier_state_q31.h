@@ -152,6 +152,8 @@ typedef struct {
 struct pvid_fourier_q31 {
     const pvid_fourier_design_q31 *design;
     const int32_t *drive_min;
+    uint8_t plain; /* samples, if each is a signal; else 0 */
+    uint8_t rest;  /* reason of a tick that ends no step and has no work; 255: there is work */
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */
     bool warm;               /* a window has been complete since the restart */

@@ -219,6 +219,9 @@ class MechanismBoard:
         return cls(rig, compiled, config, np.zeros((0, config.design.model.samples), np.float32))
 
 
+BOARDS: Mapping[str, type[MechanismBoard] | type[MechanismBoardQ31]] = {"f32": MechanismBoard, "q31": MechanismBoardQ31}
+
+
 def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
     """From the text of a log; None: that of another kind of rig.
 
@@ -234,9 +237,8 @@ def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
     rig = MechanismRig.of_document(document)
     if rig.model not in shipped():
         raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
-    made = MechanismBoardQ31 if engine.pop("core", "f32") == "q31" else MechanismBoard
     try:
-        return made.of_tables(rig, engine)
+        return BOARDS[engine.pop("core", "f32")].of_tables(rig, engine)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
 
