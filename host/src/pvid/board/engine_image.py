@@ -46,7 +46,7 @@ def _in_float(board: Board, model: str) -> EngineImage:
 
 
 def _in_fixed_point(board: Board, model: str) -> EngineImage:
-    run = steady_run(model)
+    run = steady_run(model, board.toolchain)
     return EngineImage(*build_fixed_image(board, run), run.name, run.measure_from)
 
 
