@@ -10,6 +10,7 @@
  * the same for all columns: white_f32.c. Here they are in standard deviations. */
 #include "fourier/columns_f32.h"
 
+#include "number/exact.h"
 #include "solve/products_f32.h"
 
 #define SKIP 1.0e-6f
@@ -57,7 +58,9 @@ bool pvid_fourier_columns_keep_f32(size_t rows, const float nuisance[], float wh
 void pvid_fourier_columns_project_f32(size_t rows, const float nuisance[], float inverse, float column[])
 {
     const float along = pvid_product_f32(nuisance, column, rows) * inverse;
-    for (size_t k = 0; k < rows; k++) {
+    const size_t count = PVID_COUNT(PVID_MAX_FUNCTIONS, rows);
+    PVID_UNROLL_EXACT
+    for (size_t k = 0; k < count; k++) {
         column[k] -= along * nuisance[k];
     }
 }

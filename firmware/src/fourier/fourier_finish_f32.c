@@ -13,6 +13,7 @@
 #include "fourier/scores_f32.h"
 #include "fourier/white_f32.h"
 #include "number/count.h"
+#include "number/unroll.h"
 #include "solve/information_f32.h"
 #include "solve/products_f32.h"
 #include "solve/staged_f32.h"
@@ -127,7 +128,7 @@ static size_t entries_end(const pvid_fourier_f32 *self)
     return (end < self->design->n_noise) ? end : self->design->n_noise;
 }
 
-static bool weigh_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool weigh_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const size_t end = entries_end(self);
@@ -151,7 +152,7 @@ static float rows_of(const pvid_fourier_f32 *self)
 }
 
 /* The noise's information is in the place of the covariance of the assessment, which comes later. */
-static bool noise_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_design_f32 *design = self->design;
@@ -181,7 +182,7 @@ static bool noise_stage(pvid_fourier_f32 *self)
     return last < design->n_noise;
 }
 
-static bool basis_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     pvid_fourier_white_basis_f32(&finish->white, finish->index, finish->work.rows.part, finish->work.rows.leverage);
@@ -189,7 +190,7 @@ static bool basis_stage(pvid_fourier_f32 *self)
     return finish->index < pvid_fourier_basis_stages(self->design);
 }
 
-static bool share_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool share_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const size_t parts = pvid_fourier_parts(self->design);
@@ -218,7 +219,7 @@ static void gather_column(pvid_fourier_f32 *self)
 }
 
 /* The present column: its parts, then the rows of one family after the other. */
-static bool column_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool column_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_white_f32 *white = &finish->white;
@@ -245,7 +246,7 @@ static bool column_stage(pvid_fourier_f32 *self)
 
 /* Of each nuisance in order: part 0 its inverse square, then the columns without it, those of theta, Y and the
  * nuisances behind it. */
-static bool project_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool project_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
@@ -294,7 +295,7 @@ static size_t products_per_stage(const pvid_fourier_design_f32 *design)
 }
 
 /* e, in the place of Y */
-static bool residual_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool residual_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_kind *kind = kind_of(self);
@@ -317,7 +318,7 @@ static bool residual_stage(pvid_fourier_f32 *self)
     return last < rows;
 }
 
-static bool squares_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool squares_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const size_t thetas = kind_of(self)->thetas;
@@ -337,7 +338,7 @@ static float freedom_of(const pvid_fourier_f32 *self)
     return (float)self->design->functions - (float)self->finish.live;
 }
 
-static bool pull_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool pull_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const size_t end = entries_end(self);
@@ -365,7 +366,7 @@ static bool pull_stage(pvid_fourier_f32 *self)
 
 /* Products of column `index` with those behind it, the last of them e: a row of M without its diagonal, and an entry of
  * b. */
-static bool add_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool add_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     const size_t thetas = kind_of(self)->thetas;
@@ -420,7 +421,7 @@ static void begin_solves(pvid_fourier_f32 *self)
     finish->work.solve.fallback = pvid_trust_fallback_f32(&self->trust);
 }
 
-static bool solve_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool solve_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     if (!pvid_estimator_advance_f32(&self->estimator, &finish->work.solve)) {
@@ -438,7 +439,7 @@ static bool solve_stage(pvid_fourier_f32 *self)
 }
 
 /* The larger of the two standard errors of a parameter; the covariance grows with it. */
-static bool cluster_stage(pvid_fourier_f32 *self)
+PVID_SELDOM static bool cluster_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     pvid_estimate_f32 *estimate = &finish->candidate;
@@ -456,7 +457,7 @@ static bool cluster_stage(pvid_fourier_f32 *self)
     return finish->index < n_p;
 }
 
-static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+PVID_SELDOM static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     pvid_estimate_f32 *estimate = &finish->candidate;
@@ -543,7 +544,7 @@ static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
     }
 }
 
-static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+PVID_SELDOM static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
     finish->stage = stage_after(self, reason);

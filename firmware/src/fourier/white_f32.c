@@ -26,6 +26,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "number/exact.h"
+
 #define TURN 6.28318531f
 
 /* Least D_h relative to the mean of all, and least D_h. */
@@ -101,20 +103,30 @@ void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fo
     }
 }
 
-static size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t part)
+static inline size_t cosines_of(const pvid_fourier_white_f32 *self)
+{
+    return PVID_COUNT(PVID_MAX_HARMONICS, self->cosines);
+}
+
+static inline size_t parts_of(const pvid_fourier_white_f32 *self)
+{
+    return PVID_COUNT(PVID_MAX_FUNCTIONS + PVID_MAX_POWER, self->parts);
+}
+
+static inline size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t part)
 {
     return (part < self->cosines) ? part : ((part + 1u) - self->cosines);
 }
 
 /* First part of a family, and the place behind its last one. */
-static size_t family_first(const pvid_fourier_white_f32 *self, size_t family)
+static inline size_t family_first(const pvid_fourier_white_f32 *self, size_t family)
 {
-    return (family == 0u) ? 0u : self->cosines;
+    return (family == 0u) ? 0u : cosines_of(self);
 }
 
-static size_t family_end(const pvid_fourier_white_f32 *self, size_t family)
+static inline size_t family_end(const pvid_fourier_white_f32 *self, size_t family)
 {
-    return (family == 0u) ? self->cosines : self->parts;
+    return (family == 0u) ? cosines_of(self) : parts_of(self);
 }
 
 /* x -= v (v^T x) from `first` to `end` - 1 */
@@ -129,12 +141,32 @@ static inline void reflect(const float *restrict v, size_t first, size_t end, fl
     }
 }
 
+/* All reflections of a family, one after the other: as `reflect`, written out in a build for one design. */
+static inline void reflect_family(const pvid_fourier_white_f32 *self, size_t family, float x[])
+{
+    const size_t vectors = PVID_COUNT(PVID_MAX_POWER / 2, self->vectors);
+    const size_t end = family_end(self, family);
+    PVID_UNROLL_EXACT
+    for (size_t k = 0; k < vectors; k++) {
+        const float *v = self->reflection[k];
+        float along = 0.0f;
+        PVID_UNROLL_EXACT
+        for (size_t i = family_first(self, family) + k; i < end; i++) {
+            along += v[i] * x[i];
+        }
+        PVID_UNROLL_EXACT
+        for (size_t i = family_first(self, family) + k; i < end; i++) {
+            x[i] -= along * v[i];
+        }
+    }
+}
+
 void pvid_fourier_white_reflect_f32(const pvid_fourier_white_f32 *self, size_t family, float x[])
 {
-    const size_t first = family_first(self, family);
-    const size_t end = family_end(self, family);
-    for (size_t k = 0; k < self->vectors; k++) {
-        reflect(self->reflection[k], first + k, end, x);
+    if (family == 0u) {
+        reflect_family(self, 0, x);
+    } else {
+        reflect_family(self, 1, x);
     }
 }
 

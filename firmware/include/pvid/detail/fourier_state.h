@@ -5,7 +5,7 @@
 #include "pvid/fourier.h"
 
 /* Steps that are added to the sums together. */
-#define PVID_FOURIER_BLOCK 4
+#define PVID_FOURIER_BLOCK 8u
 
 /* The front end: block sums of the signals, and their outputs at the last steps. */
 typedef struct {
@@ -22,7 +22,8 @@ typedef struct {
     float ticks;                       /* D */
     float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
-    uint32_t limit[PVID_MAX_SAMPLES];  /* bits of the largest absolute value of each sample that needs no attention */
+    uint32_t limit[PVID_MAX_SAMPLES];  /* largest absolute value of each sample that needs no attention: its bits,
+                                          shifted left by one */
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
@@ -66,18 +67,16 @@ typedef struct {
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
 typedef struct {
-    uint8_t half;                       /* that fills, 0 or 1 */
-    uint8_t halves;                     /* complete since the restart, 0..2 */
-    uint8_t filling;                    /* block that fills, 0 or 1 */
-    uint8_t target;                     /* half to which the other block is being added */
-    uint8_t harmonic;                   /* next one to which it is added; all: none */
-    uint8_t joined;                     /* next one to be joined; all: none */
-    bool first;                         /* it is the first block of its half */
-    bool last;                          /* it is the last block of a window that is to be used */
-    uint16_t index;                     /* of the next step in its half */
-    uint16_t start;                     /* of the first step of that block in its half */
-    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the window's first half at its end */
-    float block[2][PVID_FOURIER_BLOCK][PVID_MAX_CHANNELS];
+    uint8_t half;                                           /* that fills, 0 or 1 */
+    uint8_t halves;                                         /* complete since the restart, 0..2 */
+    uint8_t filling;                                        /* block that fills, 0 or 1 */
+    uint8_t target;                                         /* half to which the other block is being added */
+    uint8_t harmonic;                                       /* next one to which it is added; all: none */
+    uint8_t joined;                                         /* next one to be joined; all: none */
+    uint16_t index;                                         /* of the next step in its half */
+    uint16_t start;                                         /* of the first step of that block in its half */
+    float edge[2][PVID_MAX_INTEGRANDS];                     /* I^1 and I^2 of the window's first half at its end */
+    float block[2][PVID_FOURIER_BLOCK][PVID_MAX_CHANNELS];  /* steps, then their sums and differences: sums_f32.c */
     float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_f32;
 
@@ -163,12 +162,11 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    uint8_t plain; /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
-    uint8_t rest;  /* reason of a tick that only adds its samples; FORM: the channels of a step are due; BUSY: harmonics
-                      are to be added or joined, or a window is being processed */
-    bool warm;     /* a window has been complete since the restart */
-    bool frozen;   /* complete windows are dropped */
-    bool watches;  /* samples are compared with their range, or their deviation with the least one */
+    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: fourier_f32.c */
+    bool warm;         /* a window has been complete since the restart */
+    bool frozen;       /* complete windows are dropped */
+    bool watches;      /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;
