@@ -13,7 +13,7 @@ from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.board.field import collect
-from pvid.board.mechanism_board import MechanismBoard
+from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.stream_image import settings_number
 from pvid.board.target import HOST_TARGET, open_target
 from pvid.codegen.fourier_library import fourier_native
@@ -55,14 +55,14 @@ def log(motor: MechanismBoard, tmp_path_factory: pytest.TempPathFactory) -> Path
 def stretches_of(log: Path) -> list[Stretch]:
     text = engine_text_of_log(log)
     assert text is not None
-    return list(Verifier(MechanismBoard.parse(text)).stretches(LogReader(log)))
+    return list(Verifier(board_of(text)).stretches(LogReader(log)))
 
 
 @pytest.mark.parametrize("name", names())
 def test_text_in_a_log_gives_the_same_board_back(name: str) -> None:
     board = MechanismBoard.of_shipped_rig(name)
     text = board.text()
-    again = MechanismBoard.parse(text)
+    again = board_of(text)
     assert again is not None and again.text() == text and len(text) < 64_000
     assert settings_number(again) == settings_number(board) and again.names == board.names
     assert again.names.parse(board.names.text.encode()) == board.names
@@ -70,10 +70,10 @@ def test_text_in_a_log_gives_the_same_board_back(name: str) -> None:
 
 def test_text_that_is_damaged_is_refused(motor: MechanismBoard) -> None:
     text = motor.text()
-    assert MechanismBoard.parse("l1 = 0.3\n") is None
+    assert board_of("l1 = 0.3\n") is None
     for wrong, right in (("estimator_law", "estimator_lore"), ("design_hop", "design_hip"), ("dc_motor", "nowhere")):
         with pytest.raises(PvidError):
-            MechanismBoard.parse(text.replace(wrong, right))
+            board_of(text.replace(wrong, right))
 
 
 @pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
@@ -103,7 +103,7 @@ def test_log_of_a_mechanism_is_verified(log: Path) -> None:
 def test_a_changed_sample_and_a_changed_estimate_are_found(log: Path, tmp_path: Path) -> None:
     text = engine_text_of_log(log)
     assert text is not None
-    board = MechanismBoard.parse(text)
+    board = board_of(text)
     records = list(LogReader(log))
     at = next(i for i, one in enumerate(records) if isinstance(one.item, Raw) and one.tick > 1000)
     raw = records[at].item
@@ -131,7 +131,7 @@ def test_samples_of_another_number_a_tick_are_not_verified(log: Path) -> None:
         for one in LogReader(log)
     ]
     verdict = Verdict()
-    for stretch in Verifier(MechanismBoard.parse(text)).stretches(records):
+    for stretch in Verifier(board_of(text)).stretches(records):
         verdict.add(stretch)
         assert stretch.why_not is not None and "2 a tick, and the identifier takes 3" in stretch.why_not
     assert verdict.verified == 0 and verdict.samples == TICKS
