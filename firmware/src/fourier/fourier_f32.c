@@ -370,14 +370,13 @@ PVID_SELDOM static pvid_reason odd_tick(pvid_fourier_f32 *self, const float samp
 
 pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
 {
-    const uint32_t plain = (self != NULL) ? self->plain : 0u;
-    if ((plain == 0u) || (sample == NULL)) {
+    if ((self == NULL) || (sample == NULL) || (self->plain == 0u)) {
         return other_tick(self, sample);
     }
-    if (!pvid_fourier_front_fits_f32(&self->front, plain, sample)) {
+    if (!pvid_fourier_front_fits_f32(&self->front, self->plain, sample)) {
         return odd_tick(self, sample);
     }
-    pvid_fourier_front_add_f32(&self->front, plain, sample);
+    pvid_fourier_front_add_f32(&self->front, self->plain, sample);
     return follow(self, sample);
 }
 
