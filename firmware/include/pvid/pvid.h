@@ -25,6 +25,7 @@
 #include "pvid/snapshot_fourier.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
+#include "pvid/text.h"
 #include "pvid/trust.h"
 #include "pvid/version.h"
 #include "pvid/weak.h"

@@ -19,12 +19,14 @@
 #include "number/init.h"
 #include "number/unroll.h"
 
-/* Bits of the largest finite number. */
-#define FINITE 0x7F7FFFFFu
+/* The largest finite number. */
+#define LARGEST 3.40282347e38f
 
-/* No reasons of a tick: there is work; the channels of a step are to be formed. */
-#define BUSY 255u
-#define FORM 254u
+/* No reasons of a tick: a window is being processed; a block is being added, or a window joined; the channels of a step
+ * are to be formed. */
+#define PROCESS 255u
+#define ADD 254u
+#define FORM 253u
 
 static inline bool all_finite(const float values[], size_t n)
 {
@@ -99,9 +101,11 @@ static inline pvid_reason idle(const pvid_fourier_f32 *self)
 /* What a tick without a step does from now on. */
 static void rest(pvid_fourier_f32 *self)
 {
-    const bool busy =
-        pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics) || pvid_fourier_finish_is_busy_f32(&self->finish);
-    self->rest = busy ? BUSY : (uint8_t)idle(self);
+    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        self->rest = ADD;
+    } else {
+        self->rest = pvid_fourier_finish_is_busy_f32(&self->finish) ? PROCESS : (uint8_t)idle(self);
+    }
 }
 
 static void restart(pvid_fourier_f32 *self)
@@ -157,7 +161,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->watches = (config->range != NULL) || (config->drive_min != NULL);
     self->plain = self->front.plain ? design->model->samples : 0u;
     for (size_t i = 0; i < design->model->samples; i++) {
-        self->front.limit[i] = (config->range != NULL) ? pvid_bits_f32(config->range[i]) : FINITE;
+        self->front.limit[i] = pvid_fourier_front_limit_f32((config->range != NULL) ? config->range[i] : LARGEST);
     }
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
@@ -236,7 +240,7 @@ PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[]
         if (self->watches) {
             pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
         }
-        if (pvid_fourier_sums_count_f32(&self->sums, design->hop)) {
+        if (pvid_fourier_sums_count_f32(&self->sums, design->hop, self->channels)) {
             dropped = end_half(self);
         }
     }
@@ -252,23 +256,35 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
     return PVID_REJECTED_NOT_FINITE;
 }
 
-/* Harmonics of the last block are added or joined, else stages of the last whole window run. */
-PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
+/* Some harmonics of the last block are added, or of the last window joined. */
+static pvid_reason add(pvid_fourier_f32 *self)
+{
+    uint32_t left = self->items_per_tick;
+    do {
+        if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
+                                          self->finish.work.rows.window)) {
+            pvid_fourier_finish_begin_f32(&self->finish);
+        }
+        left--;
+    } while (left > 0u);
+    if (!pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        rest(self);
+    }
+    return idle(self);
+}
+
+/* Some stages of the last whole window. */
+static pvid_reason process(pvid_fourier_f32 *self)
 {
     pvid_reason reason = idle(self);
-    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
-        for (uint32_t left = self->items_per_tick; left > 0u; left--) {
-            if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
-                                              self->finish.work.rows.window)) {
-                pvid_fourier_finish_begin_f32(&self->finish);
-            }
-        }
-    } else {
-        for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
-            pvid_fourier_finish_step_f32(self, &reason);
-        }
+    uint32_t left = self->stages_per_tick;
+    do {
+        pvid_fourier_finish_step_f32(self, &reason);
+        left--;
+    } while (left > 0u);
+    if (!pvid_fourier_finish_is_busy_f32(&self->finish)) {
+        rest(self);
     }
-    rest(self);
     return reason;
 }
 
@@ -283,17 +299,20 @@ PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sam
         return idle(self);
     }
     const pvid_reason formed = steps ? form(self, sample) : idle(self);
-    if ((decimation > 1u) || (self->rest != BUSY)) {
+    if ((decimation > 1u) || (self->rest <= FORM)) {
         return formed;
     }
-    const pvid_reason worked = work(self);
+    const pvid_reason worked = (self->rest == ADD) ? add(self) : process(self);
     return (formed == idle(self)) ? worked : formed;
 }
 
 /* A tick with something to do. */
-static inline pvid_reason due(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason due(pvid_fourier_f32 *self, const float sample[])
 {
-    return (self->rest == BUSY) ? work(self) : form(self, sample);
+    if (self->rest == PROCESS) {
+        return process(self);
+    }
+    return (self->rest == ADD) ? add(self) : form(self, sample);
 }
 
 /* A tick whose samples need more than to be added. */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pvid.core.sizes import at_least
 from pvid.settings.fourier import NONE, FourierDesign32, FourierModel
 from pvid.settings.fourier_q31 import FourierDesignQ31
 
@@ -31,6 +32,14 @@ def sizes_of_design(design: FourierDesign32) -> dict[str, int]:
         "PVID_MAX_POWER": design.power,
         "PVID_MAX_DECIMATION": design.decimation,
     }
+
+
+def sizes_for_one(design: FourierDesign32) -> dict[str, int]:
+    """Those of a build for this design alone: none below what the core accepts, and loops of constant length where all
+    are those of the design (PVID_EXACT)."""
+    needed = sizes_of_design(design)
+    found = at_least(needed)
+    return found | {"PVID_EXACT": int(found == needed)}
 
 
 def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]:
