@@ -25,20 +25,6 @@ Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
 
 
-class _Arithmetic(NamedTuple):
-    """Properties of a core. sample, sums: numpy types of samples and p, and of the sums."""
-
-    sample: type[np.generic]
-    sums: type[np.generic]
-    exponents: bool  # of the sums
-    misfit_unit: float
-
-
-_ARITHMETIC: dict[Core, _Arithmetic] = {
-    "f32": _Arithmetic(np.float32, np.float32, False, 1.0),
-    "q31": _Arithmetic(np.int32, np.int64, True, 2.0**-16),
-}
-
 class _Estimator(NamedTuple):
     """An estimator of the core. sizes: its numbers of parameters and of sums; assess: the function in C, of the
     identifier or of the estimator in it."""
@@ -48,18 +34,39 @@ class _Estimator(NamedTuple):
     of_identifier: bool = False
 
 
+class _Arithmetic(NamedTuple):
+    """Properties of a core. sample, sums: numpy types of samples and p, and of the sums; any_model, strong: the
+    estimator of any model, and the strong form's own, which has the pendulum's sums."""
+
+    sample: type[np.generic]
+    sums: type[np.generic]
+    exponents: bool  # of the sums
+    misfit_unit: float
+    any_model: _Estimator
+    strong: _Estimator
+
+
 def _sizes_f32(one: Any) -> tuple[int, int]:
     return int(one.model.n_p), int(one.information.n_moments + one.information.n_theta + 2)
 
 
-# By core: the estimator of any model, and the strong form's own, which knows the pendulum's sums.
-_ANY_MODEL: dict[Core, _Estimator] = {
-    "f32": _Estimator(_sizes_f32, "pvid_estimator_assess_f32"),
-    "q31": _Estimator(lambda one: (int(one.model.n_p), int(one.information.n_sums)), "pvid_estimator_assess_q31"),
-}
-_STRONG: dict[Core, _Estimator] = {
-    "f32": _Estimator(lambda one: (len(one.p), len(one.sums.low)), "pvid_strong_assess_f32", of_identifier=True),
-    "q31": _Estimator(lambda one: (len(one.p), len(one.sums)), f"pvid_{DEFAULT}_estimator_assess_q31"),
+_ARITHMETIC: dict[Core, _Arithmetic] = {
+    "f32": _Arithmetic(
+        np.float32,
+        np.float32,
+        False,
+        1.0,
+        _Estimator(_sizes_f32, "pvid_estimator_assess_f32"),
+        _Estimator(lambda one: (len(one.p), len(one.sums.low)), "pvid_strong_assess_f32", of_identifier=True),
+    ),
+    "q31": _Arithmetic(
+        np.int32,
+        np.int64,
+        True,
+        2.0**-16,
+        _Estimator(lambda one: (int(one.model.n_p), int(one.information.n_sums)), "pvid_estimator_assess_q31"),
+        _Estimator(lambda one: (len(one.p), len(one.sums)), f"pvid_{DEFAULT}_estimator_assess_q31"),
+    ),
 }
 
 # Models of the fixed-point core by the lengths of p and theta.
@@ -213,7 +220,7 @@ class Stepper:
         if status is not Status.OK:
             raise PvidError(f"the core refused the configuration: {status.text}")
         self._arithmetic = _ARITHMETIC[core]
-        self._kind = self._kinds()[core]
+        self._kind = self._kind_of(self._arithmetic)
         self.n_p, self._n_sums = self._kind.sizes(self.estimator)
 
     def _filled_with(self, native: Native, kind: str, config: Any) -> Filled:
@@ -224,9 +231,9 @@ class Stepper:
         """Its function pvid_<name>_<verb>_<core>."""
         return getattr(self.native.library, f"{self._prefix}{self._name}_{verb}_{self.core}")(self.state, *arguments)
 
-    def _kinds(self) -> dict[Core, _Estimator]:
-        """Its estimator, by core."""
-        return _ANY_MODEL
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        """Its estimator."""
+        return arithmetic.any_model
 
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
@@ -342,8 +349,8 @@ class StrongStepper(Stepper):
         """pvid_strong_estimator_f32 in it."""
         return self.state.estimator
 
-    def _kinds(self) -> dict[Core, _Estimator]:
-        return _STRONG
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        return arithmetic.strong
 
 
 class StrongEstimatorQ31(Stepper):
@@ -355,8 +362,8 @@ class StrongEstimatorQ31(Stepper):
         self._row_format = native.headers.filled("pvid_strong_row_q31", row_format)
         super().__init__(native, f"{DEFAULT}_estimator", "q31", config, replay=f"{DEFAULT}_rows")
 
-    def _kinds(self) -> dict[Core, _Estimator]:
-        return _STRONG
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        return arithmetic.strong
 
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
@@ -424,8 +431,8 @@ class Identifier(Publisher):
             self._angle = given["angle"] = native.headers.ffi.new("pvid_weak_angle_f32 *")
         super().__init__(native, config.form, config.core, config, replay=config.form, **given)
 
-    def _kinds(self) -> dict[Core, _Estimator]:
-        return _STRONG if self.form == "strong" else _ANY_MODEL
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        return arithmetic.any_model if FORMS[self.form].uses_windows else arithmetic.strong
 
     @property
     def publishes(self) -> bool:
