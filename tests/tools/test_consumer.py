@@ -110,7 +110,9 @@ def test_fetch_content(by_package: list[str], tmp_path: Path) -> None:
         for name in SOURCES:
             file.add(ROOT / name, f"pvid-1/{name}")
     url = archive.as_uri()
-    printed = built(tmp_path / "build", "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}", f"-DPVID_MAX_HARMONICS={HARMONICS}")
+    printed = built(
+        tmp_path / "build", "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}", f"-DPVID_MAX_HARMONICS={HARMONICS}"
+    )
     assert printed == by_package
 
 

@@ -22,9 +22,7 @@ from pvid.settings.forms import FORMS
 @click.option(
     "--check", type=click.Path(path_type=Path, exists=True), help="Compare the measured figures with this budget file."
 )
-@click.option(
-    "--model", "models", multiple=True, metavar="NAME", help="The weak form of a mechanism; may be repeated."
-)
+@click.option("--model", "models", multiple=True, metavar="NAME", help="The weak form of a mechanism; may be repeated.")
 @click.option("--core", type=click.Choice(["f32", "q31"]), help="Arithmetic of --model.  [default: f32]")
 @click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON.")
 @click.argument("targets", nargs=-1, metavar="[TARGET]...")
