@@ -37,7 +37,7 @@ _BOTH: dict[str, Length] = {
     "drive_min": lambda config, model: model.samples,
     "design": lambda config, model: 1,
     "design.model": lambda design, model: 1,
-    "design.circle": lambda design, model: 2 * design.hop,
+    "design.circle": lambda design, model: 5 * design.hop // 2,
     "design.noise": lambda design, model: design.n_noise,
     "design.error_order": lambda design, model: model.kinds,
     "design.error_variance": lambda design, model: model.kinds,

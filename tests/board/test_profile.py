@@ -8,10 +8,9 @@ from conftest import ROOT
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.profile import HEADER, Profile, profile, table_rows
-from pvid.settings.enums import Form
+from pvid.settings.forms import FORMS
 
 BOARD = "mps2-an386"
-FORMS: tuple[Form, ...] = ("strong", "weak")
 MOST_OF_A_CALL = 12  # instructions of the main loop between the two readings: arguments, call, the second reading
 
 

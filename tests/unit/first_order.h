@@ -108,7 +108,7 @@ static const pvid_fourier_model_f32 mechanism = {
 #define HIGHEST ((FUNCTIONS / 2) + (POWER / 2))
 #define SD 1.0e-4
 
-static float circle[2 * HOP];
+static float circle[(5 * HOP) / 2];
 static const pvid_fourier_filter_f32 filters[2] = {{0, NULL}, {0, NULL}};
 static const pvid_fourier_noise_f32 noise[2] = {{0, 0, 1, 1, (float)(SD * SD)}, {0, 1, 4, 4, (float)(SD * SD)}};
 static const uint8_t error_order[1] = {0};
@@ -118,9 +118,9 @@ static const double truth[4] = {3.0, 2.0, 0.5, 0.2};
 
 static inline pvid_fourier_design_f32 design_of(const pvid_fourier_model_f32 *model)
 {
-    for (int j = 0; j < 2 * HOP; j++) {
+    for (int j = 0; j < (5 * HOP) / 2; j++) {
         const double turn = PI * (double)j / (double)HOP;
-        circle[j] = ((j == HOP / 2) || (j == (3 * HOP) / 2)) ? 0.0f : (float)cos(turn);
+        circle[j] = ((j % HOP) == 0) ? 0.0f : (float)sin(turn);
     }
     const pvid_fourier_design_f32 design = {
         .model = model,

@@ -392,7 +392,14 @@ static void a_window_that_cannot_be_processed_in_time_is_refused(void **state)
     pvid_fourier_design_f32 design;
     pvid_fourier_config_f32 config;
     start(&design, &config);
-    design.hop = 8; /* one block of four ticks in which the window's work would have to be done */
+    static pvid_fourier_noise_f32 many[2100]; /* eight a stage, twice */
+    for (size_t i = 0; i < 2100u; i++) {
+        many[i] = noise[i % 2u];
+    }
+    design.noise = many;
+    design.n_noise = 2100;
+    design.hop =
+        16; /* one block of eight ticks in which the window's work would have to be done, less those for sums */
     config.iterations = PVID_MAX_ITERATIONS;
     assert_int_equal(pvid_fourier_init_f32(&self, &config), PVID_BAD_ITERATIONS);
 }

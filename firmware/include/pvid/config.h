@@ -221,6 +221,16 @@
 #error "PVID_MAX_POWER must lie in 2..12"
 #endif
 
+/* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid
+ * model build` prints with the design, exactly; init refuses others (PVID_BAD_DESIGN). Their loops are of constant
+ * length: fewer instructions, more flash, the same bits. */
+#ifndef PVID_EXACT
+#define PVID_EXACT 0
+#endif
+#if PVID_EXACT < 0 || PVID_EXACT > 1
+#error "PVID_EXACT must be 0 or 1"
+#endif
+
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your
  * own trap or reset here; by default the misused function does nothing and returns PVID_NOT_READY or
  * PVID_BAD_POINTER. */

@@ -19,12 +19,14 @@
 #include "number/init.h"
 #include "number/unroll.h"
 
-/* Bits of the largest finite number. */
-#define FINITE 0x7F7FFFFFu
+/* The largest finite number. */
+#define LARGEST 3.40282347e38f
 
-/* No reasons of a tick: there is work; the channels of a step are to be formed. */
-#define BUSY 255u
-#define FORM 254u
+/* No reasons of a tick: a window is being processed; a block is being added, or a window joined; the channels of a step
+ * are to be formed. */
+#define PROCESS 255u
+#define ADD 254u
+#define FORM 253u
 
 static inline bool all_finite(const float values[], size_t n)
 {
@@ -99,9 +101,11 @@ static inline pvid_reason idle(const pvid_fourier_f32 *self)
 /* What a tick without a step does from now on. */
 static void rest(pvid_fourier_f32 *self)
 {
-    const bool busy =
-        pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics) || pvid_fourier_finish_is_busy_f32(&self->finish);
-    self->rest = busy ? BUSY : (uint8_t)idle(self);
+    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        self->rest = ADD;
+    } else {
+        self->rest = pvid_fourier_finish_is_busy_f32(&self->finish) ? PROCESS : (uint8_t)idle(self);
+    }
 }
 
 static void restart(pvid_fourier_f32 *self)
@@ -113,6 +117,18 @@ static void restart(pvid_fourier_f32 *self)
     pvid_fourier_finish_skip_f32(&self->finish);
     self->warm = false;
     rest(self);
+}
+
+static pvid_status init_refinement(pvid_fourier_f32 *self, const pvid_fourier_refine_f32 *refine)
+{
+    if (refine == NULL) {
+        return PVID_OK;
+    }
+    if (refine->stage == NULL) {
+        return PVID_BAD_POINTER;
+    }
+    self->refine = refine;
+    return refine->stage->init(refine->storage, refine->config);
 }
 
 static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
@@ -157,7 +173,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->watches = (config->range != NULL) || (config->drive_min != NULL);
     self->plain = self->front.plain ? design->model->samples : 0u;
     for (size_t i = 0; i < design->model->samples; i++) {
-        self->front.limit[i] = (config->range != NULL) ? pvid_bits_f32(config->range[i]) : FINITE;
+        self->front.limit[i] = pvid_fourier_front_limit_f32((config->range != NULL) ? config->range[i] : LARGEST);
     }
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
@@ -167,7 +183,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
         return PVID_BAD_ITERATIONS;
     }
     restart(self);
-    return PVID_OK;
+    return init_refinement(self, config->refine);
 }
 
 pvid_status pvid_fourier_init_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
@@ -180,6 +196,9 @@ void pvid_fourier_gap_f32(pvid_fourier_f32 *self)
 {
     if (is_ready(self)) {
         restart(self);
+        if (self->refine != NULL) {
+            self->refine->stage->gap(self->refine->storage);
+        }
     }
 }
 
@@ -187,6 +206,9 @@ void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen)
 {
     if (is_ready(self)) {
         self->frozen = frozen;
+        if (self->refine != NULL) {
+            self->refine->stage->freeze(self->refine->storage, frozen);
+        }
     }
 }
 
@@ -236,7 +258,7 @@ PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[]
         if (self->watches) {
             pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
         }
-        if (pvid_fourier_sums_count_f32(&self->sums, design->hop)) {
+        if (pvid_fourier_sums_count_f32(&self->sums, design->hop, self->channels)) {
             dropped = end_half(self);
         }
     }
@@ -252,23 +274,35 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
     return PVID_REJECTED_NOT_FINITE;
 }
 
-/* Harmonics of the last block are added or joined, else stages of the last whole window run. */
-PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
+/* Some harmonics of the last block are added, or of the last window joined. */
+static pvid_reason add(pvid_fourier_f32 *self)
+{
+    uint32_t left = self->items_per_tick;
+    do {
+        if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
+                                          self->finish.work.rows.window)) {
+            pvid_fourier_finish_begin_f32(&self->finish);
+        }
+        left--;
+    } while (left > 0u);
+    if (!pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        rest(self);
+    }
+    return idle(self);
+}
+
+/* Some stages of the last whole window. */
+static pvid_reason process(pvid_fourier_f32 *self)
 {
     pvid_reason reason = idle(self);
-    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
-        for (uint32_t left = self->items_per_tick; left > 0u; left--) {
-            if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
-                                              self->finish.work.rows.window)) {
-                pvid_fourier_finish_begin_f32(&self->finish);
-            }
-        }
-    } else {
-        for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
-            pvid_fourier_finish_step_f32(self, &reason);
-        }
+    uint32_t left = self->stages_per_tick;
+    do {
+        pvid_fourier_finish_step_f32(self, &reason);
+        left--;
+    } while (left > 0u);
+    if (!pvid_fourier_finish_is_busy_f32(&self->finish)) {
+        rest(self);
     }
-    rest(self);
     return reason;
 }
 
@@ -283,17 +317,20 @@ PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sam
         return idle(self);
     }
     const pvid_reason formed = steps ? form(self, sample) : idle(self);
-    if ((decimation > 1u) || (self->rest != BUSY)) {
+    if ((decimation > 1u) || (self->rest <= FORM)) {
         return formed;
     }
-    const pvid_reason worked = work(self);
+    const pvid_reason worked = (self->rest == ADD) ? add(self) : process(self);
     return (formed == idle(self)) ? worked : formed;
 }
 
 /* A tick with something to do. */
-static inline pvid_reason due(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason due(pvid_fourier_f32 *self, const float sample[])
 {
-    return (self->rest == BUSY) ? work(self) : form(self, sample);
+    if (self->rest == PROCESS) {
+        return process(self);
+    }
+    return (self->rest == ADD) ? add(self) : form(self, sample);
 }
 
 /* A tick whose samples need more than to be added. */
@@ -317,7 +354,8 @@ PVID_SELDOM static pvid_reason other_tick(pvid_fourier_f32 *self, const float sa
     return (self->rest >= FORM) ? due(self, sample) : (pvid_reason)self->rest;
 }
 
-pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
+/* A tick of the weak form. */
+static inline pvid_reason weak_tick(pvid_fourier_f32 *self, const float sample[])
 {
     const uint32_t plain = (self != NULL) ? self->plain : 0u;
     if ((plain == 0u) || (sample == NULL)) {
@@ -336,6 +374,27 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
     }
     const uint32_t rested = self->rest;
     return (rested >= FORM) ? due(self, sample) : (pvid_reason)rested;
+}
+
+/* A tick of both stages. */
+PVID_SELDOM static pvid_reason both_ticks(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_reason reason = weak_tick(self, sample);
+    const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
+    if (sample != NULL) {
+        self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL);
+    }
+    return reason;
+}
+
+pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
+{
+    return ((self != NULL) && (self->refine != NULL)) ? both_ticks(self, sample) : weak_tick(self, sample);
+}
+
+const pvid_estimate_f32 *pvid_fourier_candidate_f32(const pvid_fourier_f32 *self)
+{
+    return (self != NULL) ? &self->finish.candidate : NULL;
 }
 
 const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self)

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "number/exact.h"
 #include "number/finite_f32.h"
 #include "pvid/fourier.h"
 
@@ -33,6 +34,12 @@ void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_four
  */
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[]);
 
+/* What the bits of a sample without its sign, shifted left by one, are compared with. */
+static inline uint32_t pvid_fourier_front_limit_f32(float largest)
+{
+    return pvid_bits_f32(largest) << 1u;
+}
+
 /* Adds this number of samples of a tick, at least 1, to the block; sets *beyond if one is beyond its limit. Returns
  * false if one is not finite; the front end must then be reset. */
 static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[],
@@ -40,22 +47,20 @@ static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint
 {
     float *sums = self->line;
     const uint32_t *limit = self->limit;
-    const float *end = &sample[number];
-    do {
-        const float x = *sample;
-        if ((pvid_bits_f32(x) & 0x7FFFFFFFu) > *limit) {
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        const float x = sample[i];
+        if ((pvid_bits_f32(x) << 1u) > limit[i]) {
             if (!pvid_finite_f32(x)) {
                 return false;
             }
             *beyond = true;
         }
-        const float once = sums[0] + x;
-        sums[0] = once;
-        sums[1] += once;
-        sample++;
-        limit++;
-        sums = &sums[2];
-    } while (sample != end);
+        const float once = sums[2u * i] + x;
+        sums[2u * i] = once;
+        sums[(2u * i) + 1u] += once;
+    }
     return true;
 }
 

@@ -3,6 +3,7 @@
 #define PVID_FOURIER_SUMS_F32_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "pvid/fourier.h"
 
@@ -12,8 +13,8 @@ void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
 /* Where the values of the next step belong. */
 float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self);
 
-/* Counts that step. Returns true if it completes a half; index 0 then follows. */
-bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop);
+/* Counts that step, of so many channels. Returns true if it completes a half; index 0 then follows. */
+bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop, size_t channels);
 
 /* Joins the window that the last two halves form, as soon as the last block is added. edge: I^1 and I^2 of the window's
  * first half at its end. */

@@ -35,10 +35,10 @@ static bool model_is_valid(const pvid_model_f32 *model)
 {
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
-           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && (model->n_p <= model->n_theta) &&
-           (model->n_gated <= model->n_p) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) &&
-           (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
-           ((model->accumulate == NULL) == (model->project == NULL)) &&
+           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && ((PVID_EXACT == 0) || (model->n_p == PVID_MAX_P)) &&
+           (model->n_p <= model->n_theta) && (model->n_gated <= model->n_p) && (model->n_c >= 1u) &&
+           (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) && (model->n_moments >= 1u) &&
+           (model->n_moments <= PVID_MAX_MOMENTS) && ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
            ((model->accumulate != NULL)
                 ? (model->n_kinds <= 1u)

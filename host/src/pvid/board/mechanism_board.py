@@ -19,10 +19,12 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_design, files_fourier
 from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Source
+from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
@@ -31,6 +33,7 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, samples_of
 from pvid.run.mechanism import model_of
+from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierNoise
@@ -200,6 +203,24 @@ class MechanismBoard:
         """The twin with the values of a Configure frame; raises as `configured`."""
         return FourierTwin(self.configured(frame))
 
+    @property
+    def without_recording(self) -> MechanismBoard:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """Signals [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.float32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Sample.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
+
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
         lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config).items()]
@@ -219,6 +240,10 @@ class MechanismBoard:
         return cls(rig, compiled, config, np.zeros((0, config.design.model.samples), np.float32))
 
 
+_KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismBoard, MechanismBoardQ31)
+BOARDS = dict(zip(ENGINE_CORES, _KINDS, strict=True))
+
+
 def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
     """From the text of a log; None: that of another kind of rig.
 
@@ -234,9 +259,8 @@ def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
     rig = MechanismRig.of_document(document)
     if rig.model not in shipped():
         raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
-    made = MechanismBoardQ31 if engine.pop("core", "f32") == "q31" else MechanismBoard
     try:
-        return made.of_tables(rig, engine)
+        return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
 

@@ -26,7 +26,7 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.run.engine_design import config_for_simulated_rig, samples_of
 from pvid.settings.enums import Core
 from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+from pvid.setup.fourier_sizes import sizes_for_one, sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin import fnv
 from pvid.twin.fourier import FourierTwin
@@ -176,7 +176,7 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
             f"{target.name}: float32 has no bits of the twin on an AVR: its division differs at the extremes"
         )
     return build_with(
-        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), sizes_of_design(run.config.design), "f32"
+        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), sizes_for_one(run.config.design), "f32"
     )
 
 

@@ -16,6 +16,7 @@ from pvid.board.replay_image import build_image, parse_report, standard_run
 from pvid.core.sources import ROOT
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Form
+from pvid.settings.forms import FORMS
 
 TICKS = 5000
 TIMEOUT_S = 300.0
@@ -90,11 +91,21 @@ def profile(board: Board, form: Form, core: Core = "f32", model: str = DEFAULT) 
     PvidError
         When the board's emulator is not QEMU or takes no plugins, something does not build, or the image fails.
     """
-    if form == "weak":
-        made = engine_image(board, model, core)
-        return _counted(board, made.image, f"pvid_fourier_step_{core}", made.measure_from)
-    run = standard_run(form, TICKS, core)
-    return _counted(board, build_image(board, run)[0], f"pvid_{form}_step_{core}", run.measure_from)
+    return _counted(board, *_PLAYED[form](board, core, model))
+
+
+def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
+    """Image, the function that is counted, the first tick that counts."""
+    run = standard_run("strong", TICKS, core)
+    return build_image(board, run)[0], f"pvid_strong_step_{core}", run.measure_from
+
+
+def _weak(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
+    made = engine_image(board, model, core)
+    return made.image, f"pvid_fourier_step_{core}", made.measure_from
+
+
+_PLAYED = dict(zip(FORMS, (_weak, _strong), strict=True))
 
 
 def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profile:

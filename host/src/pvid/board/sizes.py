@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from pvid.board.replay_image import ReplayReport, build_image, play, standard_ru
 from pvid.board.stack_bound import stack_bound
 from pvid.models.registry import DEFAULT
 from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.forms import FORMS
 
 TICKS = 5000
 TIMEOUT_S = 300.0
@@ -111,7 +112,7 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     PvidError
         When a compiler or emulator is missing, or the image fails.
     """
-    return _measured(configuration, _weak(configuration) if configuration.form == WEAK else _strong(configuration))
+    return _measured(configuration, _BUILT[configuration.form](configuration))
 
 
 @dataclass(frozen=True)
@@ -144,6 +145,9 @@ def _weak(configuration: Configuration) -> _Built:
         ((_CODE, _CORE), (r"\.text", _MODEL)),
         ((r"\.s?rodata", _MODEL), (tables, "replay")),
     )
+
+
+_BUILT: dict[str, Callable[[Configuration], _Built]] = dict(zip(FORMS, (_weak, _strong), strict=True))
 
 
 def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, ReplayReport]:

@@ -95,7 +95,7 @@ def _tables(design: FourierDesign32) -> list[str]:
     noise = [f"{{{x.kind}, {x.power}, {x.a}, {x.b}, {float_literal(x.factor)}}}" for x in design.noise]
     parts += [
         table("pvid_fourier_filter_f32", f"{name}_filter", f"{upper}_JETS", filters),
-        _floats(f"{name}_circle", design.circle, "cos(pi j / hop)"),
+        _floats(f"{name}_circle", design.circle, "sin(pi j / hop)"),
     ]
     if noise:
         parts.append(table("pvid_fourier_noise_f32", f"{name}_noise", str(len(noise)), noise))

@@ -166,7 +166,7 @@ def fixed_design(
             FourierNoiseQ31(
                 one.kind, one.power, one.a, one.b, scaled_number(float(one.factor) * omega ** (2 * one.power))
             )
-            for one in sizes.noise
+            for one in sorted(sizes.noise, key=lambda one: (one.kind, one.power, one.a, one.b))
         ),
         error_order=tuple(int(one) for one in sizes.error_order),
         error_variance=tuple(

@@ -13,7 +13,7 @@ from pvid.api.identify import identify
 from pvid.base.errors import PvidError
 from pvid.base.version import __version__
 from pvid.base.wording import reason
-from pvid.board.mechanism_board import MechanismBoard
+from pvid.board.mechanism_board import board_of
 from pvid.log.file import Segment
 from pvid.log.reader import LogReader
 from pvid.log.rig import LOG_SUFFIX, engine_text_of_log, hello_of_log, rig_of_log
@@ -151,7 +151,7 @@ def _verified(path: Path) -> str:
     verdict, first = Verdict(), ""
     try:
         text = engine_text_of_log(path)
-        rig = rig_of_log(path) if text is None else MechanismBoard.parse(text)
+        rig = rig_of_log(path) if text is None else board_of(text)
         for stretch in Verifier(rig).stretches(LogReader(path)):
             verdict.add(stretch)
             if not first and (stretch.difference is not None or stretch.why_not is not None):

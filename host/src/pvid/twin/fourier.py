@@ -23,14 +23,14 @@ from pvid.twin.record import After, Progress, Reasons, Recorder, TwinRecord
 Float32 = npt.NDArray[np.float32]
 
 _F = np.float32
-_BLOCK = 4
+_BLOCK = 8
 
 
 @dataclass(frozen=True)
 class FourierSchedule:
     """Twin of fourier/ticks_f32.h: harmonics and stages of a free tick.
 
-    free_ticks: those of a block of four steps
+    free_ticks: those of a block of steps
     """
 
     free_ticks: int
@@ -101,7 +101,7 @@ class FourierTwin:
         self.dt = _F(design.decimation) / _F(config.sample_rate)
         self.finish = Finish(config, self.dt, self.estimator, self.trust)
         self.ticks = front_ticks(design)
-        self.schedule = FourierSchedule(self.ticks.free_ticks, design.hop, design.highest + 1)
+        self.schedule = FourierSchedule(_BLOCK * self.ticks.free_ticks, design.hop, design.highest + 1)
         self.stages_per_tick = self.schedule.stages_per_tick(self.finish.stages)
         self.runs = fourier_step.Runs.of(design, _F(self.ticks.first) / _F(config.sample_rate))
 
