@@ -55,13 +55,13 @@ def refined_run(name: str, ticks: int, **changes: object) -> RefinedRun:
 def settings_text(settings: RefineConfig, name: str) -> str:
     """The configuration in C: static const `name` and its tables."""
     signals = [
-        f"    {{{one.sample}u, {one.order}u, {int(one.source)}u, {float_literal(one.scale)}, "
-        f"{float_literal(one.range)}}},"
+        f"    {{{one.sample}u, {one.order}u, {int(one.source)}u, {float_literal(np.float32(one.scale))}, "
+        f"{float_literal(np.float32(one.range))}}},"
         for one in settings.signal
     ]
     second = [] if settings.second is None else [f"static const float {name}_second[] = {_row(settings.second)};"]
     fields = [
-        ("sample_rate_hz", float_literal(settings.sample_rate)),
+        ("sample_rate_hz", float_literal(np.float32(settings.sample_rate))),
         ("ratio", str(settings.ratio)),
         ("second", f"{name}_second" if second else "NULL"),
         ("signal", f"{name}_signal"),
@@ -89,7 +89,7 @@ def settings_text(settings: RefineConfig, name: str) -> str:
 
 
 def _row(values: npt.ArrayLike | Sequence[float]) -> str:
-    return "{" + ", ".join(float_literal(float(one)) for one in np.asarray(values)) + "}"
+    return "{" + ", ".join(float_literal(np.float32(one)) for one in np.asarray(values)) + "}"
 
 
 def header(run: RefinedRun, text: str) -> str:
