@@ -19,10 +19,12 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_design, files_fourier
 from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Source
+from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Sample, Source
 from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
@@ -155,6 +157,23 @@ class MechanismBoard:
             sensor="sensor_recording.c",
             sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
         )
+
+    def without_recording(self) -> MechanismBoard:
+        """The same for samples that the PC sends: C has no empty table, so one sample is left."""
+        return replace(self, recording=self.recording[:1])
+
+    def samples(self, *signals: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], ...]:
+        """Signals [ticks], in the order of `names`, as the identifier takes them."""
+        return tuple(np.asarray(one, np.float32) for one in signals)
+
+    def sample(self, *parts: npt.NDArray[Any]) -> Sample:
+        """The frame of consecutive samples."""
+        return Sample.of_values(*parts)
+
+    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the core on this machine [ticks]; the library is the mechanism's own."""
+        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
+        return identifier.run_samples(np.stack(self.samples(*signals), axis=1), sums=False).hash
 
     def configure(
         self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC, first_tick: int = 0

@@ -16,11 +16,13 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_fourier_q31
 from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.codegen.fourier_q31 import JetReaches, fixed_fourier
+from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
 from pvid.design.fourier_q31 import circle_of
-from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Form, Source
+from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Source
 from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
@@ -154,6 +156,23 @@ class MechanismBoardQ31:
             sensor="sensor_recording.c",
             sizes={macro: str(value) for macro, value in raised(sizes).items()},
         )
+
+    def without_recording(self) -> MechanismBoardQ31:
+        """The same for samples that the PC sends: C has no empty table, so one sample is left."""
+        return replace(self, recording=self.recording[:1])
+
+    def samples(self, *signals: npt.ArrayLike) -> tuple[npt.NDArray[np.int32], ...]:
+        """Signals [ticks], in the order of `names`, as the identifier takes them."""
+        return tuple(np.asarray(one, np.int32) for one in signals)
+
+    def sample(self, *parts: npt.NDArray[Any]) -> Count:
+        """The frame of consecutive samples."""
+        return Count.of_values(*parts)
+
+    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the core on this machine [ticks]; the library is the mechanism's own."""
+        identifier = fourier_native_q31(self.engine.made, self.engine.parameters, self.config).identifier()
+        return identifier.run_samples(np.stack(self.samples(*signals), axis=1), sums=False).hash
 
     def configure(
         self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC, first_tick: int = 0

@@ -76,18 +76,18 @@ class StreamRig:
         """phi and y [n] as the identifier gets them, from what the board's own sensors count [n, 2]."""
         return self.case.from_counts(counts, (self.phi_lsb, self.y_lsb))
 
-    def samples(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Samples, Samples]:
+    def samples(self, *signals: npt.ArrayLike) -> tuple[Samples, ...]:
         """phi [n] and y [n] as the identifier takes them: float32 in rad and m, or counts."""
-        return np.asarray(phi, self.case.sample_type), np.asarray(y, self.case.sample_type)
+        return tuple(np.asarray(one, self.case.sample_type) for one in signals)
 
-    def sample(self, phi: Samples, y: Samples) -> Message:
+    def sample(self, *parts: Samples) -> Message:
         """The frame of consecutive samples."""
-        made: Message = self.case.frame.of_values(phi, y)
+        made: Message = self.case.frame.of_values(*parts)
         return made
 
-    def hashes(self, native: Native, phi: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the core on this machine, uint32 [n]."""
-        return native.identifier(self.config).run(phi, y, sums=False).hash
+        return native.identifier(self.config).run(*signals, sums=False).hash
 
     def configure(
         self,

@@ -12,7 +12,7 @@ import select
 import socket
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,7 +42,7 @@ from pvid.link.frames import Status as BoardStatus
 from pvid.link.port import Port, open_port
 from pvid.settings.enums import Status
 
-SAMPLES_A_FRAME = 64
+SAMPLES_A_FRAME = 64  # ticks of two signals: 512 bytes, the longest payload that a board receives
 HOST_TARGET = "stream-host"
 EMULATORS = tuple(name for name, board in BOARDS.items() if board.toolchain != "avr")
 _COMING_UP_S = 20.0  # longest wait for an emulator's first word: it always has one, however busy the machine
@@ -202,9 +202,8 @@ class Player:
     def __init__(
         self,
         target: Target,
-        rig: StreamRig,
-        phi: npt.ArrayLike,
-        y: npt.ArrayLike,
+        rig: StreamRig | Streamed,
+        signals: Sequence[npt.ArrayLike],
         hash_every: int,
         estimate_every: int,
         reopen: Callable[[], Target] | None,
@@ -213,11 +212,12 @@ class Player:
         self.target = target
         self.rig = rig
         self.settings = settings_number(rig)
-        self.phi, self.y = rig.samples(phi, y)
+        self.samples = rig.samples(*signals)
+        self.a_frame = 2 * SAMPLES_A_FRAME // len(self.samples)  # ticks
         self.estimate_every = estimate_every
         self.reopen = reopen
         self.progress = progress
-        self.account = Playback(ticks=len(self.phi), hash_every=hash_every)
+        self.account = Playback(ticks=len(self.samples[0]), hash_every=hash_every)
         self.decoder = Decoder(self.account.received)
         self.sequence = 0
         self.furthest = 0  # first sample that has never been sent in this session
@@ -240,8 +240,8 @@ class Player:
     def _send_samples(self) -> None:
         limit = min(self.account.ticks, self.account.done + self.room)
         while self.running and self.next < limit:
-            end = min(self.next + SAMPLES_A_FRAME, limit)
-            self._send(self.rig.sample(self.phi[self.next : end], self.y[self.next : end]), self.next)
+            end = min(self.next + self.a_frame, limit)
+            self._send(self.rig.sample(*(one[self.next : end] for one in self.samples)), self.next)
             self.account.sent += end - self.next
             self.account.repeated += max(0, min(self.furthest, end) - self.next)
             self.furthest = max(self.furthest, end)
@@ -399,10 +399,8 @@ def refusal(status: BoardStatus) -> str:
 
 def play(
     target: Target,
-    rig: StreamRig,
-    phi: npt.ArrayLike,
-    y: npt.ArrayLike,
-    *,
+    rig: StreamRig | Streamed,
+    *signals: npt.ArrayLike,
     hash_every: int = 500,
     estimate_every: int = 0,
     patience_s: float = 20.0,
@@ -415,8 +413,8 @@ def play(
 
     Parameters
     ----------
-    phi, y
-        [ticks], in rad and m; in counts for the fixed-point core.
+    signals
+        [ticks] each: phi and y in rad and m, in counts for the fixed-point core; of a described mechanism its samples.
     hash_every, estimate_every
         Ticks between checkpoints of the running hash and between estimates; 0: the last only.
     patience_s
@@ -433,7 +431,7 @@ def play(
     PvidError
         When the target refuses the configuration.
     """
-    player = Player(target, rig, phi, y, hash_every, estimate_every, reopen, progress)
+    player = Player(target, rig, signals, hash_every, estimate_every, reopen, progress)
     try:
         return player.run(patience_s, resend_s, reconnects if reopen is not None else 0)
     finally:
@@ -495,10 +493,9 @@ def targets_of(names: tuple[str, ...]) -> list[str]:
 
 def verify(
     name: str,
-    rig: StreamRig,
+    rig: StreamRig | Streamed,
     native: Native,
-    phi: npt.ArrayLike,
-    y: npt.ArrayLike,
+    *signals: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,
 ) -> Verdict:
     """Plays a run on a target, an emulator being started again should it die, and judges it by the host's core.
@@ -508,6 +505,6 @@ def verify(
     PvidError
         When the target cannot be started or refuses the configuration.
     """
-    expected = rig.hashes(native, phi, y)
+    expected = rig.hashes(native, *signals)
     reopen = (lambda: open_target(name, rig)) if name in (HOST_TARGET, *EMULATORS) else None
-    return judge(play(open_target(name, rig), rig, phi, y, reopen=reopen, progress=progress), expected)
+    return judge(play(open_target(name, rig), rig, *signals, reopen=reopen, progress=progress), expected)

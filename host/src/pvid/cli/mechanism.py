@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.console import DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
@@ -27,6 +27,7 @@ from pvid.rig.run import Recording, is_run, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
+from pvid.settings.enums import Core
 
 if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
@@ -81,6 +82,7 @@ def identify_run(
     figure: Path | None,
     weights: Weights = "residuals",
     refine: bool = False,
+    on: str | None = None,
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
@@ -89,6 +91,7 @@ def identify_run(
     ----------
     weights : of the rows, as in pvid.oracle.fourier.identify
     refine : the equations are fitted to the whole run, from the answer on
+    on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = _model_of(rig).name
@@ -113,8 +116,10 @@ def identify_run(
 
         core = identify_in_c(answer, in_c.name)
     shown = core or answer
+    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
+        return DIFFERENT
     if as_json:
-        click.echo(json.dumps(shown.as_json()))
+        click.echo(json.dumps(shown.as_json() | ({} if on is None else {"on": on})))
     elif core is not None:
         _print_core(core)
     else:
@@ -131,6 +136,19 @@ def identify_run(
         write_stderr(f"pvid: nothing identified{reason}")
         return NOTHING_IDENTIFIED
     return DONE
+
+
+def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core) -> bool:
+    """Streams a recording to a target and prints the account; whether every hash is that of this machine."""
+    from pvid.board.engine_board import verify_recording
+
+    own = described(rig) if isinstance(rig, RigFile) else rig
+    with progress_bar(f"streaming to {target}", len(recording)) as advance:
+        verdict = verify_recording(target, own, recording, core, advance)
+    write_stderr(f"{target}: {verdict.playback.account}")
+    if not verdict.equal:
+        write_stderr(f"pvid: {target}: {verdict.text}")
+    return verdict.equal
 
 
 def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> int:
@@ -155,22 +173,29 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
 
 
 def compare_recording(
-    path: Path, rig: MechanismRig | RigFile, columns: str | None, **given: str | None
+    path: Path,
+    rig: MechanismRig | RigFile,
+    columns: str | None,
+    targets: Sequence[str] = (),
+    **given: str | None,
 ) -> list[Outcome]:
-    """The C core against its twin on a recording of a described mechanism, in float32 by default.
+    """The C core against its twin on a recording of a described mechanism, in float32 by default; then targets against
+    the C core.
 
     Parameters
     ----------
+    targets : the recording is streamed to them
     given : options, by name; a value that the weak engine does not have is refused
     """
+    from pvid.board.engine_board import verify_recording
     from pvid.run.mechanism_compare import compare_recording as compared
 
+    own = described(rig) if isinstance(rig, RigFile) else rig
     name = _model_of(rig).name
     for option, value in given.items():
         if value is not None and (option, value) not in _COMPARED:
             raise PvidError(
-                f"--{option} {value}: {name} is compared in float32 or fixed point by the weak form on this computer; "
-                f"omit --{option}"
+                f"--{option} {value}: {name} is compared in float32 or fixed point by the weak form; omit --{option}"
             )
     recording, model = recording_of(path, rig, columns)
     outcomes = []
@@ -180,6 +205,11 @@ def compare_recording(
             found = compared(model, recording, core, advance)
         verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
         outcomes.append(Outcome("host", core, "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict))
+        for target in targets:
+            with progress_bar(f"{core} on {target}", len(recording)) as advance:
+                there = verify_recording(target, own, recording, core, advance)
+            ticks, last = there.playback.done, there.playback.hash
+            outcomes.append(Outcome(target, core, "weak", "stationary", ticks, last, there.equal, there.text))
     return outcomes
 
 
