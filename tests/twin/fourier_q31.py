@@ -177,9 +177,11 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
         outcome[k] = (uint8_t)tick;
         if ((tick == PVID_FOURIER_WINDOW) && (windows < most)) {
             for (unsigned c = 0; c < model->channels; c++) {
+                const bool constant = model->channel[c].gain == PVID_FOURIER_NONE;
                 for (unsigned h = 0; h < harmonics; h++) {
-                    *window++ = self.window.s[c][h][0];
-                    *window++ = self.window.s[c][h][1];
+                    const int32_t mean = (h == 0u) ? (2 * (int32_t)rig_design_q31.hop) : 0;
+                    *window++ = constant ? mean : self.window.s[c][h][0];
+                    *window++ = constant ? 0 : self.window.s[c][h][1];
                 }
             }
             windows++;

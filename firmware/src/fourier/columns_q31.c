@@ -24,12 +24,27 @@ static uint32_t lift_of(uint32_t length)
     return (length > (uint32_t)SUM_BITS) ? 0u : ((uint32_t)SUM_BITS - length);
 }
 
+/* Whether a channel is the constant, whose sums are 2 hop at h = 0 and 0 elsewhere. */
+static bool is_constant(const pvid_fourier_design_q31 *design, size_t channel)
+{
+    return design->model->channel[channel].gain == PVID_FOURIER_NONE;
+}
+
+static uint32_t length_of(const pvid_fourier_design_q31 *design, const pvid_fourier_window_q31 *window, size_t channel,
+                          size_t h)
+{
+    if (is_constant(design, channel)) {
+        return (h == 0u) ? pvid_bit_length_q31(2u * (uint64_t)design->hop) : 0u;
+    }
+    return window->length[channel][h];
+}
+
 /* Whether a term contains harmonic h at all; *exponent: of its part there. */
 static bool exponent_of(const pvid_fourier_design_q31 *design, size_t t, const pvid_fourier_white_q31 *white,
                         const pvid_fourier_window_q31 *window, size_t h, int32_t *exponent)
 {
     const pvid_fourier_term_q31 term = design->model->term[t];
-    const uint32_t length = window->length[term.channel][h];
+    const uint32_t length = length_of(design, window, term.channel, h);
     if ((length == 0u) || ((h == 0u) && (term.order > 0u)) || (design->factor[t].m == 0)) {
         return false;
     }
@@ -42,9 +57,12 @@ void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_f
 {
     const pvid_fourier_kind *own = &design->model->kind[kind];
     const size_t columns = (size_t)own->thetas + 1u + own->nuisances;
+    const size_t parts = pvid_fourier_sums_rows_q31(design);
     for (size_t j = 0; j < columns; j++) {
         self->exponent[j] = INT32_MIN;
-        memset(self->x[j], 0, sizeof self->x[j]);
+        for (size_t i = 0; i < parts; i++) {
+            self->x[j][i] = 0;
+        }
     }
 }
 
@@ -82,11 +100,12 @@ void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fo
         }
         const int32_t below = self->exponent[term.column] - exponent;
         if (below < SUM_BITS) { /* else nothing is left of it */
-            const int32_t *s = window->s[term.channel][h];
+            const int32_t constant[2] = {2 * (int32_t)design->hop, 0};
+            const int32_t *s = is_constant(design, term.channel) ? constant : window->s[term.channel][h];
             const int32_t whole =
                 (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[term.order], design->factor[t].m), 30);
             const int32_t w = pvid_floor_shift_32_q31(whole, (uint32_t)below);
-            const int32_t up = (int32_t)((uint32_t)1 << lift_of(window->length[term.channel][h]));
+            const int32_t up = (int32_t)((uint32_t)1 << lift_of(length_of(design, window, term.channel, h)));
             const bool turned = (term.order % 2u) != 0u;
             const int32_t re = (turned ? s[1] : s[0]) * up;
             const int32_t im = (turned ? s[0] : s[1]) * up;

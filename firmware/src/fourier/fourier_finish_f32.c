@@ -22,28 +22,32 @@ enum {
     /* for each kind of rows */
     STAGE_WEIGH,    /* c_j from a few entries of the noise table */
     STAGE_SPECTRUM, /* D_h */
+    STAGE_SCALE,    /* 1 / sqrt(D_h) */
     STAGE_BASIS,    /* directions that the test functions leave out: white_f32.c */
     STAGE_SHARE,    /* a few parts' share of R^-1; only if that is needed */
-    STAGE_NOISE,  /* a few entries of the noise table: information of the noise alone; nothing if that is not checked */
-    STAGE_COLUMN, /* for each column: its terms, then its real and its imaginary parts to rows */
+    STAGE_NOISE,    /* the entries of two columns: information of the noise alone; nothing if that is not checked */
+    STAGE_COLUMN,   /* for each column: its terms one by one, then its real and its imaginary parts to rows */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
     STAGE_RESIDUAL, /* a few rows of e */
-    STAGE_SQUARES,  /* of a few columns; at the end the estimator and the gate accept or reject the kind */
-    STAGE_PULL,     /* g from a few entries of the noise table; only if the share is needed */
+    STAGE_SQUARES,  /* of a few columns */
+    STAGE_GATE,     /* the estimator and the gate accept or reject the kind */
+    STAGE_PULL,     /* g from a few entries of the noise table; this and the next only if the share is needed */
+    STAGE_CORRECT,  /* g to the estimator */
     STAGE_ADD,      /* a few products of columns to the estimator */
     /* for the window */
     STAGE_SCORE,   /* C^T (sum N e + g) */
     STAGE_SOLVE,   /* `iterations` solves, several stages each */
-    STAGE_ASSESS,  /* several stages */
     STAGE_MEAN,    /* the scores to their means */
+    STAGE_ASSESS,  /* several stages; this and the next two only behind a solve that was due */
     STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
+    STAGE_GROW,    /* the covariance grows with the standard errors */
     STAGE_JUDGE,   /* trust.h publishes the estimate or holds it */
     STAGE_IDLE = PVID_FOURIER_IDLE
 };
 
 /* Entries of the noise table, and products of the residuals and of columns, in a stage. */
 #define ENTRIES_PER_STAGE 8u
-#define PRODUCTS_PER_STAGE 36u
+#define PRODUCTS_PER_STAGE 30u
 
 /* Parts whose share a stage forms. */
 #define SHARES_PER_STAGE 4u
@@ -93,6 +97,7 @@ static void begin_kind(pvid_fourier_finish_f32 *self)
     self->moment = 0;
     self->live = 0;
     self->rss = 0.0f;
+    memset(self->work.rows.part, 0, sizeof self->work.rows.part);
     self->stage = STAGE_WEIGH;
 }
 
@@ -162,30 +167,24 @@ PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
     if ((finish->index == 0u) && (finish->kind == 0u)) {
         memset(finish->candidate.covariance, 0, sizeof finish->candidate.covariance);
     }
-    float bound[PVID_MAX_POWER];
+    if (!finish->shares && (finish->index == 0u)) {
+        pvid_fourier_noise_shares_f32(&finish->white, design, finish->white.share);
+    }
+    const size_t place = pvid_fourier_noise_next_f32(design, finish->kind, finish->index);
+    if (place >= design->n_noise) {
+        return false;
+    }
     float c[PVID_MAX_THETA * PVID_MAX_P];
-    const float *share = finish->white.share;
-    if (!finish->shares) {
-        pvid_fourier_noise_shares_f32(&finish->white, design, bound);
-        share = bound;
-    }
     design->model->model->jacobian(self->estimator.p, c);
-    const size_t end = (size_t)finish->index + PVID_FOURIER_NOISE_ENTRIES;
-    const size_t last = (end < design->n_noise) ? end : design->n_noise;
-    for (size_t i = finish->index; i < last; i++) {
-        if (design->noise[i].kind == finish->kind) {
-            pvid_fourier_noise_add_f32(design, &design->noise[i], finish->theta, share, rows_of(self), c,
-                                       finish->candidate.covariance);
-        }
-    }
-    finish->index = (uint16_t)last;
-    return last < design->n_noise;
+    finish->index = (uint16_t)pvid_fourier_noise_add_f32(design, place, finish->theta, finish->white.share,
+                                                         rows_of(self), c, finish->candidate.covariance);
+    return pvid_fourier_noise_next_f32(design, finish->kind, finish->index) < design->n_noise;
 }
 
 PVID_SELDOM static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_fourier_white_basis_f32(&finish->white, finish->index, finish->work.rows.part, finish->work.rows.leverage);
+    pvid_fourier_white_basis_f32(&finish->white, finish->index, &finish->work.rows.basis);
     finish->index++;
     return finish->index < pvid_fourier_basis_stages(self->design);
 }
@@ -196,26 +195,24 @@ PVID_SELDOM static bool share_stage(pvid_fourier_f32 *self)
     const size_t parts = pvid_fourier_parts(self->design);
     const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
     const size_t last = (end < parts) ? end : parts;
-    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.leverage, finish->index, last);
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.basis.leverage, finish->index, last);
     finish->index = (uint16_t)last;
     return last < parts;
 }
 
-/* Terms of the present column. */
-static void gather_column(pvid_fourier_f32 *self)
+/* Adds a term of the present column, if it has one. Returns whether another one follows. */
+static bool gather_term(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    const pvid_fourier_design_f32 *design = self->design;
-    const pvid_fourier_term_f32 *term = design->model->term;
+    const pvid_fourier_term_f32 *term = self->design->model->term;
     const uint16_t end = kind_of(self)->end;
-    uint16_t place = finish->term;
-    memset(finish->work.rows.part, 0, finish->white.parts * sizeof finish->work.rows.part[0]);
-    for (; (place < end) && (term[place].column == finish->index); place++) {
-        pvid_fourier_columns_add_f32(design, &term[place], &finish->white,
+    if ((finish->term < end) && (term[finish->term].column == finish->index)) {
+        pvid_fourier_columns_add_f32(self->design, &term[finish->term], &finish->white,
                                      (const float (*)[2][PVID_MAX_HARMONICS])finish->work.rows.window,
                                      finish->work.rows.part);
+        finish->term++;
     }
-    finish->term = place;
+    return (finish->term < end) && (term[finish->term].column == finish->index);
 }
 
 /* The present column: its parts, then the rows of one family after the other. */
@@ -224,8 +221,7 @@ PVID_SELDOM static bool column_stage(pvid_fourier_f32 *self)
     pvid_fourier_finish_f32 *finish = &self->finish;
     const pvid_fourier_white_f32 *white = &finish->white;
     if (finish->phase == 0u) {
-        gather_column(self);
-        finish->phase = 1;
+        finish->phase = (uint8_t)(gather_term(self) ? 0u : 1u);
         return true;
     }
     const size_t family = (size_t)finish->phase - 1u;
@@ -239,6 +235,7 @@ PVID_SELDOM static bool column_stage(pvid_fourier_f32 *self)
         finish->phase = 2;
         return true;
     }
+    memset(finish->work.rows.part, 0, finish->white.parts * sizeof finish->work.rows.part[0]);
     finish->phase = 0;
     finish->index++;
     return finish->index < columns_of(kind_of(self));
@@ -350,9 +347,12 @@ PVID_SELDOM static bool pull_stage(pvid_fourier_f32 *self)
                                     finish->index, end, &finish->work.rows.pull[finish->theta]);
     }
     finish->index = (uint16_t)end;
-    if (end < self->design->n_noise) {
-        return true;
-    }
+    return end < self->design->n_noise;
+}
+
+PVID_SELDOM static void correct_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
     const size_t thetas = kind_of(self)->thetas;
     for (size_t j = finish->theta; j < finish->theta + thetas; j++) {
         finish->work.rows.score[j] += finish->work.rows.pull[j];
@@ -361,7 +361,6 @@ PVID_SELDOM static bool pull_stage(pvid_fourier_f32 *self)
         (void)pvid_estimator_add_to_b_f32(&self->estimator, finish->work.rows.pull);
     }
     finish->expected += pvid_fourier_white_sensors_f32(&finish->white, self->design);
-    return false;
 }
 
 /* Products of column `index` with those behind it, the last of them e: a row of M without its diagonal, and an entry of
@@ -457,10 +456,9 @@ PVID_SELDOM static bool cluster_stage(pvid_fourier_f32 *self)
     return finish->index < n_p;
 }
 
-PVID_SELDOM static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+PVID_SELDOM static void grow_stage(pvid_fourier_f32 *self)
 {
-    pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_estimate_f32 *estimate = &finish->candidate;
+    pvid_estimate_f32 *estimate = &self->finish.candidate;
     const size_t n_p = self->estimator.model->n_p;
     float growth[PVID_MAX_P];
     for (size_t a = 0; a < n_p; a++) {
@@ -472,6 +470,12 @@ PVID_SELDOM static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
             estimate->covariance[a][b] *= growth[a] * growth[b];
         }
     }
+}
+
+PVID_SELDOM static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_estimate_f32 *estimate = &finish->candidate;
     const float expected = finish->expected / (float)finish->used;
     const float variance_ratio = finish->work.solve.group_rss / (finish->free * expected);
     *reason = pvid_trust_judge_f32(&self->trust, &self->estimator, finish->reason, finish->size,
@@ -480,7 +484,7 @@ PVID_SELDOM static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
 
 /* ---- the order of the stages ---- */
 
-/* Behind the squares: the estimator and the gate. Returns the next stage. */
+/* Behind the residuals: the estimator and the gate. Returns the next stage. */
 static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
@@ -535,8 +539,10 @@ static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
     switch (self->finish.stage) {
     case STAGE_BASIS:
         return self->finish.shares ? (uint8_t)STAGE_SHARE : (uint8_t)STAGE_NOISE;
-    case STAGE_SQUARES:
+    case STAGE_GATE:
         return gated(self, reason);
+    case STAGE_MEAN: /* no assessment if no solve was due */
+        return (self->finish.reason == PVID_ACCUMULATED) ? (uint8_t)STAGE_JUDGE : (uint8_t)STAGE_ASSESS;
     case STAGE_JUDGE:
         return STAGE_IDLE;
     default:
@@ -555,7 +561,7 @@ PVID_SELDOM static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
     } else if (finish->stage == (uint8_t)STAGE_SOLVE) {
         begin_solves(self);
     } else if (finish->stage == (uint8_t)STAGE_ASSESS) {
-        pvid_estimator_begin_assessment_f32(&self->estimator, &finish->work.solve, &finish->candidate);
+        pvid_estimator_assess_solved_f32(&self->estimator, &finish->work.solve, &finish->candidate);
     } else {
         /* nothing to begin */
     }
@@ -571,6 +577,9 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         break;
     case STAGE_SPECTRUM:
         pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind, self->harmonics);
+        break;
+    case STAGE_SCALE:
+        pvid_fourier_white_scale_f32(&finish->white, self->harmonics);
         break;
     case STAGE_NOISE:
         repeat = noise_stage(self);
@@ -596,6 +605,11 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
     case STAGE_PULL:
         repeat = pull_stage(self);
         break;
+    case STAGE_GATE:
+        break;
+    case STAGE_CORRECT:
+        correct_stage(self);
+        break;
     case STAGE_ADD:
         repeat = add_stage(self);
         break;
@@ -613,6 +627,9 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         break;
     case STAGE_CLUSTER:
         repeat = cluster_stage(self);
+        break;
+    case STAGE_GROW:
+        grow_stage(self);
         break;
     case STAGE_JUDGE:
         judge_stage(self, reason);
@@ -633,6 +650,17 @@ static uint32_t parts_of(uint32_t all, uint32_t each)
     return (parts > 0u) ? parts : 1u;
 }
 
+/* A stage for each term, and one for each column without any. */
+static uint32_t gather_stages(const pvid_fourier_design_f32 *design, const pvid_fourier_kind *kind)
+{
+    const pvid_fourier_term_f32 *term = design->model->term;
+    uint32_t stages = (uint32_t)columns_of(kind);
+    for (size_t i = (size_t)kind->first + 1u; i < kind->end; i++) {
+        stages += (term[i].column == term[i - 1u].column) ? 1u : 0u;
+    }
+    return stages;
+}
+
 static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
 {
     const pvid_fourier_design_f32 *design = self->design;
@@ -643,12 +671,14 @@ static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_
     const uint32_t products = (uint32_t)products_per_stage(design);
     /* nuisance i: its square, then all columns but itself and those before it */
     const uint32_t project = (nuisances > 0u) ? ((nuisances * columns) - ((nuisances * (nuisances - 1u)) / 2u)) : 1u;
-    const uint32_t noise = checks_noise(self) ? parts_of(design->n_noise, PVID_FOURIER_NOISE_ENTRIES) : 1u;
-    uint32_t stages = entries + 1u + noise + (uint32_t)pvid_fourier_basis_stages(design) + (3u * columns) + project;
+    const uint32_t pairs = (uint32_t)pvid_fourier_noise_pairs_f32(design, (uint8_t)(kind - design->model->kind));
+    const uint32_t noise = (checks_noise(self) && (pairs > 0u)) ? pairs : 1u;
+    uint32_t stages = entries + 3u + noise; /* SPECTRUM, SCALE, GATE */
+    stages += (uint32_t)pvid_fourier_basis_stages(design) + gather_stages(design, kind) + (2u * columns) + project;
     stages += parts_of(design->functions, (uint32_t)rows_per_stage(kind)) + parts_of(thetas, products);
     stages += parts_of((thetas * (thetas + 1u)) / 2u, products);
     if (self->finish.shares) {
-        stages += parts_of((uint32_t)pvid_fourier_parts(design), SHARES_PER_STAGE) + entries;
+        stages += parts_of((uint32_t)pvid_fourier_parts(design), SHARES_PER_STAGE) + entries + 1u; /* CORRECT */
     }
     return stages;
 }
@@ -656,11 +686,12 @@ static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_
 uint32_t pvid_fourier_finish_stages_f32(const pvid_fourier_f32 *self)
 {
     const pvid_fourier_model_f32 *model = self->design->model;
-    uint32_t stages = 3u + model->model->n_p; /* SCORE, MEAN, JUDGE; CLUSTER */
+    uint32_t stages = 4u + model->model->n_p; /* SCORE, MEAN, GROW, JUDGE; CLUSTER */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }
     const uint32_t first = pvid_estimator_stages_f32(&self->estimator, true);
     const uint32_t more = pvid_estimator_stages_f32(&self->estimator, false);
-    return stages + first + ((self->iterations - 1u) * more) + pvid_estimator_assessment_stages_f32(&self->estimator);
+    return stages + first + ((self->iterations - 1u) * more) +
+           pvid_estimator_assess_solved_stages_f32(&self->estimator);
 }

@@ -23,7 +23,7 @@ enum {
     STAGE_MIRROR,   /* n reflections that leave the white rows */
     STAGE_LEVERAGE, /* n parts; this and the next two only where the noise is computed anew */
     STAGE_SHARE,    /* Q_j, a few harmonics */
-    STAGE_NOISE,    /* bias and information by a few entries of the noise table */
+    STAGE_NOISE,    /* C, then bias and information by each entry of the noise table */
     STAGE_UNIT,     /* of the columns: a few harmonics */
     STAGE_COLUMN,   /* columns: each harmonic of all; the white rows of each */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
@@ -43,7 +43,6 @@ enum {
 #define ROOTS_PER_STAGE 4u
 #define UNITS_PER_STAGE 4u
 #define SHARES_PER_STAGE 2u
-#define NOISES_PER_STAGE 2u
 #define RESIDUALS_PER_STAGE 2u
 
 /* Relative step of p behind which there is no other one on the same sums: 2^-7, Q22. The next is below the square of
@@ -173,7 +172,8 @@ static bool leverage_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     pvid_fourier_rows_q31 *rows = &finish->work.rows;
-    pvid_fourier_noise_leverage_q31(&rows->white, self->design, finish->index, rows->columns.x[0], rows->columns.x[1]);
+    pvid_fourier_noise_leverage_q31(&rows->white, self->design, finish->index, rows->parts.noise.u,
+                                    rows->parts.noise.leverage);
     finish->index++;
     return finish->index < pvid_fourier_mirrors_q31(self->design);
 }
@@ -185,7 +185,8 @@ static bool share_stage(pvid_fourier_q31 *self)
     const size_t harmonics = rows->white.cosines;
     const size_t end = lesser((size_t)finish->index + SHARES_PER_STAGE, harmonics);
     for (size_t h = finish->index; h < end; h++) {
-        pvid_fourier_noise_share_q31(&rows->white, self->design, rows->columns.x[1], h, rows->share);
+        pvid_fourier_noise_share_q31(&rows->white, self->design, rows->parts.noise.leverage, h,
+                                     rows->parts.noise.share);
     }
     finish->index = (uint16_t)end;
     return end < harmonics;
@@ -206,33 +207,29 @@ static void begin_noise(pvid_fourier_q31 *self)
     }
 }
 
+/* C at p and what the sensors explain, then an entry of the table each. */
 static bool noise_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    const pvid_fourier_rows_q31 *rows = &finish->work.rows;
+    pvid_fourier_rows_q31 *rows = &finish->work.rows;
+    pvid_fourier_noise_work_q31 *work = &rows->parts.noise;
     const pvid_fourier_design_q31 *design = self->design;
-    const size_t end = lesser((size_t)finish->index + NOISES_PER_STAGE, design->n_noise);
-    const int16_t h[PVID_MAX_THETA_Q31] = {0};
-    int32_t c[PVID_MAX_C_Q31];
-    int16_t f[PVID_MAX_P];
-    if ((finish->index == 0u) && (finish->kind == 0u)) {
-        begin_noise(self);
-    }
-    pvid_system_jacobian_q31(&self->estimator, h, c, f);
-    for (size_t i = finish->index; i < end; i++) {
-        if (design->noise[i].kind == finish->kind) {
-            pvid_fourier_noise_take_q31(&self->estimator, design, &design->noise[i], rows->share, rows->of_theta,
-                                        finish->theta, finish->n_bits, finish->y_bits, c, f,
-                                        &finish->known.pull[finish->theta]);
+    if (finish->index == 0u) {
+        const int16_t h[PVID_MAX_THETA_Q31] = {0};
+        if (finish->kind == 0u) {
+            begin_noise(self);
         }
+        pvid_system_jacobian_q31(&self->estimator, h, work->c, work->f);
+        finish->known.sensors = pvid_scaled_plus_q31(finish->known.sensors,
+                                                     pvid_fourier_noise_sensors_q31(&rows->white, design, work->share));
+    } else if (design->noise[finish->index - 1u].kind == finish->kind) {
+        pvid_fourier_noise_take_q31(&self->estimator, design, &design->noise[finish->index - 1u], work, rows->of_theta,
+                                    finish->theta, finish->n_bits, finish->y_bits, &finish->known.pull[finish->theta]);
+    } else {
+        /* an entry of another kind */
     }
-    finish->index = (uint16_t)end;
-    if (end < design->n_noise) {
-        return true;
-    }
-    finish->known.sensors =
-        pvid_scaled_plus_q31(finish->known.sensors, pvid_fourier_noise_sensors_q31(&rows->white, design, rows->share));
-    return false;
+    finish->index++;
+    return finish->index <= design->n_noise;
 }
 
 static bool unit_stage(pvid_fourier_q31 *self)
@@ -242,11 +239,11 @@ static bool unit_stage(pvid_fourier_q31 *self)
     const size_t harmonics = rows->white.cosines;
     const size_t end = lesser((size_t)finish->index + UNITS_PER_STAGE, harmonics);
     if (finish->index == 0u) {
-        pvid_fourier_columns_begin_q31(&rows->columns, self->design, finish->kind);
+        pvid_fourier_columns_begin_q31(&rows->parts.columns, self->design, finish->kind);
     }
     for (size_t h = finish->index; h < end; h++) {
-        pvid_fourier_columns_scan_q31(&rows->columns, self->design, finish->kind, &rows->white, &self->collect.window,
-                                      h);
+        pvid_fourier_columns_scan_q31(&rows->parts.columns, self->design, finish->kind, &rows->white,
+                                      &self->collect.window, h);
     }
     finish->index = (uint16_t)end;
     return end < harmonics;
@@ -259,14 +256,14 @@ static bool column_stage(pvid_fourier_q31 *self)
     const pvid_fourier_kind *kind = kind_of(self);
     const size_t harmonics = finish->work.rows.white.cosines;
     if (finish->index < harmonics) {
-        pvid_fourier_columns_take_q31(&finish->work.rows.columns, design, finish->kind, &finish->work.rows.white,
+        pvid_fourier_columns_take_q31(&finish->work.rows.parts.columns, design, finish->kind, &finish->work.rows.white,
                                       &self->collect.window, finish->index);
     } else {
         const size_t place = finish->index - harmonics;
-        pvid_fourier_columns_end_q31(&finish->work.rows.columns, design, &finish->work.rows.white, place);
+        pvid_fourier_columns_end_q31(&finish->work.rows.parts.columns, design, &finish->work.rows.white, place);
         if (place > kind->thetas) {
             finish->work.rows.whole[place - kind->thetas - 1u] =
-                pvid_fourier_columns_square_q31(design->functions, finish->work.rows.columns.x[place]);
+                pvid_fourier_columns_square_q31(design->functions, finish->work.rows.parts.columns.x[place]);
         }
     }
     finish->index++;
@@ -286,7 +283,7 @@ static bool project_stage(pvid_fourier_q31 *self)
     }
     const size_t begin = finish->live;
     const size_t rows = self->design->functions - begin;
-    int32_t *mirror = &finish->work.rows.columns.x[nuisance][begin];
+    int32_t *mirror = &finish->work.rows.parts.columns.x[nuisance][begin];
     if (finish->part == 0u) {
         finish->kept = pvid_fourier_columns_keep_q31(finish->work.rows.whole[finish->index], rows, mirror);
         finish->part = 1;
@@ -295,7 +292,7 @@ static bool project_stage(pvid_fourier_q31 *self)
     const size_t place = finish->part - 1u;
     const size_t column = (place < first) ? place : (place + finish->index + 1u);
     if (finish->kept) {
-        pvid_fourier_mirror_q31(mirror, rows, &finish->work.rows.columns.x[column][begin]);
+        pvid_fourier_mirror_q31(mirror, rows, &finish->work.rows.parts.columns.x[column][begin]);
     }
     finish->part++;
     if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
@@ -312,7 +309,8 @@ static bool format_stage(pvid_fourier_q31 *self)
     const size_t place = finish->index;
     const size_t thetas = kind_of(self)->thetas;
     const int32_t bits = (place < thetas) ? finish->n_bits[finish->theta + place] : finish->y_bits;
-    pvid_fourier_columns_format_q31(&finish->work.rows.columns, place, finish->live, self->design->functions, bits);
+    pvid_fourier_columns_format_q31(&finish->work.rows.parts.columns, place, finish->live, self->design->functions,
+                                    bits);
     finish->index++;
     return finish->index <= thetas;
 }
@@ -322,7 +320,7 @@ static void row_of(const pvid_fourier_q31 *self, size_t k, int32_t n[PVID_MAX_TH
 {
     const size_t thetas = kind_of(self)->thetas;
     for (size_t j = 0; j < thetas; j++) {
-        n[j] = self->finish.work.rows.columns.x[j][k];
+        n[j] = self->finish.work.rows.parts.columns.x[j][k];
     }
 }
 
@@ -332,7 +330,7 @@ static bool residual_stage(pvid_fourier_q31 *self)
     const size_t first = (size_t)finish->live + finish->index;
     const size_t rows = self->design->functions;
     const size_t last = lesser(first + RESIDUALS_PER_STAGE, rows);
-    int32_t *y = finish->work.rows.columns.x[kind_of(self)->thetas];
+    int32_t *y = finish->work.rows.parts.columns.x[kind_of(self)->thetas];
     pvid_block block;
     pvid_information_block_q31(self->estimator.model, finish->theta, &block);
     for (size_t k = first; k < last; k++) {
@@ -396,7 +394,7 @@ static bool add_stage(pvid_fourier_q31 *self, pvid_reason *reason)
         pvid_count_up(&self->estimator.counters.rejected_saturated);
         *reason = PVID_REJECTED_SATURATED;
     } else {
-        const int32_t e = finish->work.rows.columns.x[kind_of(self)->thetas][k];
+        const int32_t e = finish->work.rows.parts.columns.x[kind_of(self)->thetas][k];
         int32_t n[PVID_MAX_THETA_Q31];
         pvid_block block;
         row_of(self, k, n);
@@ -600,10 +598,9 @@ static uint32_t stages_of_kind(const pvid_fourier_q31 *self, const pvid_fourier_
     for (size_t i = 0; i < kind->nuisances; i++) {
         project += ((size_t)kind->thetas + 1u + kind->nuisances) - i;
     }
-    const uint32_t noise = self->finish.known.used
-                               ? ((uint32_t)pvid_fourier_mirrors_q31(design) + stages_of(harmonics, SHARES_PER_STAGE) +
-                                  stages_of(design->n_noise, NOISES_PER_STAGE))
-                               : 0u;
+    const uint32_t noise = self->finish.known.used ? ((uint32_t)pvid_fourier_mirrors_q31(design) +
+                                                      stages_of(harmonics, SHARES_PER_STAGE) + 1u + design->n_noise)
+                                                   : 0u;
     return noise + stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
            stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_fourier_mirrors_q31(design) +
            stages_of(harmonics, UNITS_PER_STAGE) + (uint32_t)(harmonics + columns_of(kind)) + (uint32_t)project +

@@ -85,14 +85,14 @@ static void add_information(pvid_estimator_q31 *estimator, size_t a, size_t b, p
 }
 
 void pvid_fourier_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_fourier_design_q31 *design,
-                                 const pvid_fourier_noise_q31 *one, const pvid_scaled_q31 share[],
+                                 const pvid_fourier_noise_q31 *one, const pvid_fourier_noise_work_q31 *work,
                                  const pvid_scaled_q31 theta[], size_t first, const int8_t n_bits[], int32_t y_bits,
-                                 const int32_t c[], const int16_t f[], pvid_scaled_q31 pull[])
+                                 pvid_scaled_q31 pull[])
 {
     const size_t thetas = design->model->kind[one->kind].thetas;
     const size_t of_place[2] = {one->a, one->b};
     const pvid_scaled_q31 minus_one = pvid_scaled_of_q31(-1, 0);
-    const pvid_scaled_q31 whole = pvid_scaled_times_q31(one->factor, share[one->power]);
+    const pvid_scaled_q31 whole = pvid_scaled_times_q31(one->factor, work->share[one->power]);
     const pvid_scaled_q31 half = pvid_scaled_shifted_q31(whole, -1);
     for (size_t side = 0; side < 2u; side++) {
         const size_t own = of_place[side];
@@ -106,7 +106,7 @@ void pvid_fourier_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_fouri
     if ((one->a < thetas) && (one->b < thetas)) {
         const int32_t bits = (int32_t)n_bits[first + one->a] + n_bits[first + one->b];
         const pvid_scaled_q31 own = pvid_scaled_shifted_q31((one->a == one->b) ? whole : half, bits);
-        add_information(estimator, first + one->a, first + one->b, own, c, f);
+        add_information(estimator, first + one->a, first + one->b, own, work->c, work->f);
     }
 }
 

@@ -105,7 +105,9 @@ static void add_block(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31
         place = (place + h >= turn) ? ((place + h) - turn) : (place + h);
     }
     add_products(cosine, x, summed, design->sum_shift, self->start == 0u, &sum[RE]);
-    add_products(sine, x, summed, design->sum_shift, self->start == 0u, &sum[IM]);
+    if (h > 0u) {
+        add_products(sine, x, summed, design->sum_shift, self->start == 0u, &sum[IM]);
+    }
     const size_t next = (size_t)self->angle + self->start;
     self->angle = (uint16_t)((next >= turn) ? (next - turn) : next);
 }
@@ -157,11 +159,6 @@ static void join(const pvid_fourier_sums_q31 *self, const pvid_fourier_design_q3
             bits |= (uint32_t)((total < 0) ? -total : total);
         }
         window->length[k][h] = (uint8_t)pvid_bit_length_q31(bits);
-    }
-    if (summed < model->channels) { /* a constant */
-        window->s[summed][h][RE] = (h == 0u) ? (2 * (int32_t)design->hop) : 0;
-        window->s[summed][h][IM] = 0;
-        window->length[summed][h] = (uint8_t)((h == 0u) ? pvid_bit_length_q31(2u * (uint64_t)design->hop) : 0u);
     }
 }
 

@@ -23,7 +23,8 @@ enum {
     STAGE_PROJECT,     /* for each column c_a of C: M c_a, a few non-zeros at a time, then row a of S and F */
     STAGE_ABOVE_NOISE, /* whether S contains more information than noise alone */
     STAGE_FACTOR,      /* Cholesky factor of S + H0; whether p[0] is excited */
-    STAGE_STEP,        /* dp; p and theta after the step */
+    STAGE_STEP,        /* dp, and p after the step */
+    STAGE_THETA,       /* theta after the step */
     STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
     STAGE_COMMIT,      /* writes p, theta, b and rr */
     STAGE_FOLD,        /* ends the group: information.h */
@@ -38,8 +39,8 @@ enum {
 /* Rounding error of rr per step, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
 #define ROUNDING 2.4e-7f
 
-#define ROWS_PER_STAGE 4u
-#define COLUMNS_PER_STAGE 3u
+#define ROWS_PER_STAGE 2u
+#define COLUMNS_PER_STAGE 2u
 
 /* ---- rows ---- */
 
@@ -151,18 +152,19 @@ static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_sol
     solve->above_noise = true;
     if (((self->model->noise != NULL) || (solve->noise != NULL)) && (settings->noise_margin > 0.0f)) {
         float noise[PVID_MAX_P][PVID_MAX_P];
-        if (solve->noise != NULL) {
-            memcpy(noise, solve->noise, sizeof noise);
-        } else {
+        if (solve->noise == NULL) {
             self->model->noise(self->p, self->noise, noise);
         }
-        solve->above_noise = pvid_assess_above_noise_f32(&solve->system, settings, solve->variance, noise);
+        solve->above_noise =
+            pvid_assess_above_noise_f32(&solve->system, settings, solve->variance,
+                                        (solve->noise != NULL) ? solve->noise : (const float (*)[PVID_MAX_P])noise);
     }
 }
 
 static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     for (size_t a = 0; a < self->model->n_p; a++) {
+        solve->diagonal[a] = solve->system.s[a][a];
         solve->system.s[a][a] += self->settings.prior[a];
     }
     const pvid_reason reason = pvid_step_factor_f32(&solve->system, &self->settings, &solve->factor);
@@ -204,8 +206,12 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
     if ((solve->reason != PVID_UPDATED) && (solve->fallback != NULL)) {
         memcpy(solve->p, solve->fallback, sizeof solve->p);
     }
-    model->theta(solve->p, solve->theta);
-    for (size_t i = 0; i < model->n_theta; i++) {
+}
+
+static void theta_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    self->model->theta(solve->p, solve->theta);
+    for (size_t i = 0; i < self->model->n_theta; i++) {
         solve->theta_step[i] = solve->theta[i] - self->theta[i];
     }
     solve->fall = 0.0f;
@@ -255,6 +261,8 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     const float lost = self->information.rounding + (ROUNDING * solve->scale);
     self->information.rounding = (lost <= PVID_RESIDUAL_MAX) ? lost : PVID_RESIDUAL_MAX;
     memcpy(self->p, solve->p, sizeof self->p);
+    solve->system.rss = self->information.high[self->model->n_moments + n] + low[n];
+    solve->system.rounding = self->information.rounding;
     if (steps) {
         pvid_count_up(&self->counters.updates);
     }
@@ -319,6 +327,20 @@ void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_es
     solve->estimate = estimate;
 }
 
+void pvid_estimator_assess_solved_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
+                                      pvid_estimate_f32 *estimate)
+{
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        solve->system.s[a][a] = solve->diagonal[a];
+    }
+    solve->estimate = estimate;
+    solve->noise = NULL;
+    solve->index = 0;
+    solve->stage = STAGE_ABOVE_NOISE;
+}
+
 static void kappa_stage(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
 {
     pvid_estimate_f32 *estimate = solve->estimate;
@@ -367,6 +389,9 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
         break;
     case STAGE_STEP:
         step_stage(self, solve);
+        break;
+    case STAGE_THETA:
+        theta_stage(self, solve);
         break;
     case STAGE_MOVE_B:
         solve->index = (uint8_t)move_b_stage(self, solve, solve->index);
@@ -442,10 +467,15 @@ uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_gro
         return 1;
     }
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
-    return (uint16_t)(projection_stages(model) + 4u + follow + (ends_group ? 1u : 0u));
+    return (uint16_t)(projection_stages(model) + 5u + follow + (ends_group ? 1u : 0u));
 }
 
 uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self)
 {
-    return (uint16_t)(projection_stages(self->model) + 4u + self->model->n_p);
+    return (uint16_t)(projection_stages(self->model) + pvid_estimator_assess_solved_stages_f32(self));
+}
+
+uint16_t pvid_estimator_assess_solved_stages_f32(const pvid_estimator_f32 *self)
+{
+    return (uint16_t)(4u + (uint32_t)self->model->n_p); /* ABOVE_NOISE, KAPPA, WIDEN, SCALE; INVERT */
 }

@@ -1,7 +1,6 @@
 /* The system S dp = F in integers: M, C and S scaled by powers of two such that 30 bits hold all that matters. */
 #include "solve/system_q31.h"
 #include "number/scaled_q31.h"
-#include "solve/assess_q31.h"
 #include "solve/scaled_model_q31.h"
 
 /* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
@@ -228,7 +227,8 @@ void pvid_system_without_table_q31(const pvid_estimator_q31 *self, const pvid_es
                                    int64_t rest[][PVID_MAX_P])
 {
     const int64_t weight = self->information.sums[self->information.n_sums - 1u];
-    const pvid_scaled_q31 row = pvid_assess_row_variance_q31(&self->settings, 0);
+    const int64_t sd = self->settings.row_sd;
+    const pvid_scaled_q31 row = pvid_scaled_of_q31(sd * sd, -2 * PVID_ROW_SD_BITS);
     const pvid_scaled_q31 tables =
         pvid_scaled_over_q31(pvid_scaled_of_q31(weight, -16), pvid_scaled_of_q31((int64_t)self->noise_rows, 0));
     const pvid_scaled_q31 margin = pvid_scaled_of_q31((int64_t)self->settings.noise_margin, -16);

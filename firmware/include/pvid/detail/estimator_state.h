@@ -95,6 +95,7 @@ struct pvid_estimator_solve_f32 {
     float theta[PVID_MAX_THETA];
     float theta_step[PVID_MAX_THETA]; /* dtheta */
     float product[PVID_MAX_THETA];    /* M times a column of C, then M dtheta: b -= product */
+    float diagonal[PVID_MAX_P];       /* of S without H0 */
     pvid_cholesky_f32 factor;
 };
 

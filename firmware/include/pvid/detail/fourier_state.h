@@ -92,7 +92,8 @@ typedef struct {
     uint8_t powers;                  /* of omega^2 in use */
     float omega;                     /* 2 pi / T [rad/s] */
     float weight[PVID_MAX_POWER];    /* c_j of the sensors, variance at the power j of omega^2 */
-    float scale[PVID_MAX_HARMONICS]; /* 1 / sqrt(D_h) */
+    float floor;                     /* least D_h */
+    float scale[PVID_MAX_HARMONICS]; /* D_h, then 1 / sqrt(D_h) */
     float reflection[PVID_MAX_POWER / 2][PVID_FOURIER_PARTS]; /* v of I - v v^T, one of each family in a row */
     float share[PVID_MAX_POWER];                              /* Q_j = tr(R^-1 dR/dc_j) */
 } pvid_fourier_white_f32;
@@ -109,18 +110,27 @@ typedef struct {
     float neighbour[PVID_MAX_P][PVID_MAX_P];
 } pvid_fourier_scores_f32;
 
+/* Orthonormal directions that the test functions leave out, one of each family in a row. */
+typedef struct {
+    float norm[2];                       /* of the present direction of each family, before it was divided by it */
+    float slope[2];                      /* mean of (h/H)^2 over its squares */
+    float direction[PVID_FOURIER_PARTS]; /* the present one */
+    float before[PVID_FOURIER_PARTS];
+    float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of all */
+} pvid_fourier_basis_f32;
+
 /* What the rows of a window need until the last of them is added. */
 typedef struct {
     pvid_reason reason; /* of the solve, with its pointers: they keep their place (pvid/snapshot_fourier.h) */
     const void *pointer[3];
     float window[PVID_MAX_CHANNELS][2][PVID_MAX_HARMONICS]; /* S_h: real parts, imaginary parts */
-    float own[PVID_MAX_COLUMNS];        /* square of each nuisance before projection, then inverse of what remains; then
-                                           squares of theta's columns */
-    float pull[PVID_MAX_THETA];         /* g: what the sensors' noise takes from B */
-    float score[PVID_MAX_THETA];        /* sum N e + g of the window */
-    float gradient[PVID_MAX_THETA];     /* sum N e of the kind */
-    float part[PVID_FOURIER_PARTS];     /* of a direction, then of the present column */
-    float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of the directions */
+    float own[PVID_MAX_COLUMNS];    /* square of each nuisance before projection, then inverse of what remains; then
+                                       squares of theta's columns */
+    float pull[PVID_MAX_THETA];     /* g: what the sensors' noise takes from B */
+    float score[PVID_MAX_THETA];    /* sum N e + g of the window */
+    float gradient[PVID_MAX_THETA]; /* sum N e of the kind */
+    pvid_fourier_basis_f32 basis;
+    float part[PVID_FOURIER_PARTS];                     /* of the present column */
     float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
 } pvid_fourier_rows_f32;
 

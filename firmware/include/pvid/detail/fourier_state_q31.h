@@ -95,14 +95,29 @@ typedef struct {
     int64_t square[2][PVID_MAX_SAMPLES];
 } pvid_fourier_drive_q31;
 
+/* While the noise of a kind's rows is computed anew. */
+typedef struct {
+    int32_t u[PVID_FOURIER_ROWS_Q31];        /* a direction that the test functions leave out, Q30 */
+    int32_t leverage[PVID_FOURIER_ROWS_Q31]; /* sum of the squares of all of them, Q30 */
+    pvid_scaled_q31 share[PVID_MAX_POWER];   /* Q_j */
+    int32_t c[PVID_MAX_C_Q31];               /* C at p: C_k = c_k 2^f_column */
+    int16_t f[PVID_MAX_P];
+} pvid_fourier_noise_work_q31;
+
+/* The columns begin behind that.
+ * MISRA deviation: 19.2; as of pvid_fourier_work_q31. */
+typedef union {
+    pvid_fourier_noise_work_q31 noise;
+    pvid_fourier_columns_q31 columns;
+} pvid_fourier_parts_q31;
+
 /* The rows of a kind while they are made. */
 typedef struct {
     pvid_fourier_white_q31 white;
     pvid_scaled_q31 least;                        /* D_h */
     pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
     uint64_t whole[PVID_MAX_COLUMNS];             /* square of each nuisance before those before it are off */
-    pvid_scaled_q31 share[PVID_MAX_POWER];        /* Q_j, while the noise is computed anew */
-    pvid_fourier_columns_q31 columns;
+    pvid_fourier_parts_q31 parts;
 } pvid_fourier_rows_q31;
 
 /* The rows of all kinds are in the estimator before the solves begin: they use the same memory.
@@ -152,6 +167,8 @@ typedef struct {
 struct pvid_fourier_q31 {
     const pvid_fourier_design_q31 *design;
     const int32_t *drive_min;
+    uint8_t plain; /* samples, if each is a signal; else 0 */
+    uint8_t rest;  /* reason of a tick that ends no step and has no work; 255: there is work */
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */
     bool warm;               /* a window has been complete since the restart */

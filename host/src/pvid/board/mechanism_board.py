@@ -33,6 +33,7 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, samples_of
 from pvid.run.mechanism import model_of
+from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierNoise
@@ -238,6 +239,10 @@ class MechanismBoard:
         return cls(rig, compiled, config, np.zeros((0, config.design.model.samples), np.float32))
 
 
+_KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismBoard, MechanismBoardQ31)
+BOARDS = dict(zip(ENGINE_CORES, _KINDS, strict=True))
+
+
 def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
     """From the text of a log; None: that of another kind of rig.
 
@@ -253,9 +258,8 @@ def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
     rig = MechanismRig.of_document(document)
     if rig.model not in shipped():
         raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
-    made = MechanismBoardQ31 if engine.pop("core", "f32") == "q31" else MechanismBoard
     try:
-        return made.of_tables(rig, engine)
+        return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
 

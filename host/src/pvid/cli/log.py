@@ -179,11 +179,10 @@ def _described(
             return None
         if model is None or rig_path is not None:
             raise PvidError("--core is for a mechanism that --model names: a rig file sets that of the pendulum")
-    from pvid.board.mechanism_board import MechanismBoard  # loads SymPy
-    from pvid.board.mechanism_board_q31 import MechanismBoardQ31
+    from pvid.board.mechanism_board import BOARDS  # loads SymPy
     from pvid.run.mechanism import model_of
 
-    made = MechanismBoardQ31 if core == "q31" else MechanismBoard
+    made = BOARDS[core or "f32"]
     if described is None:
         return made.of_shipped_rig(model or "")
     if run_path is None and rig_path is None:

@@ -25,7 +25,6 @@ _ROOTS_PER_STAGE = 4
 _UNITS_PER_STAGE = 4
 _RESIDUALS_PER_STAGE = 2
 _SHARES_PER_STAGE = 2
-_NOISES_PER_STAGE = 2
 _NOISE_WINDOWS = 16
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
@@ -40,7 +39,7 @@ def _parts(count: int, few: int) -> int:
 def _noise_stages(design: FourierDesignQ31) -> int:
     """Of a kind, where the noise is computed anew."""
     harmonics = design.highest + 1
-    return design.power + _parts(harmonics, _SHARES_PER_STAGE) + _parts(len(design.noise), _NOISES_PER_STAGE)
+    return design.power + _parts(harmonics, _SHARES_PER_STAGE) + 1 + len(design.noise)
 
 
 def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int = 0) -> int:
