@@ -24,13 +24,13 @@ def verify_recording(
     core: Core = "f32",
     progress: Callable[[int], None] | None = None,
 ) -> Verdict:
-    """Plays it on a target, with the design that the recording asks for; every hash is compared.
+    """Plays it on a target, with the settings of `identify`; every hash is compared.
 
     Raises
     ------
     PvidError
         When the target cannot be started or refuses, or the engine does not have what the model needs.
     """
-    board = _BOARDS[core].of_recording(rig, recording)
+    board = _BOARDS[core].of_recording(rig, recording, to_identify=True)
     samples = board.recording.T
     return verify(target, board.without_recording(), Native(), *samples, progress=progress)
