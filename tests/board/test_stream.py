@@ -97,10 +97,10 @@ def standard(form: str, core: str = "f32") -> Standard:
     rig = MechanismRig(DEFAULT, known=simulated_rig(DEFAULT).knowns)
     if core == "q31":
         fixed = fixed_run(DEFAULT, TICKS)
-        board = MechanismBoardQ31(rig, fixed.engine, fixed.counts).without_recording()
+        board = MechanismBoardQ31(rig, fixed.engine, fixed.counts).without_recording
         return Standard(board, tuple(fixed.counts.T), mechanism_image_q31.native_hashes(fixed))
     made = mechanism_run(DEFAULT, TICKS)
-    own = MechanismBoard(rig, made.compiled, made.config, made.samples).without_recording()
+    own = MechanismBoard(rig, made.compiled, made.config, made.samples).without_recording
     return Standard(own, tuple(made.samples.T), mechanism_image.native_hashes(made))
 
 

@@ -33,4 +33,4 @@ def verify_recording(
     """
     board = _BOARDS[core].of_recording(rig, recording, to_identify=True)
     samples = board.recording.T
-    return verify(target, board.without_recording(), Native(), *samples, progress=progress)
+    return verify(target, board.without_recording, Native(), *samples, progress=progress)

@@ -24,7 +24,7 @@ from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Sample, Source
+from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
@@ -130,13 +130,8 @@ class MechanismBoard:
     def _shared(self) -> FourierConfig:
         """The settings of an image: neutral values for what a Configure frame brings."""
         ones = np.ones(len(self.compiled.unknowns), np.float32)
-        neutral: dict[str, Any] = {
-            **dict.fromkeys(_PER_PARAMETER, ones),
-            "row_sd": 1.0,
-            "forgetting_s": 0.0,
-            "feedback_hz": 0.0,
-        }
-        own = replace(self.config.estimator, divider=1, law=Law.STATIONARY, **neutral)
+        neutral: dict[str, Any] = {**dict.fromkeys(_PER_PARAMETER, ones), "row_sd": 1.0, "forgetting_s": 0.0}
+        own = replace(self.config.estimator, feedback_hz=0.0, divider=1, law=Law.STATIONARY, **neutral)
         return replace(self.config, estimator=own)
 
     @property
@@ -175,23 +170,6 @@ class MechanismBoard:
             sensor="sensor_recording.c",
             sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
         )
-
-    def without_recording(self) -> MechanismBoard:
-        """The same for samples that the PC sends: C has no empty table, so one sample is left."""
-        return replace(self, recording=self.recording[:1])
-
-    def samples(self, *signals: npt.ArrayLike) -> tuple[npt.NDArray[np.float32], ...]:
-        """Signals [ticks], in the order of `names`, as the identifier takes them."""
-        return tuple(np.asarray(one, np.float32) for one in signals)
-
-    def sample(self, *parts: npt.NDArray[Any]) -> Sample:
-        """The frame of consecutive samples."""
-        return Sample.of_values(*parts)
-
-    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
-        """Running hash after every tick in the core on this machine [ticks]; the library is the mechanism's own."""
-        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
-        return identifier.run_samples(np.stack(self.samples(*signals), axis=1), sums=False).hash
 
     def configure(
         self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC, first_tick: int = 0
@@ -236,6 +214,24 @@ class MechanismBoard:
     def twin_of(self, frame: Configuration) -> FourierTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
         return FourierTwin(self.configured(frame))
+
+    @property
+    def without_recording(self) -> MechanismBoard:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """Signals [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.float32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Sample.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""

@@ -22,7 +22,7 @@ from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
 from pvid.design.fourier_q31 import circle_of
-from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Source
+from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
 from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
@@ -121,6 +121,24 @@ class MechanismBoardQ31:
         return self.engine.sample_rate
 
     @property
+    def without_recording(self) -> MechanismBoardQ31:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.int32]:
+        """Counts [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.int32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Count.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native_q31(self.engine.made, self.engine.parameters, self.engine.config).identifier()
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
+
+    @property
     def _sizes(self) -> dict[str, int]:
         model = self.engine.parameters.model
         return sizes_of_q31(self.config.design, model.n_p, len(model.c_row))
@@ -157,23 +175,6 @@ class MechanismBoardQ31:
             sensor="sensor_recording.c",
             sizes={macro: str(value) for macro, value in raised(sizes).items()},
         )
-
-    def without_recording(self) -> MechanismBoardQ31:
-        """The same for samples that the PC sends: C has no empty table, so one sample is left."""
-        return replace(self, recording=self.recording[:1])
-
-    def samples(self, *signals: npt.ArrayLike) -> tuple[npt.NDArray[np.int32], ...]:
-        """Signals [ticks], in the order of `names`, as the identifier takes them."""
-        return tuple(np.asarray(one, np.int32) for one in signals)
-
-    def sample(self, *parts: npt.NDArray[Any]) -> Count:
-        """The frame of consecutive samples."""
-        return Count.of_values(*parts)
-
-    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
-        """Running hash after every tick in the core on this machine [ticks]; the library is the mechanism's own."""
-        identifier = fourier_native_q31(self.engine.made, self.engine.parameters, self.config).identifier()
-        return identifier.run_samples(np.stack(self.samples(*signals), axis=1), sums=False).hash
 
     def configure(
         self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC, first_tick: int = 0

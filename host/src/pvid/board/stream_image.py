@@ -6,18 +6,16 @@ import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import StreamRig
 from pvid.core.host_compiler import objects_of, run_compiler
-from pvid.core.native import Native
 from pvid.core.sources import FIRMWARE, FOLDERS, core_sources, left_out
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import Configuration, Message, Source
+from pvid.link.frames import Configuration, Source
 from pvid.link.names import names_of
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.settings.enums import Core
@@ -111,15 +109,6 @@ class Streamed(Protocol):
     def configure(
         self, settings: int, hash_every: int, estimate_every: int, source: Source = ..., first_tick: int = ...
     ) -> Configuration: ...
-
-    def samples(self, *signals: npt.ArrayLike) -> tuple[npt.NDArray[Any], ...]:
-        """Signals [ticks] as the identifier takes them."""
-
-    def sample(self, *parts: npt.NDArray[Any]) -> Message:
-        """The frame of consecutive samples."""
-
-    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
-        """Running hash after every tick in the core on this machine [ticks]."""
 
 
 def image_of(rig: StreamRig | Streamed) -> StreamImage:

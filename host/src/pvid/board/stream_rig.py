@@ -76,18 +76,19 @@ class StreamRig:
         """phi and y [n] as the identifier gets them, from what the board's own sensors count [n, 2]."""
         return self.case.from_counts(counts, (self.phi_lsb, self.y_lsb))
 
-    def samples(self, *signals: npt.ArrayLike) -> tuple[Samples, ...]:
-        """phi [n] and y [n] as the identifier takes them: float32 in rad and m, or counts."""
-        return tuple(np.asarray(one, self.case.sample_type) for one in signals)
+    def readings(self, *signals: npt.ArrayLike) -> Samples:
+        """phi [n] and y [n] as the identifier takes them [n, 2]: float32 in rad and m, or counts."""
+        return np.stack([np.asarray(one, self.case.sample_type) for one in signals], axis=1)
 
-    def sample(self, *parts: Samples) -> Message:
-        """The frame of consecutive samples."""
-        made: Message = self.case.frame.of_values(*parts)
+    def frame(self, readings: Samples) -> Message:
+        """The frame of consecutive ticks [n, 2]."""
+        made: Message = self.case.frame.of_values(*readings.T)
         return made
 
     def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the core on this machine, uint32 [n]."""
-        return native.identifier(self.config).run(*signals, sums=False).hash
+        phi, y = signals
+        return native.identifier(self.config).run(phi, y, sums=False).hash
 
     def configure(
         self,

@@ -12,8 +12,9 @@ import select
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -42,10 +43,26 @@ from pvid.link.frames import Status as BoardStatus
 from pvid.link.port import Port, open_port
 from pvid.settings.enums import Status
 
-SAMPLES_A_FRAME = 64  # ticks of two signals: 512 bytes, the longest payload that a board receives
+NUMBERS_A_FRAME = 128  # samples of all sensors: what a board receives at once
 HOST_TARGET = "stream-host"
 EMULATORS = tuple(name for name, board in BOARDS.items() if board.toolchain != "avr")
 _COMING_UP_S = 20.0  # longest wait for an emulator's first word: it always has one, however busy the machine
+
+
+class PlayedBoard(Streamed, Protocol):
+    """A board with the engine of a described mechanism, for which a run can be played."""
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[Any]:
+        """The signals [ticks] as the identifier takes them [ticks, samples]."""
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+
+    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the core on this machine [ticks]."""
+
+
+Played = StreamRig | PlayedBoard
 
 
 class PortGoneError(Exception):
@@ -202,8 +219,8 @@ class Player:
     def __init__(
         self,
         target: Target,
-        rig: StreamRig | Streamed,
-        signals: Sequence[npt.ArrayLike],
+        rig: Played,
+        signals: tuple[npt.ArrayLike, ...],
         hash_every: int,
         estimate_every: int,
         reopen: Callable[[], Target] | None,
@@ -212,12 +229,11 @@ class Player:
         self.target = target
         self.rig = rig
         self.settings = settings_number(rig)
-        self.samples = rig.samples(*signals)
-        self.a_frame = 2 * SAMPLES_A_FRAME // len(self.samples)  # ticks
+        self.readings = rig.readings(*signals)
         self.estimate_every = estimate_every
         self.reopen = reopen
         self.progress = progress
-        self.account = Playback(ticks=len(self.samples[0]), hash_every=hash_every)
+        self.account = Playback(ticks=len(self.readings), hash_every=hash_every)
         self.decoder = Decoder(self.account.received)
         self.sequence = 0
         self.furthest = 0  # first sample that has never been sent in this session
@@ -240,8 +256,8 @@ class Player:
     def _send_samples(self) -> None:
         limit = min(self.account.ticks, self.account.done + self.room)
         while self.running and self.next < limit:
-            end = min(self.next + self.a_frame, limit)
-            self._send(self.rig.sample(*(one[self.next : end] for one in self.samples)), self.next)
+            end = min(self.next + NUMBERS_A_FRAME // self.readings.shape[1], limit)
+            self._send(self.rig.frame(self.readings[self.next : end]), self.next)
             self.account.sent += end - self.next
             self.account.repeated += max(0, min(self.furthest, end) - self.next)
             self.furthest = max(self.furthest, end)
@@ -399,7 +415,7 @@ def refusal(status: BoardStatus) -> str:
 
 def play(
     target: Target,
-    rig: StreamRig | Streamed,
+    rig: Played,
     *signals: npt.ArrayLike,
     hash_every: int = 500,
     estimate_every: int = 0,
@@ -414,7 +430,7 @@ def play(
     Parameters
     ----------
     signals
-        [ticks] each: phi and y in rad and m, in counts for the fixed-point core; of a described mechanism its samples.
+        Of every sensor [ticks], in its unit; in counts for the fixed-point core. Of the pendulum phi and y.
     hash_every, estimate_every
         Ticks between checkpoints of the running hash and between estimates; 0: the last only.
     patience_s
@@ -493,7 +509,7 @@ def targets_of(names: tuple[str, ...]) -> list[str]:
 
 def verify(
     name: str,
-    rig: StreamRig | Streamed,
+    rig: Played,
     native: Native,
     *signals: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,
