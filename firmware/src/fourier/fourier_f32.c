@@ -119,6 +119,18 @@ static void restart(pvid_fourier_f32 *self)
     rest(self);
 }
 
+static pvid_status init_refinement(pvid_fourier_f32 *self, const pvid_fourier_refine_f32 *refine)
+{
+    if (refine == NULL) {
+        return PVID_OK;
+    }
+    if (refine->stage == NULL) {
+        return PVID_BAD_POINTER;
+    }
+    self->refine = refine;
+    return refine->stage->init(refine->storage, refine->config);
+}
+
 static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
 {
     const pvid_fourier_design_f32 *design = config->design;
@@ -171,7 +183,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
         return PVID_BAD_ITERATIONS;
     }
     restart(self);
-    return PVID_OK;
+    return init_refinement(self, config->refine);
 }
 
 pvid_status pvid_fourier_init_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
@@ -184,6 +196,9 @@ void pvid_fourier_gap_f32(pvid_fourier_f32 *self)
 {
     if (is_ready(self)) {
         restart(self);
+        if (self->refine != NULL) {
+            self->refine->stage->gap(self->refine->storage);
+        }
     }
 }
 
@@ -191,6 +206,9 @@ void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen)
 {
     if (is_ready(self)) {
         self->frozen = frozen;
+        if (self->refine != NULL) {
+            self->refine->stage->freeze(self->refine->storage, frozen);
+        }
     }
 }
 
@@ -374,7 +392,8 @@ PVID_SELDOM static pvid_reason odd_tick(pvid_fourier_f32 *self, const float samp
     return follow(self, sample);
 }
 
-pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
+/* A tick of the weak form. */
+static inline pvid_reason weak_tick(pvid_fourier_f32 *self, const float sample[])
 {
     if ((self == NULL) || (sample == NULL) || (self->plain == 0u)) {
         return other_tick(self, sample);
@@ -384,6 +403,27 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
     }
     pvid_fourier_front_add_f32(&self->front, self->plain, sample);
     return follow(self, sample);
+}
+
+/* A tick of both stages. */
+PVID_SELDOM static pvid_reason both_ticks(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_reason reason = weak_tick(self, sample);
+    const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
+    if (sample != NULL) {
+        self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL);
+    }
+    return reason;
+}
+
+pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
+{
+    return ((self != NULL) && (self->refine != NULL)) ? both_ticks(self, sample) : weak_tick(self, sample);
+}
+
+const pvid_estimate_f32 *pvid_fourier_candidate_f32(const pvid_fourier_f32 *self)
+{
+    return (self != NULL) ? &self->finish.candidate : NULL;
 }
 
 const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self)

@@ -188,6 +188,7 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
+    const pvid_fourier_refine_f32 *refine; /* second stage; NULL: none */
     uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
     uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: fourier_f32.c */
     bool warm;         /* a window has been complete since the restart */

@@ -27,6 +27,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "identify": "Identify the parameters from a recorded or simulated run.",
         "tune": "Choose the settings of the weak form for a recorded run.",
         "plot": "Draw a report of a log or a run.",
+        "batch": "Identify many runs and logs in parallel; one row each, and a page of drifts.",
     },
     "Boards": {
         "log": "Record a board's samples and estimates.",

@@ -17,6 +17,7 @@ from pvid.cli.input import columns_option
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.model.compiled import CompiledModel
+    from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
     from pvid.rig.run import Recording
     from pvid.settings.fourier import FourierConfig
@@ -243,22 +244,27 @@ def simulate(
     return DONE
 
 
-def _of_rig(model: str, rig_path: Path | None, run_path: Path | None) -> tuple[CompiledModel, MechanismRig | None]:
+def _of_rig(
+    model: str, rig_path: Path | None, run_path: Path | None
+) -> tuple[CompiledModel, MechanismRig | RigFile | None]:
     """The model with the values of a rig file, and that file; the one beside a run counts."""
     from pvid.log.mechanism_settings import mechanism_rig
+    from pvid.log.rig_settings import rig_for
     from pvid.models.mechanisms import compiled_of
+    from pvid.rig.described import described
 
     if rig_path is None and run_path is None:
         return compiled_of(model), None
     rig = mechanism_rig(run_path, rig_path, (), model)
-    if rig is None:
-        raise PvidError(f"{model} takes no rig file of a described mechanism: omit --rig and --run")
-    return rig.applied(compiled_of(model)), rig
+    if rig is not None:
+        return rig.applied(compiled_of(model)), rig
+    own = rig_for(run_path, rig_path)
+    return described(own).applied(compiled_of(model)), own
 
 
 def _design_of(
     compiled: CompiledModel,
-    rig: MechanismRig | None,
+    rig: MechanismRig | RigFile | None,
     model: str,
     run_path: Path | None,
     columns: str | None,
@@ -283,7 +289,7 @@ def _design_of(
 
 def _fixed_weak(
     compiled: CompiledModel,
-    rig: MechanismRig | None,
+    rig: MechanismRig | RigFile | None,
     run_path: Path | None,
     columns: str | None,
     functions: int | None,
@@ -304,11 +310,17 @@ def _fixed_weak(
     return files_of(engine, title), None
 
 
-def _recorded(compiled: CompiledModel, rig: MechanismRig | None, run_path: Path, columns: str | None) -> Recording:
+def _recorded(
+    compiled: CompiledModel, rig: MechanismRig | RigFile | None, run_path: Path, columns: str | None
+) -> Recording:
+    from pvid.cli.mechanism import recording_of
     from pvid.rig.columns import parsed
+    from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import channels_of
     from pvid.rig.run import read_recording
 
+    if isinstance(rig, RigFile):
+        return recording_of(run_path, rig, columns)[0]
     rate = None if rig is None else rig.sample_rate
     recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
     recording.refuse_damaged()

@@ -20,6 +20,7 @@ from pvid.settings.enums import Core
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
 _ROOMS = ("number", "solve", "judge", "fourier", "keep")
+_REFINED = "refine_model_f32.h"  # a text that comes with the second stage
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"
 
@@ -63,11 +64,13 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def _sources(core: Core) -> list[Path]:
-    rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in _ROOMS]
+def _sources(core: Core, refined: bool) -> list[Path]:
+    names = (*_ROOMS, "refine") if refined else _ROOMS
+    rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in names]
     return [
         *(path for path in rooms if not path.stem.endswith(ENGINE_CORES[core].without)),
         NATIVE / f"{ENGINE_CORES[core].replay}.c",
+        *([NATIVE / "replay_refine.c"] if refined else []),
     ]
 
 
@@ -95,10 +98,11 @@ def _build(
         folder = Path(made) / "library"
         folder.mkdir()
         for name, text in texts.items():
+            (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")
-        options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}", f"-I{folder}"]
+        options = [*_FLAGS, *definitions, f"-I{folder}", *INCLUDES, f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        objects = objects_of(compiler, options, [*code, *_sources(core)], Path(made))
+        objects = objects_of(compiler, options, [*code, *_sources(core, _REFINED in texts)], Path(made))
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
         declared = _declarations(compiler, headers, options, Path(made), core)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
@@ -115,7 +119,8 @@ def _declarations(compiler: str, headers: Sequence[str], options: list[str], fol
     empty.mkdir()
     for name in _STANDARD:
         (empty / f"{name}.h").write_text("", encoding="utf-8")
-    own = [f'#include "{name}"' for name in headers]
+    replays = [f"{ENGINE_CORES[core].replay}.h", *(["replay_refine.h"] if _REFINED in headers else [])]
+    own = [f'#include "{name}"' for name in (*replays, *headers) if name != _REFINED]
     top = folder / "native.h"
-    top.write_text("\n".join([f'#include "{ENGINE_CORES[core].replay}.h"', *own, ""]), encoding="utf-8")
+    top.write_text("\n".join([*own, ""]), encoding="utf-8")
     return run_compiler([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])

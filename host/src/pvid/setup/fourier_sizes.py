@@ -57,7 +57,7 @@ def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]
         "PVID_MAX_C_Q31": n_c,
         "PVID_MAX_SAMPLES": model.samples,
         "PVID_MAX_INPUTS": len(model.jet) + model.runs + model.signs,
-        "PVID_MAX_CHANNELS": max(len(model.channel), model.gains),
+        "PVID_MAX_CHANNELS": max(sum(one.gain != NONE for one in model.channel), model.gains),
         "PVID_MAX_INTEGRANDS": max(model.integrands, model.runs, model.signs),
         "PVID_MAX_KINDS": len(model.kind),
         "PVID_MAX_COLUMNS": max(one.columns for one in model.kind),

@@ -176,6 +176,16 @@ class FourierTwin:
             after(tick, reason[tick])
         return work
 
+    @property
+    def samples(self) -> int:
+        """Of a tick."""
+        return self.config.design.model.samples
+
+    @property
+    def reach(self) -> int:
+        """Ticks from a sample until the identifier has processed it completely, at most."""
+        return self.config.ticks_needed
+
     def follow(self, samples: npt.ArrayLike, after: After) -> Reasons:
         """Like `run` without a record: calls `after` after every tick.
 

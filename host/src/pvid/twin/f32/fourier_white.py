@@ -117,7 +117,7 @@ class White:
                 slope[place] = total(square * part)
             u, before = following, u if k else before
             self.reflections.append(self._reflections_of(u))
-        return leverage
+        return np.asarray(leverage, np.float32)
 
     def _reflections_of(self, u: Float32) -> Float32:
         """Those of both families that follow from the next direction [parts, lanes]."""
