@@ -43,8 +43,10 @@ _STRUCTS = (
     ("two blocks of four steps", "sizeof(((pvid_fourier_sums_q31 *)0)->block)"),
     ("sums of the last whole window", "sizeof(pvid_fourier_window_q31)"),
     ("rows while they are made, or a solve", "sizeof(pvid_fourier_work_q31)"),
-    ("gates, noise, formats of the rows", "sizeof(pvid_fourier_finish_q31) - sizeof(pvid_fourier_work_q31)"
-     " - sizeof(pvid_estimate_q31)"),
+    (
+        "gates, noise, formats of the rows",
+        "sizeof(pvid_fourier_finish_q31) - sizeof(pvid_fourier_work_q31) - sizeof(pvid_estimate_q31)",
+    ),
     ("estimates: candidate, published, its copy", "3 * sizeof(pvid_estimate_q31)"),
     ("sums M, b and rr", "sizeof(pvid_information_q31)"),
     ("the rest of the estimator", "sizeof(pvid_estimator_q31) - sizeof(pvid_information_q31)"),
