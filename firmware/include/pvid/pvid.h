@@ -23,6 +23,7 @@
 #include "pvid/refine.h"
 #include "pvid/snapshot.h"
 #include "pvid/snapshot_fourier.h"
+#include "pvid/snapshot_refine.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
 #include "pvid/text.h"

@@ -162,13 +162,13 @@ pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[
         return PVID_NOT_READY;
     }
     const pvid_model_f32 *model = self->model;
-    bool finite = true;
-    bool fits = true;
+    uint32_t largest = 0; /* bits are ordered like absolute values, infinity and NaN last */
     for (size_t i = 0; i < model->n_theta; i++) {
-        finite = finite && pvid_finite_f32(g[i]);
-        fits = fits && pvid_within_f32(g[i], -PVID_ROW_LIMIT * PVID_ROW_LIMIT, PVID_ROW_LIMIT * PVID_ROW_LIMIT);
+        const uint32_t size = pvid_bits_f32(g[i]) & 0x7FFFFFFFu;
+        largest = (size > largest) ? size : largest;
     }
-    if (!fits) {
+    if (largest > pvid_bits_f32(PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {
+        const bool finite = largest < 0x7F800000u;
         pvid_count_up(finite ? &self->counters.rejected_saturated : &self->counters.rejected_not_finite);
         return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
     }

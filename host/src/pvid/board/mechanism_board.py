@@ -19,10 +19,12 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_design, files_fourier
 from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Source
+from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
@@ -200,6 +202,24 @@ class MechanismBoard:
     def twin_of(self, frame: Configuration) -> FourierTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
         return FourierTwin(self.configured(frame))
+
+    @property
+    def without_recording(self) -> MechanismBoard:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """Signals [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.float32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Sample.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""

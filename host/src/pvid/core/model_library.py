@@ -19,6 +19,7 @@ from pvid.settings.engine_cores import FLOAT, EngineCore
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
 _ROOMS = ("number", "solve", "judge", "keep")  # of every form
+_REFINED = "refine_model_f32.h"  # a text that comes with the second stage
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"
 
@@ -62,11 +63,14 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def _sources(engine: EngineCore) -> list[Path]:
-    rooms = (*_ROOMS, engine.room)
-    found = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in rooms]
-    kept = [path for path in found if not path.stem.endswith(engine.without)]
-    return kept if engine.replay is None else [*kept, NATIVE / f"{engine.replay}.c"]
+def _sources(engine: EngineCore, refined: bool) -> list[Path]:
+    names = (*_ROOMS, engine.room, *(["refine"] if refined else []))
+    rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in names]
+    replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if refined else [])]
+    return [
+        *(path for path in rooms if not path.stem.endswith(engine.without)),
+        *(NATIVE / f"{replay}.c" for replay in replays),
+    ]
 
 
 @cache
@@ -93,10 +97,11 @@ def _build(
         folder = Path(made) / "library"
         folder.mkdir()
         for name, text in texts.items():
+            (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")
-        options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}", f"-I{folder}"]
+        options = [*_FLAGS, *definitions, f"-I{folder}", *INCLUDES, f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        objects = objects_of(compiler, options, [*code, *_sources(engine)], Path(made))
+        objects = objects_of(compiler, options, [*code, *_sources(engine, _REFINED in texts)], Path(made))
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
         declared = _declarations(compiler, headers, options, Path(made), engine)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
@@ -113,7 +118,9 @@ def _declarations(compiler: str, headers: Sequence[str], options: list[str], fol
     empty.mkdir()
     for name in _STANDARD:
         (empty / f"{name}.h").write_text("", encoding="utf-8")
-    replay = [] if engine.replay is None else [f"{engine.replay}.h"]
+    refine = ["replay_refine.h"] if _REFINED in headers else []
+    replays = [*([] if engine.replay is None else [f"{engine.replay}.h"]), *refine]
+    own = [f'#include "{name}"' for name in (*replays, *headers) if name != _REFINED]
     top = folder / "native.h"
-    top.write_text("".join(f'#include "{name}"\n' for name in (*replay, *headers)), encoding="utf-8")
+    top.write_text("\n".join([*own, ""]), encoding="utf-8")
     return run_compiler([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])
