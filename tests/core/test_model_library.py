@@ -56,7 +56,7 @@ def test_it_is_compiled_once_for_the_same_content() -> None:
 
 
 def test_code_that_does_not_compile_is_one_sentence() -> None:
-    with pytest.raises(PvidError, match="refused the code of the mechanism: .*error"):
+    with pytest.raises(PvidError, match="refused the code: .*error"):
         model_library.model_library("tiny", texts("2.0f +"), {})
 
 

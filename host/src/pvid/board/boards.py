@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import select
 import shutil
@@ -14,11 +13,11 @@ from pathlib import Path
 from filelock import FileLock
 
 from pvid.base.errors import PvidError
+from pvid.core.host_compiler import compiled_once
 from pvid.core.sources import ROOT, build_folder
 
 BUILD = build_folder() / "targets"
 SIMAVR_STDIO = BUILD / "simavr_stdio"
-COMPILED = build_folder() / "cache" / "ccache"  # objects of all trees
 
 
 @dataclass(frozen=True)
@@ -131,8 +130,7 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
     configure += [f"-DPVID_BOARD={target.name}", "-DPVID_DEVELOPER=ON"]
     configure += [f"-D{name}={value}" for name, value in options.items()]
     configure += ["-DCMAKE_C_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
-    # Trees of one processor hold the same objects but for a macro or two: compiled once.
-    environment = {**os.environ, "CCACHE_DIR": str(COMPILED), "CCACHE_NOHASHDIR": "true"}
+    environment = compiled_once()
     with one_at_a_time(tree):
         for command in (configure, ["cmake", "--build", str(tree)]):
             done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)

@@ -139,4 +139,4 @@ def build_fixed_image(target: Board, run: FixedRun) -> tuple[Path, Path]:
     -------
     The image, and the tree it was built in.
     """
-    return build_with(target, f"{run.name}-fourier-q31-{len(run.counts)}", files_of(run), run.sizes)
+    return build_with(target, f"{run.name}-fourier-q31-{len(run.counts)}", files_of(run), run.sizes, "q31")

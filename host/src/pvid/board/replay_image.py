@@ -18,6 +18,7 @@ from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.boards import run as run_image
 from pvid.cases import Samples, case_of
 from pvid.core.native import Native
+from pvid.core.sources import left_out
 from pvid.design.c_tables import float_literal
 from pvid.rig.file import RigFile
 from pvid.settings.enums import Core, Form
@@ -293,7 +294,7 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
     name = f"{run.form}-{run.core}-{run.ticks}-{zlib.crc32(text.encode()):08x}"
     folder = BUILD / "runs" / name
     keep_header(folder, "replay_run.h", text)
-    options = {"PVID_REPLAY_RUN": str(folder)}
+    options = {"PVID_REPLAY_RUN": str(folder), "PVID_LEAVE_OUT": left_out(run.form, run.core)}
     options |= case_of(run.config).sizes(run.config, exact=target.toolchain == "avr")
     options |= macros or {}
     suffix = "".join(f"-{macro}-{value}" for macro, value in (macros or {}).items())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
+import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
-from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import StreamRig
-from pvid.core.sources import FIRMWARE, FOLDERS, sources_of
+from pvid.core.host_compiler import objects_of, run_compiler
+from pvid.core.sources import FIRMWARE, FOLDERS, core_sources, left_out
 from pvid.design.c_tables import float_literal
 from pvid.link.frames import Configuration, Source
 from pvid.link.names import names_of
@@ -77,6 +77,7 @@ class StreamImage:
     number : CRC-32 of all that the bits depend on
     macros : lines of stream_rig.h
     files : generated headers and sources by name
+    form : weak, strong, or fourier for the engine of any mechanism
     core : arithmetic
     identifier : firmware/apps/stream/identifier_<identifier>.c
     sensor : a file of firmware/apps/stream
@@ -86,6 +87,7 @@ class StreamImage:
     number: int
     macros: list[str]
     files: dict[str, str]
+    form: str
     core: Core
     identifier: str
     sensor: str
@@ -117,6 +119,7 @@ def image_of(rig: StreamRig | Streamed) -> StreamImage:
         number=settings_number(rig),
         macros=[*_macros(rig), *_described(rig)],
         files={"stream_tables.h": _tables(rig)},
+        form=rig.case.form,
         core=rig.case.core,
         identifier=rig.case.core,
         sensor="sensor.c",
@@ -155,15 +158,17 @@ def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
         with one_at_a_time(tree):
             return _build_for_host(image, folder, tree)
     options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": image.identifier, **image.sizes}
+    options["PVID_LEAVE_OUT"] = left_out(image.form, image.core)
     tree = build(board, BUILD / f"{board.name}-{name}", options)
     return tree / "apps" / "stream" / "stream.elf"
 
 
 def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
-    """With the options of the core (firmware/cmake/PvidCompile.cmake); what the other core alone needs is left out."""
+    """With the options of the core (firmware/cmake/PvidCompile.cmake); without what it does not link."""
     application = FIRMWARE / "apps" / "stream"
+    needless = re.compile(left_out(made.form, made.core))
     sources = [
-        *sources_of(made.core),
+        *(path for path in core_sources() if not needless.search(path.as_posix())),
         FIRMWARE / "link" / "link.c",
         FIRMWARE / "ports" / "host" / "port.c",
         FIRMWARE / "ports" / "host" / "receiver.c",
@@ -174,14 +179,12 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
     inputs = [*sources, *folder.glob("*.h"), *FIRMWARE.glob("**/*.h")]
     if image.exists() and image.stat().st_mtime > max(one.stat().st_mtime for one in inputs):
         return image
-    tree.mkdir(parents=True, exist_ok=True)
-    fresh = tree / "stream.new"
     includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports", folder]
-    command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
-    command += [f"-D{name}={value}" for name, value in made.sizes.items()]
-    command += [f"-I{one}" for one in includes] + [str(one) for one in sources] + ["-lm", "-o", str(fresh)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise PvidError(f"the stream image for this machine did not build: {done.stderr.strip()[:300]}")
+    options = ["-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
+    options += [f"-D{name}={value}" for name, value in made.sizes.items()] + [f"-I{one}" for one in includes]
+    tree.mkdir(parents=True, exist_ok=True)
+    objects = objects_of("gcc", options, sources, tree)
+    fresh = tree / "stream.new"
+    run_compiler(["gcc", *objects, "-lm", "-o", str(fresh)])
     fresh.replace(image)
     return image

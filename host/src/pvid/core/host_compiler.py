@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 from pvid.base.errors import PvidError
+from pvid.core.sources import build_folder
 
 
 def host_compiler(what: str) -> str:
@@ -25,3 +30,48 @@ def host_compiler(what: str) -> str:
         if found:
             return found
     raise PvidError(f"{what} needs a C compiler (cc, gcc or clang, or the one that CC names), and there is none")
+
+
+def compiled_once() -> Mapping[str, str]:
+    """The environment in which ccache, where it is installed, keeps the objects of all builds in the cache of builds.
+
+    Trees of one processor hold the same objects but for a macro or two.
+    """
+    return {**os.environ, "CCACHE_DIR": str(build_folder() / "cache" / "ccache"), "CCACHE_NOHASHDIR": "true"}
+
+
+def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], folder: Path) -> list[str]:
+    """Compiles each source into a folder, side by side; the names of the objects.
+
+    Raises
+    ------
+    PvidError
+        When the compiler refuses one; the sentence has its first error.
+    """
+    ccache = shutil.which("ccache")
+    environment = compiled_once()
+
+    def made(source: Path) -> str:
+        place = str(folder / f"{source.parent.name}-{source.stem}.o")  # a generated source may have the name of another
+        command = [*([ccache] if ccache else []), compiler, *options, "-c", str(source), "-o", place]
+        run_compiler(command, environment)
+        return place
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(made, sources))
+
+
+def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None) -> str:
+    """What it prints.
+
+    Raises
+    ------
+    PvidError
+        When it fails, with its first error.
+    """
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
+        told = (lines or done.stderr.splitlines() or ["no output"])[0]
+        raise PvidError(f"the C compiler refused the code: {told.strip()[:300]}")
+    return done.stdout

@@ -19,6 +19,7 @@ FOLDERS = (*PUBLIC_FOLDERS, SRC, MODEL)
 PUBLIC_INCLUDES = [f"-I{folder}" for folder in PUBLIC_FOLDERS]
 INCLUDES = [f"-I{folder}" for folder in FOLDERS]
 _CORES = ("_f32", "_q31")
+_FORMS = ("weak", "strong", "fourier", "refine")  # rooms of a form's own
 
 
 def build_folder() -> Path:
@@ -34,6 +35,16 @@ def core_sources(pattern: str = "*.c") -> list[Path]:
 def sources_of(core: str) -> list[Path]:
     """The sources of one core, f32 or q31, and those that both need."""
     return [path for path in core_sources() if not path.stem.endswith(_CORES) or path.stem.endswith(f"_{core}")]
+
+
+def left_out(form: str, core: str, *also: str) -> str:
+    """PVID_LEAVE_OUT of an image with a form's identifier: a regular expression of what it does not link.
+
+    `also`: further rooms that it links.
+    """
+    rooms = "|".join(room for room in _FORMS if room not in (form, *also))
+    cores = "|".join(other for other in _CORES if other != f"_{core}")
+    return rf"/src/({rooms})/|({cores})\.c$"
 
 
 def source(name: str) -> Path:
