@@ -387,17 +387,6 @@ def test_identify_prints_its_advice(tmp_path: Path) -> None:
     assert sum(answer["reasons"].values()) == answer["ticks"] == 7500
 
 
-def test_tune_gives_the_advice_where_nothing_can_be_tuned(tmp_path: Path) -> None:
-    write_run(tmp_path / "run.csv", replace(run_of(), y=-run_of().y))
-    with pytest.raises(PvidError, match=r"^y is counted downwards.* \(as it is: nothing is identified from this run"):
-        CliRunner().invoke(
-            commands,
-            ["tune", str(tmp_path / "run.csv"), "--set", "l1=0.25"],
-            standalone_mode=False,
-            catch_exceptions=False,
-        )
-
-
 def test_a_refusal_has_the_advice_in_front_of_it(tmp_path: Path) -> None:
     run = run_of()
     write_run(tmp_path / "run.csv", replace(run, t=1e3 * run.t, sample_rate=0.5))
