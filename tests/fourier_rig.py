@@ -21,7 +21,7 @@ from pvid.oracle.fourier.rows import WeakRows
 from pvid.settings.f32 import EstimatorConfig
 from pvid.settings.fourier import FourierConfig
 from pvid.settings.record import Record
-from pvid.setup.fourier import config_of, design_tables, for_engine
+from pvid.setup.fourier import circle_of, config_of, design_tables, for_engine
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 from pvid.twin import fnv
 from pvid.twin.fourier import FourierTwin
@@ -54,8 +54,7 @@ class EngineRig:
 
     def resized(self, *, functions: int, hop: int, decimation: int) -> FourierConfig:
         """The settings with other sizes than those of the rig's design; the tables of its noise stay."""
-        circle = np.cos(np.pi * np.arange(2 * hop) / hop).astype(np.float32)
-        sizes: dict[str, Any] = {"functions": functions, "hop": hop, "decimation": decimation, "circle": circle}
+        sizes: dict[str, Any] = {"functions": functions, "hop": hop, "decimation": decimation, "circle": circle_of(hop)}
         return replace(self.config, design=replace(self.config.design, **sizes))
 
 

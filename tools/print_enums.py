@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Prints the enumerations of the public C headers as host/src/pvid/settings/enums.py; --check: only compares.
+"""Prints the enumerations of the public C headers as host/src/pvid/settings/enums.py, and their texts for
+firmware/src/judge/text.c; --check: only compares.
 
 Run it with build/venv/bin/python after a change of the headers, when ./tools/pvid has built the C core.
 """
@@ -7,6 +8,7 @@ Run it with build/venv/bin/python after a change of the headers, when ./tools/pv
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from pathlib import Path
 
@@ -15,6 +17,8 @@ sys.path.insert(0, str(ROOT / "host" / "src"))
 from pvid.core.headers import Headers, default_library  # noqa: E402
 
 FILE = ROOT / "host" / "src" / "pvid" / "settings" / "enums.py"
+TEXTS = ROOT / "firmware" / "src" / "judge" / "text.c"
+STATUS = ROOT / "firmware" / "include" / "pvid" / "status.h"
 ENUMS = {
     "Reason": ("pvid_reason", "Outcome of a tick"),
     "Status": ("pvid_status", "Answer of an init"),
@@ -40,6 +44,75 @@ class _Named(IntEnum):
 '''
 
 
+TEXT_HEAD = """\
+/* pvid/text.h. Printed by tools/print_enums.py from pvid/status.h: do not edit. */
+#include "pvid/text.h"
+
+#include <stddef.h>
+
+#if PVID_TEXTS
+
+/* clang-format off */
+static const char *const reasons[] = {
+@reasons@
+};
+
+static const char *const statuses[] = {
+@statuses@
+};
+/* clang-format on */
+
+const char *pvid_reason_text(pvid_reason reason)
+{
+    const size_t place = (size_t)reason;
+    return (place < (sizeof reasons / sizeof reasons[0])) ? reasons[place] : "unknown reason";
+}
+
+const char *pvid_status_text(pvid_status status)
+{
+    const size_t place = (size_t)status;
+    return (place < (sizeof statuses / sizeof statuses[0])) ? statuses[place] : "unknown status";
+}
+
+#else
+
+const char *pvid_reason_text(pvid_reason reason)
+{
+    (void)reason;
+    return "";
+}
+
+const char *pvid_status_text(pvid_status status)
+{
+    (void)status;
+    return "";
+}
+
+#endif
+"""
+
+
+def comments(text: str) -> dict[str, str]:
+    """Enumerator -> its comment in status.h, on one line; it stands behind the enumerator's comma."""
+    found = re.findall(r"^    (PVID_\w+)(?: = 0)?,?\s*/\*\s*(.*?)\s*\*/", text, re.MULTILINE | re.DOTALL)
+    return {name: re.sub(r"\s*\n\s*", " ", comment) for name, comment in found}
+
+
+def texts(headers: Headers) -> str:
+    """The C source with the texts: the words of a name, of a status with the comment of the header."""
+    about = comments(STATUS.read_text(encoding="utf-8"))
+    lines = {}
+    for place, c_name in (("reasons", "pvid_reason"), ("statuses", "pvid_status")):
+        members = headers.enum(c_name)
+        if list(members.values()) != list(range(len(members))):
+            sys.exit(f"{c_name} has gaps: its texts are in a table")
+        words = {name: name.removeprefix("PVID_").lower().replace("_", " ") for name in members}
+        if c_name == "pvid_status":
+            words |= {name: f"{words[name]}: {about[name]}" for name in members if name in about}
+        lines[place] = "\n".join(f'    "{words[name]}",' for name in members)
+    return TEXT_HEAD.replace("@reasons@", lines["reasons"]).replace("@statuses@", lines["statuses"])
+
+
 def printed(headers: Headers) -> str:
     """The text of the module."""
     classes = [HEAD]
@@ -56,11 +129,13 @@ def printed(headers: Headers) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true")
-    text = printed(Headers.of(default_library()))
-    if not parser.parse_args().check:
-        FILE.write_text(text, encoding="utf-8")
-    elif FILE.read_text(encoding="utf-8") != text:
-        sys.exit(f"{FILE.relative_to(ROOT)} differs from the headers: run tools/print_enums.py")
+    headers = Headers.of(default_library())
+    only_check = parser.parse_args().check
+    for file, text in ((FILE, printed(headers)), (TEXTS, texts(headers))):
+        if not only_check:
+            file.write_text(text, encoding="utf-8")
+        elif file.read_text(encoding="utf-8") != text:
+            sys.exit(f"{file.relative_to(ROOT)} differs from the headers: run tools/print_enums.py")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,17 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pvid/fnv.h"
 #include "pvid/fnv_refine.h"
+
+static void put_latest(const pvid_refine_f32 *refinement, uint32_t tick, float r[], float se[])
+{
+    const pvid_refine_estimate_f32 *latest = pvid_refine_latest_f32(refinement);
+    if ((r != NULL) && (latest != NULL)) {
+        memcpy(&r[(size_t)tick * PVID_REFINE_PARAMETERS], latest->r, sizeof latest->r);
+        memcpy(&se[(size_t)tick * PVID_REFINE_PARAMETERS], latest->se, sizeof latest->se);
+    }
+}
 
 void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_samples, const float samples[],
                             const float weak_p[], const float weak_se[], uint32_t *running_hash, uint8_t reason[],
@@ -25,24 +35,33 @@ void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_sa
             *running_hash = pvid_fnv_refine_f32(*running_hash, self, one);
             hash[tick] = *running_hash;
         }
-        const pvid_refine_estimate_f32 *latest = pvid_refine_latest_f32(self);
-        if ((r != NULL) && (latest != NULL)) {
-            memcpy(&r[(size_t)tick * PVID_REFINE_PARAMETERS], latest->r, sizeof latest->r);
-            memcpy(&se[(size_t)tick * PVID_REFINE_PARAMETERS], latest->se, sizeof latest->se);
-        }
+        put_latest(self, tick, r, se);
     }
 }
 
-void pvid_replay_weak_candidates_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[], const float y[], float p[],
-                                     float se[])
+void pvid_replay_both_stages_f32(pvid_fourier_f32 *self, uint32_t ticks, const float samples[], uint8_t told[],
+                                 float weak_p[], float weak_se[], float r[], float se[], uint32_t *running_hash,
+                                 uint32_t hash[])
 {
+    const uint32_t n_samples = self->design->model->samples;
+    const pvid_refine_f32 *refinement = self->refine->storage;
     for (uint32_t tick = 0; tick < ticks; tick++) {
-        const pvid_reason reason = pvid_weak_step_f32(self, phi[tick], y[tick]);
-        if ((reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN)) {
-            const pvid_estimate_f32 *estimate = &self->finish.candidate;
-            memcpy(&p[(size_t)tick * PVID_REFINE_P], estimate->p, PVID_REFINE_P * sizeof p[0]);
-            memcpy(&se[(size_t)tick * PVID_REFINE_P], estimate->se, PVID_REFINE_P * sizeof se[0]);
+        const pvid_reason reason = pvid_fourier_step_f32(self, &samples[(size_t)tick * n_samples]);
+        if ((weak_p != NULL) &&
+            ((reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN))) {
+            const pvid_estimate_f32 *estimate = pvid_fourier_candidate_f32(self);
+            memcpy(&weak_p[(size_t)tick * PVID_REFINE_P], estimate->p, PVID_REFINE_P * sizeof weak_p[0]);
+            memcpy(&weak_se[(size_t)tick * PVID_REFINE_P], estimate->se, PVID_REFINE_P * sizeof weak_se[0]);
         }
+        if (told != NULL) {
+            told[tick] = (uint8_t)pvid_refine_reason_f32(refinement);
+        }
+        if (hash != NULL) {
+            *running_hash = pvid_fnv_estimator_f32(*running_hash, &self->estimator, reason);
+            *running_hash = pvid_fnv_refine_f32(*running_hash, refinement, pvid_refine_reason_f32(refinement));
+            hash[tick] = *running_hash;
+        }
+        put_latest(refinement, tick, r, se);
     }
 }
 

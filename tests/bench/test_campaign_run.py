@@ -16,9 +16,10 @@ import pytest
 
 from bench.campaign.judge import COLUMNS, Record, identify_rig
 from bench.campaign.population import parse
-from bench.campaign.run import Campaign, _distributed, run
+from bench.campaign.run import Campaign, run
 from bench.campaign.store import Store
 from bench.campaign.truth import simulate_rig
+from pvid.base.cluster import _distributed
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 
@@ -56,7 +57,7 @@ def worker_that_must_not_start(monkeypatch: pytest.MonkeyPatch) -> Iterator[None
         raise AssertionError("something was computed")
 
     with monkeypatch.context() as patched:
-        patched.setattr("bench.campaign.run._client", refuse)
+        patched.setattr("bench.campaign.run.client", refuse)
         yield
 
 

@@ -1,4 +1,4 @@
-"""The weak engine with the generated C of a mechanism on emulated boards: the hash that the twin predicts."""
+"""The weak form with the generated C of a mechanism on emulated boards: the hash that the twin predicts."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_sizes_of_a_mechanism_are_written_as_json(tmp_path: Path) -> None:
     assert {key: found[key] for key in ("target", "model", "form", "core")} == {
         "target": "mps2-an386",
         "model": "cart_pendulum",
-        "form": "fourier",
+        "form": "weak",
         "core": "f32",
     }
     assert all(found[key] > 0 for key in ("text", "tables", "state", "stack_bound", "mean", "longest"))

@@ -149,7 +149,7 @@ def test_an_unknown_source_is_refused(host_target: Target) -> None:
 def test_samples_from_the_pc_are_not_mixed_in(host_target: Target, native: Native) -> None:
     rig = standard_rig("weak")
     collect(host_target, 100, begin=rig)
-    host_target.port.write(encode(rig.sample(np.ones(64, np.float32), np.ones(64, np.float32)), 9, tick=0))
+    host_target.port.write(encode(rig.frame(np.ones((64, 2), np.float32)), 9, tick=0))
     record = collect(host_target, 3000)
     phi, _ = record.samples(record.first, record.ticks)
     assert np.array_equal(phi, rig.from_counts(sensed("weak")[record.first : record.ticks])[0])

@@ -15,9 +15,7 @@ TIMEOUT_S = 300.0
 @pytest.mark.parametrize(
     ("board", "name"),
     [
-        ("microbit", "kapitza"),  # without a long multiplication
-        ("atmega2560", "kapitza"),
-        pytest.param("virt-rv32imac", "battery_2rc", marks=pytest.mark.long),
+        ("virt-rv32imac", "battery_2rc"),  # the pendulum: test_targets.py
         *(pytest.param("mps2-an386", name, marks=pytest.mark.long) for name in mechanisms.names()),
     ],
 )

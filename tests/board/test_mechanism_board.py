@@ -13,10 +13,11 @@ from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.board.field import collect
-from pvid.board.mechanism_board import MechanismBoard
+from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.stream_image import settings_number
-from pvid.board.target import HOST_TARGET, open_target
+from pvid.board.target import HOST_TARGET, judge, open_target, verify
 from pvid.codegen.fourier_library import fourier_native
+from pvid.core.native import Native
 from pvid.link.frames import Code, Estimate, Form, Raw, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader
@@ -55,14 +56,14 @@ def log(motor: MechanismBoard, tmp_path_factory: pytest.TempPathFactory) -> Path
 def stretches_of(log: Path) -> list[Stretch]:
     text = engine_text_of_log(log)
     assert text is not None
-    return list(Verifier(MechanismBoard.parse(text)).stretches(LogReader(log)))
+    return list(Verifier(board_of(text)).stretches(LogReader(log)))
 
 
 @pytest.mark.parametrize("name", names())
 def test_text_in_a_log_gives_the_same_board_back(name: str) -> None:
     board = MechanismBoard.of_shipped_rig(name)
     text = board.text()
-    again = MechanismBoard.parse(text)
+    again = board_of(text)
     assert again is not None and again.text() == text and len(text) < 64_000
     assert settings_number(again) == settings_number(board) and again.names == board.names
     assert again.names.parse(board.names.text.encode()) == board.names
@@ -70,10 +71,10 @@ def test_text_in_a_log_gives_the_same_board_back(name: str) -> None:
 
 def test_text_that_is_damaged_is_refused(motor: MechanismBoard) -> None:
     text = motor.text()
-    assert MechanismBoard.parse("l1 = 0.3\n") is None
+    assert board_of("l1 = 0.3\n") is None
     for wrong, right in (("estimator_law", "estimator_lore"), ("design_hop", "design_hip"), ("dc_motor", "nowhere")):
         with pytest.raises(PvidError):
-            MechanismBoard.parse(text.replace(wrong, right))
+            board_of(text.replace(wrong, right))
 
 
 @pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
@@ -92,6 +93,16 @@ def test_a_board_computes_the_bits_of_this_machine(motor: MechanismBoard, target
     assert isinstance(estimate, Estimate) and estimate.p[:7] == tuple(own.published[1999].tolist())
 
 
+def test_samples_that_the_pc_sends_have_the_bits_of_this_machine(motor: MechanismBoard, native: Native) -> None:
+    board = motor.without_recording
+    verdict = verify(HOST_TARGET, board, native, *motor.recording.T)
+    assert verdict.text == "equal" and verdict.playback.done == TICKS and len(verdict.playback.hashes) == TICKS // 500
+    other = motor.recording.copy()
+    other[1200, 1] = np.nextafter(other[1200, 1], np.float32(9))
+    found = judge(verdict.playback, board.hashes(native, *other.T))
+    assert found.first is not None and found.first[0] >= 1000 and "DIFFERENT" in found.text
+
+
 def test_log_of_a_mechanism_is_verified(log: Path) -> None:
     (stretch,) = stretches_of(log)
     verdict = Verdict()
@@ -103,7 +114,7 @@ def test_log_of_a_mechanism_is_verified(log: Path) -> None:
 def test_a_changed_sample_and_a_changed_estimate_are_found(log: Path, tmp_path: Path) -> None:
     text = engine_text_of_log(log)
     assert text is not None
-    board = MechanismBoard.parse(text)
+    board = board_of(text)
     records = list(LogReader(log))
     at = next(i for i, one in enumerate(records) if isinstance(one.item, Raw) and one.tick > 1000)
     raw = records[at].item
@@ -131,7 +142,7 @@ def test_samples_of_another_number_a_tick_are_not_verified(log: Path) -> None:
         for one in LogReader(log)
     ]
     verdict = Verdict()
-    for stretch in Verifier(MechanismBoard.parse(text)).stretches(records):
+    for stretch in Verifier(board_of(text)).stretches(records):
         verdict.add(stretch)
         assert stretch.why_not is not None and "2 a tick, and the identifier takes 3" in stretch.why_not
     assert verdict.verified == 0 and verdict.samples == TICKS

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, sources_of
 from pvid.rig.file import RigFile
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate
+from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate
 
 DOCS = ROOT / "host" / "docs"
 README = ROOT / "README.md"
@@ -43,32 +43,44 @@ def blocks(page: Path) -> list[str]:
 # ---- C
 
 
-def test_program_identifies_the_standard_rig(tmp_path: Path) -> None:
-    (tmp_path / "example.c").write_text(blocks(README)[0], encoding="utf-8")
-    RigFile.standard().write(tmp_path / "rig.toml")
-    command = [sys.executable, "-P", "-m", "pvid", "tables", "--rig", str(tmp_path / "rig.toml")]
-    header = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    (tmp_path / "weak_config.h").write_text(header, encoding="utf-8")
-    binary = tmp_path / "example"
-    core = map(str, core_sources())
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The README's, with the files that its command writes for the standard rig."""
+    folder = tmp_path_factory.mktemp("program")
+    (folder / "example.c").write_text(blocks(README)[0], encoding="utf-8")
+    RigFile.standard().write(folder / "rig.toml")
+    written = re.search(r"/\* \./tools/pvid (model build .*) -o kapitza \*/", text_of(README))
+    assert written is not None
+    command = [sys.executable, "-P", "-m", "pvid", *written[1].split(), "-o", "kapitza"]
+    subprocess.run(command, cwd=folder, capture_output=True, check=True)
+    sources = [folder / "example.c", folder / "kapitza" / "kapitza_weak_f32.c", *sources_of("f32")]
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
-    includes = [*INCLUDES, f"-I{tmp_path}"]
-    subprocess.run(["gcc", *flags, *includes, str(tmp_path / "example.c"), *core, "-o", str(binary), "-lm"], check=True)
-    run = simulate(truth="full").run
-    samples = "\n".join(f"{phi:.9g} {y:.9g}" for phi, y in zip(run.phi, run.y, strict=True))
-    printed = subprocess.run([str(binary)], input=samples, capture_output=True, text=True, check=True).stdout
+    includes = [*INCLUDES, f"-I{folder / 'kapitza'}"]
+    subprocess.run(["gcc", *flags, *includes, *map(str, sources), "-o", str(folder / "example"), "-lm"], check=True)
+    return folder / "example"
+
+
+@pytest.mark.parametrize(("truth", "largest_se"), [("linear", 2e-3), ("full", 2e-2)])
+def test_program_identifies_the_standard_rig(program: Path, truth: Truth, largest_se: float) -> None:
+    """Where the angles of the full equations are no more small, the scatter of the windows widens the errors."""
+    run = simulate(truth=truth).run
+    samples = "\n".join(f"{y:.9g} {phi:.9g}" for phi, y in zip(run.phi, run.y, strict=True))
+    printed = subprocess.run([str(program)], input=samples, capture_output=True, text=True, check=True).stdout
     numbers = np.array([float(number) for number in re.findall(r"-?\d+\.\d+", printed)])
     assert len(numbers) == 6, printed
     true_values = np.array([STANDARD_PENDULUM.g, STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2])
     errors, standard_errors = np.abs(numbers[::2] - true_values), numbers[1::2]
     assert (errors < 4 * standard_errors).all(), printed
-    assert (standard_errors < 2e-3 * true_values).all(), printed
+    assert (standard_errors < largest_se * true_values).all(), printed
 
 
 def compile_as_cpp(source: str, standard: str, folder: Path) -> None:
     (folder / "example.cpp").write_text(source, encoding="utf-8")
-    declared = '#include "pvid/weak.h"\nextern "C" const pvid_weak_config_f32 weak_config;\n'
-    (folder / "weak_config.h").write_text(declared, encoding="utf-8")
+    declared = (
+        '#include "pvid/fourier.h"\n#define KAPITZA_WEAK_SAMPLES 2\n'
+        'extern "C" const pvid_fourier_config_f32 kapitza_config_f32;\n'
+    )
+    (folder / "kapitza_design_f32.h").write_text(declared, encoding="utf-8")
     command = ["g++", f"-std={standard}", "-fsyntax-only", "-Wall"]
     includes = [*PUBLIC_INCLUDES, f"-I{folder}"]
     done = subprocess.run([*command, *includes, str(folder / "example.cpp")], capture_output=True, text=True)
@@ -157,7 +169,7 @@ def test_identifiers_and_files_that_pages_name_exist() -> None:
                 missing.append(f"{page.relative_to(ROOT)}: {name}")
         for name in re.findall(r"[\w/.]+\.(?:c|h|py|toml|cmake|md)\b", span):
             known = name.rsplit("/", 1)[-1] in files or re.match(
-                r"(run|rig|run-tuned|main|RUN|link|motor|dc_motor\w*|weak_config)\b", name
+                r"(run|rig|run-tuned|main|RUN|link|motor|dc_motor\w*|kapitza_\w*)\b", name
             )
             if not known:
                 missing.append(f"{page.relative_to(ROOT)}: {name}")

@@ -50,14 +50,14 @@ def test_gcc_fuses_nothing_at_its_default_standard(tmp_path: Path) -> None:
         pytest.skip("not an x86-64")
     for options in ((), ("-ffp-contract=fast",)):
         command = ["gcc", "-O2", "-march=haswell", *options, *INCLUDES, "-S", "-o", "-"]
-        for name in ("kapitza_sums_f32.c", "window_f32.c", "cholesky_f32.c", "arithmetic_f32.c"):
+        for name in ("kapitza_sums_f32.c", "sums_f32.c", "cholesky_f32.c", "arithmetic_f32.c"):
             done = subprocess.run([*command, str(source(name))], capture_output=True, text=True, check=True)
             assert "mulss" in done.stdout and "vfmadd" not in done.stdout, name
 
 
 def test_gcc_warns_of_nothing_when_it_vectorises() -> None:
     options = ["-std=c99", "-O3", "-march=haswell", "-Wall", "-Wextra", *INCLUDES, "-S", "-o", "/dev/null"]
-    for name in ("system_q31.c", "staged_q31.c", "window_f32.c"):
+    for name in ("system_q31.c", "staged_q31.c", "sums_f32.c"):
         done = subprocess.run(["gcc", *options, str(source(name))], capture_output=True, text=True, check=True)
         assert done.stderr == ""
 
@@ -83,8 +83,8 @@ def test_a_cortex_m4f_image_at_gccs_default_standard_has_the_same_bits(
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", f"{compiler.parent}:{os.environ['PATH']}")
     monkeypatch.setattr(replay_image, "BUILD", tmp_path / "targets")
-    run = standard_run("weak", 5000)
+    run = standard_run("strong", 1000)
     image, _ = build_image(BOARDS["mps2-an386"], run)
     given = (tmp_path / "given").read_text(encoding="utf-8")
-    assert "weak/window_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given
+    assert "strong/strong_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given
     assert play(BOARDS["mps2-an386"], image, TIMEOUT_S).hash == int(native_hashes(run, native)[-1])

@@ -14,7 +14,7 @@ from pvid.board.boards import BOARDS, BUILD, build, run
 from pvid.core.sources import INCLUDES, core_sources, source
 
 PROGRAM = ROOT / "tests" / "threads" / "read_while_stepping.c"
-ROOMS = ("solve", "judge", "weak", "kapitza")
+ROOMS = ("number", "solve", "judge", "fourier")
 TIMEOUT_S = 40.0
 
 

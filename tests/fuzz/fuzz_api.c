@@ -10,14 +10,14 @@
 #include <stdlib.h>
 
 #include "hostile.h"
+#include "pendulum/kapitza_design_f32.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
 #include "strong_table_q31.h"
-#include "weak_table.h"
 #include "weak_table_q31.h"
 
 #define LAST_REASON PVID_NOT_READY
-#define ROOM ((size_t)PVID_SNAPSHOT_WEAK_ANGLE_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
+#define ROOM ((size_t)PVID_SNAPSHOT_FOURIER_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
 #define MOST_TOLD 20u
 
 static struct {
@@ -145,67 +145,61 @@ static void spoil_estimator_q31(pvid_estimator_config_q31 *config)
 /* ---- weak, float32 ---- */
 
 static struct {
-    pvid_weak_f32 self;
-    pvid_weak_angle_f32 angle;
-    pvid_weak_config_f32 config;
-    pvid_weak_design_f32 design;
-    float smooth[2];
-    float second[2];
-    float chi[sizeof table_chi / sizeof table_chi[0]];
-    float gram[sizeof table_gram / sizeof table_gram[0]];
+    pvid_fourier_f32 self;
+    pvid_fourier_config_f32 config;
+    pvid_fourier_design_f32 design;
+    float circle[sizeof kapitza_circle / sizeof kapitza_circle[0]];
+    float range[KAPITZA_WEAK_SAMPLES];
+    float variance[KAPITZA_WEAK_KINDS];
+    pvid_fourier_noise_f32 noise[sizeof kapitza_noise / sizeof kapitza_noise[0]];
 } weak;
 
 static void spoil_tables(void)
 {
     if (one_in(5)) {
-        for (size_t i = 0; i < sizeof weak.chi / sizeof weak.chi[0]; i++) {
-            weak.chi[i] = one_in(50) ? hostile_float() : (table_chi[i] * (1.0f + (0.5f * any_part())));
+        for (size_t i = 0; i < sizeof weak.circle / sizeof weak.circle[0]; i++) {
+            weak.circle[i] = one_in(50) ? hostile_float() : (kapitza_circle[i] * (1.0f + (0.5f * any_part())));
         }
-        weak.design.chi = weak.chi;
+        weak.design.circle = weak.circle;
     }
     if (one_in(5)) {
-        for (size_t i = 0; i < sizeof weak.gram / sizeof weak.gram[0]; i++) {
-            weak.gram[i] = one_in(50) ? hostile_float() : table_gram[i];
+        for (size_t i = 0; i < sizeof weak.noise / sizeof weak.noise[0]; i++) {
+            weak.noise[i] = kapitza_noise[i];
+            weak.noise[i].factor = one_in(20) ? hostile_float() : kapitza_noise[i].factor;
+            weak.noise[i].a = one_in(100) ? (uint8_t)any_word() : kapitza_noise[i].a;
         }
-        weak.design.gram = weak.gram;
+        weak.design.noise = weak.noise;
     }
     if (one_in(5)) {
-        for (size_t i = 0; i < 2u; i++) {
-            weak.smooth[i] = hostile_float();
-            weak.second[i] = hostile_float();
-        }
-        weak.design.smooth = weak.smooth;
-        weak.design.second = weak.second;
+        weak.variance[0] = hostile_float();
+        weak.design.error_variance = weak.variance;
+    }
+    if (one_in(5)) {
+        weak.range[0] = hostile_float();
+        weak.range[1] = hostile_float();
+        weak.config.range = weak.range;
     }
 }
 
 static void configure_weak(bool sound)
 {
-    pvid_weak_config_f32 *config = &weak.config;
-    weak.design = table_design;
-    *config = table_config(starts);
+    pvid_fourier_config_f32 *config = &weak.config;
+    weak.design = kapitza_design_f32;
+    *config = kapitza_config_f32;
     config->design = &weak.design;
     config->gate.sigmas = one_in(3) ? 4.0f : 0.0f;
     config->gate.patience_s = one_in(2) ? 10.0f : 0.0f;
     config->estimator.forgetting_s = one_in(3) ? 5.0f : 0.0f;
-    config->drive_min = one_in(4) ? 0.1f : 0.0f;
+    config->drive_min = one_in(4) ? NULL : config->drive_min;
+    config->range = one_in(2) ? NULL : config->range;
+    config->compensation = !one_in(4);
     config->estimator.dead_zone = one_in(4) ? 1.0f : 0.0f;
-    config->zero_unknown = !one_in(4);
-    if (one_in(4)) {
-        config->angle = &weak.angle;
-        config->full_angle = true;
-        config->passes = 3;
-        config->angle_limit = one_in(2) ? 0.12f : 0.0f;
-    }
     if (sound) {
         return;
     }
-    float *const fields[] = {&config->sample_rate_hz,  &config->l1,
-                             &config->drive_min,       &config->pivot_noise,
-                             &config->angle_limit,     &config->trust.kappa_min,
-                             &config->trust.se_max,    &config->trust.misfit_max,
-                             &config->trust.renewal,   &config->gate.sigmas,
-                             &config->gate.patience_s, &weak.design.overlap};
+    float *const fields[] = {&config->sample_rate_hz,   &config->trust.kappa_min, &config->trust.se_max,
+                             &config->trust.misfit_max, &config->trust.renewal,   &config->gate.sigmas,
+                             &config->gate.patience_s,  &weak.design.overlap};
     if (one_in(2)) {
         spoil(fields, sizeof fields / sizeof fields[0]);
     }
@@ -213,45 +207,37 @@ static void configure_weak(bool sound)
         spoil_estimator_f32(&config->estimator);
     }
     spoil_tables();
-    weak.design.taps = one_in(8) ? (uint16_t)any_word() : weak.design.taps;
-    weak.design.decimation = one_in(8) ? (uint16_t)below(40) : weak.design.decimation;
-    weak.design.window = one_in(8) ? (uint16_t)(2u * below(79) + below(2)) : weak.design.window;
-    weak.design.functions = one_in(8) ? (uint8_t)below(7) : weak.design.functions;
-    weak.design.lag = one_in(8) ? (uint8_t)any_word() : weak.design.lag;
-    if (weak.design.taps > 5u) { /* longer than the tables */
-        weak.design.smooth = NULL;
-    }
+    weak.design.functions = one_in(8) ? (uint8_t)below(13) : weak.design.functions;
+    weak.design.power = one_in(8) ? (uint8_t)below(9) : weak.design.power;
+    weak.design.decimation = one_in(8) ? (uint8_t)below(40) : weak.design.decimation;
+    weak.design.hop = one_in(8) ? (uint16_t)below((uint32_t)weak.design.hop + 1u) : weak.design.hop;
+    weak.design.n_noise = one_in(8) ? (uint16_t)below((uint32_t)weak.design.n_noise + 1u) : weak.design.n_noise;
     config->iterations = one_in(8) ? (uint8_t)any_word() : config->iterations;
-    config->passes = one_in(8) ? (uint8_t)any_word() : config->passes;
     config->trust.groups_min = one_in(8) ? (uint16_t)any_word() : config->trust.groups_min;
     config->trust.revert_after = one_in(8) ? (uint16_t)below(3) : config->trust.revert_after;
-    config->angle = one_in(8) ? NULL : config->angle;
-    config->full_angle = one_in(8) ? true : config->full_angle;
-    config->friction = one_in(8);
     config->design = one_in(20) ? NULL : config->design;
 }
 
 static pvid_status init_weak(void)
 {
-    return pvid_weak_init_f32(&weak.self, &weak.config);
+    return pvid_fourier_init_f32(&weak.self, &weak.config);
 }
 
 static pvid_reason step_weak(uint32_t kind, unsigned long tick)
 {
-    float phi;
-    float y;
-    hostile_sample(kind, tick, &phi, &y);
-    return pvid_weak_step_f32(&weak.self, phi, y);
+    float sample[KAPITZA_WEAK_SAMPLES]; /* y, phi */
+    hostile_sample(kind, tick, &sample[1], &sample[0]);
+    return pvid_fourier_step_f32(&weak.self, sample);
 }
 
 static void gap_weak(void)
 {
-    pvid_weak_gap_f32(&weak.self);
+    pvid_fourier_gap_f32(&weak.self);
 }
 
 static void freeze_weak(bool frozen)
 {
-    pvid_weak_freeze_f32(&weak.self, frozen);
+    pvid_fourier_freeze_f32(&weak.self, frozen);
 }
 
 static void check_weak(bool published)
@@ -264,12 +250,12 @@ static void check_weak(bool published)
     uint32_t number;
     pvid_kapitza_f32 value;
     pvid_kapitza_f32 se;
-    const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(&weak.self);
+    const pvid_estimate_f32 *estimate = pvid_fourier_estimate_f32(&weak.self);
     check_estimate_f32(estimate, weak.self.estimator.model->n_p);
-    require(pvid_weak_read_f32(&weak.self, &copy, &number) && ((number > 0u) == weak.self.trust.published) &&
+    require(pvid_fourier_read_f32(&weak.self, &copy, &number) && ((number > 0u) == weak.self.trust.published) &&
                 (memcmp(&copy, estimate, sizeof copy) == 0),
             "a read estimate is the published one");
-    if (pvid_kapitza_physical_f32(estimate, weak.config.l1, &value, &se)) {
+    if (pvid_kapitza_physical_f32(estimate, 0.3f, &value, &se)) {
         require(isfinite(value.g) && isfinite(se.g) && isfinite(value.l2) && isfinite(se.rho2), "finite parameters");
     }
     pvid_estimator_assess_f32(&weak.self.estimator, &copy);
@@ -278,12 +264,12 @@ static void check_weak(bool published)
 
 static size_t save_weak(uint8_t image[], size_t room)
 {
-    return pvid_snapshot_save_weak_f32(&weak.self, &weak.config, any_word(), image, room);
+    return pvid_snapshot_save_fourier_f32(&weak.self, &weak.config, any_word(), image, room);
 }
 
 static pvid_snapshot_status restore_weak(const uint8_t image[], size_t length)
 {
-    return pvid_snapshot_restore_weak_f32(&weak.self, &weak.config, image, length);
+    return pvid_snapshot_restore_fourier_f32(&weak.self, &weak.config, image, length);
 }
 
 static bool weak_has_published(void)
@@ -539,6 +525,7 @@ static void configure_strong_q31(bool sound)
     config->bank.phi_max = one_in(5) ? any_i32() : config->bank.phi_max;
     config->bank.centre = one_in(5) ? any_i32() : config->bank.centre;
     config->bank.stride = one_in(8) ? (uint16_t)any_word() : config->bank.stride;
+    config->bank.block = one_in(8) ? (uint16_t)below(400) : config->bank.block;
     config->bank.weights = one_in(20) ? NULL : config->bank.weights;
     config->phi_offset = one_in(5) ? any_i32() : config->phi_offset;
     config->row.phi_shift[3] = one_in(8) ? (int8_t)((int32_t)below(100) - 50) : config->row.phi_shift[3];
@@ -728,7 +715,6 @@ int main(int argc, char **argv)
     }
     const unsigned long wanted = strtoul(argv[1], NULL, 10);
     hostile_seed(strtoull(argv[2], NULL, 10));
-    make_table();
     while (done.calls < wanted) {
         play(&forms[below((uint32_t)(sizeof forms / sizeof forms[0]))]);
     }

@@ -1,14 +1,13 @@
 /* One thread publishes or steps, another reads; to be built with -fsanitize=thread, which reports every data race.
  *
  * Prints "puts N reads M torn T backwards B missed G" of words that count, in both cores' estimates, then
- * "published N reads M torn T" of the weak form on the standard rig. Exit code 0 iff nothing was torn. With
+ * "published N reads M torn T" of the weak form. Exit code 0 iff nothing was torn. With
  * -DPLAIN_COPY the words go through a plain copy of the struct: what a user would do without publication.h. */
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "../unit/plant.h"
-#include "../unit/weak_table.h"
+#include "../unit/first_order.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
 
@@ -128,7 +127,7 @@ static tally share_words(void)
 
 /* ---- an identifier ---- */
 
-static pvid_weak_f32 identifier;
+static pvid_fourier_f32 identifier;
 static pvid_estimate_f32 published[MOST_PUBLISHED]; /* by number; written by the stepping thread */
 
 typedef struct {
@@ -144,7 +143,7 @@ static void *read_identifier(void *argument)
     do {
         pvid_estimate_f32 estimate;
         uint32_t number;
-        if (pvid_weak_read_f32(&identifier, &estimate, &number) && (number > 0u) && (number < MOST_PUBLISHED)) {
+        if (pvid_fourier_read_f32(&identifier, &estimate, &number) && (number > 0u) && (number < MOST_PUBLISHED)) {
             seen->reads++;
             if (seen->has[number] == 0u) {
                 seen->estimate[number] = estimate;
@@ -158,26 +157,23 @@ static void *read_identifier(void *argument)
 
 static unsigned long step_identifier(readings *seen)
 {
-    const float start[4] = {22.0f, 12.0f, 4.0f, 0.0f};
-    make_table();
-    pvid_weak_config_f32 config = table_config(start);
-    config.estimator.kappa_min = 5.0e-6f;
-    if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) {
+    const pvid_fourier_design_f32 design = design_of(&mechanism);
+    const pvid_fourier_config_f32 config = config_of(&design);
+    if (pvid_fourier_init_f32(&identifier, &config) != PVID_OK) {
         return 0;
     }
     pthread_t reader;
     set_ended(0);
     pthread_create(&reader, NULL, read_identifier, seen);
-    plant_state plant = released_plant();
+    first_order rig = {.generator = 1u};
     unsigned long number = 0;
-    for (int tick = 0; tick < 60000; tick++) {
-        double phi;
-        double y;
-        plant_step(&plant, &phi, &y);
-        const pvid_reason reason = pvid_weak_step_f32(&identifier, (float)phi, (float)y);
+    for (int tick = 0; tick < 500 * HOP; tick++) {
+        float sample[2];
+        next_sample(&rig, sample);
+        const pvid_reason reason = pvid_fourier_step_f32(&identifier, sample);
         if ((reason == PVID_UPDATED) || (reason == PVID_MISFIT)) {
             number++;
-            published[number % MOST_PUBLISHED] = *pvid_weak_estimate_f32(&identifier);
+            published[number % MOST_PUBLISHED] = *pvid_fourier_estimate_f32(&identifier);
         }
     }
     set_ended(1);

@@ -17,7 +17,7 @@ from pvid.core.sources import public_headers
 
 CONSUMER = ROOT / "tests" / "consumer"
 SOURCES = ("CMakeLists.txt", "LICENSE", "firmware")  # all that a user's build needs
-TAPS = 101  # not the default: the definition must reach whoever links the library
+HARMONICS = 17  # not the default: the definition must reach whoever links the library
 
 
 def call(*command: str | Path, cwd: Path | None = None) -> str:
@@ -52,12 +52,12 @@ class Printed:
     """What the C program says."""
 
     version: str
-    taps: int
+    harmonics: int
     hash: str
 
     @classmethod
     def of(cls, text: str) -> Printed:
-        found = re.fullmatch(r"version (\S+) taps (\d+) hash ([0-9a-f]{8})", text)
+        found = re.fullmatch(r"version (\S+) harmonics (\d+) hash ([0-9a-f]{8})", text)
         assert found is not None, text
         return cls(found[1], int(found[2]), found[3])
 
@@ -69,7 +69,7 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     install(
         folder / "first",
         folder / "build",
-        f"-DPVID_MAX_TAPS={TAPS}",
+        f"-DPVID_MAX_HARMONICS={HARMONICS}",
     )
     shutil.rmtree(folder / "build")
     return (folder / "first").rename(folder / "moved here")
@@ -93,8 +93,8 @@ def test_the_python_package_has_the_same_version(version: str) -> None:
 
 def test_find_package(by_package: list[str], version: str) -> None:
     printed = Printed.of(by_package[0])
-    assert (printed.version, printed.taps) == (version, TAPS)
-    assert by_package[1] == f"version {version} taps {TAPS}"
+    assert (printed.version, printed.harmonics) == (version, HARMONICS)
+    assert by_package[1] == f"version {version} harmonics {HARMONICS}"
 
 
 def test_find_package_refuses_another_version(prefix: Path, tmp_path: Path) -> None:
@@ -110,7 +110,9 @@ def test_fetch_content(by_package: list[str], tmp_path: Path) -> None:
         for name in SOURCES:
             file.add(ROOT / name, f"pvid-1/{name}")
     url = archive.as_uri()
-    printed = built(tmp_path / "build", "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}", f"-DPVID_MAX_TAPS={TAPS}")
+    printed = built(
+        tmp_path / "build", "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}", f"-DPVID_MAX_HARMONICS={HARMONICS}"
+    )
     assert printed == by_package
 
 
@@ -120,7 +122,7 @@ def test_add_subdirectory(by_package: list[str], tmp_path: Path) -> None:
         copy(ROOT / name, tmp_path / name)
     options = ("-DPVID_BY=add_subdirectory", f"-DPVID_SOURCES={tmp_path}")
     printed = Printed.of(built(tmp_path / "build", *options)[0])
-    assert printed.taps == 81  # the default
+    assert printed.harmonics == 13  # the default
     assert printed.hash == Printed.of(by_package[0]).hash  # sizes change no bit
 
 
@@ -155,29 +157,29 @@ def test_pkg_config(prefix: Path, by_package: list[str], version: str, tmp_path:
 
 
 def test_sizes_that_disagree_do_not_link(prefix: Path, tmp_path: Path) -> None:
-    """Here the header's default meets a library of 101 taps."""
-    without = [flag for flag in flags(prefix, "--cflags", "--libs") if not flag.startswith("-DPVID_MAX_TAPS")]
+    """Here the header's default meets a library of 17."""
+    without = [flag for flag in flags(prefix, "--cflags", "--libs") if not flag.startswith("-DPVID_MAX_HARMONICS")]
     command = ["gcc", "-std=c99", str(CONSUMER / "consumer.c"), *without, "-o", str(tmp_path / "consumer")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert re.search(r"undefined reference to `pvid_weak_init_f32_window\w+_taps81_", done.stderr)
+    assert re.search(r"undefined reference to `pvid_fourier_init_f32_window\w+_harmonics13_", done.stderr)
 
 
 def test_a_header_of_sizes_travels_too(tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir()
-    (mine / "my_sizes.h").write_text("#define PVID_MAX_TAPS 91\n", encoding="utf-8")
+    (mine / "my_sizes.h").write_text("#define PVID_MAX_HARMONICS 19\n", encoding="utf-8")
     options = ("-DPVID_CONFIG_HEADER=my_sizes.h", f"-DCMAKE_C_FLAGS=-I{mine}")
     install(tmp_path / "prefix", tmp_path / "build", *options)
     compiled = tmp_path / "consumer"
     both = flags(tmp_path / "prefix", "--cflags", "--libs")
     call("gcc", "-std=c99", f"-I{mine}", CONSUMER / "consumer.c", *both, "-o", compiled)
-    assert Printed.of(call(compiled).strip()).taps == 91
+    assert Printed.of(call(compiled).strip()).harmonics == 19
     printed = built(
         *(tmp_path / "find", "-DPVID_BY=find_package", f"-DCMAKE_PREFIX_PATH={tmp_path / 'prefix'}"),
         *(f"-DCMAKE_C_FLAGS=-I{mine}", f"-DCMAKE_CXX_FLAGS=-I{mine}"),
     )
-    assert Printed.of(printed[0]).taps == 91
+    assert Printed.of(printed[0]).harmonics == 19
 
 
 def test_installed_files(prefix: Path) -> None:

@@ -156,6 +156,7 @@ _DRIVER = """
 #include "fourier/mirror_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/white_q31.h"
+#include "number/integer_q31.h"
 
 extern const pvid_fourier_config_q31 *const rig_config;
 #define rig_config_q31 (*rig_config)
@@ -176,9 +177,11 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
         outcome[k] = (uint8_t)tick;
         if ((tick == PVID_FOURIER_WINDOW) && (windows < most)) {
             for (unsigned c = 0; c < model->channels; c++) {
+                const bool constant = model->channel[c].gain == PVID_FOURIER_NONE;
                 for (unsigned h = 0; h < harmonics; h++) {
-                    *window++ = self.window.s[c][h][0];
-                    *window++ = self.window.s[c][h][1];
+                    const int32_t mean = (h == 0u) ? (2 * (int32_t)rig_design_q31.hop) : 0;
+                    *window++ = constant ? mean : self.window.s[c][h][0];
+                    *window++ = constant ? 0 : self.window.s[c][h][1];
                 }
             }
             windows++;
@@ -228,11 +231,13 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     size_t live = 0;
     for (size_t c = 0; c < design->model->channels; c++) {
         for (size_t h = 0; h < harmonics; h++) {
+            uint32_t bits = 0;
             for (size_t part = 0; part < 2u; part++) {
                 const int32_t one = *window++;
                 sums.s[c][h][part] = one;
-                sums.bits[c] = ((h + part == 0u) ? 0u : sums.bits[c]) | (uint32_t)((one < 0) ? -one : one);
+                bits |= (uint32_t)((one < 0) ? -one : one);
             }
+            sums.length[c][h] = (uint8_t)pvid_bit_length_q31(bits);
         }
     }
     pvid_fourier_white_init_q31(&white, design);
@@ -243,7 +248,10 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     for (size_t k = 0; k < pvid_fourier_mirrors_q31(design); k++) {
         pvid_fourier_white_mirror_q31(&white, design, k);
     }
-    pvid_fourier_columns_begin_q31(&made, design, kind, &sums);
+    pvid_fourier_columns_begin_q31(&made, design, kind);
+    for (size_t h = 0; h < harmonics; h++) {
+        pvid_fourier_columns_scan_q31(&made, design, kind, &white, &sums, h);
+    }
     for (size_t h = 0; h < harmonics; h++) {
         pvid_fourier_columns_take_q31(&made, design, kind, &white, &sums, h);
     }

@@ -10,6 +10,7 @@ import pytest
 from fourier_q31 import DESIGNS, Core, Rig, core_in, rig
 
 from pvid.base.errors import PvidError
+from pvid.design.fourier_q31 import scaled_number
 from pvid.settings.enums import Reason, Status
 from pvid.settings.fourier_q31 import FourierConfigQ31
 from pvid.settings.q31 import GateConfigQ31
@@ -96,3 +97,29 @@ def test_rows_beyond_fixed_point_are_refused_by_name() -> None:
     quiet.columns = [1e6 * column for column in quiet.columns]
     with pytest.raises(PvidError, match=r"rigid_body: the residual Y - N theta is .* too much for the rows"):
         row_formats(quiet, one.truth)
+
+
+@pytest.mark.parametrize("name", ["kapitza", "cart_pendulum"])
+def test_nothing_is_identified_from_the_noise_of_the_sensors(core: Core, name: str) -> None:
+    """A mechanism at rest: only the excitation check stops the step, which without it is taken."""
+    one = rig(name, TICKS)
+    random = np.random.default_rng(11)
+    readings = random.integers(-1, 2, one.counts.shape)
+    reasons, last = assert_equal(one, core, one.config, readings)
+    assert np.sum(reasons == Reason.HELD_NOT_EXCITED) >= 2 and Reason.UPDATED not in reasons
+    assert last.tolist() == list(one.config.estimator.start)
+    unchecked = replace(one.config, estimator=replace(one.config.estimator, noise_margin=0))
+    _, moved = assert_equal(one, core, unchecked, readings)
+    assert moved.tolist() != last.tolist()
+
+
+def test_residuals_are_compared_with_what_the_sensors_explain(core: Core) -> None:
+    """An equation's own error, ten times the sensors' variance, is a misfit although the rows are white with it."""
+    one = rig("battery_2rc", TICKS)
+    error = scaled_number(20 * one.design.noise[0].factor[0] * 2.0 ** one.design.noise[0].factor[1])
+    wide = replace(one.design, error_variance=(error,), error_order=(0,))
+    twin = FourierTwinQ31(replace(one.config, design=wide), one.parameters.model)
+    twin.run(one.counts)
+    sensors = twin.noise.known.sensors
+    assert 0 < float(sensors.m[0]) * 2.0 ** float(sensors.e[0]) < 0.5
+    assert_equal(one, core, replace(one.config, design=wide), one.counts)

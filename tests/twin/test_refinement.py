@@ -10,19 +10,26 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from pvid.codegen.build import refine_functions
+from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.core.native import Native
 from pvid.core.refine_native import RefineNative, RefineRecord
 from pvid.design.refine import refine_config
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
+from pvid.models.mechanisms import compiled_of
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
-from pvid.twin.kapitza.refine import KapitzaRefine
 from pvid.twin.refine import RefineTwin
 
 Float = npt.NDArray[np.float64]
 TRUTH = STANDARD_PENDULUM.linear
 BEFORE = 500  # ticks before the weak form's first estimate
+
+
+@cache
+def model() -> GeneratedRefine:
+    return GeneratedRefine(refine_functions(compiled_of("kapitza")))
 
 
 @cache
@@ -49,7 +56,7 @@ def both(given: Float, config: RefineConfig, off: tuple[float, float, float]) ->
     """The record of the core, after the comparison with the twin's."""
     p, se = weak(len(given), off)
     core = RefineNative(Native(), config).run(given, p, se)
-    twin = RefineTwin(KapitzaRefine(), config).run(given, p, se)
+    twin = RefineTwin(model(), config).run(given, p, se)
     np.testing.assert_array_equal(core.reason, twin.reason)
     np.testing.assert_array_equal(core.hash, twin.hash)
     np.testing.assert_array_equal(core.r, twin.r)
@@ -85,7 +92,7 @@ def test_gap_and_freeze() -> None:
     given = samples(3.0, 1.0)
     p, se = weak(len(given), (0.0, 0.0, 0.0))
     core = RefineNative(Native(), configuration())
-    twin = RefineTwin(KapitzaRefine(), configuration())
+    twin = RefineTwin(model(), configuration())
     for first, frozen in ((0, False), (1000, True), (1700, False)):
         last = {0: 1000, 1000: 1700, 1700: 3000}[first]
         core.freeze(frozen)

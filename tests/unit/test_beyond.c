@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "solve/state_q31.h"
+#include "first_order.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
@@ -53,7 +54,7 @@ static void a_place_is_a_number_within_the_bounds(void **state)
 {
     (void)state;
     pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
-    config.model = &pvid_kapitza_weak_f32;
+    config.model = &parameters;
     config.update_rate_hz = 1.0f;
     config.row_sd = 1.0f;
     for (int i = 0; i < 4; i++) {
@@ -68,7 +69,7 @@ static void a_place_is_a_number_within_the_bounds(void **state)
     pvid_estimator_place_f32(&estimator, there);
     const float placed[4] = {1.0f, 2.0f, 4.0f, 3.0f};
     assert_memory_equal(estimator.p, placed, sizeof placed);
-    assert_true(estimator.theta[0] == 2.0f); /* d1, at the new p */
+    assert_true(estimator.theta[2] == 4.0f); /* at the new p */
 }
 
 /* ---- rows of the fixed-point strong form: each entry may be the one that does not fit ---- */

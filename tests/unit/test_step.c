@@ -335,9 +335,9 @@ static void information_is_compared_with_that_of_noise(void **state)
     float little[PVID_MAX_P][PVID_MAX_P] = {{0.0175f, 0.0f}, {0.0f, 0.0175f}};
     float much[PVID_MAX_P][PVID_MAX_P] = {{0.0185f, 0.0f}, {0.0f, 0.0185f}};
     float none[PVID_MAX_P][PVID_MAX_P] = {{NOT_A_NUMBER, 0.0f}, {0.0f, 0.0f}};
-    assert_true(pvid_assess_above_noise_f32(&system, &settings, 0.5f, little));
-    assert_false(pvid_assess_above_noise_f32(&system, &settings, 0.5f, much));
-    assert_false(pvid_assess_above_noise_f32(&system, &settings, 0.5f, none));
+    assert_true(pvid_assess_above_noise_f32(&system, &settings, 0.5f, (const float (*)[PVID_MAX_P])little));
+    assert_false(pvid_assess_above_noise_f32(&system, &settings, 0.5f, (const float (*)[PVID_MAX_P])much));
+    assert_false(pvid_assess_above_noise_f32(&system, &settings, 0.5f, (const float (*)[PVID_MAX_P])none));
 }
 
 int main(void)

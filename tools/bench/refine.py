@@ -1,20 +1,31 @@
-"""The refinement in C behind the pendulum's own weak form: errors, standard errors, seconds, beside the bound."""
+"""The refinement in C behind the weak engine: errors, standard errors, seconds, beside the bound."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.core.native import Native
-from pvid.core.refine_native import RefineNative, weak_candidates
+from bench.pendulum import RIGS, design_for
+from pvid.codegen.build import refine_functions
+from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.fourier_native import FourierNative, RefinedIdentifier
 from pvid.design.refine import refine_config
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
+from pvid.models.mechanisms import compiled_of
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.rows import WeakRows
 from pvid.rig.file import RigFile
-from pvid.setup.f32 import weak_config
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.run.mechanism import model_of
+from pvid.settings.fourier import FourierConfig
+from pvid.settings.refine import RefineConfig
+from pvid.setup.fourier import config_of, design_tables, for_engine
 from pvid.sim.pendulum import STANDARD_PENDULUM, STANDARD_RELEASE, Pendulum, Sensors, simulate, standard_sensors
 from pvid.sim.pendulum import standard_start as start_of
 
@@ -140,28 +151,49 @@ class Outcome:
     level: float
 
 
-def run_case(native: Native, case: Case, seed: int) -> Outcome:
-    """One run through the weak form and the refinement."""
+@dataclass(frozen=True)
+class Engine:
+    """Both stages of the pendulum for an encoder: the library, settings of the weak engine and of the refinement."""
+
+    library: FourierNative
+    weak: FourierConfig
+    refine: RefineConfig
+
+    def identifier(self, start: Float, **changes: Any) -> RefinedIdentifier:
+        """From p of the weak form."""
+        begun = np.append(start, 0.0).astype(np.float32)
+        weak = replace(self.weak, estimator=replace(self.weak.estimator, start=begun))
+        return self.library.refined_of(weak, replace(self.refine, **changes))
+
+
+@lru_cache(4)
+def engine_of(bits: int) -> Engine:
+    """Tables from the first run at the truth; the refinement knows the rig file's guess."""
+    rig = next(one for one in RIGS if one.name == "standard" and one.bits == bits)
+    sensor = {"phi": {"resolution": 2 * np.pi / 2**bits}}
+    model = model_of(MechanismRig("kapitza", RATE_HZ, known={"l1": L1}, sensor=sensor))
+    phi, y = standard_sensors(bits).measure(*_truth(Case(0.1, bits)), 0)
+    made, engine = ready(model), fourier_model_of(model)
+    rows = WeakRows.of(made, {"phi": phi, "y": y}, for_engine(design_for(rig)))
+    weak = config_of(design_tables(engine, rows, np.append(TRUTH, 0.0)), RATE_HZ, made.parameters)
+    nominal = RigFile.standard().nominal
+    guess = Pendulum(L1, nominal.l2, nominal.rho2, nominal.g).linear
+    about = refine_rig(RATE_HZ, L1, guess, sample_sd(bits), y_gain_sd=0.0, samples=("y", "phi"))
+    library = fourier_native(model, weak.design, refine_functions(compiled_of("kapitza")))
+    return Engine(library, weak, refine_config(about))
+
+
+def run_case(case: Case, seed: int, **changes: Any) -> Outcome:
+    """One run through both stages; `changes` of the refinement's settings."""
     phi, y = standard_sensors(case.bits).measure(*_truth(case), seed)
-    given = RigFile.standard()
-    rig = replace(
-        given,
-        identifier=replace(given.identifier, form="weak", zero=True, full_angle=False),
-        sensor=replace(given.sensor, phi_lsb=2 * np.pi / 2**case.bits),
-    )
-    identifier = native.identifier(weak_config(rig, RATE_HZ, start_of(seed)))
-    samples = np.stack([phi, y], axis=1)
-    p, se = weak_candidates(identifier, samples)
-    guess = Pendulum(L1, given.nominal.l2, given.nominal.rho2, given.nominal.g).linear
-    about = refine_rig(RATE_HZ, L1, guess, sample_sd(case.bits), y_gain_sd=0.0)
-    refinement = RefineNative(native, refine_config(about))
-    found = refinement.run(samples, p, se)
+    identifier = engine_of(case.bits).identifier(start_of(seed), **changes)
+    found = identifier.run_both(np.stack([y, phi], axis=1))
     with np.errstate(invalid="ignore"):
         error = np.where(found.r[:, :3] == 0, np.nan, found.r[:, :3] / TRUTH - 1)
     answered = found.r[:, 0] > 0
     first = float(np.argmax(answered)) / RATE_HZ if answered.any() else np.nan
     soon = error[min(int(_SOON_S * RATE_HZ), len(error) - 1)]
-    return Outcome(error[-1], found.se[-1, :3] / TRUTH, first, soon, float(refinement.state.estimate.level))
+    return Outcome(error[-1], found.se[-1, :3] / TRUTH, first, soon, float(identifier.refinement.estimate.level))
 
 
 def row_of(case: Case, runs: list[Outcome]) -> tuple[str, ...]:
@@ -188,15 +220,13 @@ def row_of(case: Case, runs: list[Outcome]) -> tuple[str, ...]:
     )
 
 
-def refine_table(
-    native: Native, progress: Callable[[int], None] = lambda _: None, seeds: int = SEEDS
-) -> Iterator[tuple[str, ...]]:
+def refine_table(progress: Callable[[int], None] = lambda _: None, seeds: int = SEEDS) -> Iterator[tuple[str, ...]]:
     """A row for each case."""
     done = 0
     for case in CASES:
         runs = []
         for seed in range(seeds):
-            runs.append(run_case(native, case, seed))
+            runs.append(run_case(case, seed))
             done += 1
             progress(done)
         yield row_of(case, runs)

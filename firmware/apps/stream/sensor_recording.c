@@ -17,7 +17,7 @@ bool sensor_read(uint8_t sample[SAMPLE_BYTES])
         return false;
     }
     for (uint32_t i = 0; i < STREAM_SAMPLES; i++) {
-        pvid_put_f32(&sample[4u * i], recorded[next][i]);
+        STREAM_PUT(&sample[4u * i], recorded[next][i]);
     }
     next++;
     return true;

@@ -134,6 +134,18 @@
 #error "PVID_FULL_ANGLE must be 0 or 1"
 #endif
 
+/* 0 leaves the texts of pvid/text.h out. */
+#ifndef PVID_TEXTS
+#if defined(__AVR__)
+#define PVID_TEXTS 0
+#else
+#define PVID_TEXTS 1
+#endif
+#endif
+#if PVID_TEXTS != 0 && PVID_TEXTS != 1
+#error "PVID_TEXTS must be 0 or 1"
+#endif
+
 /* ---- sizes of pvid/fourier.h ---- */
 
 /* Most samples of a tick. */
@@ -207,6 +219,23 @@
 #endif
 #if PVID_MAX_POWER < 2 || PVID_MAX_POWER > 12
 #error "PVID_MAX_POWER must lie in 2..12"
+#endif
+
+/* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid
+ * model build` prints with the design, exactly; init refuses others (PVID_BAD_DESIGN). Their loops are of constant
+ * length: fewer instructions, more flash, the same bits. */
+#ifndef PVID_EXACT
+#define PVID_EXACT 0
+#endif
+#if PVID_EXACT < 0 || PVID_EXACT > 1
+#error "PVID_EXACT must be 0 or 1"
+#endif
+#if !PVID_EXACT /* counts of the model that no array has as its size */
+#define PVID_EXACT_SIGNALS 0
+#define PVID_EXACT_JETS 0
+#define PVID_EXACT_RUNS 0
+#define PVID_EXACT_SIGNS 0
+#define PVID_EXACT_INTEGRANDS 0
 #endif
 
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your

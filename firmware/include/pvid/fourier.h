@@ -100,9 +100,9 @@ typedef struct {
                            ends with a cosine */
     uint8_t power;      /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation; /* D, ticks a step, 1..PVID_MAX_DECIMATION */
-    uint16_t hop;       /* steps of half a window, a multiple of 4; H < hop */
+    uint16_t hop;       /* steps of half a window, a multiple of 8; 2 H < hop */
     const pvid_fourier_filter_f32 *compensator; /* [jets] */
-    const float *circle;                        /* [2 hop] cos(pi j / hop) */
+    const float *circle;                        /* [5 hop / 2] sin(pi j / hop): a turn and a quarter */
     const pvid_fourier_noise_f32 *noise;        /* [n_noise] */
     uint16_t n_noise;
     const uint8_t *error_order;  /* [kinds] order of the derivative of white noise that the equation's own error is */
@@ -110,6 +110,27 @@ typedef struct {
     const float *sign_width;     /* [signs] of the soft sign tanh(v / width); 0: the mean of sgn over a step */
     float overlap;               /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_fourier_design_f32;
+
+/* ---- a second stage ---- */
+
+struct pvid_refine_f32;
+struct pvid_refine_config_f32;
+
+/* Its functions: pvid_refine_stage_f32 of refine.h. The weak form knows them by this table alone: without a second
+ * stage none of it is linked. */
+typedef struct {
+    pvid_status (*init)(struct pvid_refine_f32 *self, const struct pvid_refine_config_f32 *config);
+    void (*step)(struct pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak);
+    void (*gap)(struct pvid_refine_f32 *self);
+    void (*freeze)(struct pvid_refine_f32 *self, bool frozen);
+} pvid_fourier_stage_f32;
+
+/* A refinement, with its storage. */
+typedef struct {
+    const pvid_fourier_stage_f32 *stage; /* &pvid_refine_stage_f32 */
+    struct pvid_refine_f32 *storage;     /* must outlive the identifier; its init is that of the identifier */
+    const struct pvid_refine_config_f32 *config;
+} pvid_fourier_refine_f32;
 
 /* ---- the configuration ---- */
 
@@ -126,6 +147,8 @@ typedef struct {
                                             row_weight and correlation */
     pvid_trust_config_f32 trust;         /* conditions of publication */
     pvid_gate_config_f32 gate;           /* outlier gate on the residuals of a window, for each kind */
+    const pvid_fourier_refine_f32 *refine; /* second stage, refine.h: gets every sample, each new estimate, gaps and
+                                              freezes; must outlive the identifier. NULL: none */
 } pvid_fourier_config_f32;
 
 /* State: detail/fourier_state.h, not API. Only the functions below write to it. */
@@ -134,8 +157,9 @@ typedef struct pvid_fourier_f32 pvid_fourier_f32;
 /* Initialises `self`. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
  *   - a field of config, design or model is out of its range (the status names it),
- *   - a table is NULL or contains a number that is not finite (PVID_BAD_DESIGN), or
- *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS). */
+ *   - a table is NULL or contains a number that is not finite (PVID_BAD_DESIGN),
+ *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS), or
+ *   - the init of config.refine fails, with its status. */
 pvid_status pvid_fourier_init_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config);
 
 /* One tick: the samples [samples], taken at the same time, in the units of the model. Returns
@@ -151,6 +175,10 @@ pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[]);
 
 /* The published estimate, for the context that calls step; the start before the first one. */
 const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self);
+
+/* The estimate of the last window, with its standard errors, whether it was published or not; it is new at the ticks
+ * that return PVID_UPDATED, PVID_MISFIT or PVID_HELD_UNCERTAIN. All zeros before the first one. NULL without object. */
+const pvid_estimate_f32 *pvid_fourier_candidate_f32(const pvid_fourier_f32 *self);
 
 /* Copies the published estimate from any context, also while another one calls step (publication.h). *number:
  * estimates published so far, 0: *estimate is the start; may be NULL. Fails iff

@@ -123,7 +123,7 @@ typedef struct {
     const pvid_fourier_integral_q31 *integral; /* [integrands] */
     const pvid_fourier_format_q31 *format;     /* [channels] */
     const PVID_TABLE int32_t *circle;          /* [2 hop] (2^23 - 1) cos(pi j / hop) */
-    const pvid_scaled_q31 *factor; /* of each term, of (h/H)^order times a unit of S_h: [model->kind[kinds - 1].end] */
+    const pvid_scaled_q31 *factor; /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_fourier_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;
     const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
@@ -138,6 +138,7 @@ typedef struct {
     const int32_t *offset;                 /* [samples] reading of each sensor at 0, within +-2^30 [counts] */
     const int32_t *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, 0..2^24
                                  [counts]; NULL: no check */
+    bool compensation;        /* corrects the bias by the sensors' noise (errors in variables), as in fourier.h */
     uint8_t iterations;       /* most Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3. There is no
                                  other one behind a step below 0.8 % */
     pvid_estimator_config_q31 estimator; /* row_sd 2^(8 + y_bits): rows are in standard deviations. init sets model and

@@ -20,6 +20,7 @@
 #include "pvid/snapshot_q31.h"
 #include "pvid/status.h"
 #include "pvid/strong_q31.h"
+#include "pvid/text.h"
 #include "pvid/trust_q31.h"
 #include "pvid/version.h"
 #include "pvid/weak_q31.h"

@@ -11,11 +11,11 @@
  *     best of the last blocks; after two refusals in a row the search begins again.
  *
  *   static pvid_refine_f32 refinement;
- *   if (pvid_refine_init_f32(&refinement, &config) != PVID_OK) ...
- *   each tick:     reason = pvid_weak_step_f32(&identifier, phi, y);
- *                  weak = address of an estimate that is new at this tick, trusted or not yet; else NULL
- *                  reason = pvid_refine_step_f32(&refinement, sample, weak);
- *   same context:  estimate = pvid_refine_latest_f32(&refinement);
+ *   static const pvid_fourier_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &refine_config};
+ *   config.refine = &second;
+ *   if (pvid_fourier_init_f32(&identifier, &config) != PVID_OK) ...
+ *   each tick:     reason = pvid_fourier_step_f32(&identifier, sample);          both stages
+ *   same context:  estimate = pvid_refine_latest_f32(&refinement);               NULL: the weak form's stands
  *   other context: if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
  * The model: refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is spread over the ticks,
@@ -29,6 +29,7 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
+#include "pvid/fourier.h"
 #include "pvid/refine_shape.h"
 
 #ifdef __cplusplus
@@ -50,11 +51,12 @@ extern "C" {
 typedef struct {
     uint8_t sample; /* entry of the argument of step */
     uint8_t order;  /* 0: the sample, 2: its second derivative (inputs alone) */
+    uint8_t source; /* PVID_SIGNAL_SAMPLED, or of an input PVID_SIGNAL_HELD (fourier_parts.h) */
     float scale;    /* factor to the model's unit */
     float range;    /* largest absolute value [model's unit], > 0: it is kept in 16 bits */
 } pvid_refine_signal_f32;
 
-typedef struct {
+typedef struct pvid_refine_config_f32 {
     float sample_rate_hz; /* ticks per second [Hz], 1e-3..1e6 */
     uint8_t ratio;        /* ticks of a step of the motion, 1..255. A step of 1/40 of the fastest period or less */
     const float *second;  /* [PVID_REFINE_HALF + 1] weights of second derivatives, centre first [1/s^2]; NULL: no
@@ -77,7 +79,8 @@ typedef struct {
     float step_limit; /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 0.9 at most;
                          recommended: 2 */
     float se_max;     /* largest relative standard error of a published estimate, > 0 */
-    float distance;   /* relative distance from the weak form's estimate that its own bias allows, >= 0 */
+    float distance;   /* relative distance from the weak form's estimate that the bias of its equations allows, >= 0. 0:
+                         they are the refinement's, and only smaller standard errors than its own are published */
 } pvid_refine_config_f32;
 
 /* An estimate; all numbers are finite. */
@@ -90,6 +93,10 @@ typedef struct {
 
 /* State: detail/refine_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_refine_f32 pvid_refine_f32;
+
+/* The functions below, for the configuration of the weak form, which then calls them: only latest, read and
+ * reason are left to the application. */
+extern const pvid_fourier_stage_f32 pvid_refine_stage_f32;
 
 /* Initialises `self`. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or
@@ -110,6 +117,10 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
 
 /* The published estimate, for the context that calls step; NULL before the first one. */
 const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self);
+
+/* What the last block told: as step, at the end of a block. PVID_WARMING_UP before the first one, PVID_NOT_READY
+ * without init. */
+pvid_reason pvid_refine_reason_f32(const pvid_refine_f32 *self);
 
 /* Copies the published estimate from any context (publication.h). *number: estimates published so far, 0: none; may be
  * NULL. Fails iff

@@ -96,6 +96,7 @@
 #define pvid_fourier_read_f32 PVID_SIZED(pvid_fourier_read_f32)
 #define pvid_fourier_gap_f32 PVID_SIZED(pvid_fourier_gap_f32)
 #define pvid_fourier_freeze_f32 PVID_SIZED(pvid_fourier_freeze_f32)
+#define pvid_fourier_candidate_f32 PVID_SIZED(pvid_fourier_candidate_f32)
 
 /* fourier_q31.h */
 #define pvid_fourier_init_q31 PVID_SIZED(pvid_fourier_init_q31)
@@ -146,6 +147,8 @@
 #define pvid_refine_read_f32 PVID_SIZED(pvid_refine_read_f32)
 #define pvid_refine_gap_f32 PVID_SIZED(pvid_refine_gap_f32)
 #define pvid_refine_freeze_f32 PVID_SIZED(pvid_refine_freeze_f32)
+#define pvid_refine_reason_f32 PVID_SIZED(pvid_refine_reason_f32)
+#define pvid_refine_stage_f32 PVID_SIZED(pvid_refine_stage_f32)
 
 /* fnv_refine.h */
 #define pvid_fnv_refine_f32 PVID_SIZED(pvid_fnv_refine_f32)
@@ -153,6 +156,10 @@
 /* snapshot_fourier.h */
 #define pvid_snapshot_save_fourier_f32 PVID_SIZED(pvid_snapshot_save_fourier_f32)
 #define pvid_snapshot_restore_fourier_f32 PVID_SIZED(pvid_snapshot_restore_fourier_f32)
+
+/* snapshot_refine.h */
+#define pvid_snapshot_save_refine_f32 PVID_SIZED(pvid_snapshot_save_refine_f32)
+#define pvid_snapshot_restore_refine_f32 PVID_SIZED(pvid_snapshot_restore_refine_f32)
 
 /* snapshot_fourier_q31.h */
 #define pvid_snapshot_save_fourier_q31 PVID_SIZED(pvid_snapshot_save_fourier_q31)

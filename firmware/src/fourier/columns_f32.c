@@ -10,6 +10,7 @@
  * the same for all columns: white_f32.c. Here they are in standard deviations. */
 #include "fourier/columns_f32.h"
 
+#include "number/exact.h"
 #include "solve/products_f32.h"
 
 #define SKIP 1.0e-6f
@@ -30,17 +31,24 @@ void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const p
     const float *im = window[term->channel][turned ? 0u : 1u];
     const float sign = negative ? -term->factor : term->factor;
     const float of_re = turned ? -sign : sign;
-    const size_t cosines = white->cosines;
+    const float unit = white->omega;
+    const size_t order = term->order;
+    const size_t cosines = PVID_COUNT(PVID_MAX_HARMONICS, white->cosines);
     float *imaginary = &part[cosines - 1u];
-    const size_t sines = white->parts - cosines;
-    for (size_t h = 0; h < cosines; h++) {
-        const float rate = (float)h * white->omega;
+    const size_t sines = PVID_COUNT(PVID_MAX_FUNCTIONS + PVID_MAX_POWER, white->parts) - cosines;
+    float number = 0.0f;
+    if (order == 0u) {
+        part[0] += (of_re * white->scale[0]) * re[0];
+    }
+    for (size_t h = 1; h < cosines; h++) {
+        number += 1.0f;
+        const float rate = number * unit;
         float weight = white->scale[h];
-        for (size_t i = term->order; i > 0u; i--) {
+        for (size_t i = order; i > 0u; i--) {
             weight *= rate;
         }
         part[h] += (of_re * weight) * re[h];
-        if ((h > 0u) && (h <= sines)) {
+        if (h <= sines) {
             imaginary[h] += (sign * weight) * im[h];
         }
     }
@@ -57,7 +65,9 @@ bool pvid_fourier_columns_keep_f32(size_t rows, const float nuisance[], float wh
 void pvid_fourier_columns_project_f32(size_t rows, const float nuisance[], float inverse, float column[])
 {
     const float along = pvid_product_f32(nuisance, column, rows) * inverse;
-    for (size_t k = 0; k < rows; k++) {
+    const size_t count = PVID_COUNT(PVID_MAX_FUNCTIONS, rows);
+    PVID_UNROLL_EXACT
+    for (size_t k = 0; k < count; k++) {
         column[k] -= along * nuisance[k];
     }
 }

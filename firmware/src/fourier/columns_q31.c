@@ -3,8 +3,8 @@
  *
  *   sum over terms  factor (-1)^m (i omega_h)^m S_h[channel]
  *
- * over their standard deviations. The sums of a channel are shifted up to 30 bits, the factors of all terms to the
- * exponent of the largest; products lose 33 of their bits, so that 15 of them fit. */
+ * over their standard deviations. Of each term and harmonic the sums and the factor are shifted up to 30 bits; all are
+ * added in the unit of the largest of the column. Products lose 33 of their bits, so that 15 of them fit. */
 #include "fourier/columns_q31.h"
 
 #include <string.h>
@@ -18,34 +18,63 @@
 #define KEPT_BITS 20
 #define SQUARE_DOWN 16u
 
-static int32_t exponent_of(const pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t t)
+/* Bits that the sums of a channel at a harmonic are shifted up; 0 <= length <= 31. */
+static uint32_t lift_of(uint32_t length)
 {
-    return design->factor[t].e - (int32_t)self->lift[design->model->term[t].channel];
+    return (length > (uint32_t)SUM_BITS) ? 0u : ((uint32_t)SUM_BITS - length);
 }
 
-void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
-                                    const pvid_fourier_window_q31 *window)
+/* Whether a channel is the constant, whose sums are 2 hop at h = 0 and 0 elsewhere. */
+static bool is_constant(const pvid_fourier_design_q31 *design, size_t channel)
 {
-    const pvid_fourier_model_q31 *model = design->model;
-    const pvid_fourier_kind *own = &model->kind[kind];
-    const size_t parts = pvid_fourier_sums_rows_q31(design);
-    const size_t columns = (size_t)own->thetas + 1u + own->nuisances;
-    for (size_t k = 0; k < model->channels; k++) {
-        const uint32_t length = pvid_bit_length_q31(window->bits[k]);
-        const bool full = (length == 0u) || (length > (uint32_t)SUM_BITS);
-        self->lift[k] = (uint8_t)(full ? 0u : ((uint32_t)SUM_BITS - length));
+    return design->model->channel[channel].gain == PVID_FOURIER_NONE;
+}
+
+static uint32_t length_of(const pvid_fourier_design_q31 *design, const pvid_fourier_window_q31 *window, size_t channel,
+                          size_t h)
+{
+    if (is_constant(design, channel)) {
+        return (h == 0u) ? pvid_bit_length_q31(2u * (uint64_t)design->hop) : 0u;
     }
+    return window->length[channel][h];
+}
+
+/* Whether a term contains harmonic h at all; *exponent: of its part there. */
+static bool exponent_of(const pvid_fourier_design_q31 *design, size_t t, const pvid_fourier_white_q31 *white,
+                        const pvid_fourier_window_q31 *window, size_t h, int32_t *exponent)
+{
+    const pvid_fourier_term_q31 term = design->model->term[t];
+    const uint32_t length = length_of(design, window, term.channel, h);
+    if ((length == 0u) || ((h == 0u) && (term.order > 0u)) || (design->factor[t].m == 0)) {
+        return false;
+    }
+    *exponent =
+        (design->factor[t].e - (int32_t)lift_of(length)) + pvid_fourier_white_exponent_q31(white, h, term.order);
+    return true;
+}
+
+void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind)
+{
+    const pvid_fourier_kind *own = &design->model->kind[kind];
+    const size_t columns = (size_t)own->thetas + 1u + own->nuisances;
+    const size_t parts = pvid_fourier_sums_rows_q31(design);
     for (size_t j = 0; j < columns; j++) {
-        self->exponent[j] = INT16_MIN;
+        self->exponent[j] = INT32_MIN;
         for (size_t i = 0; i < parts; i++) {
             self->x[j][i] = 0;
         }
     }
+}
+
+void pvid_fourier_columns_scan_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
+                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window, size_t h)
+{
+    const pvid_fourier_kind *own = &design->model->kind[kind];
     for (size_t t = own->first; t < own->end; t++) {
-        const int32_t e = exponent_of(self, design, t);
-        int16_t *top = &self->exponent[model->term[t].column];
-        if ((design->factor[t].m != 0) && (e > *top)) {
-            *top = (int16_t)e;
+        int32_t exponent = 0;
+        int32_t *top = &self->exponent[design->model->term[t].column];
+        if (exponent_of(design, t, white, window, h, &exponent) && (exponent > *top)) {
+            *top = exponent;
         }
     }
 }
@@ -61,17 +90,22 @@ void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fo
     int32_t weight[PVID_MAX_POWER + 1]; /* of the orders */
     weight[0] = white->scale[h].m;
     for (size_t m = 1; m < design->power; m++) {
-        weight[m] = (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[m - 1u], (int32_t)h * white->rate), 30);
+        weight[m] = pvid_fourier_white_times_q31(weight[m - 1u], h);
     }
     for (size_t t = own->first; t < own->end; t++) {
         const pvid_fourier_term_q31 term = design->model->term[t];
-        const int32_t below = self->exponent[term.column] - exponent_of(self, design, t);
-        const int32_t *s = window->s[term.channel][h];
-        if ((design->factor[t].m != 0) && (below < SUM_BITS)) { /* else nothing is left of it */
+        int32_t exponent = 0;
+        if (!exponent_of(design, t, white, window, h, &exponent)) {
+            continue;
+        }
+        const int32_t below = self->exponent[term.column] - exponent;
+        if (below < SUM_BITS) { /* else nothing is left of it */
+            const int32_t constant[2] = {2 * (int32_t)design->hop, 0};
+            const int32_t *s = is_constant(design, term.channel) ? constant : window->s[term.channel][h];
             const int32_t whole =
                 (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[term.order], design->factor[t].m), 30);
             const int32_t w = pvid_floor_shift_32_q31(whole, (uint32_t)below);
-            const int32_t up = (int32_t)((uint32_t)1 << self->lift[term.channel]);
+            const int32_t up = (int32_t)((uint32_t)1 << lift_of(length_of(design, window, term.channel, h)));
             const bool turned = (term.order % 2u) != 0u;
             const int32_t re = (turned ? s[1] : s[0]) * up;
             const int32_t im = (turned ? s[0] : s[1]) * up;
@@ -91,8 +125,8 @@ void pvid_fourier_columns_end_q31(pvid_fourier_columns_q31 *self, const pvid_fou
 {
     const int32_t top = self->exponent[place];
     const int32_t exponent = pvid_fourier_block_q31(pvid_fourier_sums_rows_q31(design), self->x[place]);
-    const int32_t unit = (top == INT16_MIN) ? 0 : (top + white->exponent + 30 + (int32_t)PRODUCT_DOWN);
-    self->exponent[place] = (int16_t)pvid_clamp_q31((int64_t)unit + exponent, INT16_MAX);
+    const int32_t unit = (top == INT32_MIN) ? 0 : (top + 30 + (int32_t)PRODUCT_DOWN);
+    self->exponent[place] = unit + exponent;
     pvid_fourier_white_remove_q31(white, design, self->x[place]);
 }
 

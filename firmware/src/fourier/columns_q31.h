@@ -8,8 +8,12 @@
 #include "pvid/fourier_q31.h"
 
 /* Begins the columns of a kind: all entries 0. */
-void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
-                                    const pvid_fourier_window_q31 *window);
+void pvid_fourier_columns_begin_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind);
+
+/* The unit of each column: all harmonics, each in turn. */
+void pvid_fourier_columns_scan_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,
+                                   const pvid_fourier_white_q31 *white, const pvid_fourier_window_q31 *window,
+                                   size_t h);
 
 /* Adds harmonic h of the window's sums, over its standard deviation, to the K + n parts of all columns. */
 void pvid_fourier_columns_take_q31(pvid_fourier_columns_q31 *self, const pvid_fourier_design_q31 *design, size_t kind,

@@ -19,12 +19,14 @@
 #include "number/init.h"
 #include "number/unroll.h"
 
-/* Bits of the largest finite number. */
-#define FINITE 0x7F7FFFFFu
+/* The largest finite number. */
+#define LARGEST 3.40282347e38f
 
-/* No reasons of a tick: there is work; the channels of a step are to be formed. */
-#define BUSY 255u
-#define FORM 254u
+/* No reasons of a tick: a window is being processed; a block is being added, or a window joined; the channels of a step
+ * are to be formed. */
+#define PROCESS 255u
+#define ADD 254u
+#define FORM 253u
 
 static inline bool all_finite(const float values[], size_t n)
 {
@@ -99,9 +101,11 @@ static inline pvid_reason idle(const pvid_fourier_f32 *self)
 /* What a tick without a step does from now on. */
 static void rest(pvid_fourier_f32 *self)
 {
-    const bool busy =
-        pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics) || pvid_fourier_finish_is_busy_f32(&self->finish);
-    self->rest = busy ? BUSY : (uint8_t)idle(self);
+    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        self->rest = ADD;
+    } else {
+        self->rest = pvid_fourier_finish_is_busy_f32(&self->finish) ? PROCESS : (uint8_t)idle(self);
+    }
 }
 
 static void restart(pvid_fourier_f32 *self)
@@ -113,6 +117,18 @@ static void restart(pvid_fourier_f32 *self)
     pvid_fourier_finish_skip_f32(&self->finish);
     self->warm = false;
     rest(self);
+}
+
+static pvid_status init_refinement(pvid_fourier_f32 *self, const pvid_fourier_refine_f32 *refine)
+{
+    if (refine == NULL) {
+        return PVID_OK;
+    }
+    if (refine->stage == NULL) {
+        return PVID_BAD_POINTER;
+    }
+    self->refine = refine;
+    return refine->stage->init(refine->storage, refine->config);
 }
 
 static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
@@ -157,7 +173,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->watches = (config->range != NULL) || (config->drive_min != NULL);
     self->plain = self->front.plain ? design->model->samples : 0u;
     for (size_t i = 0; i < design->model->samples; i++) {
-        self->front.limit[i] = (config->range != NULL) ? pvid_bits_f32(config->range[i]) : FINITE;
+        self->front.limit[i] = pvid_fourier_front_limit_f32((config->range != NULL) ? config->range[i] : LARGEST);
     }
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
@@ -167,7 +183,7 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
         return PVID_BAD_ITERATIONS;
     }
     restart(self);
-    return PVID_OK;
+    return init_refinement(self, config->refine);
 }
 
 pvid_status pvid_fourier_init_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
@@ -180,6 +196,9 @@ void pvid_fourier_gap_f32(pvid_fourier_f32 *self)
 {
     if (is_ready(self)) {
         restart(self);
+        if (self->refine != NULL) {
+            self->refine->stage->gap(self->refine->storage);
+        }
     }
 }
 
@@ -187,13 +206,15 @@ void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen)
 {
     if (is_ready(self)) {
         self->frozen = frozen;
+        if (self->refine != NULL) {
+            self->refine->stage->freeze(self->refine->storage, frozen);
+        }
     }
 }
 
 /* The reason why a complete window is dropped; PVID_ACCUMULATED if it is used. */
 static pvid_reason drop_reason(pvid_fourier_f32 *self)
 {
-    const pvid_fourier_design_f32 *design = self->design;
     if (self->frozen) {
         return PVID_HELD_FROZEN;
     }
@@ -201,7 +222,7 @@ static pvid_reason drop_reason(pvid_fourier_f32 *self)
         pvid_count_up(&self->estimator.counters.held_out_of_range);
         return PVID_HELD_OUT_OF_RANGE;
     }
-    if (pvid_fourier_watch_still_f32(&self->watch, design->model->samples, self->sums.target, design->hop)) {
+    if (self->watch.still) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
@@ -226,17 +247,13 @@ PVID_SELDOM static pvid_reason end_half(pvid_fourier_f32 *self)
 }
 
 /* The channels of a step to the present block. */
-PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self)
 {
     const pvid_fourier_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
-    const size_t half = self->sums.half;
     pvid_reason dropped = PVID_ACCUMULATED;
     if (pvid_fourier_step_take_f32(&self->history, design, self->dt, index, pvid_fourier_sums_place_f32(&self->sums))) {
-        if (self->watches) {
-            pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
-        }
-        if (pvid_fourier_sums_count_f32(&self->sums, design->hop)) {
+        if (pvid_fourier_sums_count_f32(&self->sums, design->hop, self->channels)) {
             dropped = end_half(self);
         }
     }
@@ -252,24 +269,52 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
     return PVID_REJECTED_NOT_FINITE;
 }
 
-/* Harmonics of the last block are added or joined, else stages of the last whole window run. */
-PVID_SELDOM static pvid_reason work(pvid_fourier_f32 *self)
+/* Some harmonics of the last block are added, or of the last window joined. */
+static pvid_reason add(pvid_fourier_f32 *self)
 {
-    pvid_reason reason = idle(self);
-    if (pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
-        for (uint32_t left = self->items_per_tick; left > 0u; left--) {
-            if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
-                                              self->finish.work.rows.window)) {
+    pvid_fourier_sums_f32 *sums = &self->sums;
+    for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
+        if (pvid_fourier_sums_joins_f32(sums)) {
+            pvid_fourier_sums_join_one_f32(sums, self->design, self->channels, self->dt, self->finish.work.rows.window);
+            if (sums->joined == self->harmonics) {
                 pvid_fourier_finish_begin_f32(&self->finish);
+                rest(self);
+            }
+        } else {
+            pvid_fourier_sums_add_f32(sums, self->design, self->channels);
+            if (!pvid_fourier_sums_is_busy_f32(sums, self->harmonics)) {
+                rest(self);
             }
         }
-    } else {
-        for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
-            pvid_fourier_finish_step_f32(self, &reason);
-        }
     }
-    rest(self);
+    return idle(self);
+}
+
+/* Some stages of the last whole window. */
+static pvid_reason process(pvid_fourier_f32 *self)
+{
+    pvid_reason reason = idle(self);
+    uint32_t left = self->stages_per_tick;
+    do {
+        pvid_fourier_finish_step_f32(self, &reason);
+        left--;
+    } while (left > 0u);
+    if (!pvid_fourier_finish_is_busy_f32(&self->finish)) {
+        rest(self);
+    }
     return reason;
+}
+
+/* The samples of the tick of a step, whose channels follow. */
+static void watch(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    const uint16_t index = self->sums.index;
+    const size_t half = self->sums.half;
+    pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
+    if (index + 1u == design->hop) {
+        pvid_fourier_watch_half_f32(&self->watch, design->model->samples, half, design->hop);
+    }
 }
 
 /* The last tick of a block. */
@@ -278,22 +323,39 @@ PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sam
     const uint8_t decimation = self->front.decimation;
     const bool steps =
         pvid_fourier_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
+    if (steps && self->watches && (self->history.known > 1u)) {
+        watch(self, sample);
+    }
     if (steps && (decimation >= PVID_FOURIER_TWO_TICKS)) {
         self->rest = FORM;
         return idle(self);
     }
-    const pvid_reason formed = steps ? form(self, sample) : idle(self);
-    if ((decimation > 1u) || (self->rest != BUSY)) {
+    const pvid_reason formed = steps ? form(self) : idle(self);
+    if ((decimation > 1u) || (self->rest <= FORM)) {
         return formed;
     }
-    const pvid_reason worked = work(self);
+    const pvid_reason worked = (self->rest == ADD) ? add(self) : process(self);
     return (formed == idle(self)) ? worked : formed;
 }
 
 /* A tick with something to do. */
-static inline pvid_reason due(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason due(pvid_fourier_f32 *self)
 {
-    return (self->rest == BUSY) ? work(self) : form(self, sample);
+    if (self->rest == ADD) {
+        return add(self);
+    }
+    return (self->rest == PROCESS) ? process(self) : form(self);
+}
+
+/* Behind the samples of a tick. */
+static inline pvid_reason follow(pvid_fourier_f32 *self, const float sample[])
+{
+    self->front.wait--;
+    if (self->front.wait == 0u) {
+        return end_block(self, sample);
+    }
+    const uint32_t rested = self->rest;
+    return (rested >= FORM) ? due(self) : (pvid_reason)rested;
 }
 
 /* A tick whose samples need more than to be added. */
@@ -310,32 +372,52 @@ PVID_SELDOM static pvid_reason other_tick(pvid_fourier_f32 *self, const float sa
         pvid_fourier_watch_sample_f32(&self->watch, model->samples, sample);
     }
     pvid_fourier_front_derive_f32(&self->front, model, sample);
-    self->front.wait--;
-    if (self->front.wait == 0u) {
-        return end_block(self, sample);
+    return follow(self, sample);
+}
+
+/* A tick with a sample that is not finite or beyond its range. */
+PVID_SELDOM static pvid_reason odd_tick(pvid_fourier_f32 *self, const float sample[])
+{
+    if (!all_finite(sample, self->plain)) {
+        return reject(self);
     }
-    return (self->rest >= FORM) ? due(self, sample) : (pvid_reason)self->rest;
+    self->watch.beyond = self->watch.delay;
+    pvid_fourier_front_add_f32(&self->front, self->plain, sample);
+    return follow(self, sample);
+}
+
+/* A tick of the weak form. */
+static inline pvid_reason weak_tick(pvid_fourier_f32 *self, const float sample[])
+{
+    if ((self == NULL) || (sample == NULL) || (self->plain == 0u)) {
+        return other_tick(self, sample);
+    }
+    if (!pvid_fourier_front_fits_f32(&self->front, self->plain, sample)) {
+        return odd_tick(self, sample);
+    }
+    pvid_fourier_front_add_f32(&self->front, self->plain, sample);
+    return follow(self, sample);
+}
+
+/* A tick of both stages. */
+PVID_SELDOM static pvid_reason both_ticks(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_reason reason = weak_tick(self, sample);
+    const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
+    if (sample != NULL) {
+        self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL);
+    }
+    return reason;
 }
 
 pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
 {
-    const uint32_t plain = (self != NULL) ? self->plain : 0u;
-    if ((plain == 0u) || (sample == NULL)) {
-        return other_tick(self, sample);
-    }
-    bool beyond = false;
-    if (!pvid_fourier_front_add_f32(&self->front, plain, sample, &beyond)) {
-        return reject(self);
-    }
-    if (beyond) {
-        self->watch.beyond = self->watch.delay;
-    }
-    self->front.wait--;
-    if (self->front.wait == 0u) {
-        return end_block(self, sample);
-    }
-    const uint32_t rested = self->rest;
-    return (rested >= FORM) ? due(self, sample) : (pvid_reason)rested;
+    return ((self != NULL) && (self->refine != NULL)) ? both_ticks(self, sample) : weak_tick(self, sample);
+}
+
+const pvid_estimate_f32 *pvid_fourier_candidate_f32(const pvid_fourier_f32 *self)
+{
+    return (self != NULL) ? &self->finish.candidate : NULL;
 }
 
 const pvid_estimate_f32 *pvid_fourier_estimate_f32(const pvid_fourier_f32 *self)

@@ -5,6 +5,7 @@
 
 #include "fourier/columns_q31.h"
 #include "fourier/mirror_q31.h"
+#include "fourier/noise_q31.h"
 #include "fourier/sums_q31.h"
 #include "fourier/white_q31.h"
 #include "number/count.h"
@@ -12,6 +13,7 @@
 #include "number/scaled_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
+#include "solve/system_q31.h"
 
 enum {
     /* for each kind of rows */
@@ -19,12 +21,17 @@ enum {
     STAGE_SPECTRUM, /* D_h, a few harmonics at a time */
     STAGE_INVERT,   /* 1 / sqrt(D_h), a harmonic at a time */
     STAGE_MIRROR,   /* n reflections that leave the white rows */
-    STAGE_COLUMN,   /* columns: they begin; each harmonic of all; the white rows of each */
+    STAGE_LEVERAGE, /* n parts; this and the next two only where the noise is computed anew */
+    STAGE_SHARE,    /* Q_j, a few harmonics */
+    STAGE_NOISE,    /* C, then bias and information by each entry of the noise table */
+    STAGE_UNIT,     /* of the columns: a few harmonics */
+    STAGE_COLUMN,   /* columns: each harmonic of all; the white rows of each */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
     STAGE_FORMAT,   /* for theta's columns and Y: their format */
     STAGE_RESIDUAL, /* a few rows of e, in place of Y; at the end the gate accepts or rejects the kind */
     STAGE_FADE,     /* before the first rows of the window: the factor of a renewal on the sums, in parts */
     STAGE_ADD,      /* K times, less the nuisances: a row to the estimator */
+    STAGE_PULL,     /* what the noise takes from b */
     /* for the window */
     STAGE_SOLVE,  /* `iterations` solves, several stages each */
     STAGE_ASSESS, /* several stages */
@@ -35,11 +42,16 @@ enum {
 #define ENTRIES_PER_STAGE 4u
 #define HARMONICS_PER_STAGE 2u
 #define ROOTS_PER_STAGE 4u
+#define UNITS_PER_STAGE 2u
+#define SHARES_PER_STAGE 1u
 #define RESIDUALS_PER_STAGE 2u
 
 /* Relative step of p behind which there is no other one on the same sums: 2^-7, Q22. The next is below the square of
  * that. */
 #define SMALL_STEP ((int64_t)1 << 15)
+
+/* Windows after which the noise is computed anew; it is behind a step that is not small. */
+#define NOISE_WINDOWS 16u
 
 /* Windows in the average of the gate's scale, which is relative to the sensors' noise and at least 1. */
 #define GATE_MEMORY 4u
@@ -73,6 +85,12 @@ pvid_status pvid_fourier_finish_init_q31(pvid_fourier_finish_q31 *self, const pv
     memcpy(self->n_bits, config->estimator.n_bits, sizeof self->n_bits);
     self->y_bits = config->estimator.y_bits;
     self->expected = pvid_scaled_of_q31(sd * sd, -2 * PVID_ROW_SD_BITS);
+    self->known.compensates = config->compensation && (design->n_noise > 0u);
+    self->known.used = self->known.compensates || ((config->estimator.noise_margin > 0u) && (design->n_noise > 0u));
+    for (size_t i = 0; i < design->model->kinds; i++) {
+        self->known.used = self->known.used || (design->error_variance[i].m > 0);
+    }
+    self->known.age = NOISE_WINDOWS;
     self->stage = STAGE_IDLE;
     return PVID_OK;
 }
@@ -90,6 +108,9 @@ static void begin_kind(pvid_fourier_finish_q31 *self, const pvid_fourier_design_
 
 void pvid_fourier_finish_begin_q31(pvid_fourier_finish_q31 *self, const pvid_fourier_design_q31 *design)
 {
+    pvid_fourier_known_q31 *known = &self->known;
+    known->renewed = known->used && ((known->age >= NOISE_WINDOWS) || (self->size > SMALL_STEP));
+    known->age = (uint8_t)(known->renewed ? 1u : (known->age + (known->used ? 1u : 0u)));
     self->kind = 0;
     self->theta = 0;
     self->used = 0;
@@ -148,27 +169,107 @@ static bool mirror_stage(pvid_fourier_q31 *self)
     return finish->index < pvid_fourier_mirrors_q31(self->design);
 }
 
+static bool leverage_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_fourier_rows_q31 *rows = &finish->work.rows;
+    pvid_fourier_noise_leverage_q31(&rows->white, self->design, finish->index, rows->parts.noise.u,
+                                    rows->parts.noise.leverage);
+    finish->index++;
+    return finish->index < pvid_fourier_mirrors_q31(self->design);
+}
+
+static bool share_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_fourier_rows_q31 *rows = &finish->work.rows;
+    const size_t harmonics = rows->white.cosines;
+    const size_t end = lesser((size_t)finish->index + SHARES_PER_STAGE, harmonics);
+    for (size_t h = finish->index; h < end; h++) {
+        pvid_fourier_noise_share_q31(&rows->white, self->design, rows->parts.noise.leverage, h,
+                                     rows->parts.noise.share);
+    }
+    finish->index = (uint16_t)end;
+    return end < harmonics;
+}
+
+/* Before the first entry of the first kind the sums over all kinds begin. */
+static void begin_noise(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    const pvid_fourier_model_q31 *model = self->design->model;
+    memset(self->estimator.noise_table, 0, sizeof self->estimator.noise_table);
+    memset(finish->known.pull, 0, sizeof finish->known.pull);
+    finish->known.sensors = pvid_scaled_of_q31(0, 0);
+    self->estimator.noise_rows = 0;
+    for (size_t i = 0; (self->design->n_noise > 0u) && (i < model->kinds); i++) {
+        const uint32_t rows = (uint32_t)self->design->functions - model->kind[i].nuisances;
+        self->estimator.noise_rows = (uint16_t)(self->estimator.noise_rows + rows);
+    }
+}
+
+/* C at p; what the sensors explain; then an entry of the table each. */
+static bool noise_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_fourier_rows_q31 *rows = &finish->work.rows;
+    pvid_fourier_noise_work_q31 *work = &rows->parts.noise;
+    const pvid_fourier_design_q31 *design = self->design;
+    if (finish->index == 0u) {
+        const int16_t h[PVID_MAX_THETA_Q31] = {0};
+        if (finish->kind == 0u) {
+            begin_noise(self);
+        }
+        pvid_system_jacobian_q31(&self->estimator, h, work->c, work->f);
+    } else if (finish->index == 1u) {
+        finish->known.sensors = pvid_scaled_plus_q31(finish->known.sensors,
+                                                     pvid_fourier_noise_sensors_q31(&rows->white, design, work->share));
+    } else if (design->noise[finish->index - 2u].kind == finish->kind) {
+        pvid_fourier_noise_take_q31(&self->estimator, design, &design->noise[finish->index - 2u], work, rows->of_theta,
+                                    finish->theta, finish->n_bits, finish->y_bits, &finish->known.pull[finish->theta]);
+    } else {
+        /* an entry of another kind */
+    }
+    finish->index++;
+    return finish->index < (design->n_noise + 2u);
+}
+
+static bool unit_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    pvid_fourier_rows_q31 *rows = &finish->work.rows;
+    const size_t harmonics = rows->white.cosines;
+    const size_t end = lesser((size_t)finish->index + UNITS_PER_STAGE, harmonics);
+    if (finish->index == 0u) {
+        pvid_fourier_columns_begin_q31(&rows->parts.columns, self->design, finish->kind);
+    }
+    for (size_t h = finish->index; h < end; h++) {
+        pvid_fourier_columns_scan_q31(&rows->parts.columns, self->design, finish->kind, &rows->white,
+                                      &self->collect.window, h);
+    }
+    finish->index = (uint16_t)end;
+    return end < harmonics;
+}
+
 static bool column_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     const pvid_fourier_design_q31 *design = self->design;
     const pvid_fourier_kind *kind = kind_of(self);
     const size_t harmonics = finish->work.rows.white.cosines;
-    if (finish->index == 0u) {
-        pvid_fourier_columns_begin_q31(&finish->work.rows.columns, design, finish->kind, &self->collect.window);
-    } else if (finish->index <= harmonics) {
-        pvid_fourier_columns_take_q31(&finish->work.rows.columns, design, finish->kind, &finish->work.rows.white,
-                                      &self->collect.window, (size_t)finish->index - 1u);
+    if (finish->index < harmonics) {
+        pvid_fourier_columns_take_q31(&finish->work.rows.parts.columns, design, finish->kind, &finish->work.rows.white,
+                                      &self->collect.window, finish->index);
     } else {
-        const size_t place = finish->index - (harmonics + 1u);
-        pvid_fourier_columns_end_q31(&finish->work.rows.columns, design, &finish->work.rows.white, place);
+        const size_t place = finish->index - harmonics;
+        pvid_fourier_columns_end_q31(&finish->work.rows.parts.columns, design, &finish->work.rows.white, place);
         if (place > kind->thetas) {
             finish->work.rows.whole[place - kind->thetas - 1u] =
-                pvid_fourier_columns_square_q31(design->functions, finish->work.rows.columns.x[place]);
+                pvid_fourier_columns_square_q31(design->functions, finish->work.rows.parts.columns.x[place]);
         }
     }
     finish->index++;
-    return finish->index <= (harmonics + columns_of(kind));
+    return finish->index < (harmonics + columns_of(kind));
 }
 
 /* Of each nuisance in order: part 0 its reflection, then the columns without it, those of theta, Y and the nuisances
@@ -184,7 +285,7 @@ static bool project_stage(pvid_fourier_q31 *self)
     }
     const size_t begin = finish->live;
     const size_t rows = self->design->functions - begin;
-    int32_t *mirror = &finish->work.rows.columns.x[nuisance][begin];
+    int32_t *mirror = &finish->work.rows.parts.columns.x[nuisance][begin];
     if (finish->part == 0u) {
         finish->kept = pvid_fourier_columns_keep_q31(finish->work.rows.whole[finish->index], rows, mirror);
         finish->part = 1;
@@ -193,7 +294,7 @@ static bool project_stage(pvid_fourier_q31 *self)
     const size_t place = finish->part - 1u;
     const size_t column = (place < first) ? place : (place + finish->index + 1u);
     if (finish->kept) {
-        pvid_fourier_mirror_q31(mirror, rows, &finish->work.rows.columns.x[column][begin]);
+        pvid_fourier_mirror_q31(mirror, rows, &finish->work.rows.parts.columns.x[column][begin]);
     }
     finish->part++;
     if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
@@ -210,7 +311,8 @@ static bool format_stage(pvid_fourier_q31 *self)
     const size_t place = finish->index;
     const size_t thetas = kind_of(self)->thetas;
     const int32_t bits = (place < thetas) ? finish->n_bits[finish->theta + place] : finish->y_bits;
-    pvid_fourier_columns_format_q31(&finish->work.rows.columns, place, finish->live, self->design->functions, bits);
+    pvid_fourier_columns_format_q31(&finish->work.rows.parts.columns, place, finish->live, self->design->functions,
+                                    bits);
     finish->index++;
     return finish->index <= thetas;
 }
@@ -220,7 +322,7 @@ static void row_of(const pvid_fourier_q31 *self, size_t k, int32_t n[PVID_MAX_TH
 {
     const size_t thetas = kind_of(self)->thetas;
     for (size_t j = 0; j < thetas; j++) {
-        n[j] = self->finish.work.rows.columns.x[j][k];
+        n[j] = self->finish.work.rows.parts.columns.x[j][k];
     }
 }
 
@@ -230,7 +332,7 @@ static bool residual_stage(pvid_fourier_q31 *self)
     const size_t first = (size_t)finish->live + finish->index;
     const size_t rows = self->design->functions;
     const size_t last = lesser(first + RESIDUALS_PER_STAGE, rows);
-    int32_t *y = finish->work.rows.columns.x[kind_of(self)->thetas];
+    int32_t *y = finish->work.rows.parts.columns.x[kind_of(self)->thetas];
     pvid_block block;
     pvid_information_block_q31(self->estimator.model, finish->theta, &block);
     for (size_t k = first; k < last; k++) {
@@ -247,9 +349,9 @@ static bool residual_stage(pvid_fourier_q31 *self)
 }
 
 /* rss over its expectation. */
-static pvid_scaled_q31 variance_ratio_of(const pvid_fourier_finish_q31 *self, int64_t rss, int64_t freedom)
+static pvid_scaled_q31 variance_ratio_of(pvid_scaled_q31 of_row, int64_t rss, int64_t freedom)
 {
-    const pvid_scaled_q31 expected = pvid_scaled_times_q31(pvid_scaled_of_q31(freedom, 0), self->expected);
+    const pvid_scaled_q31 expected = pvid_scaled_times_q31(pvid_scaled_of_q31(freedom, 0), of_row);
     return pvid_scaled_over_q31(pvid_scaled_of_q31(rss, 0), expected);
 }
 
@@ -266,7 +368,7 @@ static bool passes(pvid_fourier_q31 *self)
     pvid_fourier_finish_q31 *finish = &self->finish;
     pvid_gate_q31 *gate = &finish->gate[finish->kind];
     return (gate->limit.m == 0) || finish->saturated ||
-           pvid_gate_passes_q31(gate, variance_ratio_of(finish, finish->rss, freedom_of(self)));
+           pvid_gate_passes_q31(gate, variance_ratio_of(finish->expected, finish->rss, freedom_of(self)));
 }
 
 static bool fade_stage(pvid_fourier_q31 *self)
@@ -294,7 +396,7 @@ static bool add_stage(pvid_fourier_q31 *self, pvid_reason *reason)
         pvid_count_up(&self->estimator.counters.rejected_saturated);
         *reason = PVID_REJECTED_SATURATED;
     } else {
-        const int32_t e = finish->work.rows.columns.x[kind_of(self)->thetas][k];
+        const int32_t e = finish->work.rows.parts.columns.x[kind_of(self)->thetas][k];
         int32_t n[PVID_MAX_THETA_Q31];
         pvid_block block;
         row_of(self, k, n);
@@ -305,13 +407,34 @@ static bool add_stage(pvid_fourier_q31 *self, pvid_reason *reason)
     return (k + 1u) < self->design->functions;
 }
 
+static void pull_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
+    if (finish->known.compensates && !finish->saturated) {
+        pvid_scaled_q31 pull[PVID_MAX_THETA_Q31] = {{0, 0}};
+        memcpy(&pull[finish->theta], &finish->known.pull[finish->theta], kind_of(self)->thetas * sizeof pull[0]);
+        (void)pvid_estimator_add_to_b_q31(&self->estimator, pull);
+    }
+}
+
 /* ---- steps of p and verdict ---- */
+
+/* Variance of a row by the sensors' noise alone, mean over the kinds; all of it where that is not known. */
+static pvid_scaled_q31 expected_of(const pvid_fourier_q31 *self)
+{
+    const pvid_fourier_finish_q31 *finish = &self->finish;
+    if (finish->known.sensors.m <= 0) {
+        return finish->expected;
+    }
+    const pvid_scaled_q31 kinds = pvid_scaled_of_q31((int64_t)self->design->model->kinds, 0);
+    return pvid_scaled_times_q31(finish->expected, pvid_scaled_over_q31(finish->known.sensors, kinds));
+}
 
 static void begin_solves(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     const int32_t *fallback = pvid_trust_fallback_q31(&self->trust);
-    pvid_estimator_set_expected_q31(&self->estimator, finish->expected);
+    pvid_estimator_set_expected_q31(&self->estimator, expected_of(self));
     pvid_estimator_begin_q31(&self->estimator, &finish->work.solve, true);
     finish->rss = finish->work.solve.group_rss;
     if (fallback != NULL) {
@@ -341,7 +464,7 @@ static bool solve_stage(pvid_fourier_q31 *self)
 static void judge_stage(pvid_fourier_q31 *self, pvid_reason *reason)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
-    const pvid_scaled_q31 ratio = variance_ratio_of(finish, finish->rss, finish->free);
+    const pvid_scaled_q31 ratio = variance_ratio_of(expected_of(self), finish->rss, finish->free);
     *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
                                    finish->work.solve.above_noise,
                                    pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
@@ -382,6 +505,18 @@ static bool advance_kind(pvid_fourier_q31 *self, pvid_reason *reason)
     case STAGE_MIRROR:
         more = mirror_stage(self);
         break;
+    case STAGE_LEVERAGE:
+        more = leverage_stage(self);
+        break;
+    case STAGE_SHARE:
+        more = share_stage(self);
+        break;
+    case STAGE_NOISE:
+        more = noise_stage(self);
+        break;
+    case STAGE_UNIT:
+        more = unit_stage(self);
+        break;
     case STAGE_COLUMN:
         more = column_stage(self);
         break;
@@ -397,8 +532,12 @@ static bool advance_kind(pvid_fourier_q31 *self, pvid_reason *reason)
     case STAGE_FADE:
         more = fade_stage(self);
         break;
-    default: /* STAGE_ADD */
+    case STAGE_ADD:
         more = add_stage(self, reason);
+        break;
+    default: /* STAGE_PULL */
+        pull_stage(self);
+        more = false;
         break;
     }
     return more;
@@ -414,12 +553,13 @@ static void step_kind(pvid_fourier_q31 *self, pvid_reason *reason)
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         *reason = PVID_REJECTED_OUTLIER;
         end_kind(self);
-    } else if (finish->stage == (uint8_t)STAGE_ADD) {
+    } else if (finish->stage == (uint8_t)STAGE_PULL) {
         finish->used++;
         finish->free = (uint16_t)(finish->free + (uint16_t)freedom_of(self));
         end_kind(self);
     } else {
-        finish->stage++;
+        const bool skips = (finish->stage == (uint8_t)STAGE_MIRROR) && !finish->known.renewed;
+        finish->stage = (uint8_t)(skips ? (uint8_t)STAGE_UNIT : (finish->stage + 1u));
         finish->index = 0;
         finish->part = 0;
     }
@@ -466,10 +606,13 @@ static uint32_t stages_of_kind(const pvid_fourier_q31 *self, const pvid_fourier_
     for (size_t i = 0; i < kind->nuisances; i++) {
         project += ((size_t)kind->thetas + 1u + kind->nuisances) - i;
     }
-    return stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
+    const uint32_t noise = self->finish.known.used ? ((uint32_t)pvid_fourier_mirrors_q31(design) +
+                                                      stages_of(harmonics, SHARES_PER_STAGE) + 2u + design->n_noise)
+                                                   : 0u;
+    return noise + stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
            stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_fourier_mirrors_q31(design) +
-           (uint32_t)(1u + harmonics + columns_of(kind)) + (uint32_t)project + kind->thetas + 1u +
-           stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows;
+           stages_of(harmonics, UNITS_PER_STAGE) + (uint32_t)(harmonics + columns_of(kind)) + (uint32_t)project +
+           kind->thetas + 1u + stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
 }
 
 uint32_t pvid_fourier_finish_stages_q31(const pvid_fourier_q31 *self)

@@ -16,7 +16,7 @@
 #include <string.h>
 
 #include "fourier/fourier_signals.h"
-#include "number/unroll.h"
+#include "number/exact.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
 
@@ -157,20 +157,21 @@ static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order,
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[])
 {
     const pvid_fourier_model_f32 *model = design->model;
-    const size_t signals = self->signals;
+    const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, self->signals);
+    const size_t jets = PVID_COUNT(PVID_EXACT_JETS, model->jets);
     const size_t length = (2u * (size_t)self->half) + 1u;
     float *sums = self->line;
     float *carry = &sums[2u * signals];
     float *outputs = &carry[signals];
     float *place = &outputs[self->head * signals];
+    PVID_UNROLL_EXACT
     for (size_t i = 0; i < signals; i++) {
-        const float once = sums[0];
-        const float twice = sums[1];
+        const float once = sums[2u * i];
+        const float twice = sums[(2u * i) + 1u];
         const float output = self->scale * (twice + carry[i]);
         carry[i] = (self->ticks * once) - twice;
-        sums[0] = 0.0f;
-        sums[1] = 0.0f;
-        sums = &sums[2];
+        sums[2u * i] = 0.0f;
+        sums[(2u * i) + 1u] = 0.0f;
         place[i] = output;
         place[(length * signals) + i] = output;
     }
@@ -181,7 +182,8 @@ bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourie
         return false;
     }
     const float *centre = &outputs[((size_t)self->head + self->half) * signals];
-    for (size_t i = 0; i < model->jets; i++) {
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < jets; i++) {
         jet[i] = jet_of(&design->compensator[i], model->jet[i].order, &centre[model->jet[i].signal], signals);
     }
     return true;

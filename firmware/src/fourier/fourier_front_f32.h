@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "number/exact.h"
 #include "number/finite_f32.h"
 #include "pvid/fourier.h"
 
@@ -33,30 +34,37 @@ void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_four
  */
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[]);
 
-/* Adds this number of samples of a tick, at least 1, to the block; sets *beyond if one is beyond its limit. Returns
- * false if one is not finite; the front end must then be reset. */
-static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[],
-                                              bool *beyond)
+/* What the bits of a sample without its sign, shifted left by one, are compared with. */
+static inline uint32_t pvid_fourier_front_limit_f32(float largest)
 {
-    float *sums = self->line;
-    const uint32_t *limit = self->limit;
-    const float *end = &sample[number];
-    do {
-        const float x = *sample;
-        if ((pvid_bits_f32(x) & 0x7FFFFFFFu) > *limit) {
-            if (!pvid_finite_f32(x)) {
-                return false;
-            }
-            *beyond = true;
+    return pvid_bits_f32(largest) << 1u;
+}
+
+/* Returns whether none of this number of samples, at least 1, is beyond its limit. */
+static inline bool pvid_fourier_front_fits_f32(const pvid_fourier_front_f32 *self, uint32_t number,
+                                               const float sample[])
+{
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        if ((pvid_bits_f32(sample[i]) << 1u) > self->limit[i]) {
+            return false;
         }
-        const float once = sums[0] + x;
-        sums[0] = once;
-        sums[1] += once;
-        sample++;
-        limit++;
-        sums = &sums[2];
-    } while (sample != end);
+    }
     return true;
+}
+
+/* Adds this number of finite samples of a tick to the block. */
+static inline void pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[])
+{
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
+    float *sums = self->line;
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        const float once = sums[2u * i] + sample[i];
+        sums[2u * i] = once;
+        sums[(2u * i) + 1u] += once;
+    }
 }
 
 #endif

@@ -44,18 +44,14 @@ static inline bool pvid_fourier_is_within_q31(int32_t count, int32_t full_scale)
     return ((uint32_t)count + (uint32_t)full_scale) <= (2u * (uint32_t)full_scale);
 }
 
-/* Adds the readings of a tick to the block. Returns false if one is beyond its full scale; the front end must then be
- * reset. */
-static inline bool pvid_fourier_front_add_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
-                                              const int32_t reading[])
+/* Adds the readings of a tick, each a signal, to the block. Returns as pvid_fourier_front_add_q31. */
+static inline bool pvid_fourier_front_plain_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
+                                                uint32_t signals, const int32_t reading[])
 {
-    if (!self->plain) {
-        return pvid_fourier_front_derive_q31(self, design, reading);
-    }
     int32_t *sums = self->line;
     const int32_t *full_scale = design->full_scale;
     const int32_t *offset = self->offset;
-    for (uint32_t left = design->model->signals; left > 0u; left--) {
+    for (uint32_t left = signals; left > 0u; left--) {
         const int32_t x = pvid_fourier_count_q31(*reading, *offset);
         if (!pvid_fourier_is_within_q31(x, *full_scale)) {
             return false;
@@ -69,6 +65,17 @@ static inline bool pvid_fourier_front_add_q31(pvid_fourier_front_q31 *self, cons
         sums += 2;
     }
     return true;
+}
+
+/* Adds the readings of a tick to the block. Returns false if one is beyond its full scale; the front end must then be
+ * reset. */
+static inline bool pvid_fourier_front_add_q31(pvid_fourier_front_q31 *self, const pvid_fourier_design_q31 *design,
+                                              const int32_t reading[])
+{
+    if (!self->plain) {
+        return pvid_fourier_front_derive_q31(self, design, reading);
+    }
+    return pvid_fourier_front_plain_q31(self, design, design->model->signals, reading);
 }
 
 #endif

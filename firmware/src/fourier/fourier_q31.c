@@ -18,6 +18,9 @@
 #define STAGES_MAX 64u
 #define ONE_Q16 65536u
 
+/* No reason of a tick: there is work. */
+#define BUSY 255u
+
 static bool is_ready(const pvid_fourier_q31 *self)
 {
     const bool ready = (self != NULL) && (self->design != NULL);
@@ -25,10 +28,23 @@ static bool is_ready(const pvid_fourier_q31 *self)
     return ready;
 }
 
+static pvid_reason idle_reason(const pvid_fourier_q31 *self)
+{
+    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+}
+
+/* What a tick does from now on that ends no step. */
+static void rest(pvid_fourier_q31 *self)
+{
+    const bool busy = (self->collect.sums.left > 0u) || pvid_fourier_finish_is_busy_q31(&self->finish);
+    self->rest = busy ? BUSY : (uint8_t)idle_reason(self);
+}
+
 static void restart(pvid_fourier_q31 *self)
 {
     pvid_fourier_collect_reset_q31(&self->collect);
     self->warm = false;
+    rest(self);
 }
 
 static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config)
@@ -79,7 +95,12 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
     const uint32_t stages = pvid_fourier_finish_stages_q31(self);
     const uint32_t each = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
     self->stages_per_tick = (uint8_t)((each <= STAGES_MAX) ? each : 0u);
-    return (self->stages_per_tick > 0u) ? PVID_OK : PVID_BAD_ITERATIONS;
+    if (self->stages_per_tick == 0u) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->plain = self->collect.front.plain ? design->model->samples : 0u;
+    rest(self);
+    return PVID_OK;
 }
 
 pvid_status pvid_fourier_init_q31(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config)
@@ -139,11 +160,6 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_q31 *self)
     return PVID_REJECTED_SATURATED;
 }
 
-static pvid_reason idle_reason(const pvid_fourier_q31 *self)
-{
-    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
-}
-
 PVID_SELDOM static pvid_reason advance_finish(pvid_fourier_q31 *self)
 {
     pvid_reason reason = idle_reason(self);
@@ -168,24 +184,9 @@ PVID_SELDOM static pvid_fourier_tick end_step(pvid_fourier_q31 *self, const int3
     return tick;
 }
 
-pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[])
+/* Behind the work of a tick. */
+static pvid_reason after(pvid_fourier_q31 *self, pvid_fourier_tick tick)
 {
-    if (!is_ready(self) || (reading == NULL)) {
-        return PVID_NOT_READY;
-    }
-    pvid_fourier_collect_q31 *collect = &self->collect;
-    if (!pvid_fourier_front_add_q31(&collect->front, self->design, reading)) {
-        return reject(self);
-    }
-    pvid_fourier_tick tick = PVID_FOURIER_FREE;
-    collect->front.wait--;
-    if (collect->front.wait == 0u) {
-        tick = end_step(self, reading);
-    } else if (collect->sums.left > 0u) {
-        tick = pvid_fourier_collect_work_q31(collect);
-    } else {
-        /* free */
-    }
     pvid_reason reason = idle_reason(self);
     if (tick == PVID_FOURIER_REJECTED) {
         reason = reject(self);
@@ -196,7 +197,50 @@ pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[
     } else {
         /* the tick is full, or there is nothing to do */
     }
+    rest(self);
     return reason;
+}
+
+/* A tick that ends no step, with work. */
+PVID_SELDOM static pvid_reason work(pvid_fourier_q31 *self)
+{
+    pvid_fourier_collect_q31 *collect = &self->collect;
+    return after(self, (collect->sums.left > 0u) ? pvid_fourier_collect_work_q31(collect) : PVID_FOURIER_FREE);
+}
+
+/* Behind the readings of a tick. */
+static inline pvid_reason end_tick(pvid_fourier_q31 *self, const int32_t reading[])
+{
+    self->collect.front.wait--;
+    if (self->collect.front.wait == 0u) {
+        return after(self, end_step(self, reading));
+    }
+    const uint32_t rested = self->rest;
+    return (rested == BUSY) ? work(self) : (pvid_reason)rested;
+}
+
+/* A tick whose readings need more than to be added. */
+PVID_SELDOM static pvid_reason other_tick(pvid_fourier_q31 *self, const int32_t reading[])
+{
+    if (!is_ready(self) || (reading == NULL)) {
+        return PVID_NOT_READY;
+    }
+    if (!pvid_fourier_front_derive_q31(&self->collect.front, self->design, reading)) {
+        return reject(self);
+    }
+    return end_tick(self, reading);
+}
+
+pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[])
+{
+    const uint32_t plain = (self != NULL) ? self->plain : 0u;
+    if ((plain == 0u) || (reading == NULL)) {
+        return other_tick(self, reading);
+    }
+    if (!pvid_fourier_front_plain_q31(&self->collect.front, self->design, plain, reading)) {
+        return reject(self);
+    }
+    return end_tick(self, reading);
 }
 
 const pvid_estimate_q31 *pvid_fourier_estimate_q31(const pvid_fourier_q31 *self)

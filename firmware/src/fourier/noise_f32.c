@@ -11,6 +11,7 @@
  * which counts n parts that no test function contains: the check is up to (K + n)/K times as strict. */
 #include "fourier/noise_f32.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 void pvid_fourier_noise_shares_f32(const pvid_fourier_white_f32 *white, const pvid_fourier_design_f32 *design,
@@ -32,43 +33,85 @@ void pvid_fourier_noise_shares_f32(const pvid_fourier_white_f32 *white, const pv
     }
 }
 
-void pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, const pvid_fourier_noise_f32 *one, size_t first,
-                                const float share[PVID_MAX_POWER], float rows, const float c[], float s[][PVID_MAX_P])
+/* Of this kind, and of two regressors. */
+static bool counts(const pvid_fourier_design_f32 *design, uint8_t kind, size_t place)
+{
+    const pvid_fourier_noise_f32 *one = &design->noise[place];
+    const uint8_t thetas = design->model->kind[kind].thetas;
+    return (one->kind == kind) && (one->a < thetas) && (one->b < thetas);
+}
+
+size_t pvid_fourier_noise_next_f32(const pvid_fourier_design_f32 *design, uint8_t kind, size_t place)
+{
+    size_t i = place;
+    while ((i < design->n_noise) && !counts(design, kind, i)) {
+        i++;
+    }
+    return i;
+}
+
+/* The entry has the same columns as the one before it. */
+static bool goes_on(const pvid_fourier_design_f32 *design, size_t place)
+{
+    const pvid_fourier_noise_f32 *one = &design->noise[place];
+    const pvid_fourier_noise_f32 *last = &design->noise[place - 1u];
+    return (one->kind == last->kind) && (one->a == last->a) && (one->b == last->b);
+}
+
+size_t pvid_fourier_noise_pairs_f32(const pvid_fourier_design_f32 *design, uint8_t kind)
+{
+    size_t pairs = 0;
+    for (size_t i = 0; i < design->n_noise; i++) {
+        if (counts(design, kind, i) && ((i == 0u) || !goes_on(design, i))) {
+            pairs++;
+        }
+    }
+    return pairs;
+}
+
+void pvid_fourier_noise_begin_f32(const pvid_fourier_design_f32 *design, size_t first, size_t thetas,
+                                  pvid_fourier_slopes_f32 *slopes)
 {
     const pvid_model_f32 *model = design->model->model;
-    const size_t thetas = design->model->kind[one->kind].thetas;
-    if ((one->a >= thetas) || (one->b >= thetas)) { /* of Y: no regressor */
-        return;
+    for (size_t row = 0; row < thetas; row++) {
+        slopes->count[row] = 0;
+    }
+    for (size_t k = 0; k < model->n_c; k++) {
+        const size_t row = (size_t)model->c_row[k] - first; /* beyond `thetas` also for a row before the kind's */
+        if ((row < thetas) && (slopes->count[row] < (uint8_t)PVID_MAX_P)) {
+            slopes->place[row][slopes->count[row]] = (uint8_t)k;
+            slopes->count[row]++;
+        }
+    }
+}
+
+size_t pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, size_t place, const float share[], float rows,
+                                  const pvid_fourier_slopes_f32 *slopes, float s[][PVID_MAX_P])
+{
+    const pvid_fourier_noise_f32 *one = &design->noise[place];
+    const uint8_t *c_column = design->model->model->c_column;
+    const float *c = slopes->c;
+    float sum = one->factor * share[one->power];
+    size_t end = place + 1u;
+    while ((end < design->n_noise) && goes_on(design, end)) {
+        sum += design->noise[end].factor * share[design->noise[end].power];
+        end++;
     }
     const bool same = one->a == one->b;
-    const float whole = (one->factor * share[one->power]) / rows;
-    const float own = same ? whole : (0.5f * whole);
-    uint8_t of_a[PVID_MAX_P];
-    uint8_t of_b[PVID_MAX_P];
-    size_t n_a = 0; /* non-zeros of these rows of C */
-    size_t n_b = 0;
-    const uint8_t *c_row = model->c_row;
-    for (size_t k = 0; k < model->n_c; k++) {
-        const size_t row = (size_t)c_row[k] - first;
-        if ((row == one->a) && (n_a < (size_t)PVID_MAX_P)) {
-            of_a[n_a] = (uint8_t)k;
-            n_a++;
-        }
-        if ((row == one->b) && (n_b < (size_t)PVID_MAX_P)) {
-            of_b[n_b] = (uint8_t)k;
-            n_b++;
-        }
-    }
-    for (size_t k = 0; k < n_a; k++) {
-        for (size_t l = 0; l < n_b; l++) {
-            const size_t i = model->c_column[of_a[k]];
-            const size_t j = model->c_column[of_b[l]];
+    const float own = (same ? sum : (0.5f * sum)) / rows;
+    for (size_t k = 0; k < slopes->count[one->a]; k++) {
+        const size_t of_a = slopes->place[one->a][k];
+        const size_t i = c_column[of_a];
+        for (size_t l = 0; l < slopes->count[one->b]; l++) {
+            const size_t of_b = slopes->place[one->b][l];
+            const size_t j = c_column[of_b];
             if (same && (j < i)) {
                 continue;
             }
-            const float x = own * (c[of_a[k]] * c[of_b[l]]);
-            float *place = (i < j) ? &s[i][j] : &s[j][i];
-            *place += (!same && (i == j)) ? (x + x) : x;
+            const float x = own * (c[of_a] * c[of_b]);
+            float *entry = (i < j) ? &s[i][j] : &s[j][i];
+            *entry += (!same && (i == j)) ? (x + x) : x;
         }
     }
+    return end;
 }

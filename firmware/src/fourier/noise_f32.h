@@ -6,16 +6,25 @@
 
 #include "pvid/fourier.h"
 
-/* Entries of the noise table that are added at a time. */
-#define PVID_FOURIER_NOISE_ENTRIES 1u
-
 /* Q_j of a kind's rows, at most. */
 void pvid_fourier_noise_shares_f32(const pvid_fourier_white_f32 *white, const pvid_fourier_design_f32 *design,
                                    float share[PVID_MAX_POWER]);
 
-/* Adds what entry `one` of the noise table, whose kind begins with theta `first`, adds to C^T M C at p for each unit of
- * the rows' weight: to the upper triangle of s. rows: weight of a window. */
-void pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, const pvid_fourier_noise_f32 *one, size_t first,
-                                const float share[PVID_MAX_POWER], float rows, const float c[], float s[][PVID_MAX_P]);
+/* The first entry of the noise table from `place` on that is of this kind and of two regressors; behind the table:
+ * none.
+ */
+size_t pvid_fourier_noise_next_f32(const pvid_fourier_design_f32 *design, uint8_t kind, size_t place);
+
+/* The non-zeros of each row of the kind, whose `thetas` rows of C begin at `first`. */
+void pvid_fourier_noise_begin_f32(const pvid_fourier_design_f32 *design, size_t first, size_t thetas,
+                                  pvid_fourier_slopes_f32 *slopes);
+
+/* Adds what this entry and those behind it of the same two columns add to C^T M C for each unit of the rows' weight: to
+ * the upper triangle of s. rows: weight of a window. Returns the place behind them. */
+size_t pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, size_t place, const float share[], float rows,
+                                  const pvid_fourier_slopes_f32 *slopes, float s[][PVID_MAX_P]);
+
+/* How often that is to be called for a kind. */
+size_t pvid_fourier_noise_pairs_f32(const pvid_fourier_design_f32 *design, uint8_t kind);
 
 #endif

@@ -2,10 +2,16 @@
 
 /* A_h and B_h = sum_k channel(t_k) (cos + i sin)(2 pi h k / (2 hop)), k = 0..hop - 1, of the two halves of a window.
  *
- * A block of four steps is complete every four steps; while the next one fills it is added, one harmonic after the
- * other. The circle has all the factors: cos(pi j / hop) at j = h k mod 2 hop, the sine a quarter turn before. Behind
- * the last block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral I = E_1 + I'
- * (E_1 + E_2 of the first half at its end) gets what I' from the second half's own start lacks:
+ * Steps are added in blocks of eight, k = c - 4 .. c + 3 about a centre c. With a = pi h / hop and, as soon as both are
+ * known, s_j = x_(c+j) + x_(c-j) and d_j = x_(c+j) - x_(c-j) in the places of the two, the block's sum is
+ *
+ *   e^(i a c) (P + i Q),   P = x_c + sum_j s_j cos(a j) + x_(c-4) cos(4 a),   Q = sum_j d_j sin(a j) - x_(c-4) sin(4
+ * a),
+ *
+ * j = 1..3: half as many products as from the steps one by one. A block is added while the next one fills, one harmonic
+ * after the other. The circle has all the factors: sin(pi j / hop) at j = h k mod 2 hop, the cosine a quarter turn
+ * behind. Behind the last block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral
+ * I = E_1 + I' (E_1 + E_2 of the first half at its end) gets what I' from the second half's own start lacks:
  *
  *   fold 1:  B + E_1 B[plain]        fold 2:  (B + E_2 B[plain]) + E_1 B[ramp]
  *
@@ -15,7 +21,10 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "number/unroll.h"
+#include "number/exact.h"
+
+/* Place of a block's centre. */
+#define CENTRE (PVID_FOURIER_BLOCK / 2u)
 
 void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
 {
@@ -27,18 +36,30 @@ void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
     self->joined = harmonics;
 }
 
-float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self)
+/* s_j and d_j of the step `place` behind the centre and its partner. */
+static void pair(float (*block)[PVID_MAX_CHANNELS], size_t place, size_t channels)
 {
-    return self->block[self->filling][self->index % (uint16_t)PVID_FOURIER_BLOCK];
+    float *after = block[place];
+    float *before = block[(2u * CENTRE) - place];
+    for (size_t c = 0; c < channels; c++) {
+        const float x = after[c];
+        const float y = before[c];
+        after[c] = x + y;
+        before[c] = x - y;
+    }
 }
 
-bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop)
+bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop, size_t channels)
 {
+    const size_t place = self->index % PVID_FOURIER_BLOCK;
+    if (place > CENTRE) {
+        pair(self->block[self->filling], place, channels);
+    }
     self->index++;
-    if ((self->index % (uint16_t)PVID_FOURIER_BLOCK) != 0u) {
+    if (place + 1u < PVID_FOURIER_BLOCK) {
         return false;
     }
-    self->start = (uint16_t)(self->index - (uint16_t)PVID_FOURIER_BLOCK);
+    self->start = (uint16_t)(self->index - PVID_FOURIER_BLOCK);
     self->target = self->half;
     self->harmonic = 0;
     self->filling ^= 1u;
@@ -57,43 +78,47 @@ void pvid_fourier_sums_join_f32(pvid_fourier_sums_f32 *self, float edge[2][PVID_
     self->joined = 0;
 }
 
-/* Adds the four steps of the block to one harmonic of all channels. */
-static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
+/* What the sums of a half begin with. */
+static const float nothing[PVID_MAX_CHANNELS][2];
+
+void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
 {
     const uint32_t h = self->harmonic;
     const uint32_t turn = 2u * (uint32_t)design->hop;
-    const uint32_t quarter = (uint32_t)design->hop / 2u;
-    const float *circle = design->circle;
-    uint32_t at = (h * self->start) % turn;
-    float cosine[PVID_FOURIER_BLOCK];
-    float sine[PVID_FOURIER_BLOCK];
+    const float *of_sine = design->circle;
+    const float *of_cosine = &of_sine[design->hop / 2u];
+    float cosine[CENTRE + 1u]; /* of 0 the centre's own, of j those of j steps */
+    float sine[CENTRE + 1u];
+    uint32_t at = (h * (self->start + CENTRE)) % turn;
+    cosine[0] = of_cosine[at];
+    sine[0] = of_sine[at];
+    at = 0;
     PVID_UNROLL
-    for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
-        cosine[k] = circle[at];
-        sine[k] = circle[(at >= quarter) ? (at - quarter) : ((at + turn) - quarter)];
-        at += h;
-        at = (at >= turn) ? (at - turn) : at;
+    for (size_t j = 1; j <= CENTRE; j++) {
+        at += h; /* at most 4 H: within a turn */
+        cosine[j] = of_cosine[at];
+        sine[j] = of_sine[at];
     }
     float (*sum)[2] = self->sum[self->target][h];
-    if (self->start == 0u) {
-        for (size_t c = 0; c < channels; c++) {
-            sum[c][0] = 0.0f;
-            sum[c][1] = 0.0f;
-        }
-    }
+    const float (*last)[2] = (self->start == 0u) ? nothing : (const float (*)[2])sum;
     const float *x = self->block[self->filling ^ 1u][0];
+    PVID_UNROLL_BY_FOUR
     for (size_t c = 0; c < channels; c++) {
-        float re = sum[c][0];
-        float im = sum[c][1];
+        float even = x[CENTRE * PVID_MAX_CHANNELS];
+        float odd = 0.0f;
         PVID_UNROLL
-        for (size_t k = 0; k < (size_t)PVID_FOURIER_BLOCK; k++) {
-            const float value = x[(k * PVID_MAX_CHANNELS) + c];
-            re += cosine[k] * value;
-            im += sine[k] * value;
+        for (size_t j = 1; j < CENTRE; j++) {
+            const float part = sine[j] * x[(CENTRE - j) * PVID_MAX_CHANNELS];
+            even += cosine[j] * x[(CENTRE + j) * PVID_MAX_CHANNELS];
+            odd = (j == 1u) ? part : (odd + part);
         }
-        sum[c][0] = re;
-        sum[c][1] = im;
+        even += cosine[CENTRE] * x[0];
+        odd -= sine[CENTRE] * x[0];
+        sum[c][0] = (last[c][0] + (cosine[0] * even)) - (sine[0] * odd);
+        sum[c][1] = (last[c][1] + (sine[0] * even)) + (cosine[0] * odd);
+        x = &x[1];
     }
+    self->harmonic++;
 }
 
 /* I^1 or I^2 of an integrand at the end of the window's first half. */
@@ -105,11 +130,12 @@ static float edge_of(const pvid_fourier_sums_f32 *self, const pvid_fourier_chann
     return self->edge[fold - 1u][one->integrand];
 }
 
-/* One harmonic of all channels of the window whose second half is the last one. */
-static void join(const pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                 float half_time, float window[][2][PVID_MAX_HARMONICS])
+void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
+                                    float dt, float window[][2][PVID_MAX_HARMONICS])
 {
+    const float half_time = dt * (float)design->hop;
     const size_t h = self->joined;
+    self->joined++;
     const float (*a)[2] = (const float (*)[2])self->sum[self->target ^ 1u][h];
     const float (*b)[2] = (const float (*)[2])self->sum[self->target][h];
     for (size_t c = 0; c < channels; c++) {
@@ -131,21 +157,4 @@ static void join(const pvid_fourier_sums_f32 *self, const pvid_fourier_design_f3
         window[c][0][h] = ((h % 2u) != 0u) ? (a[c][0] - re) : (a[c][0] + re);
         window[c][1][h] = ((h % 2u) != 0u) ? (a[c][1] - im) : (a[c][1] + im);
     }
-}
-
-bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
-                                   uint8_t harmonics, uint8_t channels, float dt, float window[][2][PVID_MAX_HARMONICS])
-{
-    /* a window's harmonic is joined right behind the addition to it */
-    if (self->joined < self->harmonic) {
-        const float half_time = dt * (float)design->hop;
-        join(self, design, channels, half_time, window);
-        self->joined++;
-        return self->joined == harmonics;
-    }
-    if (self->harmonic < harmonics) {
-        add_block(self, design, channels);
-        self->harmonic++;
-    }
-    return false;
 }

@@ -3,6 +3,7 @@
 #define PVID_FOURIER_SUMS_F32_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "pvid/fourier.h"
 
@@ -10,10 +11,13 @@
 void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics);
 
 /* Where the values of the next step belong. */
-float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self);
+static inline float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self)
+{
+    return self->block[self->filling][self->index % PVID_FOURIER_BLOCK];
+}
 
-/* Counts that step. Returns true if it completes a half; index 0 then follows. */
-bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop);
+/* Counts that step, of so many channels. Returns true if it completes a half; index 0 then follows. */
+bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop, size_t channels);
 
 /* Joins the window that the last two halves form, as soon as the last block is added. edge: I^1 and I^2 of the window's
  * first half at its end. */
@@ -25,9 +29,17 @@ static inline bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *se
     return (self->harmonic < harmonics) || (self->joined < harmonics);
 }
 
-/* Adds the block to one harmonic, or joins one harmonic to `window`. Returns true if this completes the window. */
-bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
-                                   uint8_t harmonics, uint8_t channels, float dt,
-                                   float window[][2][PVID_MAX_HARMONICS]);
+/* Returns whether a harmonic of a window is to be joined: right behind the addition to it. */
+static inline bool pvid_fourier_sums_joins_f32(const pvid_fourier_sums_f32 *self)
+{
+    return self->joined < self->harmonic;
+}
+
+/* Adds the block to the next harmonic of all channels. */
+void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels);
+
+/* Joins the next harmonic of all channels to `window`. */
+void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
+                                    float dt, float window[][2][PVID_MAX_HARMONICS]);
 
 #endif

@@ -105,7 +105,9 @@ static void add_block(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31
         place = (place + h >= turn) ? ((place + h) - turn) : (place + h);
     }
     add_products(cosine, x, summed, design->sum_shift, self->start == 0u, &sum[RE]);
-    add_products(sine, x, summed, design->sum_shift, self->start == 0u, &sum[IM]);
+    if (h > 0u) {
+        add_products(sine, x, summed, design->sum_shift, self->start == 0u, &sum[IM]);
+    }
     const size_t next = (size_t)self->angle + self->start;
     self->angle = (uint16_t)((next >= turn) ? (next - turn) : next);
 }
@@ -146,7 +148,7 @@ static void join(const pvid_fourier_sums_q31 *self, const pvid_fourier_design_q3
         const bool ramps = channel->fold > 1u;
         const int32_t end = folds ? edge_of(values, channel, first, channel->fold, design->hop) : 0;
         const int32_t once = ramps ? edge_of(values, channel, first, 1, design->hop) : 0;
-        uint32_t bits = (h == 0u) ? 0u : window->bits[k];
+        uint32_t bits = 0;
         for (size_t part = 0; part < 2u; part++) {
             const int32_t other = b[k][part];
             int64_t shift = folds ? shifted(end, b[channel->plain][part], format.plain) : 0;
@@ -156,12 +158,7 @@ static void join(const pvid_fourier_sums_q31 *self, const pvid_fourier_design_q3
             window->s[k][h][part] = total;
             bits |= (uint32_t)((total < 0) ? -total : total);
         }
-        window->bits[k] = bits;
-    }
-    if (summed < model->channels) { /* a constant */
-        window->s[summed][h][RE] = (h == 0u) ? (2 * (int32_t)design->hop) : 0;
-        window->s[summed][h][IM] = 0;
-        window->bits[summed] = 2u * (uint32_t)design->hop;
+        window->length[k][h] = (uint8_t)pvid_bit_length_q31(bits);
     }
 }
 

@@ -1,6 +1,6 @@
 /* The schedule of the weak form of any mechanism in float32. Private to the core.
  *
- * The last tick of a step's D forms its jets, the tick behind it the channels. The others add a block of four steps to
+ * The last tick of a step's D forms its jets, the tick behind it the channels. The others add a block of eight steps to
  * the sums, some harmonics a tick, and at the end of a window join these; when nothing is to be added, they run stages
  * of the last whole window. Below 4 ticks jets and channels are of one tick; with D = 1 every tick does all. All other
  * ticks only add their samples to the front end's block.
@@ -10,17 +10,19 @@
 
 #include <stdint.h>
 
+#include "pvid/fourier.h"
+
 /* Largest number of stages per tick. */
 #define PVID_FOURIER_MOST_STAGES 64u
 
 /* Least D whose jets and channels have a tick each. */
 #define PVID_FOURIER_TWO_TICKS 4u
 
-/* Ticks of a block of four steps that add harmonics or run stages. */
+/* Ticks of a block of steps that add harmonics or run stages. */
 static inline uint32_t pvid_fourier_free_ticks_f32(uint32_t decimation)
 {
     const uint32_t used = (decimation >= PVID_FOURIER_TWO_TICKS) ? 2u : 1u;
-    return 4u * ((decimation > 1u) ? (decimation - used) : 1u);
+    return PVID_FOURIER_BLOCK * ((decimation > 1u) ? (decimation - used) : 1u);
 }
 
 /* Harmonics that a tick adds or joins, such that a block that ends a window is added and joined before the next one. */
@@ -35,7 +37,7 @@ static inline uint8_t pvid_fourier_stages_f32(uint32_t stages, uint32_t hop, uin
 {
     const uint32_t items = pvid_fourier_items_f32(free_ticks, harmonics);
     const uint32_t adding = (harmonics + (items - 1u)) / items;
-    const uint32_t ticks = ((hop / 4u) - 1u) * (free_ticks - adding);
+    const uint32_t ticks = ((hop / PVID_FOURIER_BLOCK) - 1u) * (free_ticks - adding);
     const uint32_t stages_per_tick = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
     return (uint8_t)((stages_per_tick <= PVID_FOURIER_MOST_STAGES) ? stages_per_tick : 0u);
 }

@@ -152,6 +152,19 @@ static pvid_status model_is_valid(const pvid_fourier_model_f32 *model)
     return valid ? PVID_OK : PVID_BAD_MODEL;
 }
 
+/* In a build for one design: the counts that are constants there (number/exact.h). */
+static bool is_exact(const pvid_fourier_design_f32 *design)
+{
+    const pvid_fourier_model_f32 *model = design->model;
+    const uint32_t harmonics = ((uint32_t)design->functions / 2u) + ((uint32_t)design->power / 2u) + 1u;
+    return (design->functions == PVID_MAX_FUNCTIONS) && (design->power == PVID_MAX_POWER) &&
+           (harmonics == PVID_MAX_HARMONICS) && (model->samples == PVID_MAX_SAMPLES) &&
+           (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
+           (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
+           (model->integrands == PVID_EXACT_INTEGRANDS) && (model->model->n_p == PVID_MAX_P) &&
+           (model->model->n_gated == 0u);
+}
+
 static pvid_status sizes_are_valid(const pvid_fourier_design_f32 *design)
 {
     const uint32_t harmonics = ((uint32_t)design->functions / 2u) + ((uint32_t)design->power / 2u) + 1u;
@@ -164,7 +177,8 @@ static pvid_status sizes_are_valid(const pvid_fourier_design_f32 *design)
     if ((design->functions < 4u) || (design->functions > PVID_MAX_FUNCTIONS) || (harmonics > PVID_MAX_HARMONICS)) {
         return PVID_BAD_FUNCTIONS;
     }
-    if ((design->hop < 8u) || (design->hop > 16384u) || ((design->hop % 4u) != 0u) || (design->hop < harmonics)) {
+    if ((design->hop < (2u * PVID_FOURIER_BLOCK)) || (design->hop > 16384u) ||
+        ((design->hop % PVID_FOURIER_BLOCK) != 0u) || (design->hop < (2u * harmonics))) {
         return PVID_BAD_WINDOW;
     }
     return PVID_OK;
@@ -183,13 +197,16 @@ pvid_status pvid_fourier_valid_f32(const pvid_fourier_design_f32 *design)
     if (status != PVID_OK) {
         return status;
     }
+    if ((PVID_EXACT != 0) && !is_exact(design)) {
+        return PVID_BAD_DESIGN;
+    }
     if (!pvid_within_f32(design->overlap, 1.0f, 1.0e6f)) {
         return PVID_BAD_OVERLAP;
     }
     const bool given = (design->compensator != NULL) && (design->circle != NULL) && (design->error_order != NULL) &&
                        (design->error_variance != NULL) && ((design->noise != NULL) || (design->n_noise == 0u)) &&
                        ((design->sign_width != NULL) || (design->model->signs == 0u));
-    if (!given || !filters_are_valid(design) || !all_within(design->circle, 2u * (size_t)design->hop, -1.0f) ||
+    if (!given || !filters_are_valid(design) || !all_within(design->circle, (5u * (size_t)design->hop) / 2u, -1.0f) ||
         !all_within(design->sign_width, design->model->signs, 0.0f)) {
         return PVID_BAD_DESIGN;
     }

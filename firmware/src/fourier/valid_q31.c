@@ -6,6 +6,7 @@
 #include "fourier/fourier_front_q31.h"
 #include "fourier/fourier_signals.h"
 #include "fourier/sums_q31.h"
+#include "fourier/values_q31.h"
 #include "number/integer_q31.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
@@ -23,7 +24,7 @@ static bool counts_fit(const pvid_fourier_model_q31 *model)
            (model->jets >= 1u) && (inputs <= PVID_MAX_INPUTS) && (model->runs <= PVID_MAX_INTEGRANDS) &&
            (model->signs <= PVID_MAX_INTEGRANDS) && (model->gains >= 1u) && (model->gains <= PVID_MAX_CHANNELS) &&
            (model->integrands <= PVID_MAX_INTEGRANDS) && (model->channels >= 1u) &&
-           (model->channels <= PVID_MAX_CHANNELS) && (model->kinds >= 1u) && (model->kinds <= PVID_MAX_KINDS);
+           (model->channels <= (PVID_MAX_CHANNELS + 1u)) && (model->kinds >= 1u) && (model->kinds <= PVID_MAX_KINDS);
 }
 
 static bool tables_are_given(const pvid_fourier_model_q31 *model)
@@ -57,7 +58,7 @@ static bool channel_is_valid(const pvid_fourier_model_q31 *model, size_t place)
 
 static bool channels_are_valid(const pvid_fourier_model_q31 *model)
 {
-    bool valid = true;
+    bool valid = pvid_fourier_summed_q31(model) <= (size_t)PVID_MAX_CHANNELS; /* a constant is not stored */
     for (size_t i = 0; i < model->channels; i++) {
         valid = valid && channel_is_valid(model, i);
     }

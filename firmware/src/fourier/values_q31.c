@@ -91,6 +91,17 @@ static inline int32_t rounded(int64_t x, uint32_t s)
     return pvid_floor_shift_32_q31((int32_t)twice + 1, 1);
 }
 
+/* The same of a product whose factors are within 2^30; its upper part is enough where the shift is long. */
+static inline int32_t rounded_product(int32_t a, int32_t b, uint32_t s)
+{
+    const int64_t product = pvid_product_q31(a, b);
+    if (s < 32u) {
+        return rounded(product, s);
+    }
+    const int32_t upper = (int32_t)pvid_floor_shift_q31(product, 31);
+    return (s < 63u) ? pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(upper, s - 32u) + 1, 1) : 0;
+}
+
 /* Integrals at the step before that of the integrands f; at the first step of a half they begin anew. */
 static void integrate(pvid_fourier_values_q31 *self, const pvid_fourier_design_q31 *design, const int32_t f[])
 {
@@ -143,7 +154,7 @@ static void write_channels(const pvid_fourier_values_q31 *self, const pvid_fouri
         if (one->fold == 0u) {
             value = rounded(gain, shift);
         } else {
-            value = rounded(pvid_product_q31(gain, integral_of(self, design, one)), shift);
+            value = rounded_product(gain, integral_of(self, design, one), shift);
         }
         channel[k] = (value > PVID_FOURIER_LIMIT_Q31)
                          ? PVID_FOURIER_LIMIT_Q31

@@ -8,6 +8,8 @@
  * is (q - s^2/N) / N of both halves together. */
 #include "fourier/watch_f32.h"
 
+#include "number/exact.h"
+
 void pvid_fourier_watch_init_f32(pvid_fourier_watch_f32 *self, const pvid_fourier_config_f32 *config, uint16_t delay)
 {
     self->range = config->range;
@@ -38,8 +40,10 @@ void pvid_fourier_watch_step_f32(pvid_fourier_watch_f32 *self, size_t samples, c
 {
     self->out[half] = (!first && self->out[half]) || (self->beyond > 0u);
     self->beyond = (uint16_t)((self->beyond > 0u) ? (self->beyond - 1u) : 0u);
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, samples);
     if (self->drive_min != NULL) {
-        for (size_t i = 0; i < samples; i++) {
+        PVID_UNROLL_EXACT
+        for (size_t i = 0; i < count; i++) {
             pvid_fourier_spread_f32 *spread = &self->spread[half][i];
             if (first) {
                 spread->reference = sample[i];
@@ -58,7 +62,7 @@ bool pvid_fourier_watch_beyond_f32(const pvid_fourier_watch_f32 *self)
     return self->out[0] || self->out[1];
 }
 
-bool pvid_fourier_watch_still_f32(const pvid_fourier_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
+void pvid_fourier_watch_half_f32(pvid_fourier_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
 {
     bool still = false;
     const float n = (float)hop;
@@ -71,5 +75,5 @@ bool pvid_fourier_watch_still_f32(const pvid_fourier_watch_f32 *self, size_t sam
         const float variance = (square - ((sum * sum) / (2.0f * n))) / (2.0f * n);
         still = still || (variance < (self->drive_min[i] * self->drive_min[i]));
     }
-    return still;
+    self->still = still;
 }

@@ -16,8 +16,9 @@
  *   h^(2 k) / sqrt(D_h) of the real parts,   h^(2 k + 1) / sqrt(D_h) of the imaginary parts,   k = 0..n/2 - 1,
  *
  * are the white rows, up to a rotation. n/2 reflections of each family turn these directions into its first n/2 parts;
- * what is behind them are K white rows. A direction is (h/H)^2 times the one before, made orthogonal to those before it
- * by their reflections; u_k are the directions made orthonormal, the reflections of the first parts' unit vectors.
+ * what is behind them are K white rows. u_k are the directions made orthonormal, by three-term recurrence:
+ *
+ *   y_(k+1) = (h/H)^2 u_k - a_k u_k - |y_k| u_(k-1),   a_k = u_k^T (h/H)^2 u_k,   u_(k+1) = y_(k+1) / |y_(k+1)|
  *
  *   Q_j = tr(R^-1 dR/dc_j) = sum over the parts of W_h omega_h^(2 j) (1 - sum_k u_kh^2) / D_h
  */
@@ -25,6 +26,8 @@
 
 #include <math.h>
 #include <string.h>
+
+#include "number/exact.h"
 
 #define TURN 6.28318531f
 
@@ -81,40 +84,56 @@ void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fo
                                      uint8_t harmonics)
 {
     float mean = 0.0f;
-    const size_t order = design->error_order[kind];
-    const float error = design->error_variance[kind];
+    float c[PVID_MAX_POWER]; /* of the sensors and the equation */
+    for (size_t j = 0; j < self->powers; j++) {
+        c[j] = self->weight[j];
+    }
+    c[design->error_order[kind]] += design->error_variance[kind];
     for (size_t h = 0; h < harmonics; h++) {
         const float rate = (float)h * self->omega;
         const float square = rate * rate;
         float sum = 0.0f;
         for (size_t j = self->powers; j > 0u; j--) {
-            const float own = (j - 1u == order) ? (self->weight[j - 1u] + error) : self->weight[j - 1u];
-            sum = (sum * square) + own;
+            sum = (sum * square) + c[j - 1u];
         }
         self->scale[h] = samples_of(design, h) * sum;
         mean += self->scale[h];
     }
     const float part = (FLOOR * mean) / (float)harmonics;
-    const float least = (part > SPECTRUM_MIN) ? part : SPECTRUM_MIN;
+    self->floor = (part > SPECTRUM_MIN) ? part : SPECTRUM_MIN;
+}
+
+void pvid_fourier_white_scale_f32(pvid_fourier_white_f32 *self, uint8_t harmonics)
+{
     for (size_t h = 0; h < harmonics; h++) {
-        self->scale[h] = 1.0f / sqrtf((self->scale[h] > least) ? self->scale[h] : least);
+        self->scale[h] = 1.0f / sqrtf((self->scale[h] > self->floor) ? self->scale[h] : self->floor);
     }
 }
 
-static size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t part)
+static inline size_t cosines_of(const pvid_fourier_white_f32 *self)
+{
+    return PVID_COUNT(PVID_MAX_HARMONICS, self->cosines);
+}
+
+static inline size_t parts_of(const pvid_fourier_white_f32 *self)
+{
+    return PVID_COUNT(PVID_MAX_FUNCTIONS + PVID_MAX_POWER, self->parts);
+}
+
+static inline size_t harmonic_of(const pvid_fourier_white_f32 *self, size_t part)
 {
     return (part < self->cosines) ? part : ((part + 1u) - self->cosines);
 }
 
 /* First part of a family, and the place behind its last one. */
-static size_t family_first(const pvid_fourier_white_f32 *self, size_t family)
+static inline size_t family_first(const pvid_fourier_white_f32 *self, size_t family)
 {
-    return (family == 0u) ? 0u : self->cosines;
+    return (family == 0u) ? 0u : cosines_of(self);
 }
 
-static size_t family_end(const pvid_fourier_white_f32 *self, size_t family)
+static inline size_t family_end(const pvid_fourier_white_f32 *self, size_t family)
 {
-    return (family == 0u) ? self->cosines : self->parts;
+    return (family == 0u) ? cosines_of(self) : parts_of(self);
 }
 
 /* x -= v (v^T x) from `first` to `end` - 1 */
@@ -129,17 +148,37 @@ static inline void reflect(const float *restrict v, size_t first, size_t end, fl
     }
 }
 
-void pvid_fourier_white_reflect_f32(const pvid_fourier_white_f32 *self, size_t family, float x[])
+/* All reflections of a family, one after the other: as `reflect`, written out in a build for one design. */
+static inline void reflect_family(const pvid_fourier_white_f32 *self, size_t family, float x[])
 {
-    const size_t first = family_first(self, family);
+    const size_t vectors = PVID_COUNT(PVID_MAX_POWER / 2, self->vectors);
     const size_t end = family_end(self, family);
-    for (size_t k = 0; k < self->vectors; k++) {
-        reflect(self->reflection[k], first + k, end, x);
+    PVID_UNROLL_EXACT
+    for (size_t k = 0; k < vectors; k++) {
+        const float *v = self->reflection[k];
+        float along = 0.0f;
+        PVID_UNROLL_EXACT
+        for (size_t i = family_first(self, family) + k; i < end; i++) {
+            along += v[i] * x[i];
+        }
+        PVID_UNROLL_EXACT
+        for (size_t i = family_first(self, family) + k; i < end; i++) {
+            x[i] -= along * v[i];
+        }
     }
 }
 
-/* v with v^T v = 2, such that x - v (v^T x) has nothing behind its first entry. */
-static void form(const float *restrict x, size_t first, size_t end, float *restrict v)
+void pvid_fourier_white_reflect_f32(const pvid_fourier_white_f32 *self, size_t family, float x[])
+{
+    if (family == 0u) {
+        reflect_family(self, 0, x);
+    } else {
+        reflect_family(self, 1, x);
+    }
+}
+
+/* Puts in place of x, from `first` on, v with v^T v = 2, such that x - v (v^T x) has nothing behind its first entry. */
+static void form(float *x, size_t first, size_t end)
 {
     float square = 0.0f;
     for (size_t i = first; i < end; i++) {
@@ -149,57 +188,78 @@ static void form(const float *restrict x, size_t first, size_t end, float *restr
     const float head = x[first];
     const bool negative = head < 0.0f;
     const float scale = 1.0f / sqrtf(size * (size + (negative ? -head : head)));
+    x[first] = negative ? (head - size) : (head + size);
     for (size_t i = first; i < end; i++) {
-        v[i] = x[i] * scale;
-    }
-    v[first] = (negative ? (head - size) : (head + size)) * scale;
-}
-
-/* The direction k before its reflections; u: the direction before it. */
-static void begin_direction(const pvid_fourier_white_f32 *self, size_t k, float u[])
-{
-    const float highest = (float)(self->cosines - 1u);
-    for (size_t i = 0; i < self->parts; i++) {
-        const size_t h = harmonic_of(self, i);
-        const float x = (float)h / highest;
-        const float first = (i < self->cosines) ? self->scale[h] : (x * self->scale[h]);
-        u[i] = (k == 0u) ? first : ((x * x) * u[i]);
+        x[i] *= scale;
     }
 }
 
-/* Direction k takes 2 k + 2 stages: it begins, is reflected as those before, and gives a reflection of its own; then
- * the unit vector of its first part is reflected back, the last reflection first. */
-void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, size_t stage, float u[], float leverage[])
+/* The next orthonormal direction of a family, the first one if k is 0. */
+static void direct(const pvid_fourier_white_f32 *self, size_t k, size_t family, pvid_fourier_basis_f32 *basis)
 {
-    size_t k = 0;
-    size_t part = stage;
-    while (part >= (2u * k) + 2u) {
-        part -= (2u * k) + 2u;
-        k++;
-    }
-    if (part == 0u) {
-        begin_direction(self, k, u);
-    }
-    for (size_t family = 0; family < 2u; family++) {
-        const size_t first = family_first(self, family);
-        const size_t end = family_end(self, family);
-        if (part < k) {
-            reflect(self->reflection[part], first + part, end, u);
-        } else if (part == k) {
-            form(u, first + k, end, self->reflection[k]);
-            for (size_t i = first; i < end; i++) {
-                u[i] = (i == first + k) ? 1.0f : 0.0f;
-            }
+    const size_t first = family_first(self, family);
+    const size_t end = family_end(self, family);
+    const float unit = 1.0f / (float)(self->cosines - 1u);
+    const float least = (family == 0u) ? 0.0f : 1.0f; /* its first harmonic */
+    const float *scale = &self->scale[family];
+    const float norm = basis->norm[family];
+    const float slope = basis->slope[family];
+    float *u = basis->direction;
+    float *before = basis->before;
+    float square = 0.0f;
+    float h = least;
+    for (size_t i = first; i < end; i++) {
+        const float x = h * unit;
+        const float last = u[i];
+        float y = scale[i - first];
+        if (k > 0u) {
+            y = (((x * x) - slope) * last) - (norm * before[i]);
+        } else if (family > 0u) {
+            y *= x;
         } else {
-            const size_t back = (2u * k) + 1u - part;
-            reflect(self->reflection[back], first + back, end, u);
+            /* of h^0 */
         }
+        before[i] = (k > 0u) ? last : 0.0f;
+        u[i] = y;
+        square += y * y;
+        h += 1.0f;
     }
-    if (part == (2u * k) + 1u) {
-        for (size_t i = 0; i < self->parts; i++) {
-            leverage[i] = ((k == 0u) ? 0.0f : leverage[i]) + (u[i] * u[i]);
-        }
+    const float size = sqrtf(square);
+    const float inverse = 1.0f / size;
+    float moment = 0.0f;
+    h = least;
+    for (size_t i = first; i < end; i++) {
+        const float x = h * unit;
+        const float one = u[i] * inverse;
+        const float part = one * one;
+        u[i] = one;
+        basis->leverage[i] = (k > 0u) ? (basis->leverage[i] + part) : part;
+        moment += (x * x) * part;
+        h += 1.0f;
     }
+    basis->norm[family] = size;
+    basis->slope[family] = moment;
+}
+
+/* Direction k takes four stages: for each family it is found, then for each its reflection. */
+void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, size_t stage, pvid_fourier_basis_f32 *basis)
+{
+    const size_t k = stage / 4u;
+    const size_t family = stage % 2u;
+    if ((stage % 4u) < 2u) {
+        direct(self, k, family, basis);
+        return;
+    }
+    const size_t first = family_first(self, family);
+    const size_t end = family_end(self, family);
+    float *own = self->reflection[k];
+    for (size_t i = first; i < end; i++) {
+        own[i] = basis->direction[i];
+    }
+    for (size_t j = 0; j < k; j++) {
+        reflect(self->reflection[j], first + j, end, own);
+    }
+    form(own, first + k, end);
 }
 
 void pvid_fourier_white_share_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design,

@@ -18,8 +18,7 @@ static inline size_t pvid_fourier_parts(const pvid_fourier_design_f32 *design)
 /* Stages of the basis. */
 static inline size_t pvid_fourier_basis_stages(const pvid_fourier_design_f32 *design)
 {
-    const size_t vectors = design->power / 2u;
-    return vectors * (vectors + 1u);
+    return 2u * (size_t)design->power;
 }
 
 /* Requires a valid design. dt: between steps [s]. */
@@ -29,13 +28,13 @@ void pvid_fourier_white_init_f32(pvid_fourier_white_f32 *self, const pvid_fourie
 void pvid_fourier_white_weigh_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, uint8_t kind,
                                   const float theta[], size_t first, size_t last);
 
-/* 1 / sqrt(D_h) from the weights and the equation's own error. */
+/* D_h from the weights and the equation's own error; then 1 / sqrt(D_h) in its place. */
 void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, uint8_t kind,
                                      uint8_t harmonics);
+void pvid_fourier_white_scale_f32(pvid_fourier_white_f32 *self, uint8_t harmonics);
 
-/* The next of the basis' stages, counted from 0; u, leverage [parts] are kept from stage to stage: the present
- * direction, and sum_k u_k^2. */
-void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, size_t stage, float u[], float leverage[]);
+/* The next of the basis' stages, counted from 0. */
+void pvid_fourier_white_basis_f32(pvid_fourier_white_f32 *self, size_t stage, pvid_fourier_basis_f32 *basis);
 
 /* Reflects the parts of a family, 0: real, 1: imaginary; its rows are behind the first n/2. */
 void pvid_fourier_white_reflect_f32(const pvid_fourier_white_f32 *self, size_t family, float x[]);

@@ -1,8 +1,8 @@
-/* As white_f32.c, in numbers of any size up to 1 / sqrt(D_h) and in Q30 from there on:
+/* As white_f32.c, in numbers of any size up to 1 / sqrt(D_h), and in Q30 from the reflections on:
  *
  *   D_h = W_h sum_j c_j h^(2 j),   W_0 = 2 hop, else hop,   c_j = sum factor theta_a theta_b  (theta_Y = -1)
  *
- * with the equation's own error as a part of c_m. A D_h below 2^-20 of the mean counts as that much.
+ * with the equation's own error as a part of c_m. A D_h below 2^-33 of the mean counts as that much.
  *
  * The test functions leave out the polynomials in h below degree n, over the standard deviations: even ones among the
  * real parts, odd ones among the imaginary parts. n/2 reflections for each family turn these into the first n/2 rows,
@@ -16,7 +16,7 @@
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 
-#define FLOOR_BITS 20
+#define FLOOR_BITS 33
 #define LEAST_EXPONENT (-200) /* of D_h, where there is no noise at all */
 
 static const pvid_scaled_q31 none = {0, 0};
@@ -24,7 +24,6 @@ static const pvid_scaled_q31 none = {0, 0};
 void pvid_fourier_white_init_q31(pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design)
 {
     self->cosines = pvid_fourier_harmonics_q31(design);
-    self->rate = PVID_ONE_Q30 / ((int32_t)self->cosines - 1);
     self->powers = 1;
     for (size_t i = 0; i < design->n_noise; i++) {
         const uint8_t powers = (uint8_t)(design->noise[i].power + 1u);
@@ -98,32 +97,26 @@ void pvid_fourier_white_invert_q31(pvid_fourier_white_q31 *self, pvid_scaled_q31
         const bool is_less = pvid_scaled_exceeds_q31(least, self->scale[h]);
         self->scale[h] = pvid_fourier_inverse_root_q31(is_less ? least : self->scale[h]);
     }
-    if (last < self->cosines) {
-        return;
-    }
-    int32_t largest = self->scale[0].e;
-    for (size_t h = 1; h < last; h++) {
-        largest = (self->scale[h].e > largest) ? self->scale[h].e : largest;
-    }
-    for (size_t h = 0; h < last; h++) {
-        const int32_t below = largest - self->scale[h].e;
-        self->scale[h].m = (below < 31) ? pvid_floor_shift_32_q31(self->scale[h].m, (uint32_t)below) : 0;
-    }
-    self->exponent = largest;
 }
 
-/* The vector of place k before the reflections of those before it: h^(2 k) / sqrt(D_h), or h times that, in units of
- * the highest harmonic. */
+/* The vector of place k before the reflections of those before it: h^(2 k) / sqrt(D_h), or h times that, in a unit in
+ * which the largest has 29 or 30 bits, less the order at most. */
 static void begin_vector(const pvid_fourier_white_q31 *self, size_t k, size_t first, size_t n, int32_t x[])
 {
     const size_t order = (2u * k) + ((first > 0u) ? 1u : 0u);
+    int32_t largest = INT32_MIN;
+    for (size_t i = (order > 0u) ? (1u - first) : 0u; i < n; i++) {
+        const int32_t exponent = pvid_fourier_white_exponent_q31(self, first + i, order);
+        largest = (exponent > largest) ? exponent : largest;
+    }
     for (size_t i = 0; i < n; i++) {
         const size_t h = first + i;
+        const int32_t below = largest - pvid_fourier_white_exponent_q31(self, h, order);
         int32_t weight = self->scale[h].m;
         for (size_t m = 0; m < order; m++) {
-            weight = (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight, (int32_t)h * self->rate), 30);
+            weight = pvid_fourier_white_times_q31(weight, h);
         }
-        x[i] = weight;
+        x[i] = (below < 31) ? pvid_floor_shift_32_q31(weight, (uint32_t)((below > 0) ? below : 0)) : 0;
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 
+#include "number/integer_q31.h"
 #include "pvid/fourier_q31.h"
 
 /* Parts of the sums of a window, K + n: real parts of the harmonics 0.., then imaginary parts of the harmonics 1.. */
@@ -23,11 +24,24 @@ void pvid_fourier_white_weigh_q31(pvid_fourier_white_q31 *self, const pvid_fouri
 void pvid_fourier_white_spectrum_q31(pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design, uint8_t kind,
                                      size_t first, size_t last);
 
-/* The least D_h: 2^-20 of the mean of all. */
+/* The least D_h: 2^-33 of the mean of all. */
 pvid_scaled_q31 pvid_fourier_white_floor_q31(const pvid_fourier_white_q31 *self, const pvid_fourier_design_q31 *design);
 
-/* 1 / sqrt(D_h) in place of D_h, of harmonics first..last-1; those of all harmonics in a unit when the last is done. */
+/* 1 / sqrt(D_h) in place of D_h, of harmonics first..last-1. */
 void pvid_fourier_white_invert_q31(pvid_fourier_white_q31 *self, pvid_scaled_q31 least, size_t first, size_t last);
+
+/* weight h 2^-(bits of h), which loses one bit at most. */
+static inline int32_t pvid_fourier_white_times_q31(int32_t weight, size_t h)
+{
+    const uint32_t up = 30u - pvid_bit_length_q31(h);
+    return (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight, (int32_t)((uint32_t)h << up)), 30);
+}
+
+/* The exponent of 1 / sqrt(D_h) behind `order` of them. */
+static inline int32_t pvid_fourier_white_exponent_q31(const pvid_fourier_white_q31 *self, size_t h, size_t order)
+{
+    return self->scale[h].e + (int32_t)(order * pvid_bit_length_q31(h));
+}
 
 /* Reflections of a kind: n. */
 static inline size_t pvid_fourier_mirrors_q31(const pvid_fourier_design_q31 *design)

@@ -120,7 +120,7 @@ uint32_t pvid_fingerprint_fourier_design_f32(const pvid_fourier_design_f32 *desi
     uint32_t hash = pvid_fingerprint_bytes(PVID_FNV_START, sizes, sizeof sizes);
     hash = pvid_fnv_word(hash, design->hop);
     hash = filters_of(hash, design->compensator, model->jets);
-    hash = pvid_fingerprint_floats(hash, design->circle, 2u * (size_t)design->hop);
+    hash = pvid_fingerprint_floats(hash, design->circle, (5u * (size_t)design->hop) / 2u);
     hash = pvid_fnv_word(hash, design->n_noise);
     hash = noise_of(hash, design->noise, design->n_noise);
     hash = pvid_fingerprint_bytes(hash, design->error_order, model->kinds);

@@ -198,6 +198,7 @@ uint32_t pvid_fingerprint_fourier_q31(const pvid_fourier_config_q31 *config)
     uint32_t hash = pvid_fingerprint_words(PVID_FNV_START, config->offset, model->samples);
     hash = pvid_fnv_word(hash, driven ? 1u : 0u);
     hash = pvid_fingerprint_words(hash, config->drive_min, driven ? model->samples : 0u);
+    hash = pvid_fnv_word(hash, config->compensation ? 1u : 0u);
     hash = pvid_fnv_word(hash, config->iterations);
     hash = pvid_fingerprint_estimator_q31(hash, &config->estimator, model->model->n_theta, model->model->n_p);
     hash = pvid_fingerprint_trust_q31(hash, &config->trust);

@@ -14,7 +14,8 @@ typedef enum {
     PVID_SNAPSHOT_KIND_WEAK_Q31 = 3,
     PVID_SNAPSHOT_KIND_STRONG_Q31 = 4,
     PVID_SNAPSHOT_KIND_FOURIER_F32 = 5,
-    PVID_SNAPSHOT_KIND_FOURIER_Q31 = 6
+    PVID_SNAPSHOT_KIND_FOURIER_Q31 = 6,
+    PVID_SNAPSHOT_KIND_REFINE_F32 = 7
 } pvid_snapshot_kind;
 
 /* Identity of a snapshot: only a snapshot with the same identity is restored. */

@@ -4,7 +4,7 @@
 #include <stddef.h>
 
 #include "keep/fingerprint_fourier_f32.h"
-#include "keep/snapshot.h"
+#include "keep/snapshot_fourier_f32.h"
 #include "pvid/snapshot_fourier.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_fourier_f32, field))
@@ -57,6 +57,7 @@ static const uint32_t layout[] = {
 
 static const pvid_snapshot_pointer pointers[] = {
     {PLACE(design), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(refine), PVID_SNAPSHOT_OF_INIT},
     {PLACE(watch.range), PVID_SNAPSHOT_OF_INIT},
     {PLACE(watch.drive_min), PVID_SNAPSHOT_OF_INIT},
     {PLACE(finish.work.solve.fallback), PLACE(trust.estimate.p)},
@@ -64,9 +65,10 @@ static const pvid_snapshot_pointer pointers[] = {
     {PLACE(finish.work.solve.estimate), PLACE(finish.candidate)},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
 };
-static const pvid_snapshot_shape shape = {sizeof(pvid_fourier_f32), pointers, sizeof pointers / sizeof pointers[0]};
+const pvid_snapshot_shape pvid_snapshot_fourier_shape_f32 = {sizeof(pvid_fourier_f32), pointers,
+                                                             sizeof pointers / sizeof pointers[0]};
 
-static pvid_snapshot_identity identity_of(const pvid_fourier_config_f32 *config)
+pvid_snapshot_identity pvid_snapshot_fourier_identity_f32(const pvid_fourier_config_f32 *config)
 {
     const pvid_snapshot_identity identity = {
         .kind = PVID_SNAPSHOT_KIND_FOURIER_F32,
@@ -79,8 +81,8 @@ static pvid_snapshot_identity identity_of(const pvid_fourier_config_f32 *config)
     return identity;
 }
 
-/* Whether init has accepted a configuration. */
-static bool is_ready(const pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config, const uint8_t image[])
+bool pvid_snapshot_fourier_is_ready_f32(const pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config,
+                                        const uint8_t image[])
 {
     const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->design != NULL);
     PVID_ASSERT(ready && (self->design == config->design));
@@ -90,19 +92,19 @@ static bool is_ready(const pvid_fourier_f32 *self, const pvid_fourier_config_f32
 size_t pvid_snapshot_save_fourier_f32(const pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config,
                                       uint32_t generation, uint8_t image[], size_t room)
 {
-    if (!is_ready(self, config, image)) {
+    if (!pvid_snapshot_fourier_is_ready_f32(self, config, image)) {
         return 0;
     }
-    const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_save(image, room, &identity, generation, self, &shape, NULL);
+    const pvid_snapshot_identity identity = pvid_snapshot_fourier_identity_f32(config);
+    return pvid_snapshot_save(image, room, &identity, generation, self, &pvid_snapshot_fourier_shape_f32, NULL);
 }
 
 pvid_snapshot_status pvid_snapshot_restore_fourier_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config,
                                                        const uint8_t image[], size_t length)
 {
-    if (!is_ready(self, config, image)) {
+    if (!pvid_snapshot_fourier_is_ready_f32(self, config, image)) {
         return PVID_SNAPSHOT_NOT_READY;
     }
-    const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &shape, NULL);
+    const pvid_snapshot_identity identity = pvid_snapshot_fourier_identity_f32(config);
+    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &pvid_snapshot_fourier_shape_f32, NULL);
 }

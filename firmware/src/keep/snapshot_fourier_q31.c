@@ -30,7 +30,7 @@ static const uint32_t layout[] = {
     PLACE(finish),
     PLACE(finish.gate),
     PLACE(finish.work),
-    PLACE(finish.work.rows.columns),
+    PLACE(finish.work.rows.parts),
     PLACE(finish.candidate),
     PLACE(estimator),
     PLACE(estimator.p),

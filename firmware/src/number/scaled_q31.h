@@ -29,6 +29,22 @@ static inline pvid_scaled_q31 pvid_scaled_shifted_q31(pvid_scaled_q31 a, int32_t
     return result;
 }
 
+/* a in one word: 20 bits, and an exponent within +-1000; 0 below that. */
+static inline int32_t pvid_scaled_packed_q31(pvid_scaled_q31 a)
+{
+    if ((a.m == 0) || (a.e < -1000)) {
+        return 0;
+    }
+    return (pvid_floor_shift_32_q31(a.m, 11) * 2048) + (((a.e < 1000) ? a.e : 1000) + 1024);
+}
+
+static inline pvid_scaled_q31 pvid_scaled_unpacked_q31(int32_t word)
+{
+    const int32_t m = pvid_floor_shift_32_q31(word, 11);
+    const pvid_scaled_q31 result = {m * 2048, (word - (m * 2048)) - 1024};
+    return result;
+}
+
 /* a as an integer of `bits` bits after the point, rounded half up, saturated at +-PVID_WIDE. */
 static inline int64_t pvid_scaled_fixed_q31(pvid_scaled_q31 a, int32_t bits)
 {

@@ -139,8 +139,10 @@ static void take(pvid_refine_f32 *self, float square)
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
     }
-    const uint32_t twice = 2u * (uint32_t)self->length;
-    self->length = (uint16_t)((twice < config->block) ? twice : config->block);
+    if (self->taken > 1u) { /* the second one is as long: it confirms the first one soon */
+        const uint32_t twice = 2u * (uint32_t)self->length;
+        self->length = (uint16_t)((twice < config->block) ? twice : config->block);
+    }
 }
 
 /* A block that is not taken. */
@@ -353,6 +355,7 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
         break;
     case NEXT:
         reason = self->verdict;
+        self->told = reason;
         next_block(self);
         break;
     default:
@@ -388,6 +391,7 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
         }
         pvid_refine_front_init_f32(&self->front, config);
         self->phase = WAIT;
+        self->told = PVID_WARMING_UP;
     }
     return pvid_init_end(self, sizeof *self, status);
 }
@@ -446,6 +450,11 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
 const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self)
 {
     return (is_ready(self) && (self->mark.number[0] > 0u)) ? &self->estimate : NULL;
+}
+
+pvid_reason pvid_refine_reason_f32(const pvid_refine_f32 *self)
+{
+    return is_ready(self) ? self->told : PVID_NOT_READY;
 }
 
 bool pvid_refine_read_f32(const pvid_refine_f32 *self, pvid_refine_estimate_f32 *estimate, uint32_t *number)

@@ -1,7 +1,8 @@
 #include "number/uncontracted.h"
 
-/* Means x of `ratio` samples, x - droop (x_-1 - 2 x + x_+1): the mean's droop undone to second order. Second
- * derivatives: w_0 x + sum_i w_i (x_-i + x_+i), i = 1..half. */
+/* Means x of `ratio` samples, of an input that is held from tick to tick of its means about the ticks; x - droop (x_-1
+ * - 2 x + x_+1): the mean's droop undone to second order. Second derivatives: w_0 x + sum_i w_i (x_-i + x_+i), i
+ * = 1..half. */
 #include "refine/refine_front_f32.h"
 
 #include <stddef.h>
@@ -93,9 +94,24 @@ static void enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *con
     }
 }
 
-pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+/* The sum of a held input's means about the ticks: half of each of the two samples that bound the block is another
+ * block's. */
+static void about_the_ticks(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, const float sample[])
+{
+    for (size_t i = 0; i < INPUTS; i++) {
+        if (config->signal[i].source == (uint8_t)PVID_SIGNAL_HELD) {
+            const float last = sample[self->sample[i]] - self->reference[i];
+            self->sum[i] += 0.5f * (self->held[i] - last);
+            self->held[i] = last;
+        }
+    }
+}
+
+pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
+                                                  const float sample[])
 {
     const bool known = self->means >= 2u;
+    about_the_ticks(self, config, sample);
     for (size_t i = 0; i < INPUTS; i++) {
         if (!pvid_finite_f32(self->sum[i])) {
             return PVID_REFINE_BROKEN;
@@ -127,6 +143,7 @@ void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_
     for (size_t i = 0; i < INPUTS; i++) {
         const float x = sample[config->signal[i].sample];
         self->reference[i] = (config->signal[i].order == 2u) ? x : 0.0f;
+        self->held[i] = x - self->reference[i];
     }
     self->referred = true;
 }

@@ -20,7 +20,8 @@ typedef enum { PVID_REFINE_NOTHING, PVID_REFINE_ENTERED, PVID_REFINE_BROKEN } pv
 /* The first sample since the restart; the end of a block of samples. */
 void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
                                  const float sample[]);
-pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config);
+pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
+                                                  const float sample[]);
 
 PVID_ALWAYS_INLINE pvid_refine_entry pvid_refine_front_step_f32(pvid_refine_front_f32 *self,
                                                                 const pvid_refine_config_f32 *config,
@@ -35,7 +36,7 @@ PVID_ALWAYS_INLINE pvid_refine_entry pvid_refine_front_step_f32(pvid_refine_fron
         self->sum[i] += (i < (size_t)PVID_REFINE_INPUTS) ? (x - self->reference[i]) : x;
     }
     self->wait--;
-    return (self->wait > 0u) ? PVID_REFINE_NOTHING : pvid_refine_front_end_block_f32(self, config);
+    return (self->wait > 0u) ? PVID_REFINE_NOTHING : pvid_refine_front_end_block_f32(self, config, sample);
 }
 
 /* Entries of the ring since the restart: from the first one that is complete, up to the end. Older ones than those of

@@ -82,9 +82,14 @@ pvid_reason pvid_refine_verdict_f32(const pvid_refine_estimate_f32 *estimate, co
         return PVID_HELD_UNCERTAIN;
     }
     bool agree = true;
+    bool better = true;
     for (size_t i = 0; i < PVID_REFINE_P; i++) {
         const size_t place = pvid_refine_place_of_p[i];
+        better = better && ((config->distance > 0.0f) || (estimate->se[place] <= weak_se[i]));
         agree = agree && agrees(estimate, place, weak[place], weak_se[i], config->distance);
     }
-    return agree ? PVID_UPDATED : PVID_HELD_DISAGREES;
+    if (!agree) {
+        return PVID_HELD_DISAGREES;
+    }
+    return better ? PVID_UPDATED : PVID_HELD_UNCERTAIN;
 }

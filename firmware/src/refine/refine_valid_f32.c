@@ -24,6 +24,8 @@ static pvid_status signals_are_valid(const pvid_refine_config_f32 *config)
         const pvid_refine_signal_f32 *signal = &config->signal[i];
         const bool derived = (signal->order == 2u) && (i < (size_t)PVID_REFINE_INPUTS) && (config->second != NULL);
         if (((signal->order != 0u) && !derived) || (signal->sample >= PVID_MAX_SAMPLES) ||
+            (signal->source >
+             (((i < (size_t)PVID_REFINE_INPUTS)) ? (uint8_t)PVID_SIGNAL_HELD : (uint8_t)PVID_SIGNAL_SAMPLED)) ||
             !pvid_within_f32(signal->scale, -1.0e9f, 1.0e9f)) {
             return PVID_BAD_DESIGN;
         }

@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "number/exact.h"
 #include "number/finite_f32.h"
 
 /* Degrees of freedom of the residuals. */
@@ -34,17 +35,21 @@ float pvid_assess_misfit_f32(const pvid_system_f32 *system, const pvid_solve_set
 }
 
 bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float variance,
-                                 float noise[][PVID_MAX_P])
+                                 const float noise[][PVID_MAX_P])
 {
     const uint8_t n = settings->n_excited;
+    const size_t count = PVID_COUNT(PVID_MAX_P, n);
     const float much = (settings->noise_margin * variance) * system->weight;
-    for (size_t a = 0; a < n; a++) {
-        for (size_t b = a; b < n; b++) {
-            noise[a][b] = system->s[a][b] - (much * noise[a][b]);
+    float excess[PVID_MAX_P][PVID_MAX_P];
+    PVID_UNROLL_EXACT
+    for (size_t a = 0; a < count; a++) {
+        PVID_UNROLL_EXACT
+        for (size_t b = a; b < count; b++) {
+            excess[a][b] = system->s[a][b] - (much * noise[a][b]);
         }
     }
     pvid_cholesky_f32 factor;
-    return pvid_cholesky_factor_f32(&factor, n, (const float (*)[PVID_MAX_P])noise);
+    return pvid_cholesky_factor_f32(&factor, n, (const float (*)[PVID_MAX_P])excess);
 }
 
 void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,

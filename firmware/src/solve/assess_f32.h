@@ -24,10 +24,10 @@ float pvid_assess_variance_f32(const pvid_system_f32 *system, const pvid_solve_s
 float pvid_assess_misfit_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings);
 
 /* Returns whether S contains more information than noise: S - noise_margin Sn is positive definite, where Sn is the
- * information of noise of this variance in so many rows. noise: that of unit variance and one row, upper triangle;
- * overwritten. Cost: a factorisation. */
+ * information of noise of this variance in so many rows. noise: that of unit variance and one row, upper triangle.
+ * Cost: a factorisation. */
 bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float variance,
-                                 float noise[][PVID_MAX_P]);
+                                 const float noise[][PVID_MAX_P]);
 
 /* Writes estimate->kappa and least_pivot of S; 0 if S cannot be factored. Cost: a factorisation. */
 void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,

@@ -35,10 +35,10 @@ static bool model_is_valid(const pvid_model_f32 *model)
 {
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
-           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && (model->n_p <= model->n_theta) &&
-           (model->n_gated <= model->n_p) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) &&
-           (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
-           ((model->accumulate == NULL) == (model->project == NULL)) &&
+           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && ((PVID_EXACT == 0) || (model->n_p == PVID_MAX_P)) &&
+           (model->n_p <= model->n_theta) && (model->n_gated <= model->n_p) && (model->n_c >= 1u) &&
+           (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) && (model->n_moments >= 1u) &&
+           (model->n_moments <= PVID_MAX_MOMENTS) && ((model->accumulate == NULL) == (model->project == NULL)) &&
            ((model->innovate == NULL) == (model->project == NULL)) &&
            ((model->accumulate != NULL)
                 ? (model->n_kinds <= 1u)
@@ -162,13 +162,13 @@ pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[
         return PVID_NOT_READY;
     }
     const pvid_model_f32 *model = self->model;
-    bool finite = true;
-    bool fits = true;
+    uint32_t largest = 0; /* bits are ordered like absolute values, infinity and NaN last */
     for (size_t i = 0; i < model->n_theta; i++) {
-        finite = finite && pvid_finite_f32(g[i]);
-        fits = fits && pvid_within_f32(g[i], -PVID_ROW_LIMIT * PVID_ROW_LIMIT, PVID_ROW_LIMIT * PVID_ROW_LIMIT);
+        const uint32_t size = pvid_bits_f32(g[i]) & 0x7FFFFFFFu;
+        largest = (size > largest) ? size : largest;
     }
-    if (!fits) {
+    if (largest > pvid_bits_f32(PVID_ROW_LIMIT * PVID_ROW_LIMIT)) {
+        const bool finite = largest < 0x7F800000u;
         pvid_count_up(finite ? &self->counters.rejected_saturated : &self->counters.rejected_not_finite);
         return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
     }

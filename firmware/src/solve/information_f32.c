@@ -163,6 +163,7 @@ void pvid_information_fade_f32(pvid_information_f32 *self, float factor)
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS])
 {
     const size_t n = number_of_sums(self);
+    PVID_UNROLL_BY_FOUR
     for (size_t i = 0; i < n; i++) {
         sums[i] = self->high[i] + self->low[i];
     }

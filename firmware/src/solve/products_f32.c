@@ -5,8 +5,20 @@
 #include <stddef.h>
 
 #include "number/count.h"
+#include "number/exact.h"
 #include "number/finite_f32.h"
 #include "solve/pattern_f32.h"
+
+float pvid_product_f32(const float x[], const float y[], size_t n)
+{
+    const size_t rows = PVID_COUNT(PVID_MAX_FUNCTIONS, n);
+    float sum = 0.0f;
+    PVID_UNROLL_EXACT
+    for (size_t k = 0; k < rows; k++) {
+        sum += x[k] * y[k];
+    }
+    return sum;
+}
 
 pvid_reason pvid_products_accept_f32(pvid_estimator_f32 *self, size_t n, const float squares[], float rss)
 {

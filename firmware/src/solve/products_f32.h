@@ -7,14 +7,7 @@
 #include "solve/state_f32.h"
 
 /* sum of x y over n entries */
-static inline float pvid_product_f32(const float *x, const float *y, size_t n)
-{
-    float sum = 0.0f;
-    for (size_t k = 0; k < n; k++) {
-        sum += x[k] * y[k];
-    }
-    return sum;
-}
+float pvid_product_f32(const float x[], const float y[], size_t n);
 
 /* Accepts rows by the sum of squares of each of the n entries of N, and of e, or counts them as rejected, once. */
 pvid_reason pvid_products_accept_f32(pvid_estimator_f32 *self, size_t n, const float squares[], float rss);

@@ -20,10 +20,12 @@
 
 enum {
     STAGE_READ,        /* the sums and C */
-    STAGE_PROJECT,     /* for each column c_a of C: M c_a, a few non-zeros at a time, then row a of S and F */
+    STAGE_PROJECT,     /* for each column c_a of C: M c_a, a few non-zeros at a time, then row a of S */
+    STAGE_FORCE,       /* F */
     STAGE_ABOVE_NOISE, /* whether S contains more information than noise alone */
     STAGE_FACTOR,      /* Cholesky factor of S + H0; whether p[0] is excited */
-    STAGE_STEP,        /* dp; p and theta after the step */
+    STAGE_STEP,        /* dp, and p after the step */
+    STAGE_THETA,       /* theta after the step */
     STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
     STAGE_COMMIT,      /* writes p, theta, b and rr */
     STAGE_FOLD,        /* ends the group: information.h */
@@ -38,8 +40,8 @@ enum {
 /* Rounding error of rr per step, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
 #define ROUNDING 2.4e-7f
 
-#define ROWS_PER_STAGE 4u
-#define COLUMNS_PER_STAGE 3u
+#define ROWS_PER_STAGE 2u
+#define COLUMNS_PER_STAGE 2u
 
 /* ---- rows ---- */
 
@@ -117,16 +119,18 @@ static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 
     solve->system.weight = tail[1];
 }
 
-/* Adds a part of M c_a; when M c_a is complete, computes row a of S and F. Returns whether the stage is to be repeated.
+/* Adds a part of M c_a; when M c_a is complete, computes row a of S. Returns whether the stage is to be repeated.
  */
 static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
     const size_t a = solve->index;
     const size_t next = solve->next;
-    const size_t end = pvid_pattern_end_f32(model, solve->start);
+    const size_t end = solve->end;
     if (next == solve->start) {
-        memset(solve->product, 0, sizeof solve->product);
+        for (size_t i = 0; i < model->n_theta; i++) {
+            solve->product[i] = 0.0f;
+        }
     }
     if (next < end) {
         const size_t last = ((end - next) > COLUMNS_PER_STAGE) ? (next + COLUMNS_PER_STAGE) : end;
@@ -135,10 +139,15 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
         return true;
     }
     pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->product, solve->system.s[a]);
-    solve->system.force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
     solve->start = (uint8_t)end;
+    solve->end = (uint8_t)pvid_pattern_end_f32(model, end);
     solve->index++;
     return solve->index < model->n_p;
+}
+
+static void force_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    pvid_pattern_project_row_f32(self->model, solve->c, 0, &solve->sums[self->model->n_moments], solve->system.force);
 }
 
 /* The noise has row_sd^2 in a solve, because the residuals are larger while p is far from the solution, and the
@@ -151,18 +160,19 @@ static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_sol
     solve->above_noise = true;
     if (((self->model->noise != NULL) || (solve->noise != NULL)) && (settings->noise_margin > 0.0f)) {
         float noise[PVID_MAX_P][PVID_MAX_P];
-        if (solve->noise != NULL) {
-            memcpy(noise, solve->noise, sizeof noise);
-        } else {
+        if (solve->noise == NULL) {
             self->model->noise(self->p, self->noise, noise);
         }
-        solve->above_noise = pvid_assess_above_noise_f32(&solve->system, settings, solve->variance, noise);
+        solve->above_noise =
+            pvid_assess_above_noise_f32(&solve->system, settings, solve->variance,
+                                        (solve->noise != NULL) ? solve->noise : (const float (*)[PVID_MAX_P])noise);
     }
 }
 
 static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     for (size_t a = 0; a < self->model->n_p; a++) {
+        solve->diagonal[a] = solve->system.s[a][a];
         solve->system.s[a][a] += self->settings.prior[a];
     }
     const pvid_reason reason = pvid_step_factor_f32(&solve->system, &self->settings, &solve->factor);
@@ -197,15 +207,21 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
         rhs[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
         self->innovation[a] = 0.0f;
     }
-    memcpy(solve->p, self->p, sizeof solve->p);
+    for (size_t a = 0; a < model->n_p; a++) {
+        solve->p[a] = self->p[a];
+    }
     if (solve->reason == PVID_UPDATED) {
         take_step(self, solve, rhs);
     }
     if ((solve->reason != PVID_UPDATED) && (solve->fallback != NULL)) {
         memcpy(solve->p, solve->fallback, sizeof solve->p);
     }
-    model->theta(solve->p, solve->theta);
-    for (size_t i = 0; i < model->n_theta; i++) {
+}
+
+static void theta_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    self->model->theta(solve->p, solve->theta);
+    for (size_t i = 0; i < self->model->n_theta; i++) {
         solve->theta_step[i] = solve->theta[i] - self->theta[i];
     }
     solve->fall = 0.0f;
@@ -255,6 +271,8 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     const float lost = self->information.rounding + (ROUNDING * solve->scale);
     self->information.rounding = (lost <= PVID_RESIDUAL_MAX) ? lost : PVID_RESIDUAL_MAX;
     memcpy(self->p, solve->p, sizeof self->p);
+    solve->system.rss = self->information.high[self->model->n_moments + n] + low[n];
+    solve->system.rounding = self->information.rounding;
     if (steps) {
         pvid_count_up(&self->counters.updates);
     }
@@ -276,8 +294,9 @@ static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
     }
 }
 
-static void reset_solve(pvid_estimator_solve_f32 *solve)
+static void reset_solve(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
+    solve->end = (uint8_t)pvid_pattern_end_f32(self->model, 0);
     solve->reason = PVID_ACCUMULATED;
     solve->index = 0;
     solve->start = 0;
@@ -295,7 +314,7 @@ static void reset_solve(pvid_estimator_solve_f32 *solve)
 
 void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
 {
-    reset_solve(solve);
+    reset_solve(self, solve);
     solve->ends_group = ends_group;
     if (self->settings.engine == PVID_ENGINE_DIRECT) {
         solve->stage = STAGE_DIRECT;
@@ -313,10 +332,24 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
 void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
                                          pvid_estimate_f32 *estimate)
 {
-    reset_solve(solve);
+    reset_solve(self, solve);
     memset(estimate, 0, sizeof *estimate);
     memcpy(estimate->p, self->p, sizeof estimate->p);
     solve->estimate = estimate;
+}
+
+void pvid_estimator_assess_solved_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
+                                      pvid_estimate_f32 *estimate)
+{
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        solve->system.s[a][a] = solve->diagonal[a];
+    }
+    solve->estimate = estimate;
+    solve->noise = NULL;
+    solve->index = 0;
+    solve->stage = STAGE_ABOVE_NOISE;
 }
 
 static void kappa_stage(const pvid_estimator_f32 *self, const pvid_estimator_solve_f32 *solve)
@@ -337,6 +370,8 @@ static bool advance_shared(const pvid_estimator_f32 *self, pvid_estimator_solve_
         return false;
     case STAGE_PROJECT:
         return project_stage(self, solve);
+    case STAGE_FORCE:
+        return false; /* an assessment needs none */
     default:
         above_noise_stage(self, solve);
         return false;
@@ -358,15 +393,25 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
     bool repeat = false;
     switch (solve->stage) {
     case STAGE_READ:
+        read_stage(self, solve);
+        break;
     case STAGE_PROJECT:
+        repeat = project_stage(self, solve);
+        break;
+    case STAGE_FORCE:
+        force_stage(self, solve);
+        break;
     case STAGE_ABOVE_NOISE:
-        repeat = advance_shared(self, solve);
+        above_noise_stage(self, solve);
         break;
     case STAGE_FACTOR:
         factor_stage(self, solve);
         break;
     case STAGE_STEP:
         step_stage(self, solve);
+        break;
+    case STAGE_THETA:
+        theta_stage(self, solve);
         break;
     case STAGE_MOVE_B:
         solve->index = (uint8_t)move_b_stage(self, solve, solve->index);
@@ -394,6 +439,7 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
     switch (solve->stage) {
     case STAGE_READ:
     case STAGE_PROJECT:
+    case STAGE_FORCE:
     case STAGE_ABOVE_NOISE:
         repeat = advance_shared(self, solve);
         break;
@@ -421,10 +467,10 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
     return finish_stage(solve, repeat);
 }
 
-/* Number of stages of READ and PROJECT. */
+/* Number of stages of READ, PROJECT and FORCE. */
 static size_t projection_stages(const pvid_model_f32 *model)
 {
-    size_t stages = 1u;
+    size_t stages = 2u;
     size_t place = 0; /* in a column of C */
     for (size_t k = 0; k < model->n_c; k++) {
         const bool first = (k == 0u) || (model->c_column[k] != model->c_column[k - 1u]);
@@ -442,10 +488,15 @@ uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_gro
         return 1;
     }
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
-    return (uint16_t)(projection_stages(model) + 4u + follow + (ends_group ? 1u : 0u));
+    return (uint16_t)(projection_stages(model) + 5u + follow + (ends_group ? 1u : 0u));
 }
 
 uint16_t pvid_estimator_assessment_stages_f32(const pvid_estimator_f32 *self)
 {
-    return (uint16_t)(projection_stages(self->model) + 4u + self->model->n_p);
+    return (uint16_t)(projection_stages(self->model) + pvid_estimator_assess_solved_stages_f32(self));
+}
+
+uint16_t pvid_estimator_assess_solved_stages_f32(const pvid_estimator_f32 *self)
+{
+    return (uint16_t)(4u + (uint32_t)self->model->n_p); /* ABOVE_NOISE, KAPPA, WIDEN, SCALE; INVERT */
 }

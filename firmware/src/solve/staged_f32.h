@@ -11,6 +11,12 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const fl
  * solve begins. */
 void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance);
 
+/* Begins the assessment behind a complete solve, from its normal equations: S at the p before its step, the residuals
+ * behind it. pvid_estimator_assess_advance_f32 continues it; number of its stages. */
+void pvid_estimator_assess_solved_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
+                                      pvid_estimate_f32 *estimate);
+uint16_t pvid_estimator_assess_solved_stages_f32(const pvid_estimator_f32 *self);
+
 /* Returns whether rounding may dominate rr, because p has moved far since the rows were added. */
 bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self);
 

@@ -222,3 +222,25 @@ void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_es
         }
     }
 }
+
+void pvid_system_without_table_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
+                                   int64_t rest[][PVID_MAX_P])
+{
+    const int64_t weight = self->information.sums[self->information.n_sums - 1u];
+    const int64_t sd = self->settings.row_sd;
+    const pvid_scaled_q31 row = pvid_scaled_of_q31(sd * sd, -2 * PVID_ROW_SD_BITS);
+    const pvid_scaled_q31 tables =
+        pvid_scaled_over_q31(pvid_scaled_of_q31(weight, -16), pvid_scaled_of_q31((int64_t)self->noise_rows, 0));
+    const pvid_scaled_q31 margin = pvid_scaled_of_q31((int64_t)self->settings.noise_margin, -16);
+    const pvid_scaled_q31 much =
+        pvid_scaled_times_q31(pvid_scaled_times_q31(margin, tables), pvid_scaled_over_q31(solve->variance, row));
+    size_t at = 0;
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        for (size_t b = a; b < self->model->n_p; b++) {
+            const pvid_scaled_q31 noise = pvid_scaled_times_q31(much, pvid_scaled_unpacked_q31(self->noise_table[at]));
+            const int32_t unit = (int32_t)solve->system.f[a] + solve->system.f[b] + PVID_S_BITS;
+            rest[a][b] = pvid_clamp_q31(solve->system.s[a][b] - pvid_scaled_fixed_q31(noise, -unit), PVID_WIDE);
+            at++;
+        }
+    }
+}

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
-import logging
-import os
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from bench.campaign.judge import Record, identify_rig
 from bench.campaign.population import Population
 from bench.campaign.store import Store, code_version, core_version
 from bench.campaign.truth import GENERATOR, kept_rig, simulate_rig
+from pvid.base.cluster import client, each, processors
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.rig.file import Core
@@ -79,25 +74,13 @@ def run(
     done = campaign.rigs - len(missing)
     progress(done)
     if missing:
-        with _client(scheduler, min(workers or _processors(), len(missing))) as client:
-            for record in _records(client, campaign, missing):
+        with client(scheduler, min(workers or processors(), len(missing))) as connected:
+            code = code_version()
+            for record in each(connected, _work, missing, campaign=campaign, code=code):
                 store.add(record)
                 done += 1
                 progress(done)
     return store.finish(rigs)
-
-
-def _records(client: Any, campaign: Campaign, rigs: list[int]) -> Iterator[Record]:
-    futures = client.map(_work, rigs, campaign=campaign, code=code_version(), pure=False)
-    for future in _distributed().as_completed(futures, loop=client.loop):
-        try:
-            yield future.result()
-        except PvidError:
-            raise
-        except Exception as error:
-            raise PvidError(f"a worker cannot run pvid: {type(error).__name__}: {error}") from error
-        finally:
-            future.release()
 
 
 def _work(rig: int, *, campaign: Campaign, code: str) -> Record:
@@ -115,50 +98,3 @@ def _work(rig: int, *, campaign: Campaign, code: str) -> Record:
 @lru_cache(maxsize=1)
 def _native() -> Native:
     return Native()
-
-
-@contextmanager
-def _client(scheduler: str | None, workers: int) -> Iterator[Any]:
-    """A client of the scheduler, or of worker processes of its own that nobody else can reach."""
-    distributed = _distributed()
-    if scheduler is not None:
-        try:
-            client = distributed.Client(scheduler, timeout=_CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
-            raise PvidError(
-                f"no scheduler of dask.distributed can be reached at {scheduler} within {_CONNECT_S} s: is it "
-                f"running, and is the address that which it prints (tcp://HOST:PORT)?"
-            ) from error
-        with client:
-            try:
-                client.wait_for_workers(1, timeout=_WORKERS_S)
-            except TimeoutError as error:
-                raise PvidError(f"the scheduler at {scheduler} has no worker: start one with dask worker") from error
-            yield client
-        return
-    with (
-        tempfile.TemporaryDirectory(prefix="pvid-campaign-") as folder,
-        distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",  # of its bare status pages, which cannot be switched off
-            scheduler_kwargs={"dashboard": False},
-            local_directory=folder,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        distributed.Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
-
-
-def _distributed() -> Any:
-    try:
-        return importlib.import_module("distributed")
-    except ImportError as error:
-        raise PvidError("a campaign needs the Python package distributed, which is not installed") from error
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -83,6 +83,7 @@ struct pvid_estimator_solve_f32 {
     uint8_t index; /* of the row or column within the stage */
     uint8_t start; /* first non-zero of the present column of C */
     uint8_t next;  /* next non-zero of this column */
+    uint8_t end;   /* behind its last one */
     bool ends_group;
     bool in_dead_zone; /* within the dead zone: no step is taken */
     float gain;        /* g of this solve */
@@ -95,6 +96,7 @@ struct pvid_estimator_solve_f32 {
     float theta[PVID_MAX_THETA];
     float theta_step[PVID_MAX_THETA]; /* dtheta */
     float product[PVID_MAX_THETA];    /* M times a column of C, then M dtheta: b -= product */
+    float diagonal[PVID_MAX_P];       /* of S without H0 */
     pvid_cholesky_f32 factor;
 };
 

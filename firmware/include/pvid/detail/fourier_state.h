@@ -5,7 +5,7 @@
 #include "pvid/fourier.h"
 
 /* Steps that are added to the sums together. */
-#define PVID_FOURIER_BLOCK 4
+#define PVID_FOURIER_BLOCK 8u
 
 /* The front end: block sums of the signals, and their outputs at the last steps. */
 typedef struct {
@@ -22,7 +22,8 @@ typedef struct {
     float ticks;                       /* D */
     float scale;                       /* 1 / D^2 */
     float jump_scale;                  /* dt/12, dt the tick [s] */
-    uint32_t limit[PVID_MAX_SAMPLES];  /* bits of the largest absolute value of each sample that needs no attention */
+    uint32_t limit[PVID_MAX_SAMPLES];  /* largest absolute value of each sample that needs no attention: its bits,
+                                          shifted left by one */
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
@@ -61,23 +62,22 @@ typedef struct {
     uint16_t delay;                                      /* steps from a sample to the last step that it is part of */
     uint16_t beyond;                                     /* steps that may yet contain a sample beyond its range */
     bool out[2];                                         /* of each half: contains such a step */
+    bool still;                                          /* a sample moved too little in the last two halves */
     pvid_fourier_spread_f32 spread[2][PVID_MAX_SAMPLES]; /* of each half, if a sample has a least deviation */
 } pvid_fourier_watch_f32;
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
 typedef struct {
-    uint8_t half;                       /* that fills, 0 or 1 */
-    uint8_t halves;                     /* complete since the restart, 0..2 */
-    uint8_t filling;                    /* block that fills, 0 or 1 */
-    uint8_t target;                     /* half to which the other block is being added */
-    uint8_t harmonic;                   /* next one to which it is added; all: none */
-    uint8_t joined;                     /* next one to be joined; all: none */
-    bool first;                         /* it is the first block of its half */
-    bool last;                          /* it is the last block of a window that is to be used */
-    uint16_t index;                     /* of the next step in its half */
-    uint16_t start;                     /* of the first step of that block in its half */
-    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the window's first half at its end */
-    float block[2][PVID_FOURIER_BLOCK][PVID_MAX_CHANNELS];
+    uint8_t half;                                           /* that fills, 0 or 1 */
+    uint8_t halves;                                         /* complete since the restart, 0..2 */
+    uint8_t filling;                                        /* block that fills, 0 or 1 */
+    uint8_t target;                                         /* half to which the other block is being added */
+    uint8_t harmonic;                                       /* next one to which it is added; all: none */
+    uint8_t joined;                                         /* next one to be joined; all: none */
+    uint16_t index;                                         /* of the next step in its half */
+    uint16_t start;                                         /* of the first step of that block in its half */
+    float edge[2][PVID_MAX_INTEGRANDS];                     /* I^1 and I^2 of the window's first half at its end */
+    float block[2][PVID_FOURIER_BLOCK][PVID_MAX_CHANNELS];  /* steps, then their sums and differences: sums_f32.c */
     float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_f32;
 
@@ -93,7 +93,8 @@ typedef struct {
     uint8_t powers;                  /* of omega^2 in use */
     float omega;                     /* 2 pi / T [rad/s] */
     float weight[PVID_MAX_POWER];    /* c_j of the sensors, variance at the power j of omega^2 */
-    float scale[PVID_MAX_HARMONICS]; /* 1 / sqrt(D_h) */
+    float floor;                     /* least D_h */
+    float scale[PVID_MAX_HARMONICS]; /* D_h, then 1 / sqrt(D_h) */
     float reflection[PVID_MAX_POWER / 2][PVID_FOURIER_PARTS]; /* v of I - v v^T, one of each family in a row */
     float share[PVID_MAX_POWER];                              /* Q_j = tr(R^-1 dR/dc_j) */
 } pvid_fourier_white_f32;
@@ -110,19 +111,43 @@ typedef struct {
     float neighbour[PVID_MAX_P][PVID_MAX_P];
 } pvid_fourier_scores_f32;
 
+/* Orthonormal directions that the test functions leave out, one of each family in a row. */
+typedef struct {
+    float norm[2];                       /* of the present direction of each family, before it was divided by it */
+    float slope[2];                      /* mean of (h/H)^2 over its squares */
+    float direction[PVID_FOURIER_PARTS]; /* the present one */
+    float before[PVID_FOURIER_PARTS];
+    float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of all */
+} pvid_fourier_basis_f32;
+
+/* C at p, and the places of the non-zeros of each row of a kind. */
+typedef struct {
+    float c[PVID_MAX_THETA * PVID_MAX_P];
+    uint8_t count[PVID_MAX_THETA];
+    uint8_t place[PVID_MAX_THETA][PVID_MAX_P];
+} pvid_fourier_slopes_f32;
+
+/* What the columns of a kind need before they are formed, and they themselves. */
+typedef union {
+    struct {
+        pvid_fourier_basis_f32 basis;
+        pvid_fourier_slopes_f32 slopes;
+    } before;
+    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
+} pvid_fourier_columns_f32;
+
 /* What the rows of a window need until the last of them is added. */
 typedef struct {
     pvid_reason reason; /* of the solve, with its pointers: they keep their place (pvid/snapshot_fourier.h) */
     const void *pointer[3];
     float window[PVID_MAX_CHANNELS][2][PVID_MAX_HARMONICS]; /* S_h: real parts, imaginary parts */
-    float own[PVID_MAX_COLUMNS];        /* square of each nuisance before projection, then inverse of what remains; then
-                                           squares of theta's columns */
-    float pull[PVID_MAX_THETA];         /* g: what the sensors' noise takes from B */
-    float score[PVID_MAX_THETA];        /* sum N e + g of the window */
-    float gradient[PVID_MAX_THETA];     /* sum N e of the kind */
-    float part[PVID_FOURIER_PARTS];     /* of a direction, then of the present column */
-    float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of the directions */
-    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
+    float own[PVID_MAX_COLUMNS];    /* square of each nuisance before projection, then inverse of what remains; then
+                                       squares of theta's columns */
+    float pull[PVID_MAX_THETA];     /* g: what the sensors' noise takes from B */
+    float score[PVID_MAX_THETA];    /* sum N e + g of the window */
+    float gradient[PVID_MAX_THETA]; /* sum N e of the kind */
+    float part[PVID_FOURIER_PARTS]; /* of the present column */
+    pvid_fourier_columns_f32 of_kind;
 } pvid_fourier_rows_f32;
 
 /* The rows of a window, and behind them the solve and the assessment. */
@@ -163,12 +188,12 @@ typedef struct {
 /* Only the functions of fourier.h write to it. */
 struct pvid_fourier_f32 {
     const pvid_fourier_design_f32 *design;
-    uint8_t plain; /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
-    uint8_t rest;  /* reason of a tick that only adds its samples; FORM: the channels of a step are due; BUSY: harmonics
-                      are to be added or joined, or a window is being processed */
-    bool warm;     /* a window has been complete since the restart */
-    bool frozen;   /* complete windows are dropped */
-    bool watches;  /* samples are compared with their range, or their deviation with the least one */
+    const pvid_fourier_refine_f32 *refine; /* second stage; NULL: none */
+    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: fourier_f32.c */
+    bool warm;         /* a window has been complete since the restart */
+    bool frozen;       /* complete windows are dropped */
+    bool watches;      /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;

@@ -57,7 +57,7 @@ typedef struct {
 
 /* S_h of a window, real and imaginary part. */
 typedef struct {
-    uint32_t bits[PVID_MAX_CHANNELS]; /* all of those of the magnitudes of a channel's sums */
+    uint8_t length[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS]; /* bits of the larger part */
     int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
 } pvid_fourier_window_q31;
 
@@ -68,17 +68,14 @@ typedef struct {
 typedef struct {
     uint8_t cosines;                                           /* real parts; the others are imaginary parts */
     uint8_t powers;                                            /* of h^2 in use */
-    int32_t rate;                                              /* 1 / H, Q30 */
-    int32_t exponent;                                          /* of 1 / sqrt(D_h) */
     pvid_scaled_q31 weight[PVID_MAX_POWER];                    /* c_j, variance at the power j of h^2 */
-    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                 /* D_h, then m 2^exponent = 1 / sqrt(D_h) */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                 /* D_h, then 1 / sqrt(D_h) */
     int32_t mirror[PVID_MAX_POWER / 2][PVID_FOURIER_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
 } pvid_fourier_white_q31;
 
 /* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
 typedef struct {
-    uint8_t lift[PVID_MAX_CHANNELS]; /* bits that the sums of a channel are shifted up */
-    int16_t exponent[PVID_MAX_COLUMNS];
+    int32_t exponent[PVID_MAX_COLUMNS];
     int32_t x[PVID_MAX_COLUMNS][PVID_FOURIER_ROWS_Q31];
 } pvid_fourier_columns_q31;
 
@@ -98,13 +95,29 @@ typedef struct {
     int64_t square[2][PVID_MAX_SAMPLES];
 } pvid_fourier_drive_q31;
 
+/* While the noise of a kind's rows is computed anew. */
+typedef struct {
+    int32_t u[PVID_FOURIER_ROWS_Q31];        /* a direction that the test functions leave out, Q30 */
+    int32_t leverage[PVID_FOURIER_ROWS_Q31]; /* sum of the squares of all of them, Q30 */
+    pvid_scaled_q31 share[PVID_MAX_POWER];   /* Q_j */
+    int32_t c[PVID_MAX_C_Q31];               /* C at p: C_k = c_k 2^f_column */
+    int16_t f[PVID_MAX_P];
+} pvid_fourier_noise_work_q31;
+
+/* The columns begin behind that.
+ * MISRA deviation: 19.2; as of pvid_fourier_work_q31. */
+typedef union {
+    pvid_fourier_noise_work_q31 noise;
+    pvid_fourier_columns_q31 columns;
+} pvid_fourier_parts_q31;
+
 /* The rows of a kind while they are made. */
 typedef struct {
     pvid_fourier_white_q31 white;
     pvid_scaled_q31 least;                        /* D_h */
     pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
     uint64_t whole[PVID_MAX_COLUMNS];             /* square of each nuisance before those before it are off */
-    pvid_fourier_columns_q31 columns;
+    pvid_fourier_parts_q31 parts;
 } pvid_fourier_rows_q31;
 
 /* The rows of all kinds are in the estimator before the solves begin: they use the same memory.
@@ -113,6 +126,16 @@ typedef union {
     pvid_fourier_rows_q31 rows;
     pvid_estimator_solve_q31 solve;
 } pvid_fourier_work_q31;
+
+/* What the sensors' noise does to the rows, at the p of one of the last windows. */
+typedef struct {
+    bool used;               /* anything needs it */
+    bool renewed;            /* in the present window */
+    uint8_t age;             /* windows since it was computed */
+    bool compensates;        /* `pull` is added to b */
+    pvid_scaled_q31 sensors; /* part of the rows' variance that the sensors explain, summed over kinds */
+    pvid_scaled_q31 pull[PVID_MAX_THETA_Q31]; /* what it takes from b in a window, in units of b */
+} pvid_fourier_known_q31;
 
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
@@ -135,6 +158,7 @@ typedef struct {
     int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];
+    pvid_fourier_known_q31 known;
     pvid_fourier_work_q31 work;
     pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_fourier_finish_q31;
@@ -143,6 +167,8 @@ typedef struct {
 struct pvid_fourier_q31 {
     const pvid_fourier_design_q31 *design;
     const int32_t *drive_min;
+    uint8_t plain; /* samples, if each is a signal; else 0 */
+    uint8_t rest;  /* reason of a tick that ends no step and has no work; 255: there is work */
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */
     bool warm;               /* a window has been complete since the restart */

@@ -36,6 +36,7 @@ typedef struct {
     float from_counts[PVID_REFINE_SIGNALS];              /* range / 32767 */
     float sum[PVID_REFINE_SIGNALS];                      /* of the block */
     float reference[PVID_REFINE_INPUTS];                 /* the first sample since the restart */
+    float held[PVID_REFINE_INPUTS];                      /* the last sample of the block before, less the reference */
     float mean[2][PVID_REFINE_SIGNALS];                  /* the last two means, latest first */
     float line[PVID_REFINE_INPUTS][PVID_REFINE_LINE];    /* means of inputs of order 2, circular, twice */
     int16_t ring[PVID_REFINE_RING][PVID_REFINE_SIGNALS]; /* INT16_MIN: missing or beyond its range */
@@ -99,6 +100,7 @@ struct pvid_refine_f32 {
     bool waiting;        /* the next job needs an entry of the ring that is not there */
     bool sane;           /* the block */
     pvid_reason verdict; /* on the block */
+    pvid_reason told;    /* of the last block that ended */
     uint8_t phase;
     uint8_t pass;                         /* of the block */
     uint8_t taken;                        /* blocks in a row, up to 2 */

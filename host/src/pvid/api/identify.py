@@ -14,6 +14,7 @@ from pvid.api.result import Result, of_core, of_mechanism, of_pendulum
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
+from pvid.log.rig import LOG_SUFFIX, recording_of_log, run_of_log
 from pvid.log.rig_settings import rig_for
 from pvid.rig.columns import Columns, parsed
 from pvid.rig.mechanism_file import channels_of
@@ -43,8 +44,8 @@ def identify(
     Parameters
     ----------
     data
-        A table (csv, npz, parquet, ...), a data frame, or a mapping of names to arrays, shape (n,): the time t [s] and
-        the signals of the mechanism; of the pendulum phi [rad] and y [m].
+        A table (csv, npz, parquet, ...), the log of a board, a data frame, or a mapping of names to arrays, shape
+        (n,): the time t [s] and the signals of the mechanism; of the pendulum phi [rad] and y [m].
     model
         A mechanism of `pvid models` or a model file; the rig file's or the pendulum by default.
     rig
@@ -76,14 +77,21 @@ def identify(
     described = mechanism_rig(path, rig_path, texts, None if model is None else os.fspath(model))
     if described is not None:
         compiled = model_of(described)
-        recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
+        if path is not None and path.suffix == LOG_SUFFIX:
+            recording = recording_of_log(path, [one.name for one in compiled.signals])
+        else:
+            recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
         answer = identify_mechanism(recording.whole(), compiled)
         engine = ENGINE_CORES.get(core or "")
         return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)
     if core is not None:
         file = replace(file, identifier=replace(file.identifier, core=core))
-    run = aligned(Run.of(_recording(data, path, file.sample_rate, parsed(columns))), file.sensor.y_delay)
+    if path is not None and path.suffix == LOG_SUFFIX:
+        run = run_of_log(path)
+    else:
+        run = Run.of(_recording(data, path, file.sample_rate, parsed(columns)))
+    run = aligned(run, file.sensor.y_delay)
     if not file.identifier.core_traits.takes_gaps:
         run = run.whole()
     given, file = file, resolved(file, run)

@@ -14,14 +14,17 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
+from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_design, files_fourier
 from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Source
+from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
@@ -30,11 +33,13 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, samples_of
 from pvid.run.mechanism import model_of
+from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierNoise
 from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
+from pvid.twin.fourier import FourierTwin
 
 _COMMAND = "pvid log"
 _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
@@ -57,6 +62,7 @@ class MechanismBoard:
     """
 
     configure_frame = Configure
+    matrix = "covariance"  # of an estimate
     rig: MechanismRig
     compiled: CompiledModel
     config: FourierConfig
@@ -193,33 +199,70 @@ class MechanismBoard:
         single = {name: getattr(frame, name) for name in _SINGLE}
         return replace(self.config, estimator=replace(own, law=Law(frame.law), **places, **single))
 
+    def twin_of(self, frame: Configuration) -> FourierTwin:
+        """The twin with the values of a Configure frame; raises as `configured`."""
+        return FourierTwin(self.configured(frame))
+
+    @property
+    def without_recording(self) -> MechanismBoard:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """Signals [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.float32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Sample.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
+
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
         lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config).items()]
         return "\n".join([self.rig.text(), f"[{_TABLE}]", *lines, ""])
 
     @classmethod
-    def parse(cls, text: str) -> MechanismBoard | None:
-        """From the text of a log; None: that of another kind of rig.
+    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoard:
+        """From the rig and the table `engine` of the text of a log.
 
         Raises
         ------
-        PvidError
-            Where it breaks off, or its mechanism is none of the shipped ones.
+        KeyError, TypeError, ValueError, IndexError
+            Where it is damaged.
         """
-        document = toml_document(text)
-        engine = document.pop(_TABLE, None)
-        if not isinstance(engine, dict):
-            return None
-        rig = MechanismRig.of_document(document)
-        if rig.model not in shipped():
-            raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
         compiled = model_of(rig)
-        try:
-            config = _config(compiled, engine)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
-            raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
+        config = _config(compiled, engine)
         return cls(rig, compiled, config, np.zeros((0, config.design.model.samples), np.float32))
+
+
+_KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismBoard, MechanismBoardQ31)
+BOARDS = dict(zip(ENGINE_CORES, _KINDS, strict=True))
+
+
+def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
+    """From the text of a log; None: that of another kind of rig.
+
+    Raises
+    ------
+    PvidError
+        Where it breaks off, or its mechanism is none of the shipped ones.
+    """
+    document = toml_document(text)
+    engine = document.pop(_TABLE, None)
+    if not isinstance(engine, dict):
+        return None
+    rig = MechanismRig.of_document(document)
+    if rig.model not in shipped():
+        raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
+    try:
+        return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
 
 
 def _recording(samples: npt.NDArray[np.float32]) -> str:
@@ -230,6 +273,7 @@ def _recording(samples: npt.NDArray[np.float32]) -> str:
             "#ifndef STREAM_RECORDING_H",
             "#define STREAM_RECORDING_H",
             "",
+            "#define STREAM_PUT pvid_put_f32",
             f"#define RECORDED_TICKS {len(samples)}u",
             f"static const float recorded[RECORDED_TICKS][{samples.shape[1]}] = {{",
             *rows,

@@ -26,7 +26,7 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.run.engine_design import config_for_simulated_rig, samples_of
 from pvid.settings.enums import Core
 from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+from pvid.setup.fourier_sizes import sizes_for_one, sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin import fnv
 from pvid.twin.fourier import FourierTwin
@@ -176,20 +176,38 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
             f"{target.name}: float32 has no bits of the twin on an AVR: its division differs at the extremes"
         )
     return build_with(
-        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), sizes_of_design(run.config.design), "f32"
+        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), sizes_for_one(run.config.design), "f32"
     )
 
 
 def build_with(
-    target: Board, name: str, files: Mapping[str, str], sizes: Mapping[str, int], core: Core
+    target: Board,
+    name: str,
+    files: Mapping[str, str],
+    sizes: Mapping[str, int],
+    core: Core,
+    room: str = "fourier",
+    *,
+    refined: bool = False,
 ) -> tuple[Path, Path]:
-    """The same from generated files: name -> text."""
+    """The same from generated files: name -> text.
+
+    Parameters
+    ----------
+    room : of the core, of the form
+    refined : the files of the second stage are among them
+    """
     stamp = zlib.crc32("".join(files.values()).encode())
     whole = f"{name}-{stamp:08x}"
     folder = BUILD / "runs" / whole
     for file, text in files.items():
-        keep_header(folder, file, text)
-    options = {"PVID_REPLAY_RUN": str(folder), "PVID_LEAVE_OUT": left_out("fourier", core)}
+        keep_header((folder / file).parent, Path(file).name, text)
+    options = {
+        "PVID_REPLAY_RUN": str(folder),
+        "PVID_LEAVE_OUT": left_out(room, core, *(["refine"] if refined else [])),
+    }
+    if refined:
+        options["PVID_REFINE_MODEL"] = str(folder)
     options |= {macro: str(size) for macro, size in at_least(sizes).items()}
     tree = build(target, BUILD / f"{target.name}-{whole}", options)
     return tree / "apps" / "replay" / "replay.elf", tree

@@ -14,7 +14,9 @@ from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
 from pvid.board.engine_image import engine_image
 from pvid.board.replay_image import build_image, parse_report, standard_run
 from pvid.core.sources import ROOT
-from pvid.settings.enums import Core
+from pvid.models.registry import DEFAULT
+from pvid.settings.enums import Core, Form
+from pvid.settings.forms import FORMS
 
 TICKS = 5000
 TIMEOUT_S = 300.0
@@ -81,22 +83,29 @@ def _named(symbols: list[_Symbol], name: str) -> _Symbol:
     raise PvidError(f"the image has no function {name}")
 
 
-def profile(board: Board, form: str, core: str = "f32", ticks: int = TICKS) -> Profile:
-    """Plays the replay image of the standard run and counts.
+def profile(board: Board, form: Form, core: Core = "f32", model: str = DEFAULT) -> Profile:
+    """Plays the replay image of the standard run, or in the weak form that of a shipped mechanism, and counts.
 
     Raises
     ------
     PvidError
         When the board's emulator is not QEMU or takes no plugins, something does not build, or the image fails.
     """
-    run = standard_run(form, ticks, core)
-    return _counted(board, build_image(board, run)[0], f"pvid_{form}_step_{core}", run.measure_from)
+    return _counted(board, *_PLAYED[form](board, core, model))
 
 
-def profile_mechanism(board: Board, name: str, core: Core = "f32") -> Profile:
-    """The same of the weak engine with a shipped mechanism."""
-    made = engine_image(board, name, core)
-    return _counted(board, made.image, f"pvid_fourier_step_{core}", made.measure_from)
+def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
+    """Image, the function that is counted, the first tick that counts."""
+    run = standard_run("strong", TICKS, core)
+    return build_image(board, run)[0], f"pvid_strong_step_{core}", run.measure_from
+
+
+def _weak(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
+    made = engine_image(board, model, core)
+    return made.image, f"pvid_fourier_step_{core}", made.measure_from
+
+
+_PLAYED = dict(zip(FORMS, (_weak, _strong), strict=True))
 
 
 def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profile:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from pvid.board.replay_image import ReplayReport, build_image, play, standard_ru
 from pvid.board.stack_bound import stack_bound
 from pvid.models.registry import DEFAULT
 from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.forms import FORMS
 
 TICKS = 5000
 TIMEOUT_S = 300.0
@@ -38,7 +39,7 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Configuration:
-    """A board, the arithmetic and the form of the identifier; form "fourier": the weak engine of any mechanism."""
+    """A board, the arithmetic and the form of the identifier; the weak form is that of the shipped rig of `model`."""
 
     board: Board
     form: str
@@ -48,19 +49,18 @@ class Configuration:
     @property
     def name(self) -> str:
         """Key of the budget."""
-        model = f" {self.model}" if self.form == ENGINE else ""
+        model = "" if self.model == DEFAULT else f" {self.model}"
         return f"{self.board.name} {self.form} {self.core}{model}"
 
 
-ENGINE = "fourier"
+WEAK = "weak"
 ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
 
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
 ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}
 
-CONFIGURATIONS = (
-    *(Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)),
-    *(Configuration(board, ENGINE) for board in BOARDS.values() if board.name not in ON_AVR),
+CONFIGURATIONS = tuple(
+    Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)
 )
 
 
@@ -112,47 +112,55 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     PvidError
         When a compiler or emulator is missing, or the image fails.
     """
-    if configuration.form == ENGINE:
-        return _measure_engine(configuration)
-    board = configuration.board
-    image, tree = build_image(board, standard_run(configuration.form, TICKS, configuration.core))
-    map_text = image.with_suffix(".map").read_text(encoding="utf-8")
-    report = play(board, image, TIMEOUT_S)
-    footprint = Footprint(
-        text=_bytes_of(map_text, _CODE, _CORE),
-        arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),
-        tables=_bytes_of(
-            map_text,
-            r"\.(s?rodata|progmem\.data)\.replay_(config_)?(smooth|second|chi|gram|multiplier|weights)$",
-            "replay",
-        ),
-        data=_bytes_of(map_text, r"\.s?data", _CORE),
-        bss=_bytes_of(map_text, r"\.s?bss|COMMON", _CORE) + report.state_bytes,
-        stack_bound=stack_bound(board.tool_prefix, image, tree, board.entry),
-        stack_seen=report.stack_used,
-        mean=round(report.instructions_mean),
-        longest=round(report.instructions_longest),
+    return _measured(configuration, _BUILT[configuration.form](configuration))
+
+
+@dataclass(frozen=True)
+class _Built:
+    """An image with what is counted in it.
+
+    image, tree: the file, and where it was built; code, tables: (section, origin) of the core's code and constants and
+    of the design's tables, as patterns.
+    """
+
+    image: Path
+    tree: Path
+    code: tuple[tuple[str, str], ...]
+    tables: tuple[tuple[str, str], ...]
+
+
+def _strong(configuration: Configuration) -> _Built:
+    run = standard_run("strong", TICKS, configuration.core)
+    tables = r"\.(s?rodata|progmem\.data)\.replay_(config_)?weights$"
+    return _Built(*build_image(configuration.board, run), ((_CODE, _CORE),), ((tables, "replay"),))
+
+
+def _weak(configuration: Configuration) -> _Built:
+    """Of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
+    made = engine_image(configuration.board, configuration.model, ENGINE_CORES[configuration.core].name)
+    tables = rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.{made.name}_"
+    return _Built(
+        made.image,
+        made.tree,
+        ((_CODE, _CORE), (r"\.text", _MODEL)),
+        ((r"\.s?rodata", _MODEL), (tables, "replay")),
     )
-    return footprint, report
 
 
-def _measure_engine(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
-    """The weak engine of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
+_BUILT: dict[str, Callable[[Configuration], _Built]] = dict(zip(FORMS, (_weak, _strong), strict=True))
+
+
+def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, ReplayReport]:
     board = configuration.board
-    made = engine_image(board, configuration.model, ENGINE_CORES[configuration.core].name)
-    image, tree = made.image, made.tree
-    map_text = image.with_suffix(".map").read_text(encoding="utf-8")
-    report = play(board, image, TIMEOUT_S)
-    code = _bytes_of(map_text, _CODE, _CORE) + _bytes_of(map_text, r"\.text", _MODEL)
-    tables = _bytes_of(map_text, r"\.s?rodata", _MODEL)
-    tables += _bytes_of(map_text, rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.{made.name}_", r"replay")
+    map_text = built.image.with_suffix(".map").read_text(encoding="utf-8")
+    report = play(board, built.image, TIMEOUT_S)
     footprint = Footprint(
-        text=code,
+        text=sum(_bytes_of(map_text, *one) for one in built.code),
         arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),
-        tables=tables,
+        tables=sum(_bytes_of(map_text, *one) for one in built.tables),
         data=_bytes_of(map_text, r"\.s?data", _CORE),
         bss=_bytes_of(map_text, r"\.s?bss|COMMON", _CORE) + report.state_bytes,
-        stack_bound=stack_bound(board.tool_prefix, image, tree, board.entry),
+        stack_bound=stack_bound(board.tool_prefix, built.image, built.tree, board.entry),
         stack_seen=report.stack_used,
         mean=round(report.instructions_mean),
         longest=round(report.instructions_longest),
@@ -161,9 +169,9 @@ def _measure_engine(configuration: Configuration) -> tuple[Footprint, ReplayRepo
 
 
 def configurations_on(boards: Sequence[Board], models: Sequence[str], core: str = "f32") -> list[Configuration]:
-    """All forms and cores on some boards; with models the weak engine of each of them in one arithmetic instead."""
+    """All forms and cores on some boards; with models the weak form of each of them in one arithmetic instead."""
     if models:
-        return [Configuration(board, ENGINE, core, model) for board in boards for model in models]
+        return [Configuration(board, WEAK, core, model) for board in boards for model in models]
     return [one for one in CONFIGURATIONS if one.board in boards]
 
 
@@ -201,7 +209,7 @@ def table_rows(footprints: dict[Configuration, Footprint]) -> list[tuple[str, ..
 
 def _form_of(configuration: Configuration) -> str:
     """In the table."""
-    model = f"{configuration.model}, " if configuration.form == ENGINE else ""
+    model = "" if configuration.model == DEFAULT else f"{configuration.model}, "
     return f"{model}{configuration.form}, {configuration.core}"
 
 

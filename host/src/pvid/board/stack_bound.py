@@ -1,7 +1,7 @@
 """The deepest stack an image can need: frames and calls read off its machine code.
 
 Frames of compiled functions come from the compiler (-fstack-usage), those of the compiler's own arithmetic from their
-instructions. A call through a pointer may reach any function whose address is in a constant of the core.
+instructions. A call through a pointer may reach any function whose address is in a constant of the core or the model.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 
-_FUNCTION = re.compile(r"^[0-9a-f]+ <(.+)>:$")
+_FUNCTION = re.compile(r"^([0-9a-f]+) <(.+)>:$")
 _INSTRUCTION = re.compile(r"^\s*[0-9a-f]+:\t[0-9a-f ]+\t(\S+)\s*(.*)$")
 _TRANSFER = re.compile(
     r"^(b|bl|blx|bx|b[a-z]{2,3}(\.[nw])?|b\.[nw]|cbn?z|j|jr|jal|jalr|e?i?r?call|e?i?r?jmp|br[a-z]{2})$"
 )
-_TARGET = re.compile(r"<([^+>]+)(?:\+0x[0-9a-f]+)?>")
+_TARGET = re.compile(r"\b(?:0x)?([0-9a-f]+) <[^+>]+(?:\+0x([0-9a-f]+))?>")
 _RETURN = re.compile(r"^(lr|ra)$")
 _POINTER_CALLS = {"blx", "bx", "jr", "jalr", "icall", "eicall", "ijmp", "eijmp"}
 
@@ -28,9 +28,11 @@ _ARM_PUSH = re.compile(r"\{(.*)\}")
 
 @dataclass
 class _Function:
-    callees: set[str] = field(default_factory=set)
+    name: str  # static functions of several files may share it
+    callees: set[int] = field(default_factory=set)  # where they begin
     through_pointer: bool = False
     pushed: int = 0  # by the instructions
+    stored: int = 0  # a Cortex-M0: arguments of registers, in front of the frame that the compiler counts
 
 
 def _output(*command: str) -> str:
@@ -70,26 +72,35 @@ def _pushed(mnemonic: str, operands: str) -> int:
     return 0
 
 
-def _functions(disassembly: str) -> dict[str, _Function]:
-    functions: dict[str, _Function] = {}
-    name, here = "", _Function()
+def _functions(disassembly: str) -> dict[int, _Function]:
+    """By the address where they begin."""
+    functions: dict[int, _Function] = {}
+    at, here = 0, _Function("")
+    popped, freed = "", 0  # a Cortex-M0 that has stored arguments returns by pop {r3}, add sp, #8, bx r3
     for line in disassembly.splitlines():
         if header := _FUNCTION.match(line):
-            name = header.group(1)
-            here = functions.setdefault(name, _Function())
+            at = int(header.group(1), 16)
+            here = functions.setdefault(at, _Function(header.group(2)))
             continue
         instruction = _INSTRUCTION.match(line)
         if instruction is None:
             continue
         mnemonic, operands = instruction.groups()
         here.pushed += _pushed(mnemonic, operands)
+        if mnemonic == "bx" and operands.strip() == popped:
+            here.stored = freed
+            continue
+        if popped and mnemonic == "add" and (up := re.match(r"^sp, #(\d+)", operands)):
+            freed = int(up.group(1))
+        else:
+            popped = operands.strip("{} ") if mnemonic == "pop" else ""
         if not _TRANSFER.match(mnemonic):
             continue
         target = _TARGET.search(operands)
         if target is None:
             here.through_pointer |= mnemonic in _POINTER_CALLS and not _RETURN.match(operands.strip())
-        elif target.group(1) != name:
-            here.callees.add(target.group(1))
+        elif (begin := int(target.group(1), 16) - int(target.group(2) or "0", 16)) != at:
+            here.callees.add(begin)
     return functions
 
 
@@ -108,17 +119,33 @@ def _frames(tree: Path) -> dict[str, int]:
     return frames
 
 
-def _pointed_to(relocations: str) -> set[str]:
-    """Functions whose address stands in constant data."""
-    names: set[str] = set()
-    in_data = False
+def _pointed_to(relocations: str) -> set[tuple[str, str]]:
+    """(object file, name) of the functions whose address stands in constant data."""
+    found: set[tuple[str, str]] = set()
+    file, in_data = "", False
     for line in relocations.splitlines():
-        if line.startswith("RELOCATION RECORDS FOR"):
+        if ":     file format" in line:
+            file = line.partition(":")[0].rpartition("/")[2]
+        elif line.startswith("RELOCATION RECORDS FOR"):
             in_data = bool(re.search(r"\[\.(s?rodata|s?data)", line))
         elif in_data and (fields := line.split()) and len(fields) == 3:
             # An AVR names the section; elsewhere a section in data is a place inside a function: a switch's table.
-            names.add(fields[2].removeprefix(".text.") if fields[1] == "R_AVR_16_PM" else fields[2])
-    return names
+            found.add((file, fields[2].removeprefix(".text.") if fields[1] == "R_AVR_16_PM" else fields[2]))
+    return found
+
+
+def _placed(map_text: str) -> dict[tuple[str, str], int]:
+    """Where a function of an object file begins, by the linker's map: one section each."""
+    entry = re.compile(r"^ \.text\.(\S+)\s+0x([0-9a-f]+)\s+0x[0-9a-f]+\s+\S*?([^/(\s]+)\)?$", re.MULTILINE)
+    kept = map_text.partition("Linker script and memory map")[2]
+    return {(file, name): int(at, 16) for name, at, file in entry.findall(kept)}
+
+
+def _addresses(pointed: set[tuple[str, str]], placed: dict[tuple[str, str], int], names: dict[int, str]) -> set[int]:
+    """Of functions that calls through a pointer may reach; of a name that its own file does not have, all."""
+    found = {placed[one] for one in pointed if one in placed}
+    elsewhere = {name for file, name in pointed if (file, name) not in placed}
+    return (found | {at for at, name in names.items() if name in elsewhere}) & names.keys()
 
 
 def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
@@ -131,7 +158,8 @@ def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
     entry
         Where the stack is still empty.
     image, tree
-        The linked image, and the build tree with the compiler's records (*.su) and libpvid.a.
+        The linked image, with its map beside it, and the build tree with the compiler's records (*.su), libpvid.a and
+        the image's objects.
 
     Raises
     ------
@@ -139,31 +167,39 @@ def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
         When a frame's size is unknown or a function can call itself.
     """
     functions = _functions(_output(f"{tool_prefix}objdump", "-d", str(image)))
-    pointed = _pointed_to(_output(f"{tool_prefix}objdump", "-r", str(tree / "libpvid.a"))) & functions.keys()
+    compiled_in = [tree / "libpvid.a", *sorted((tree / "apps").rglob("*.o*"))]  # a model is beside the image's own
+    relocations = _output(f"{tool_prefix}objdump", "-r", *map(str, compiled_in))
+    placed = _placed(image.with_suffix(".map").read_text(encoding="utf-8"))
+    pointed = _addresses(_pointed_to(relocations), placed, {at: one.name for at, one in functions.items()})
     frames = _frames(tree)
     is_avr = tool_prefix.startswith("avr")
-    depth: dict[str, int] = {}
+    depth: dict[int, int] = {}
 
-    def arithmetic(name: str, seen: set[str]) -> int:
+    def arithmetic(at: int, seen: set[int]) -> int:
         """Of the compiler's own functions, which jump into each other: each that can be reached, once."""
-        if name in seen or name not in functions:
+        if at in seen or at not in functions:
             return 0
-        seen.add(name)
-        own = functions[name].pushed + (3 if is_avr else 0)  # an AVR's call pushes the return address
-        return own + sum(arithmetic(callee, seen) for callee in functions[name].callees)
+        seen.add(at)
+        own = functions[at].pushed + (3 if is_avr else 0)  # an AVR's call pushes the return address
+        return own + sum(arithmetic(callee, seen) for callee in functions[at].callees)
 
-    def deepest(name: str, callers: tuple[str, ...]) -> int:
+    def deepest(at: int, callers: tuple[int, ...]) -> int:
+        name = functions[at].name
         compiled = frames.get(name, frames.get(name.split(".")[0]))  # a part split off has a frame of its own
         if compiled is None:
-            return arithmetic(name, set())
-        if name in callers:
-            raise PvidError(f"{name} can call itself: {' > '.join(callers[callers.index(name) :])}")
-        if name not in depth:
-            below = functions[name].callees & functions.keys()
-            if functions[name].through_pointer:
+            return arithmetic(at, set())
+        if at in callers:
+            path = [functions[one].name for one in (*callers[callers.index(at) :], at)]
+            raise PvidError(f"{name} can call itself: {' > '.join(path)}")
+        if at not in depth:
+            below = functions[at].callees & functions.keys()
+            if functions[at].through_pointer:
                 below = below | pointed
-            depth[name] = compiled + max((deepest(callee, (*callers, name)) for callee in below), default=0)
-        return depth[name]
+            own = compiled + functions[at].stored
+            depth[at] = own + max((deepest(callee, (*callers, at)) for callee in below), default=0)
+        return depth[at]
 
-    interrupts = max((deepest(name, ()) for name in functions if name.startswith("__vector_")), default=0)
-    return deepest(entry, ()) + interrupts
+    def deepest_of(wanted: str) -> int:
+        return max((deepest(at, ()) for at, one in functions.items() if one.name.startswith(wanted)), default=0)
+
+    return deepest_of(entry) + deepest_of("__vector_")

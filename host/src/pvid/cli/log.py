@@ -36,6 +36,7 @@ from pvid.show.view import LiveView
 
 if TYPE_CHECKING:
     from pvid.board.mechanism_board import MechanismBoard
+    from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 
 
 @click.command(name="log")
@@ -51,6 +52,11 @@ if TYPE_CHECKING:
     "run_path",
     type=click.Path(path_type=Path),
     help="Recording of the mechanism: the board's design is made from it, and an emulated board's sensors read it.",
+)
+@click.option(
+    "--core",
+    type=click.Choice(("f32", "q31")),
+    help="Arithmetic of a described mechanism's board.  [default: f32]",
 )
 @click.option("--append", is_flag=True, help="Append to an existing log.")
 @click.option("--restart", is_flag=True, help="Restart the board on every (re)connection (needs --rig).")
@@ -85,6 +91,7 @@ def command(
     rig_path: Path | None,
     model: str | None,
     run_path: Path | None,
+    core: str | None,
     append: bool,
     restart: bool,
     paced: bool,
@@ -107,7 +114,7 @@ def command(
     On a terminal the estimates are shown as they arrive; otherwise a status line is printed every 10 s.
     """
     emulated = port in (HOST_TARGET, *EMULATORS)
-    described = _described(rig_path, model, run_path)
+    described = _described(rig_path, model, run_path, core)
     rig = None if rig_path is None or described is not None else load(rig_path)
     if emulated and rig is None and described is None:
         rig = RigFile.standard()
@@ -160,22 +167,30 @@ def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     return StatusLine(sys.stderr, mechanism.model)
 
 
-def _described(rig_path: Path | None, model: str | None, run_path: Path | None) -> MechanismBoard | None:
+def _described(
+    rig_path: Path | None, model: str | None, run_path: Path | None, core: str | None
+) -> MechanismBoard | MechanismBoardQ31 | None:
     """The board of a described mechanism; None: it is one of the library's."""
     described = mechanism_rig(run_path, rig_path, (), model)
     if described is None:
         if run_path is not None:
             raise PvidError("--run is for a described mechanism: name it with --model, or in the rig file")
-        return None
-    from pvid.board.mechanism_board import MechanismBoard  # loads SymPy
+        if core is None:
+            return None
+        if model is None or rig_path is not None:
+            raise PvidError("--core is for a mechanism that --model names: a rig file sets that of the pendulum")
+    from pvid.board.mechanism_board import BOARDS  # loads SymPy
     from pvid.run.mechanism import model_of
 
+    made = BOARDS[core or "f32"]
+    if described is None:
+        return made.of_shipped_rig(model or "")
     if run_path is None and rig_path is None:
-        return MechanismBoard.of_shipped_rig(described.model)
+        return made.of_shipped_rig(described.model)
     if run_path is None:
         raise PvidError(f"{described.model}: name a recording of it with --run, from which the board's design is made")
     columns = parsed(None, channels_of(model_of(described)))
-    return MechanismBoard.of_recording(described, read_recording(run_path, described.sample_rate, columns))
+    return made.of_recording(described, read_recording(run_path, described.sample_rate, columns))
 
 
 def _board(rig: RigFile) -> StreamRig:
@@ -184,7 +199,9 @@ def _board(rig: RigFile) -> StreamRig:
     return stream_rig(rig, rig.sample_rate)
 
 
-def _configurations(board: StreamRig | MechanismBoard, source: Source) -> Callable[[], Configuration]:
+def _configurations(
+    board: StreamRig | MechanismBoard | MechanismBoardQ31, source: Source
+) -> Callable[[], Configuration]:
     """Makes configurations with an estimate and a hash ten times a second."""
     settings = settings_number(board)
     every = max(1, min(65535, round(board.sample_rate / 10)))

@@ -27,6 +27,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "identify": "Identify the parameters from a recorded or simulated run.",
         "tune": "Show the designs of the weak form for a recorded run.",
         "plot": "Draw a report of a log or a run.",
+        "batch": "Identify many runs and logs in parallel; one row each, and a page of drifts.",
     },
     "Boards": {
         "log": "Record a board's samples and estimates.",
@@ -43,6 +44,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
     "Models": {
         "models": "List the mechanisms with their channels, parameters and units.",
         "model": "Check, predict, simulate or build a mechanism of your own or of the list.",
+        "deploy": "Write a mechanism with its rig for Arduino, PlatformIO, ESP-IDF, Zephyr, CMake or CubeMX.",
     },
     "Prove": {
         "compare": "Compare the C core with its numpy twin, bit for bit.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,8 @@ from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
-from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
+from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
+from pvid.settings.enums import Law
 
 if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
@@ -36,6 +37,8 @@ _FORM = ("form", "weak")
 _IN_C = tuple(("core", name) for name in ENGINE_CORES)
 _POSSIBLE = (("core", "f64"), *_IN_C, _FORM)
 _COMPARED = (("core", "all"), *_IN_C, _FORM)
+_STRONG = "strong"  # as --form
+_LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
 
 def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
@@ -91,6 +94,10 @@ def identify_run(
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = _model_of(rig).name
+    if only_in_c.get("form") == _STRONG:
+        if figure is not None or refine or weights != "residuals":
+            raise PvidError("--figure, --refine and --weights are for the weak form; omit --form strong")
+        return _identified_by_strong_form(path, rig, columns, as_json=as_json, **only_in_c)
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
@@ -132,6 +139,45 @@ def identify_run(
     return DONE
 
 
+def _identified_by_strong_form(
+    path: Path, rig: MechanismRig | RigFile, columns: str | None, *, as_json: bool, **given: str | None
+) -> int:
+    """Identifies a recording by the strong form and prints the answer."""
+    from pvid.run.strong_mechanism import identify_strong_mechanism
+
+    core = _strong_core(_model_of(rig).name, given)
+    if given.get("on") is not None:
+        raise PvidError("--on with the strong form of a described mechanism is for `compare`")
+    recording, model = recording_of(path, rig, columns)
+    answer = identify_strong_mechanism(recording, model, core == STRONG.name, _LAWS[given.get("law") or "stationary"])
+    if as_json:
+        click.echo(json.dumps(answer.as_json()))
+    else:
+        arithmetic = "float64" if answer.hash is None else "C in float32"
+        if answer.identified:
+            _table(answer.values, f"{model.title}: strong form, {arithmetic}")
+        config = answer.design.config
+        ends = "" if answer.hash is None or answer.reason is None else f"; {answer.reason.text}; hash {answer.hash:08x}"
+        click.echo(
+            f"status {answer.status}; derivatives over {config.window} samples, "
+            f"{config.window / config.sample_rate:.3g} s{ends}"
+        )
+    for text in answer.doubts.values():
+        write_stderr(f"pvid: {'warning' if answer.identified else 'note'}: {text}")
+    if not answer.identified:
+        write_stderr("pvid: nothing identified")
+        return NOTHING_IDENTIFIED
+    return DONE
+
+
+def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
+    """The arithmetic of the strong form: float32 unless given."""
+    core = given.get("core") or STRONG.name
+    if core not in STRONG_CORES:
+        raise PvidError(f"--core {core}: the strong form of {name} is in float32 and float64; omit --core {core}")
+    return core
+
+
 def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> int:
     """Refines an answer and prints it."""
     from pvid.cli.result import write_refined_figure
@@ -154,17 +200,21 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
 
 
 def compare_recording(
-    path: Path, rig: MechanismRig | RigFile, columns: str | None, **given: str | None
+    path: Path, rig: MechanismRig | RigFile, columns: str | None, targets: Sequence[str] = (), **given: str | None
 ) -> list[Outcome]:
     """The C core against its twin on a recording of a described mechanism, in float32 by default.
 
     Parameters
     ----------
-    given : options, by name; a value that the weak engine does not have is refused
+    targets : emulated boards, for the strong form
+    given : options, by name; a value that the form does not have is refused
     """
     from pvid.run.mechanism_compare import compare_recording as compared
 
+    if given.get("form") == _STRONG:
+        return _compared_strong(path, rig, columns, targets, given)
     name = _model_of(rig).name
+    given["on"] = targets[0] if targets else None
     for option, value in given.items():
         if value is not None and (option, value) not in _COMPARED:
             raise PvidError(
@@ -179,6 +229,33 @@ def compare_recording(
             found = compared(model, recording, core, advance)
         verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
         outcomes.append(Outcome("host", core, "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict))
+    return outcomes
+
+
+def _compared_strong(
+    path: Path,
+    rig: MechanismRig | RigFile,
+    columns: str | None,
+    targets: Sequence[str],
+    given: Mapping[str, str | None],
+) -> list[Outcome]:
+    """The same by the strong form, on this computer and on emulated boards."""
+    from pvid.board.strong_image import compare_on_board
+    from pvid.run.strong_compare import StrongComparison
+
+    core = _strong_core(_model_of(rig).name, given)
+    if core != STRONG.name:
+        raise PvidError(f"--core {core} has no twin; omit it")
+    recording, model = recording_of(path, rig, columns)
+    outcomes = []
+    for law in [given["law"]] if given.get("law") else ["stationary"]:
+        assert law is not None
+        with progress_bar(f"{law} law, {FLOAT.name}", len(recording)) as advance:
+            run = StrongComparison.of(model, recording, _LAWS[law], advance)
+        found = run.found
+        verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
+        outcomes.append(Outcome("host", core, _STRONG, law, found.ticks, found.core_hash, found.equal, verdict))
+        outcomes += [compare_on_board(target, run, law) for target in targets]
     return outcomes
 
 

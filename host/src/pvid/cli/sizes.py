@@ -11,6 +11,7 @@ from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.settings.enums import Core
+from pvid.settings.forms import FORMS
 
 
 @click.command(name="sizes")
@@ -21,9 +22,7 @@ from pvid.settings.enums import Core
 @click.option(
     "--check", type=click.Path(path_type=Path, exists=True), help="Compare the measured figures with this budget file."
 )
-@click.option(
-    "--model", "models", multiple=True, metavar="NAME", help="The weak engine of a mechanism; may be repeated."
-)
+@click.option("--model", "models", multiple=True, metavar="NAME", help="The weak form of a mechanism; may be repeated.")
 @click.option("--core", type=click.Choice(["f32", "q31"]), help="Arithmetic of --model.  [default: f32]")
 @click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON.")
 @click.argument("targets", nargs=-1, metavar="[TARGET]...")
@@ -50,8 +49,8 @@ def command(
         from pvid.board import profile
 
         on = boards.board(profiled)
-        profiles = {name: profile.profile_mechanism(on, name, core or "f32") for name in models} or {
-            form: profile.profile(on, form) for form in ("strong", "weak")
+        profiles = {name: profile.profile(on, "weak", core or "f32", name) for name in models} or {
+            form: profile.profile(on, form) for form in FORMS
         }
         put_table(update, "profile", markdown(profile.HEADER, profile.table_rows(profiles)))
         return DONE

@@ -23,9 +23,9 @@ def _rig_of(log: Path) -> RigFile | EngineBoard | None:
     text = engine_text_of_log(log)
     if text is None:
         return rig_of_log(log)
-    from pvid.board.mechanism_board import MechanismBoard  # loads SymPy
+    from pvid.board.mechanism_board import board_of  # loads SymPy
 
-    return MechanismBoard.parse(text)
+    return board_of(text)
 
 
 @click.command(name="verify")

@@ -232,6 +232,7 @@ def configuration(config: FourierConfigQ31, prefix: str) -> str:
         f"    .design = &{prefix}_design_q31,",
         f"    .offset = {prefix}_offset,",
         f"    .drive_min = {drive},",
+        f"    .compensation = {'true' if config.compensation else 'false'},",
         f"    .iterations = {config.iterations},",
         "    .estimator = {",
         *(f"        .{name} = {{{', '.join(map(_literal, getattr(own, name)))}}}," for name in arrays),

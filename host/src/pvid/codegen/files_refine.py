@@ -96,7 +96,7 @@ def shape(made: RefineFunctions, command: str) -> str:
             ]
         ),
     ]
-    rates = any(_is_nonzero(made, "Zv"))
+    rates = any(is_nonzero(made, "Zv"))
     counts = [
         ("ORDER", made.order, "q'' = a(q, v, u, r)" if made.order == 2 else "q' = a(q, u, r)"),
         ("COORDINATES", len(made.coordinates), "entries of q, hidden ones included"),
@@ -159,7 +159,7 @@ def _banner(made: RefineFunctions, command: str) -> list[str]:
 def _check_outputs(made: RefineFunctions) -> None:
     """The kernel has columns of the motion, and those of outputs alone."""
     n, moving = len(made.parameters), made.moving - made.skew
-    shown = _is_nonzero(made, "Zr")
+    shown = is_nonzero(made, "Zr")
     width = n - made.skew
     for row in range(len(made.outputs)):
         for k in range(moving):
@@ -176,7 +176,7 @@ def _is_linear(made: RefineFunctions) -> bool:
     return all(isinstance(program.values[place], Literal) for place in program.results)
 
 
-def _is_nonzero(made: RefineFunctions, key: str) -> list[bool]:
+def is_nonzero(made: RefineFunctions, key: str) -> list[bool]:
     """Which entries of a derivative of the outputs are not constantly 0."""
     one = made.functions["output_jacobian"]
     at = 0
@@ -251,7 +251,7 @@ def _tail(made: RefineFunctions, stored: list[str]) -> list[str]:
     found = []
     for line in stored:
         key, _, value = line.partition("[")
-        if key == "Zv" and not any(_is_nonzero(made, "Zv")):
+        if key == "Zv" and not any(is_nonzero(made, "Zv")):
             continue
         if key == "Zr":
             row, column = divmod(int(value.partition("]")[0]), width)

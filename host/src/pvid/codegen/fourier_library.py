@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pvid.codegen import files_fourier
+from pvid.codegen import files_fourier, files_refine
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.codegen.refine import RefineFunctions
 from pvid.core.fourier_native import FourierNative
 from pvid.core.model_library import model_library
 from pvid.core.sizes import raised
@@ -24,8 +25,10 @@ _STEPS = {
 }
 
 
-def fourier_native(compiled: CompiledModel, design: FourierDesign32 | None = None) -> FourierNative:
-    """The library of a model, with arrays that hold a design.
+def fourier_native(
+    compiled: CompiledModel, design: FourierDesign32 | None = None, refine: RefineFunctions | None = None
+) -> FourierNative:
+    """The library of a model, with arrays that hold a design; `refine`: with the second stage.
 
     Raises
     ------
@@ -38,6 +41,9 @@ def fourier_native(compiled: CompiledModel, design: FourierDesign32 | None = Non
         f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), "identification"),
         f"{made.name}_weak_f32.c": files_fourier.source(made, model, "identification"),
     }
+    if refine is not None:
+        texts["pvid/refine_shape.h"] = files_refine.shape(refine, "identification")
+        texts["refine_model_f32.h"] = files_refine.header(refine, "identification")
     return FourierNative(made.name, model_library(made.name, texts, raised(_roomy(needed))))
 
 

@@ -49,6 +49,7 @@ class FixedFourier:
     ----------
     functions : what is generated
     reaches : largest value of each jet
+    run_s : longest run [s]
     prepare : None where there are neither runs nor signs
     values : of jets, runs and signs
     prepare_limits, values_limits : largest integer of each input
@@ -58,6 +59,7 @@ class FixedFourier:
 
     functions: FourierFunctions
     reaches: tuple[float, ...]
+    run_s: float
     prepare: FixedProgram | None
     values: FixedProgram
     prepare_limits: tuple[int, ...]
@@ -104,6 +106,7 @@ def fixed_fourier(made: FourierFunctions, given: JetReaches | None = None) -> Fi
     return FixedFourier(
         functions=made,
         reaches=tuple(reaches),
+        run_s=chosen.run_s,
         prepare=prepared,
         values=values,
         prepare_limits=limits[: len(bounds)],

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.files_refine import refine_hash
+from pvid.codegen.files_refine import is_nonzero, refine_hash
 from pvid.codegen.literals import python_literal
 from pvid.codegen.refine import RefineFunction, RefineFunctions
 from pvid.codegen.statements import Language, call_of, statements
 from pvid.codegen.twin_file import namespace
+from pvid.twin.f32.refine_model import Derivatives, RefineShape
 
 Float32 = npt.NDArray[np.float32]
 
@@ -116,3 +117,84 @@ def loaded(made: RefineFunctions) -> RefineTwin:
         region=space["region"],
         chart=space.get("chart"),
     )
+
+
+class GeneratedRefine:
+    """pvid.twin.f32.refine_model.RefineModel of a mechanism: the functions with the arrays of the core's kernel."""
+
+    def __init__(self, made: RefineFunctions) -> None:
+        self.made = made
+        self._twin = loaded(made)
+        self._still = made.moving - made.skew  # derivatives by these do not come from the outputs
+        by_p = {one.place: k for k, one in enumerate(made.parameters) if one.place >= 0}
+        self.shape = RefineShape(
+            order=made.order,
+            coordinates=len(made.coordinates),
+            inputs=len(made.inputs),
+            outputs=len(made.outputs),
+            moving=made.moving,
+            parameters=len(made.parameters),
+            skew=made.skew,
+            rates=any(is_nonzero(made, "Zv")),
+            logarithmic=tuple(one.log for one in made.parameters),
+            place_of_p=tuple(by_p[place] for place in sorted(by_p)),
+        )
+
+    def _called(self, name: str, **arrays: Float32) -> dict[str, Float32]:
+        one = self.made.functions[name]
+        found = getattr(self._twin, name)(*(arrays[key][:, np.newaxis] for key, _ in one.given))
+        return {key: values[:, 0] for (key, _), values in zip(one.written, found, strict=True)}
+
+    def region(self, r: Float32) -> bool:
+        """Whether a mechanism with these parameters is possible."""
+        return bool(self._twin.region(r[:, np.newaxis])[0])
+
+    def constants(self, r: Float32) -> Float32:
+        """m."""
+        return self._called("constants", r=r)["m"]
+
+    def motion(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32:
+        """a."""
+        return self._called("motion", m=m, q=q, v=v, u=u)["a"]
+
+    def jacobian(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Derivatives:
+        """a and its derivatives."""
+        found, n = self._called("jacobian", m=m, q=q, v=v, u=u), self.shape.coordinates
+        B = np.zeros((self.shape.moving, n), np.float32)
+        B[: self._still] = found["B"].reshape(self._still, n)
+        return Derivatives(
+            a=found["a"],
+            K=found["K"].reshape(n, n),
+            D=found["D"].reshape(n, n) if "D" in found else np.zeros((n, n), np.float32),
+            U=found["U"].reshape(n, self.shape.inputs),
+            B=B,
+        )
+
+    def output(self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32) -> Float32:
+        """z."""
+        return self._called("output", m=m, q=q, v=v, u=u, r=r)["z"]
+
+    def output_jacobian(
+        self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32
+    ) -> tuple[Float32, Float32, Float32]:
+        """By q, v and what moves nothing, each [outputs, entries]."""
+        found, rows = self._called("output_jacobian", m=m, q=q, v=v, u=u, r=r), self.shape.outputs
+        by_v = found["Zv"] if "Zv" in found else np.zeros(rows * self.shape.coordinates, np.float32)
+        return (
+            found["Zq"].reshape(rows, -1),
+            by_v.reshape(rows, -1),
+            found["Zr"].reshape(rows, self.shape.parameters - self.shape.skew)[:, self._still :],
+        )
+
+    def chart(self, r: Float32, row: Float32) -> Float32:
+        """Derivatives by the motion's steps [moving] to those by the steps of r."""
+        if self._twin.chart is None:
+            return row
+        out = row.copy()
+        out[: self._still] = self._called("chart", r=r, row=row[: self._still])["row"]
+        return out
+
+    def from_p(self, p: Float32) -> Float32:
+        """r of an estimate of the weak form."""
+        places = [one.place for one in self.made.parameters]
+        return np.array([p[place] if place >= 0 else 0 for place in places], np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from pvid.core.native import Native, Publisher
 from pvid.settings.fourier import Float32, FourierConfig
 from pvid.settings.record import Record
+from pvid.settings.refine import RefineConfig
 
 
 class FourierNative(Native):
@@ -29,6 +31,10 @@ class FourierNative(Native):
     def identifier_of(self, config: FourierConfig) -> FourierIdentifier:
         """An initialised identifier."""
         return FourierIdentifier(self, config)
+
+    def refined_of(self, config: FourierConfig, refine: RefineConfig) -> RefinedIdentifier:
+        """An initialised identifier with its second stage; the library has it."""
+        return RefinedIdentifier(self, config, refine)
 
     def values(self, inputs: npt.ArrayLike) -> Float32:
         """The generated function: gains, then integrands [vectors, results] from inputs [vectors, inputs]."""
@@ -59,10 +65,10 @@ class FourierNative(Native):
 class FourierIdentifier(Publisher):
     """The identifier: samples of every tick in the units of the model."""
 
-    def __init__(self, native: FourierNative, config: FourierConfig) -> None:
+    def __init__(self, native: FourierNative, config: FourierConfig, **given: Any) -> None:
         self._model = native.model
         self.config = config
-        super().__init__(native, "fourier", "f32", config, replay="fourier")
+        super().__init__(native, "fourier", "f32", config, replay="fourier", **given)
 
     def initialise(self) -> Any:
         """Runs init on the present configuration, with the library's model."""
@@ -75,3 +81,60 @@ class FourierIdentifier(Publisher):
         """Steps through samples [ticks, samples], converted to float32 as a board would read them."""
         given = np.ascontiguousarray(samples, np.float32)
         return self._recorded(len(given), [given], sums, hashes, estimate_every)
+
+
+@dataclass(frozen=True)
+class RefinedRecord:
+    """One entry a tick along the first axis.
+
+    Attributes
+    ----------
+    told : reason of the refinement's last block, uint8 [ticks]
+    weak_p, weak_se : estimates of the weak form, trusted or not, where they are new [ticks, p]; NaN at all others
+    r, se : published parameters and standard errors of the refinement [ticks, parameters]; 0 before the first one
+    hash : running hash of both stages, uint32 [ticks]
+    """
+
+    told: npt.NDArray[np.uint8]
+    weak_p: Float32
+    weak_se: Float32
+    r: Float32
+    se: Float32
+    hash: npt.NDArray[np.uint32]
+
+
+class RefinedIdentifier(FourierIdentifier):
+    """The identifier with its second stage, which `refinement` is in C."""
+
+    def __init__(self, native: FourierNative, config: FourierConfig, refine: RefineConfig) -> None:
+        ffi, library = native.headers.ffi, native.library
+        self.refinement = ffi.new("pvid_refine_f32 *")
+        self.refine_filled = native.headers.filled("pvid_refine_config_f32", refine)
+        stage, settings = ffi.addressof(library, "pvid_refine_stage_f32"), ffi.addressof(self.refine_filled.struct)
+        self._second = ffi.new("pvid_fourier_refine_f32 *", [stage, self.refinement, settings])
+        super().__init__(native, config, refine=self._second)
+
+    @property
+    def refined(self) -> npt.NDArray[np.void] | None:
+        """The published estimate of the refinement; None before the first one."""
+        number = int(self.refinement.mark.number[0])
+        return self.native.headers.viewed(self.refinement.estimate) if number else None
+
+    def run_both(self, samples: npt.ArrayLike) -> RefinedRecord:
+        """Steps through samples [ticks, samples]."""
+        headers = self.native.headers
+        given = np.ascontiguousarray(samples, np.float32)
+        p, n = len(self.refinement.weak_se), len(self.refinement.r)
+        record = RefinedRecord(
+            told=np.zeros(len(given), np.uint8),
+            weak_p=np.full((len(given), p), np.nan, np.float32),
+            weak_se=np.full((len(given), p), np.nan, np.float32),
+            r=np.zeros((len(given), n), np.float32),
+            se=np.zeros((len(given), n), np.float32),
+            hash=np.zeros(len(given), np.uint32),
+        )
+        arrays = (
+            given, record.told, record.weak_p, record.weak_se, record.r, record.se, self._hash, record.hash
+        )  # fmt: skip
+        self.native.library.pvid_replay_both_stages_f32(self.state, len(given), *map(headers.pointer, arrays))
+        return record

@@ -21,7 +21,7 @@ HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the buil
 Tables = dict[str, npt.NDArray[Any]]
 
 # Fields of a configuration that the identifier sets, and a field with another name in Python.
-_FILLED_LATER = ("angle", "model", "update_rate_hz")
+_FILLED_LATER = ("angle", "model", "update_rate_hz", "refine")
 _NAMES = {"sample_rate_hz": "sample_rate"}
 
 

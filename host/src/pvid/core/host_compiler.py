@@ -52,7 +52,7 @@ def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], f
     environment = compiled_once()
 
     def made(source: Path) -> str:
-        place = str(folder / f"{source.stem}.o")
+        place = str(folder / f"{source.parent.name}-{source.stem}.o")  # a generated source may have the name of another
         command = [*([ccache] if ccache else []), compiler, *options, "-c", str(source), "-o", place]
         run_compiler(command, environment)
         return place

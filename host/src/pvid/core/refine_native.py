@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Identifier, Native
+from pvid.core.native import Native
 from pvid.settings.enums import Status
 from pvid.settings.refine import RefineConfig
 
@@ -33,17 +33,6 @@ class RefineRecord:
     hash: npt.NDArray[np.uint32]
     r: Float32
     se: Float32
-
-
-def weak_candidates(weak: Identifier, samples: npt.ArrayLike) -> tuple[Float32, Float32]:
-    """Steps the pendulum's weak form through (phi, y) [ticks, 2]: its assessed p and standard errors, trusted or not,
-    at the ticks at which they are new [ticks, p]; NaN at all others."""
-    given = np.asarray(samples, np.float32)
-    phi, y = np.ascontiguousarray(given[:, 0]), np.ascontiguousarray(given[:, 1])
-    p, se = np.full((len(given), weak.n_p), np.nan, np.float32), np.full((len(given), weak.n_p), np.nan, np.float32)
-    pointer = weak.native.headers.pointer
-    weak.native.library.pvid_replay_weak_candidates_f32(weak.state, len(given), *map(pointer, (phi, y, p, se)))
-    return p, se
 
 
 class RefineNative:

@@ -143,7 +143,6 @@ def fixed_design(
     channels = _Channels(model, sizes.hop, sum_shift, formats, tuple(integral), margins)
     units = tuple(channels.unit(k, dt) for k in range(len(model.channel)))
     omega = math.pi / (sizes.hop * dt)
-    highest = sizes.functions // 2 + sizes.power // 2
     terms = zip(sizes.model.term, model.term, strict=True)
     return FourierDesignQ31(
         model=model,
@@ -159,16 +158,15 @@ def fixed_design(
         sign_width=widths,
         integral=tuple(integral),
         format=tuple(channels.format(k) for k in range(len(model.channel))),
-        circle=np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * sizes.hop) / sizes.hop)).astype(np.int32),
+        circle=circle_of(sizes.hop),
         factor=tuple(
-            scaled_number(float(theirs.factor) * units[mine.channel] * (highest * omega) ** mine.order)
-            for theirs, mine in terms
+            scaled_number(float(theirs.factor) * units[mine.channel] * omega**mine.order) for theirs, mine in terms
         ),
         noise=tuple(
             FourierNoiseQ31(
                 one.kind, one.power, one.a, one.b, scaled_number(float(one.factor) * omega ** (2 * one.power))
             )
-            for one in sizes.noise
+            for one in sorted(sizes.noise, key=lambda one: (one.kind, one.power, one.a, one.b))
         ),
         error_order=tuple(int(one) for one in sizes.error_order),
         error_variance=tuple(
@@ -178,6 +176,11 @@ def fixed_design(
         units=units,
         margins=dict(margins),
     )
+
+
+def circle_of(hop: int) -> npt.NDArray[np.int32]:
+    """The table of cosines of a half window [2 hop]."""
+    return np.asarray(np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * hop) / hop)), np.int32)
 
 
 def scaled_number(x: float) -> tuple[int, int]:

@@ -399,7 +399,8 @@ class RawCount(_Measured):
     samples: int = wire("u8", absent=2)
 
     def in_si(self, lsb: Float) -> Float:
-        """[ticks, 2]: phi [rad], y [m], a count being worth `lsb` [2]; NaN for another number of samples."""
+        """[ticks, samples] in the units of the model by the value of a count [samples]; NaN for another number of
+        samples."""
         if self.samples != len(lsb):
             return np.full(self.values.shape, np.nan)
         return self.values.astype(np.float64) * lsb

@@ -5,14 +5,17 @@
     sample phi rad
     p R ohm
     p d1
+    count V 0.000366
 
 The mechanism's name, then its samples and its parameters in order, each with its name and, except for a pure number,
-its unit. A board is not trusted: names are those of a program's variables, units are few printable characters, and
-nothing is read of a text that breaks a rule.
+its unit; of a board that sends counts also the value of a count of each sample. A board is not trusted:
+names are those of a program's variables, units are few printable characters, and nothing is read of a text that breaks
+a rule.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -22,22 +25,28 @@ from pvid.link.frames import MAX_P, MAX_SAMPLES
 from pvid.models.model import Model
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]{0,31}"
+_COUNT = re.compile(rf"count ({_NAME}) ([0-9.e+-]{{1,24}})")
 _LINE = re.compile(rf"(sample|p) ({_NAME})(?: ([A-Za-z0-9/*^()%.+-]{{1,24}}))?")
 MOST = 1200  # characters of a text
 
 
 @dataclass(frozen=True)
 class BoardNames:
-    """A mechanism by the names and units of its samples and of its parameters; a unit of "" is that of a number."""
+    """A mechanism by the names and units of its samples and of its parameters; a unit of "" is that of a number.
+
+    counts : value of a count of each sample, if the board sends counts
+    """
 
     mechanism: str
     samples: tuple[tuple[str, str], ...]
     parameters: tuple[tuple[str, str], ...]
+    counts: tuple[float, ...] = ()
 
     @property
     def text(self) -> str:
         """As in a frame."""
         lines = [("sample", *one) for one in self.samples] + [("p", *one) for one in self.parameters]
+        lines += [("count", name, repr(float(x))) for (name, _), x in zip(self.samples, self.counts, strict=False)]
         return "\n".join([self.mechanism, *(" ".join(line).rstrip() for line in lines)])
 
     @classmethod
@@ -55,7 +64,11 @@ class BoardNames:
         if not re.fullmatch(_NAME, mechanism):
             raise PvidError(f"{shown(mechanism, 40)} is no name of a mechanism")
         found: dict[str, list[tuple[str, str]]] = {"sample": [], "p": []}
+        counts: dict[str, float] = {}
         for line in lines:
+            if (of_count := _COUNT.fullmatch(line)) is not None:
+                counts[of_count[1]] = _number(of_count[2])
+                continue
             match = _LINE.fullmatch(line)
             if match is None:
                 raise PvidError(f"{shown(line, 60)} names no sample and no parameter")
@@ -64,7 +77,19 @@ class BoardNames:
             named = [name for name, _ in found[what]]
             if not 0 < len(named) <= most or len(set(named)) < len(named):
                 raise PvidError(f"{mechanism}: {len(named)} names of {what}, where 1 to {most} different ones belong")
-        return cls(mechanism, tuple(found["sample"]), tuple(found["p"]))
+        if counts and list(counts) != [name for name, _ in found["sample"]]:
+            raise PvidError(f"{mechanism}: the counts of {len(counts)} samples, and not of all in their order")
+        return cls(mechanism, tuple(found["sample"]), tuple(found["p"]), tuple(counts.values()))
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise PvidError(f"{shown(text, 30)} is no value of a count")
+    return value
 
 
 def names_of(model: Model) -> BoardNames:

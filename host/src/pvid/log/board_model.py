@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -28,7 +29,7 @@ def mechanism_of(text: bytes) -> Mechanism:
     """
     names = BoardNames.parse(text)
     known = MODELS.get(names.mechanism)
-    if known is not None and names == names_of(known):
+    if known is not None and replace(names, counts=()) == names_of(known):
         return Mechanism(known)
     for columns in (names.samples, (*names.parameters, *((f"{name}_se", "") for name, _ in names.parameters))):
         called = [name for name, _ in columns]

@@ -36,6 +36,7 @@ from pvid.link.frames import (
     RawCount,
     Status,
 )
+from pvid.link.names import BoardNames
 from pvid.log.board_model import mechanism_of
 from pvid.log.file import Close, Segment
 from pvid.log.reader import Gap, Record, Restart
@@ -141,6 +142,7 @@ class Values:
         self._hello = hello
         self._row_sd = math.nan
         self._offset = 0.0  # of the angle in fixed point [rad]
+        self._counts: tuple[float, ...] = ()  # value of a count of each sample, if the board named them
         self._anchor: tuple[int, int] | None = None  # tick and log time
         self._latest = 0
         self._runs = 0
@@ -170,9 +172,10 @@ class Values:
         match item:
             case Hello():
                 self._hello = item
-            case Names() if self.follows:
+            case Names():
                 with suppress(PvidError):  # a board that names nothing that there can be
-                    self.mechanism = mechanism_of(item.text)
+                    self._counts = BoardNames.parse(item.text).counts
+                    self.mechanism = mechanism_of(item.text) if self.follows else self.mechanism
             case Configure() | ConfigureQ31():
                 self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
                 self._offset = getattr(item, "phi_offset", 0) * (self._hello.phi_lsb if self._hello else 0.0)
@@ -239,7 +242,8 @@ class Values:
     @np.errstate(all="ignore")  # a board may send any number
     def _samples(self, record: Record, item: Raw | RawCount) -> Rows:
         hello = self._hello
-        measured = item.in_si(np.array([np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]))
+        of_two = [np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]
+        measured = item.in_si(np.array(self._counts or of_two))
         columns = self._where(record, record.tick + np.arange(len(measured), dtype=np.int64))
         channels = self.mechanism.model.channels
         if measured.shape[1] != len(channels):  # samples of something else

@@ -43,17 +43,17 @@ from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
 from pvid.run.compare import P_NAMES, Difference
 from pvid.settings.enums import Reason
-from pvid.settings.fourier import FourierConfig
 from pvid.settings.kinds import Settings
 from pvid.settings.record import HASHED_TYPES
 from pvid.twin import fnv
 from pvid.twin.fourier import FourierTwin
+from pvid.twin.fourier_q31 import FourierTwinQ31
 
 Check = Estimate | EstimateQ31 | Hash | Credit
 
 
 class EngineBoard(Protocol):
-    """A board that identifies a described mechanism; pvid.board.mechanism_board.MechanismBoard is one."""
+    """A board that identifies a described mechanism: MechanismBoard of pvid.board, and that in fixed point."""
 
     @property
     def stream_image(self) -> StreamImage: ...
@@ -61,7 +61,10 @@ class EngineBoard(Protocol):
     @property
     def p_names(self) -> tuple[str, ...]: ...
 
-    def configured(self, frame: Configuration) -> FourierConfig: ...
+    @property
+    def matrix(self) -> str: ...
+
+    def twin_of(self, frame: Configuration) -> FourierTwin | FourierTwinQ31: ...
 
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
@@ -337,7 +340,7 @@ class Verifier:
             self._number = self.rig.stream_image.number
         if configuration.settings != self._number:
             raise PvidError("the board's image was made for other settings than the log's, or by another version")
-        return _EngineTwin(self.rig.configured(configuration)), self.rig.p_names
+        return _EngineTwin(self.rig.twin_of(configuration), self.rig.matrix), self.rig.p_names
 
     def _config(self, rig: RigFile, configuration: Configuration) -> Settings:
         """The identifier's settings: those of the rig file, with the values of the configuration."""
@@ -392,14 +395,11 @@ class _PendulumTwin:
 
 
 class _EngineTwin:
-    """The engine of any mechanism, which says what it publishes."""
+    """The engine of any mechanism, in either arithmetic, which reports what it publishes."""
 
-    matrix = "covariance"
-
-    def __init__(self, config: FourierConfig) -> None:
-        self._twin = FourierTwin(config)
-        self.samples = config.design.model.samples
-        self.reach, self.estimator = config.ticks_needed, self._twin.estimator
+    def __init__(self, twin: FourierTwin | FourierTwinQ31, matrix: str) -> None:
+        self._twin, self.matrix = twin, matrix
+        self.samples, self.reach, self.estimator = twin.samples, twin.reach, twin.estimator
 
     def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
         return self._twin.follow(samples, after)

@@ -123,7 +123,9 @@ class Identifier:
         form), 0.241 s (strong form)
     differentiator : filters of the strong form
     degree : strong form: degree of the Savitzky-Golay polynomial
-    stride : strong form: samples between the points of the differentiator
+    stride : strong form: samples between the points of the differentiator; with a block at least its length
+    block : strong form, float32, Savitzky-Golay: odd number of samples whose mean is a point; a window of window_s then
+        takes the time of window_s / block points, with 2 % (phi) to 14 % (its fourth derivative) more noise
     test_functions : weak form: modulating functions per window, at least 4; 0: 8 to 16, up to 1.5 times the nominal
         fast mode
     decimation : weak form: samples per decimated sample; 0: about 200 decimated samples per window
@@ -153,6 +155,7 @@ class Identifier:
     differentiator: Differentiator = _choice("savitzky-golay", Differentiator)
     degree: int = _number(12, "", 4, 12)
     stride: int = _number(1, "samples", 1, 65535)
+    block: int = _number(1, "samples", 1, 8191)
     test_functions: int = _number(0, "", 0, 16)
     decimation: int = _number(0, "samples", 0, 64)
     smoothing_s: float = _number(0.0, "s", 0.0, 1e6)

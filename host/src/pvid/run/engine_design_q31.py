@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
 from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
 from pvid.codegen.parameters_q31 import ParametersQ31, fixed_parameters
 from pvid.design.fourier_q31 import Sensing, fixed_design, most_counts
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.run import Recording
 from pvid.run.engine_design import Run, design_and_p, engine_tables, simulated_run_of
@@ -68,8 +70,7 @@ class FixedEngine:
     @property
     def ticks_needed(self) -> int:
         """Samples up to the first estimate, at most: as in float32."""
-        design = self.config.design
-        return design.decimation * (2 * design.half + 3 * design.hop + 9) + 3
+        return self.config.design.ticks_needed
 
     def counts_of(self, run: Run) -> npt.NDArray[np.int32]:
         """The argument of step at every tick [ticks, samples]."""
@@ -108,7 +109,7 @@ def fixed_engine(
     functions = fourier_functions_of(compiled)
     found = engine_tables(compiled, run, design, p)
     known = {one.name: one for one in compiled.signals}
-    lsb = tuple(known[one].resolution or known[one].reach / 2**_INPUT_BITS for one in functions.samples)
+    lsb = lsb_of(compiled, functions.samples)
     largest = [float(np.max(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
     limits = most_counts(functions.signal, len(lsb), found.tables.decimation)
     full_scale = tuple(
@@ -120,11 +121,7 @@ def fixed_engine(
     seconds = len(next(iter(of_jets.values()))) * found.tables.decimation / design.sample_rate
     made = fixed_fourier(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
     parameters_of = found.rows.compiled.parameters
-    bounds = [
-        (min(one.low, x), max(one.high, x))
-        for one, x in zip(parameters_of.model.unknowns, parameters_of.guess, strict=True)
-    ]
-    parameters = fixed_parameters(functions.functions, bounds)
+    parameters = _parameters(functions, parameters_of)
     sizes = with_soft_widths(found.tables, soft_signs or {})
     tables = fixed_design(made.model, sizes, Sensing(lsb, full_scale, design.sample_rate), made.formats)
     formats = row_formats(found.rows, found.p, found.errors)
@@ -138,6 +135,26 @@ def fixed_engine(
         found.tables.overlap,
     )
     return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
+
+
+def lsb_of(compiled: CompiledModel, samples: Sequence[str]) -> tuple[float, ...]:
+    """Value of a count of each sample: a sensor's resolution, of an input a part of its reach."""
+    known = {one.name: one for one in compiled.signals}
+    return tuple(known[one].resolution or known[one].reach / 2**_INPUT_BITS for one in samples)
+
+
+def _parameters(functions: FourierFunctions, known: Parameters) -> ParametersQ31:
+    bounds = [(min(one.low, x), max(one.high, x)) for one, x in zip(known.model.unknowns, known.guess, strict=True)]
+    return fixed_parameters(functions.functions, bounds)
+
+
+def engine_of_parts(
+    compiled: CompiledModel, made: FixedFourier, config: FourierConfigQ31, sample_rate: float
+) -> FixedEngine:
+    """An engine whose formats and settings are known, as from a log."""
+    parameters = _parameters(made.functions, ready(compiled).parameters)
+    lsb = lsb_of(compiled, made.functions.samples)
+    return FixedEngine(compiled, made, parameters, config, sample_rate, lsb)
 
 
 def engine_for_recording(

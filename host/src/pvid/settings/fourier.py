@@ -220,11 +220,11 @@ class FourierDesign32:
     functions : K
     power : n of sin^n
     decimation : D, ticks a step
-    hop : steps of half a window, a multiple of 4
+    hop : steps of half a window, a multiple of 8
     filter : of each jet, at the samples: block sums and compensator in one
     compensator : of each jet, at the steps, behind the block sums; without a decimation the filter
-    circle : cos(pi j / hop) [2 hop]
-    noise : sorted by kind, then power
+    circle : sin(pi j / hop) [5 hop / 2], a turn and a quarter
+    noise : sorted by kind, then by columns
     error_order : of each kind uint8 [kinds]: its own error is that derivative of white noise
     error_variance : of that noise at a step [kinds]; 0: the sensors explain the rows
     sign_width : of the soft sign [signs]; 0: the mean of sgn over a step

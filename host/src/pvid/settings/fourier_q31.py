@@ -119,7 +119,7 @@ class FourierDesignQ31:
     integral : shifts (once, twice) of each integrand
     format : of each channel
     circle : int32 (2^23 - 1) cos(pi j / hop) [2 hop]
-    factor : of each term (m, e), of (h/H)^order times a unit of S_h
+    factor : of each term (m, e), of h^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
     error_variance : of that noise at a step, of h^(2 order) (m, e) [kinds]; (0, 0): the sensors explain the rows
@@ -164,6 +164,11 @@ class FourierDesignQ31:
         return self.functions + self.power
 
     @property
+    def ticks_needed(self) -> int:
+        """Samples up to the first estimate, at most: as in float32."""
+        return self.decimation * (2 * self.half + 3 * self.hop + 9) + 3
+
+    @property
     def powers(self) -> int:
         """Of h^2 in the noise."""
         return 1 + max((*(one.power for one in self.noise), *self.error_order), default=0)
@@ -179,6 +184,7 @@ class FourierConfigQ31:
     estimator : rows are in standard deviations, row_sd 2^(8 + y_bits)
     offset : reading of each sensor at 0 [counts]
     drive_min : window dropped if the standard deviation of a sample is below [counts]; None: no check
+    compensation : b gets what the sensors' noise takes from it
     iterations : Gauss-Newton steps a window
     """
 
@@ -186,6 +192,7 @@ class FourierConfigQ31:
     estimator: EstimatorConfigQ31
     offset: tuple[int, ...]
     drive_min: tuple[int, ...] | None = None
+    compensation: bool = True
     iterations: int = 3
     trust: TrustConfigQ31 = TrustConfigQ31()
     gate: GateConfigQ31 = GateConfigQ31()

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pvid.settings.fourier import Source
+
 Float32 = npt.NDArray[np.float32]
 
 BIG_STEP = 4  # steps of the motion in one of the columns and rows
@@ -21,6 +23,7 @@ class RefineSignal:
     ----------
     sample : place in the argument of step
     order : 0: the sample, 2: its second derivative
+    source : of an input HELD where it is held from tick to tick
     scale : factor to the model's unit
     range : largest absolute value [model's unit]
     """
@@ -29,6 +32,7 @@ class RefineSignal:
     order: int
     scale: float
     range: float
+    source: Source = Source.SAMPLED
 
 
 @dataclass(frozen=True, eq=False)

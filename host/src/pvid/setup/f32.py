@@ -37,13 +37,16 @@ def bank_of(rig: RigFile, sample_rate: float) -> FirBank:
     """The FIR bank of a rig file at `sample_rate` [Hz]."""
     settings = rig.identifier
     if settings.differentiator == "finite-difference":
+        if settings.block > 1:
+            raise PvidError("[identifier] block is of the Savitzky-Golay filters: omit it with finite differences")
         bank = finite_difference(settings.stride)
     else:
-        points = max(round(settings.strong_window_s * sample_rate / settings.stride), settings.degree + 1)
-        bank = savitzky_golay(points | 1, settings.degree, settings.stride)
-    if bank.window > MAX_WINDOW:
+        stride = max(settings.stride, settings.block)
+        points = max(round(settings.strong_window_s * sample_rate / stride), settings.degree + 1)
+        bank = savitzky_golay(points | 1, settings.degree, stride, settings.block)
+    if bank.memory > MAX_WINDOW:
         raise PvidError(
-            f"the differentiator's window is {bank.window} samples at {sample_rate:g} Hz and the core holds "
+            f"the differentiator's window is {bank.memory} samples at {sample_rate:g} Hz and the core holds "
             f"{MAX_WINDOW} (PVID_MAX_WINDOW): shorten window_s or raise stride"
         )
     return bank
@@ -62,7 +65,7 @@ def estimator_config(rig: RigFile, bank: FirBank, start: npt.ArrayLike | None = 
         forgetting_s=settings.forgetting_s,
         feedback_hz=settings.feedback_hz,
         # rows closer than the bank's reach share samples: count half a window as one row
-        correlation=float(max(bank.half, 1)),
+        correlation=float(max(bank.delay if bank.block > 1 else bank.half, 1)),
         kappa_min=settings.kappa_min,
         law=LAWS[settings.law],
         dead_zone=settings.dead_zone,
@@ -78,7 +81,7 @@ def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
     """
     weights = bank.weights[2]
     white_gain = np.sqrt(2 * np.sum(weights**2) + 4 * np.sum(weights) ** 2)
-    noise = 0.5 * rig.sensor.y_lsb * white_gain * (sample_rate / bank.stride) ** 2 / rig.l1
+    noise = 0.5 * rig.sensor.y_lsb / math.sqrt(bank.block) * white_gain * (sample_rate / bank.stride) ** 2 / rig.l1
     return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
 
 
@@ -96,6 +99,7 @@ def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
         drive_min=drive_threshold(rig, bank, sample_rate),
         weights=bank.weights32,
         stride=bank.stride,
+        block=bank.block,
         gate=gate_config(rig),
         estimator=estimator_config(rig, bank, start),
     )

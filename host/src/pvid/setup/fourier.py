@@ -22,7 +22,7 @@ from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter,
 
 HIGHEST_POWER = 8  # n of sin^n
 LONGEST_HOP = 16384  # steps of half a window
-_STEPS_OF_A_BLOCK = 4  # half a window is a whole number of blocks
+_STEPS_OF_A_BLOCK = 8  # half a window is a whole number of blocks
 
 # An entry whose share is below this part of the noise at every harmonic is left out.
 _SHARE = 1e-6
@@ -47,7 +47,7 @@ def for_engine(design: FourierDesign) -> FourierDesign:
     A soft sign stays one. The engine does not locate reversals.
     """
     block = _STEPS_OF_A_BLOCK
-    least = -(-(design.highest + 1) // block) * block
+    least = -(-2 * (design.highest + 1) // block) * block
     hop = max(round(design.hop / block) * block, least)
     found = replace(design, window_s=2 * hop * design.dt, joint=False, comb=design.decimation > 1)
     return found if design.reversals == "soft" else replace(found, reversals="averaged")
@@ -76,13 +76,18 @@ def design_tables(
         hop=design.hop,
         filter=tuple(_filter(weights_of(design, one.order)) for one in model.jet),
         compensator=tuple(_filter(step_weights_of(design, one.order)) for one in model.jet),
-        circle=_as_float32(np.cos(np.pi * np.arange(2 * design.hop) / design.hop)),
+        circle=circle_of(design.hop),
         noise=tuple(entry for kind in range(rows.kinds) for entry in _noise(rows, kind, p)),
         error_order=np.array([one.order for one in found], np.uint8),
         error_variance=_as_float32([one.variance for one in found]),
         sign_width=np.full(model.signs, design.soft if design.reversals == "soft" else 0.0, np.float32),
         overlap=float(np.float32(overlap_of(rows, p, found))),
     )
+
+
+def circle_of(hop: int) -> npt.NDArray[np.float32]:
+    """sin(pi j / hop), a turn and a quarter [5 hop / 2]: the cosine of a place is the sine a quarter turn behind it."""
+    return _as_float32(np.sin(np.pi * np.arange(5 * hop // 2) / hop))
 
 
 def with_soft_signs(config: FourierConfig, widths: Mapping[str, float]) -> FourierConfig:
@@ -122,9 +127,9 @@ def _noise(rows: WeakRows, kind: int, p: Float) -> list[FourierNoise]:
     sized = np.abs(shares * np.outer(theta, theta))
     whole = np.einsum("jab,jh->h", shares * np.outer(theta, theta), powers)
     entries = []
-    for power in range(len(shares)):
-        for a in range(count):
-            for b in range(a, count):
+    for a in range(count):
+        for b in range(a, count):
+            for power in range(len(shares)):
                 factor = float(shares[power, a, b]) * (1 if a == b else 2)
                 share = 2 * sized[power, a, b] * powers[power]
                 if factor and np.any(share > _SHARE * whole):

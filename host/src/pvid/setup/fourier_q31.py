@@ -16,6 +16,7 @@ from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31
 
 _GATE = GateConfigQ31(sigmas=4 << 16, patience_groups=100)  # as in float32
 
+_NOISE_MARGIN = 16  # as in float32
 _ROW_BITS = 28  # of an entry of a row
 _MARGIN_BITS = 3  # that the entries of a run leave free
 _MOST_Y_BITS = 12
@@ -99,6 +100,7 @@ def config_of_q31(
             y_bits=y_bits,
             row_sd=2 ** (8 + y_bits),
             correlation=max(round(overlap * 2**16), 2**16),
+            noise_margin=_NOISE_MARGIN << 16,
         ),
         offset=tuple(offset),
         gate=_GATE,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pvid.core.sizes import at_least
 from pvid.settings.fourier import NONE, FourierDesign32, FourierModel
 from pvid.settings.fourier_q31 import FourierDesignQ31
 
@@ -33,6 +34,18 @@ def sizes_of_design(design: FourierDesign32) -> dict[str, int]:
     }
 
 
+def sizes_for_one(design: FourierDesign32) -> dict[str, int]:
+    """Those of a build for this design alone: none below what the core accepts, and loops of constant length where all
+    are those of the design (PVID_EXACT)."""
+    needed = sizes_of_design(design)
+    found = at_least(needed)
+    if found != needed:
+        return found
+    model = design.model
+    counts = ("signals", "jets", "runs", "signs", "integrands")
+    return found | {"PVID_EXACT": 1} | {f"PVID_EXACT_{one.upper()}": getattr(model, one) for one in counts}
+
+
 def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]:
     """Those of a fixed-point design and its model with n_p parameters and n_c non-zeros of d theta / d p."""
     model = design.model
@@ -44,7 +57,7 @@ def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]
         "PVID_MAX_C_Q31": n_c,
         "PVID_MAX_SAMPLES": model.samples,
         "PVID_MAX_INPUTS": len(model.jet) + model.runs + model.signs,
-        "PVID_MAX_CHANNELS": max(len(model.channel), model.gains),
+        "PVID_MAX_CHANNELS": max(sum(one.gain != NONE for one in model.channel), model.gains),
         "PVID_MAX_INTEGRANDS": max(model.integrands, model.runs, model.signs),
         "PVID_MAX_KINDS": len(model.kind),
         "PVID_MAX_COLUMNS": max(one.columns for one in model.kind),

@@ -23,14 +23,14 @@ from pvid.twin.record import After, Progress, Reasons, Recorder, TwinRecord
 Float32 = npt.NDArray[np.float32]
 
 _F = np.float32
-_BLOCK = 4
+_BLOCK = 8
 
 
 @dataclass(frozen=True)
 class FourierSchedule:
     """Twin of fourier/ticks_f32.h: harmonics and stages of a free tick.
 
-    free_ticks: those of a block of four steps
+    free_ticks: those of a block of steps
     """
 
     free_ticks: int
@@ -101,7 +101,7 @@ class FourierTwin:
         self.dt = _F(design.decimation) / _F(config.sample_rate)
         self.finish = Finish(config, self.dt, self.estimator, self.trust)
         self.ticks = front_ticks(design)
-        self.schedule = FourierSchedule(self.ticks.free_ticks, design.hop, design.highest + 1)
+        self.schedule = FourierSchedule(_BLOCK * self.ticks.free_ticks, design.hop, design.highest + 1)
         self.stages_per_tick = self.schedule.stages_per_tick(self.finish.stages)
         self.runs = fourier_step.Runs.of(design, _F(self.ticks.first) / _F(config.sample_rate))
 
@@ -123,7 +123,7 @@ class FourierTwin:
             return Stretch(steps, free, np.zeros((0, 0, 2, 0), np.float32), [])
         count = len(windows)
         drop = np.full(count, Reason.ACCUMULATED)
-        later = ticks[2:]  # of the channels
+        later = ticks[2:] - self.ticks.apart  # of the steps whose channels follow
         if self.config.drive_min is not None:
             still = fourier_watch.windows_still(samples[later], np.asarray(self.config.drive_min, np.float32), hop)
             drop[still] = Reason.HELD_NOT_EXCITED
@@ -175,6 +175,16 @@ class FourierTwin:
                 reason[tick] = dropped
             after(tick, reason[tick])
         return work
+
+    @property
+    def samples(self) -> int:
+        """Of a tick."""
+        return self.config.design.model.samples
+
+    @property
+    def reach(self) -> int:
+        """Ticks from a sample until the identifier has processed it completely, at most."""
+        return self.config.ticks_needed
 
     def follow(self, samples: npt.ArrayLike, after: After) -> Reasons:
         """Like `run` without a record: calls `after` after every tick.

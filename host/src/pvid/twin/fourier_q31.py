@@ -19,7 +19,7 @@ from pvid.twin.q31.gate import GateQ31
 from pvid.twin.q31.integer import Int, clamp, integers
 from pvid.twin.q31.scaled import scaled
 from pvid.twin.q31.trust import TrustQ31
-from pvid.twin.record import Mask, Reasons, Recorder, TwinRecord
+from pvid.twin.record import After, Mask, Reasons, Recorder, TwinRecord
 from pvid.twin.weak_schedule import Work, play
 
 _GATE_MEMORY = 4
@@ -40,7 +40,8 @@ class FourierTwinQ31:
         floor = scaled(np.ones(self.estimator.lanes, np.int64), 0)
         self.gates = [GateQ31(config.gate, _GATE_MEMORY, floor) for _ in design.model.kind]
         self.iterations = 1 if self.estimator.is_rate else config.iterations
-        stages = fourier_finish.number_of_stages(design, self.iterations, self.estimator)
+        self.noise = fourier_finish.NoiseOfWindows(design, self.estimator, config.compensation)
+        stages = fourier_finish.number_of_stages(design, self.iterations, self.estimator, self.noise.is_used)
         self.stages_per_tick = -(-stages // Schedule.of(design).free_ticks)
         self.frozen: Mask | None = None
 
@@ -74,17 +75,30 @@ class FourierTwinQ31:
             self.trust,
             self.gates,
             (own.n_bits, own.y_bits),
+            self.noise,
         )
 
     def _reject(self) -> Reason:
         self.estimator.counters["rejected_saturated"] += 1
         return Reason.REJECTED_SATURATED
 
-    def run(self, readings: npt.ArrayLike) -> TwinRecord:
-        """Steps all lanes through readings [samples, ticks]."""
-        complete, ticks = self._complete(integers(readings))
-        recorder = Recorder(self.estimator, len(ticks), True, None, self.trust)
-        reason = play(
+    @property
+    def samples(self) -> int:
+        """Of a tick."""
+        return self.config.design.model.samples
+
+    @property
+    def reach(self) -> int:
+        """Ticks from a sample until the identifier has processed it completely, at most."""
+        return self.config.design.ticks_needed
+
+    def follow(self, samples: npt.ArrayLike, after: After) -> Reasons:
+        """Steps all lanes through readings [ticks, samples]; calls `after` after every tick.
+
+        Returns the reason of every tick [ticks, lanes].
+        """
+        complete, ticks = self._complete(integers(samples).T)
+        return play(
             ticks != Tick.REJECTED,
             ticks == Tick.FREE,
             complete,
@@ -92,6 +106,11 @@ class FourierTwinQ31:
             self.estimator.lanes,
             reject=self._reject,
             take=self._take,
-            record=recorder,
+            record=after,
         )
-        return recorder.finished(reason)
+
+    def run(self, readings: npt.ArrayLike) -> TwinRecord:
+        """Steps all lanes through readings [samples, ticks]."""
+        given = integers(readings)
+        recorder = Recorder(self.estimator, given.shape[1], True, None, self.trust)
+        return recorder.finished(self.follow(given.T, recorder))

@@ -44,8 +44,8 @@ class FrontTicks:
 
     @property
     def free_ticks(self) -> int:
-        """Ticks of a block of four steps that add harmonics or run stages."""
-        return 4 * max(self.decimation - 1 - self.apart, 1)
+        """Ticks of a step that add harmonics or run stages, with those that do so at every tick."""
+        return max(self.decimation - 1 - self.apart, 1)
 
     def tick_of(self, step: int) -> int:
         """Tick that takes the jets of a step to the channels."""

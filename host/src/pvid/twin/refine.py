@@ -155,7 +155,8 @@ class RefineTwin:
         self.r, self.next = self.linear.copy(), self.linear.copy()
         fade = _F(1) - (_F(1) - self.fade) * (_F(self.length) / _F(config.block))
         self.triangle = self.solve.triangle * fade
-        self.length = min(2 * self.length, config.block)
+        if self.taken > 1:
+            self.length = min(2 * self.length, config.block)
 
     def _refuse(self) -> None:
         if self.taken > 0:
@@ -232,13 +233,16 @@ class RefineTwin:
         if not certain:
             self.verdict = Reason.HELD_UNCERTAIN
             return
-        distance = _F(self.config.distance)
+        better, distance = True, _F(self.config.distance)
         for i, place in enumerate(self.shape.place_of_p):
             x, error, weak_se = self.r[place], se[place], self.weak_se[i]
             errors = np.sqrt(error * error + weak_se * weak_se)
             allowed = _ERRORS * errors + (distance * x if logarithmic[place] else distance)
             if not -allowed <= x - self.weak[place] <= allowed:
                 self.verdict = Reason.HELD_DISAGREES
+            better = better and bool(distance > 0 or error <= weak_se)
+        if not better and self.verdict is Reason.UPDATED:
+            self.verdict = Reason.HELD_UNCERTAIN
 
     # ---- jobs ----
 

@@ -50,8 +50,8 @@ typedef struct {
 } pvid_strong_row_q31;
 
 /* One row from phi[k] = d^k phi/dt^k within +-PVID_DERIVATIVE_LIMIT_Q31 and u = y_A''/l1 within
- * +-PVID_KAPITZA_RATE_LIMIT_Q31, u', u'' within twice that. Fails (returns false, row undefined) iff an entry or a part
- * of Y exceeds +-PVID_ROW_LIMIT_Q31. Cost: 13 products of 32 by 32 bits. */
+ * +-PVID_KAPITZA_RATE_LIMIT_Q31, u', u'' within twice that. Fails (returns false, row undefined) iff an entry is
+ * outside -2^28..2^28 - 1 or a part of one outside -2^30..2^30 - 1. Cost: 13 products of 32 by 32 bits. */
 bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS],
                                  const int32_t u[PVID_Y_ORDERS_Q31], int32_t row[PVID_KAPITZA_ROW_Q31]);
 

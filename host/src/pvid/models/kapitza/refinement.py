@@ -27,8 +27,9 @@ def refine_rig(
     phi_sd: float,
     y_gain_sd: float = 0.003,
     angle_range: float = _ANGLE_RANGE,
+    samples: tuple[str, str] = ("phi", "y"),
 ) -> RefineRig:
-    """The pendulum's, with samples (phi, y).
+    """The pendulum's.
 
     Parameters
     ----------
@@ -38,6 +39,7 @@ def refine_rig(
     phi_sd : white noise of a sample of the angle [rad]
     y_gain_sd : relative standard deviation of the gain of y
     angle_range : largest |phi| [rad]
+    samples : argument of step; that of the weak form is ("y", "phi")
     """
     p = np.asarray(guess, float)
     found = modes_hz(p)
@@ -49,7 +51,10 @@ def refine_rig(
         sample_rate=sample_rate,
         slow_hz=slow,
         fast_hz=fast,
-        signal=(RefineSignal(1, 2, 1.0 / l1, max(_INPUT_RANGE * w, 1.0)), RefineSignal(0, 0, 1.0, angle_range)),
+        signal=(
+            RefineSignal(samples.index("y"), 2, 1.0 / l1, max(_INPUT_RANGE * w, 1.0)),
+            RefineSignal(samples.index("phi"), 0, 1.0, angle_range),
+        ),
         sample_sd=(phi_sd,),
         prior_sd=_PRIOR_SD,
         gain_sd=(y_gain_sd, *(0.0,) * 6),

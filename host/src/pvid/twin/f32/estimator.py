@@ -214,8 +214,8 @@ class RelativeEstimator(Estimator):
     theta float32 [n_theta, lanes] is f(p); B and yy are b = B - M theta and the sum of squared residuals.
     """
 
-    _ROWS_PER_STAGE = 4
-    _COLUMNS_PER_STAGE = 3
+    _ROWS_PER_STAGE = 2
+    _COLUMNS_PER_STAGE = 2
 
     def __init__(self, configs: Sequence[EstimatorConfig], update_rate: float, pattern: PatternModel) -> None:
         super().__init__(configs, update_rate, pattern.n_p, pattern.n_sums)
@@ -236,6 +236,7 @@ class RelativeEstimator(Estimator):
         self.everywhere = np.ones(len(configs), np.bool_)
         self.was_due = True
         self.judged_variance = self.row_variance
+        self._solved = (np.zeros((0, 0, 0), np.float32), self.sums, self.rss)  # S, sums, rounding of the last solve
 
     @property
     def is_rate(self) -> bool:
@@ -363,22 +364,33 @@ class RelativeEstimator(Estimator):
     @property
     def _projection_stages(self) -> int:
         columns = self.model.c_column
-        return 1 + sum(1 + -(-columns.count(a) // self._COLUMNS_PER_STAGE) for a in range(self.model.n_p))
+        return 2 + sum(1 + -(-columns.count(a) // self._COLUMNS_PER_STAGE) for a in range(self.model.n_p))
 
     def solve_stages(self, ends_group: bool) -> int:
         """Stages of a solve that is due."""
-        return self._projection_stages + 4 + -(-self.model.n_theta // self._ROWS_PER_STAGE) + ends_group
+        return self._projection_stages + 5 + -(-self.model.n_theta // self._ROWS_PER_STAGE) + ends_group
 
     @property
     def assessment_stages(self) -> int:
         """Stages of an assessment."""
-        return self._projection_stages + 4 + self.model.n_p
+        return self._projection_stages + self.assess_solved_stages
+
+    @property
+    def assess_solved_stages(self) -> int:
+        """Stages of an assessment behind a solve."""
+        return 4 + self.model.n_p
 
     def judged(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
         """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
         sums = self.information.read()
         s, residual = self._assessed(sums)
         variance = self.judged_variance = self._variance(sums, residual)
+        return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
+
+    def judged_as_solved(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
+        """The same from the normal equations of the last solve, which was due: S at the p before its step."""
+        s, sums, rounding = self._solved
+        variance = self.judged_variance = self._variance(sums, self._residual(sums, rounding))
         return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
 
     def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
@@ -406,6 +418,7 @@ class RelativeEstimator(Estimator):
         c = pattern.jacobian(self.p)
         force = pattern.transpose_times(c, b)
         s = pattern.project(c, matrix)
+        own = s.copy()
         above_noise = self._above_noise(s, self.row_variance, sums[-1])
         x, reason, in_dead_zone = self._step_from(s, force, gain, self.everywhere, above_noise)
         stepping = (reason == Reason.UPDATED) & ~in_dead_zone
@@ -438,6 +451,9 @@ class RelativeEstimator(Estimator):
         self.theta = np.where(moving, theta, self.theta)
         self.p = np.where(moving, x, self.p)
         self.counters["updates"] += moving & stepping
+        sums = sums.copy()
+        sums[-2] = self.information.high[-2] + self.information.low[-2]
+        self._solved = own, sums, self.information.rounding
         return reason
 
     def place(self, p: Float32) -> None:
@@ -453,9 +469,13 @@ class RelativeEstimator(Estimator):
 
     def _assessed(self, sums: Float32) -> tuple[Float32, Float32]:
         s = self.model.project(self.model.jacobian(self.p), self.model.matrix(sums))
+        return s, self._residual(sums, self.information.rounding)
+
+    def _residual(self, sums: Float32, rounding: Float32) -> Float32:
+        """The sum of squared residuals [lanes], not below its rounding and its expectation."""
         floor = self.expected * (sums[-1] - np.float32(len(self.p)))
-        residual = capped(sums[-2] + self.information.rounding)
-        return s, np.where(residual > floor, residual, floor)
+        residual = capped(sums[-2] + rounding)
+        return np.where(residual > floor, residual, floor)
 
     def set_expected(self, variance: Float32) -> None:
         """pvid_estimator_set_expected_f32: variance [lanes] of the rows since the last group by the sensors' noise."""

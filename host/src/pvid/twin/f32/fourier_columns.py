@@ -39,7 +39,8 @@ def parts_of_columns(white: White, window: Float32) -> Float32:
             weight = white.scale
             for _ in range(one.order):
                 weight = weight * rate
-            column[: rows.cosines] = column[: rows.cosines] + ((-sign if turned else sign) * weight) * re[:, None]
+            own = slice(0 if one.order == 0 else 1, rows.cosines)  # of h = 0 only order 0 counts
+            column[own] = column[own] + (((-sign if turned else sign) * weight) * re[:, None])[own]
             column[rows.cosines :] = column[rows.cosines :] + ((sign * weight) * im[:, None])[sines]
     return out
 

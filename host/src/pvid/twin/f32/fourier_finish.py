@@ -11,7 +11,7 @@ from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig
 from pvid.twin.f32.estimator import RelativeEstimator
 from pvid.twin.f32.fourier_columns import parts_of_columns, projected
-from pvid.twin.f32.fourier_noise import ENTRIES, Noise, shares
+from pvid.twin.f32.fourier_noise import Noise, pairs_of, shares
 from pvid.twin.f32.fourier_scores import Scores
 from pvid.twin.f32.fourier_white import Rows, White, total
 from pvid.twin.f32.gate import Gate
@@ -23,7 +23,8 @@ Float32 = npt.NDArray[np.float32]
 Stages = Iterator[Reasons | None]
 
 _F = np.float32
-_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 36, 4
+_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 30, 4
+_PAIRS_PER_STAGE, _BOTH_FAMILIES = 1, 16
 _GATE_MEMORY = _F(4)
 _VARIANCE_MAX = _F(1e36)
 
@@ -63,13 +64,17 @@ class Finish:
     def _stages_of_rows(self, kind: int) -> int:
         """Stages of a kind up to its gate."""
         own = self.design.model.kind[kind]
-        vectors, nuisances = self.design.power // 2, own.nuisances
-        project = nuisances * own.columns - nuisances * (nuisances - 1) // 2 if nuisances else 1
+        nuisances = own.nuisances
+        at_once = max(1, _PRODUCTS_PER_STAGE // (2 * self.design.functions))
+        project = sum(1 + _parts(own.columns - 1 - i, at_once) for i in range(nuisances)) or 1
         residual = _parts(self.design.functions, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
         squares = _parts(own.thetas, self._products)
-        basis = vectors * (vectors + 1) + self._stages_of_share
-        noise = _parts(len(self.design.noise), ENTRIES) if self._checks_noise else 1
-        return self._entries() + 1 + noise + basis + 3 * own.columns + project + residual + squares
+        basis = 2 * self.design.power + self._stages_of_share
+        noise = 2 + _parts(len(pairs_of(self.design, kind)), _PAIRS_PER_STAGE) if self._checks_noise else 1
+        reflect = 1 if self.design.functions <= _BOTH_FAMILIES else 2
+        terms = [one.column for one in self.design.model.terms_of(kind)]
+        gather = sum(max(1, terms.count(column)) for column in range(own.columns))
+        return self._entries() + 3 + noise + basis + gather + reflect * own.columns + project + residual + squares
 
     @property
     def _checks_noise(self) -> bool:
@@ -91,7 +96,7 @@ class Finish:
     def _stages_of_adding(self, kind: int) -> int:
         """Stages of a kind behind its gate."""
         thetas = self.design.model.kind[kind].thetas
-        return _parts(thetas * (thetas + 1) // 2, self._products)
+        return _parts(thetas * (thetas + 1) // 2, self._products) + 1
 
     @property
     def _stages_of_share(self) -> int:
@@ -99,7 +104,7 @@ class Finish:
 
     @property
     def _stages_of_pull(self) -> int:
-        return self._entries() if self.shares else 0
+        return self._entries() + 1 if self.shares else 0
 
     @property
     def stages(self) -> int:
@@ -110,7 +115,7 @@ class Finish:
             for kind in range(self.design.model.kinds)
         )
         solves = estimator.solve_stages(True) + (self.iterations - 1) * estimator.solve_stages(False)
-        return of_kinds + 3 + len(estimator.p) + solves + estimator.assessment_stages
+        return of_kinds + 6 + len(estimator.p) + solves + estimator.assess_solved_stages
 
     # ---- a window
 
@@ -189,16 +194,17 @@ class Finish:
                         score[i] = score[i] + product
                         self.estimator.add_gradient(kind, i, product)
                 done += 1
-                if i < thetas - 1 and done % self._products == 0:
+                if done % self._products == 0 and done < thetas * (thetas + 1) // 2:
                     yield None
+        yield None
         self.estimator.end_rows(kind, gradient, rss, self.design.functions)
         yield None
 
     def _add_noise(self, noise: Noise, white: White, first: int) -> None:
         share = white.share if self.shares else shares(white)
         with np.errstate(all="ignore"):
-            for one in self.design.noise_of(white.kind):
-                noise.add(one, first, self.design.model.kind[white.kind].thetas, share)
+            for pair in pairs_of(self.design, white.kind):
+                noise.add(pair, first, share)
 
     def _pull(self, white: White, block: slice, score: Float32) -> Stages:
         """The stages of the compensation, the last of which adds it."""
@@ -218,6 +224,7 @@ class Finish:
         """From the rows in the sums to the verdict."""
         estimator = self.estimator
         self.scores.take(estimator.model, estimator.p, score)
+        yield None
         estimator.set_expected(expected)
         yield None
         reason = np.full(score.shape[1], Reason.ACCUMULATED, np.uint8)
@@ -231,13 +238,18 @@ class Finish:
                 break
         estimator.noise_alone = None
         size, group_rss = estimator.size, estimator.group_rss
-        for _ in range(estimator.assessment_stages + 1 + len(estimator.p)):
+        with np.errstate(all="ignore"):
+            self.scores.add(square / free)
+            variance_ratio = group_rss / (free * expected)
+        yield None
+        if not estimator.was_due:
+            yield self.trust.judge(reason, size, estimator.everywhere, variance_ratio, self.trust.estimate)
+            return
+        for _ in range(1 + estimator.assess_solved_stages + len(estimator.p) + 1):
             yield None
         with np.errstate(all="ignore"):
-            candidate, above_noise = estimator.judged()
-            self.scores.add(square / free)
+            candidate, above_noise = estimator.judged_as_solved()
             self._cluster(candidate)
-            variance_ratio = group_rss / (free * expected)
         yield self.trust.judge(reason, size, above_noise, variance_ratio, candidate)
 
     def _cluster(self, candidate: Candidate) -> None:

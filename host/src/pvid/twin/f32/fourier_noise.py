@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import numpy as np
 import numpy.typing as npt
 
-from pvid.settings.fourier import FourierNoise
+from pvid.settings.fourier import FourierDesign32, FourierNoise
 from pvid.twin.f32.fourier_white import White
 from pvid.twin.f32.pattern import PatternModel
 
 Float32 = npt.NDArray[np.float32]
 
-ENTRIES = 1  # of the noise table in a stage
 _F = np.float32
+
+
+def pairs_of(design: FourierDesign32, kind: int) -> list[tuple[FourierNoise, ...]]:
+    """Neighbouring entries of the same two regressors of a kind."""
+    thetas = design.model.kind[kind].thetas
+    groups = groupby(design.noise, key=lambda one: (one.kind, one.a, one.b))
+    return [tuple(of_pair) for (own, a, b), of_pair in groups if own == kind and a < thetas and b < thetas]
 
 
 def shares(white: White) -> Float32:
@@ -47,13 +55,14 @@ class Noise:
             self._c = model.jacobian(p)
         self.s = np.zeros((model.n_p, model.n_p, p.shape[1]), np.float32)
 
-    def add(self, one: FourierNoise, first: int, thetas: int, share: Float32) -> None:
-        """Adds an entry of the noise table, of a kind with so many theta from `first` on."""
-        if one.a >= thetas or one.b >= thetas:
-            return
+    def add(self, pair: tuple[FourierNoise, ...], first: int, share: Float32) -> None:
+        """Adds the entries of two columns, of a kind with theta from `first` on."""
+        one = pair[0]
         model, same = self._model, one.a == one.b
-        whole = (one.factor * share[one.power]) / self._rows
-        own = whole if same else _F(0.5) * whole
+        whole = one.factor * share[one.power]
+        for entry in pair[1:]:
+            whole = whole + entry.factor * share[entry.power]
+        own = (whole if same else _F(0.5) * whole) / self._rows
         pattern = list(enumerate(zip(model.c_row, model.c_column, strict=True)))
         for k, (row, i) in pattern:
             for m, (other, j) in pattern:

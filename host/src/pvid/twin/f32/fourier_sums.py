@@ -11,6 +11,7 @@ from pvid.twin.f32.fourier_step import Values
 Float32 = npt.NDArray[np.float32]
 
 _F = np.float32
+_BLOCK = 8  # steps that are added together
 
 
 def half_sums(channels: Float32, circle: Float32, hop: int, harmonics: int) -> Float32:
@@ -18,15 +19,29 @@ def half_sums(channels: Float32, circle: Float32, hop: int, harmonics: int) -> F
 
     Returns float32 [halves, channels, 2, harmonics]: real and imaginary parts.
     """
-    halves = len(channels) // hop
-    of_halves = channels[: halves * hop].reshape(halves, hop, channels.shape[1], 1, 1)
+    halves, centre = len(channels) // hop, _BLOCK // 2
+    x = channels[: halves * hop].reshape(halves, hop // _BLOCK, _BLOCK, channels.shape[1], 1)
     turn, h = 2 * hop, np.arange(harmonics)
+
+    def factors(steps: int) -> tuple[Float32, Float32]:
+        at = (h * steps) % turn
+        return circle[at + hop // 2], circle[at]
+
     total = np.zeros((halves, channels.shape[1], 2, harmonics), np.float32)
     with np.errstate(all="ignore"):
-        for k in range(hop):
-            at = (h * k) % turn
-            factors = np.stack([circle[at], circle[(at - hop // 2) % turn]])
-            total = total + factors * of_halves[:, k]
+        even, odd = x[:, :, centre], np.zeros((), np.float32)
+        for j in range(1, centre):
+            cosine, sine = factors(j)
+            even = even + cosine * (x[:, :, centre + j] + x[:, :, centre - j])
+            part = sine * (x[:, :, centre + j] - x[:, :, centre - j])
+            odd = part if j == 1 else odd + part
+        cosine, sine = factors(centre)
+        even, odd = even + cosine * x[:, :, 0], odd - sine * x[:, :, 0]
+        for block in range(hop // _BLOCK):
+            cosine, sine = factors(block * _BLOCK + centre)
+            p, q = even[:, block], odd[:, block]
+            total[:, :, 0] = (total[:, :, 0] + cosine * p) - sine * q
+            total[:, :, 1] = (total[:, :, 1] + sine * p) + cosine * q
     return total
 
 

@@ -96,25 +96,39 @@ class White:
     def _leverage(self) -> Float32:
         """Sum of the squares of the directions [parts, lanes]; finds their reflections."""
         rows = self.rows
-        x = (rows.harmonic.astype(np.float32) / _F(rows.cosines - 1))[:, None]
+        x = (rows.harmonic.astype(np.float32) * (_F(1) / _F(rows.cosines - 1)))[:, None]
         scale = self.scale[rows.harmonic]
-        u: Float32 = np.where(np.arange(rows.parts)[:, None] < rows.cosines, scale, x * scale)
-        leverage: Float32 = np.zeros(u.shape, np.float32)
+        lanes = scale.shape[1]
+        leverage: Float32 = np.zeros(scale.shape, np.float32)
+        u, before = scale, np.zeros_like(scale)
+        norm, slope = np.zeros((2, lanes), np.float32), np.zeros((2, lanes), np.float32)
         for k in range(rows.vectors):
-            u = (x * x) * u if k else u
-            for place in range(k):
-                u = self._reflected(place, u)
-            self.reflections.append(np.zeros_like(u))
-            for family in rows.families:
-                own = slice(family.start + k, family.stop)
-                self.reflections[k][own] = _reflection(u[own])
-            u = np.zeros_like(u)
-            for family in rows.families:
-                u[family.start + k] = 1
-            for place in reversed(range(k + 1)):
-                u = self._reflected(place, u)
-            leverage = leverage + u * u
-        return leverage
+            following = np.zeros_like(u)
+            for place, family in enumerate(rows.families):
+                own, square = u[family], x[family] * x[family]
+                if k:
+                    y = (square - slope[place]) * own - norm[place] * before[family]
+                else:
+                    y = own * x[family] if place else own
+                norm[place] = np.sqrt(total(y * y))
+                following[family] = y * (_F(1) / norm[place])
+                part = following[family] * following[family]
+                leverage[family] = leverage[family] + part if k else part
+                slope[place] = total(square * part)
+            u, before = following, u if k else before
+            self.reflections.append(self._reflections_of(u))
+        return np.asarray(leverage, np.float32)
+
+    def _reflections_of(self, u: Float32) -> Float32:
+        """Those of both families that follow from the next direction [parts, lanes]."""
+        v = u
+        for place in range(len(self.reflections)):
+            v = self._reflected(place, v)
+        out: Float32 = np.zeros(v.shape, np.float32)
+        for family in self.rows.families:
+            own = slice(family.start + len(self.reflections), family.stop)
+            out[own] = _reflection(v[own])
+        return out
 
     def _reflected(self, place: int, x: Float32) -> Float32:
         """x [parts, ..., lanes] behind a reflection of both families."""
@@ -170,6 +184,6 @@ def _reflection(x: Float32) -> Float32:
     size, head = np.sqrt(total(x * x)), x[0]
     negative = head < 0
     scale = _F(1) / np.sqrt(size * (size + np.where(negative, -head, head)))
-    v: Float32 = x * scale
-    v[0] = np.where(negative, head - size, head + size) * scale
-    return v
+    v = x.copy()
+    v[0] = np.where(negative, head - size, head + size)
+    return np.asarray(v * scale, np.float32)

@@ -6,6 +6,7 @@ from enum import Enum
 
 import numpy as np
 
+from pvid.settings.fourier import Source
 from pvid.settings.refine import RefineConfig
 from pvid.twin.f32.refine_model import Float32, RefineShape
 from pvid.twin.f32.refine_pass import Signals
@@ -42,6 +43,7 @@ class Front:
         self.droop = (_F(1) - _F(1) / (ratio * ratio)) / _F(24)
         self.to_counts = np.array([_F(one.scale) * (_FULL_SCALE / _F(one.range)) for one in signals], _F)
         self.from_counts = np.array([_F(one.range) / _FULL_SCALE for one in signals], _F)
+        self.is_held = [one.source is Source.HELD for one in signals]
         self.derived = [one.order == 2 for one in signals]
         self.sample = [one.sample for one in signals]
         self.second = None if config.second is None else np.asarray(config.second, _F)
@@ -55,6 +57,7 @@ class Front:
         """pvid_refine_front_reset_f32."""
         self.wait, self.means, self.next, self.referred = self.config.ratio, 0, 0, False
         self.sum = np.zeros(len(self.sample), _F)
+        self.held = np.zeros(len(self.sample), _F)
         self.line: list[list[np.float32]] = [[] for _ in self.sample]
 
     @property
@@ -90,7 +93,9 @@ class Front:
         else:
             self.ring[self.next % RING, signal] = counts(x * self.to_counts[signal])
 
-    def _end_block(self) -> Entry:
+    def _end_block(self, last: Float32) -> Entry:
+        self.sum = np.where(self.is_held, self.sum + _F(0.5) * (self.held - last), self.sum)
+        self.held = last
         if not np.all(np.isfinite(self.sum[: self.inputs])):
             return Entry.BROKEN
         known = self.means >= 2
@@ -114,10 +119,11 @@ class Front:
         given = sample[self.sample]
         if not self.referred:
             self.reference = np.where(self.derived, given, _F(0))
+            self.held = given - self.reference
             self.referred = True
         self.sum = self.sum + (given - self.reference)
         self.wait -= 1
-        return Entry.NOTHING if self.wait > 0 else self._end_block()
+        return Entry.NOTHING if self.wait > 0 else self._end_block(given - self.reference)
 
     def read(self, entry: int) -> Signals:
         """Signals of an entry and the next two; of inputs those of the reach as well."""

@@ -15,6 +15,7 @@ Float32 = npt.NDArray[np.float32]
 class RefineShape:
     """Numbers of refine_shape.h."""
 
+    order: int
     coordinates: int
     inputs: int
     outputs: int
@@ -32,8 +33,8 @@ class RefineShape:
 
     @property
     def states(self) -> int:
-        """q and v."""
-        return 2 * self.coordinates
+        """q, and v of order 2."""
+        return self.order * self.coordinates
 
     @property
     def columns(self) -> int:
@@ -58,7 +59,10 @@ class RefineShape:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Accelerations a [q] and their derivatives K, D [q, q], U [q, inputs], B [moving, q] (that of the skew is 0)."""
+    """Accelerations (order 1: rates) a [q], their derivatives K, D [q, q], U [q, inputs], B [moving, q].
+
+    The row of the skew is 0.
+    """
 
     a: Float32
     K: Float32
@@ -76,7 +80,9 @@ class RefineModel(Protocol):
     def constants(self, r: Float32) -> Float32: ...
     def motion(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32: ...
     def jacobian(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Derivatives: ...
-    def output(self, m: Float32, r: Float32, q: Float32, v: Float32) -> Float32: ...
-    def output_jacobian(self, m: Float32, r: Float32, q: Float32, v: Float32) -> tuple[Float32, Float32, Float32]: ...
+    def output(self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32) -> Float32: ...
+    def output_jacobian(
+        self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32
+    ) -> tuple[Float32, Float32, Float32]: ...
     def chart(self, r: Float32, row: Float32) -> Float32: ...
     def from_p(self, p: Float32) -> Float32: ...

@@ -44,12 +44,17 @@ _OF_POSITION, _OF_VELOCITY = _weights(_POSITION), _weights(_VELOCITY)
 ORDER = len(_OF_POSITION)
 
 
+def _product(a: Float32, b: Float32) -> Float32:
+    """Of two matrices, summed in the order of the core."""
+    total = np.multiply.outer(a[:, 0], b[0])
+    for k in range(1, a.shape[1]):
+        total = total + np.multiply.outer(a[:, k], b[k])
+    return np.asarray(total)
+
+
 def _damped(D: Float32, half: np.float32, x: Float32) -> Float32:
     """x + half D x of columns x [q, n]."""
-    total = np.multiply.outer(D[:, 0], x[0])
-    for k in range(1, len(D)):
-        total = total + np.multiply.outer(D[:, k], x[k])
-    return np.asarray(x + half * total)
+    return np.asarray(x + half * _product(D, x))
 
 
 class Pass:
@@ -104,6 +109,9 @@ class Pass:
             age = (j - self.head) % ORDER
             position = position + _OF_POSITION[age] * self.rate[j]
             velocity = velocity + _OF_VELOCITY[age] * self.rate[j]
+        if self.shape.order == 1:
+            self.state = np.asarray(self.state + h * velocity)
+            return
         x, v = self.state[:q], self.state[q:]
         self.state = np.concatenate([x + h * (v + h * position), v + h * velocity])
 
@@ -146,9 +154,14 @@ class Pass:
         h, q = self.h, self.q
         x, v = self.state[:q], self.state[q:]
         if self.starts == _STARTS:
-            self._push(self._motion(self.state, self._input(signals, 0)))
-            self.last = signals[1][0] - self.model.output(self.constants, r, x, v)
+            u = self._input(signals, 0)
+            self._push(self._motion(self.state, u))
+            self.last = signals[1][0] - self.model.output(self.constants, x, v, u, r)
         u, k0 = self._input(signals, 1), self.rate[self.head]
+        if self.shape.order == 1:
+            self.k1 = self._motion(x + h * k0, u)
+            self.k2 = self._motion(x + h * self.k1, u)
+            return
         self.k1 = self._motion(np.concatenate([x + h * v, v + h * k0]), u)
         self.k2 = self._motion(np.concatenate([x + h * (v + h * k0), v + h * self.k1]), u)
 
@@ -157,6 +170,13 @@ class Pass:
         h2, sixth = _F(2) * h, (_F(2) * h) / _F(6)
         x, v = self.state[:q], self.state[q:]
         u, k0 = self._input(signals, 2), self.rate[self.head]
+        if self.shape.order == 1:
+            k3 = self._motion(x + h2 * k2, u)
+            dx = sixth * ((k0 + _F(2) * (k1 + k2)) + k3)
+            self.end = np.asarray(x + dx)
+            a = self._motion(self.end, u)
+            self.middle = (x + _F(0.5) * dx) + (h2 * _F(0.125)) * (k0 - a)
+            return
         k3 = self._motion(np.concatenate([x + h2 * (v + h * k1), v + h2 * k2]), u)
         mean = k1 + k2
         dx = h2 * (v + sixth * (k0 + mean))
@@ -168,8 +188,8 @@ class Pass:
         rate = ((_F(1.875) * dx) / h2 - _F(0.4375) * (v + v1)) + (h2 * _F(0.03125)) * (a - k0)
         self.middle = np.concatenate([middle, rate])
 
-    def _residuals(self, r: Float32, state: Float32, measured: Float32) -> None:
-        e = measured - self.model.output(self.constants, r, state[: self.q], state[self.q :])
+    def _residuals(self, r: Float32, state: Float32, u: Float32, measured: Float32) -> None:
+        e = measured - self.model.output(self.constants, state[: self.q], state[self.q :], u, r)
         self.mean = np.asarray(self.mean + _F(0.5) * (self.last + e), _F)
         self.last = e
 
@@ -184,27 +204,40 @@ class Pass:
             for j in range(shape.inputs):
                 total = total + found.U[:, j] * rate[j]
             B[-1] = total
+        self.output_column = self.model.output_jacobian(self.constants, x, v, u, r)
+        if shape.order == 1:
+            self._first_order_kick(found.K, B)
+        else:
+            self._second_order_kick(found.K, found.D, B)
+        return found.a
+
+    def _first_order_kick(self, K: Float32, B: Float32) -> None:
+        big = _F(BIG_STEP) * self.h
+        unit = np.eye(self.q, dtype=_F)
+        factor = unit
+        for n in (4, 3, 2):
+            factor = np.asarray((big / _F(n)) * _product(K, factor) + unit)
+        self.kick_q = big * _product(factor, K)
+        self.kick_r = big * _product(factor, B.T)
+
+    def _second_order_kick(self, K: Float32, D: Float32, B: Float32) -> None:
         big = _F(BIG_STEP) * self.h
         g = (big * big) * (_F(1) / _F(12))
-        square = np.multiply.outer(found.K[:, 0], found.K[0])
-        for k in range(1, q):
-            square = square + np.multiply.outer(found.K[:, k], found.K[k])
+        square = _product(K, K)
         half = _F(0.5) * big
-        self.kick_q = _damped(found.D, half, big * (found.K + g * square))
-        self.kick_v = _damped(found.D, half, big * found.D)
-        self.kick_r = _damped(found.D, half, (big * B).T).T
-        self.output_column = self.model.output_jacobian(self.constants, r, x, v)
-        return found.a
+        self.kick_q = _damped(D, half, big * (K + g * square))
+        self.kick_v = _damped(D, half, big * D)
+        self.kick_r = _damped(D, half, (big * B).T)
 
     def _pair(self, r: Float32, signals: Signals, to_middle: bool) -> None:
         starting = self.starts > 0
         u = self._input(signals, 1)
         if starting:
-            self._residuals(r, self.middle, signals[1][1])
+            self._residuals(r, self.middle, u, signals[1][1])
             self._push(self._motion(self.middle, u))
         else:
             self._adams_bashforth()
-            self._residuals(r, self.state, signals[1][1])
+            self._residuals(r, self.state, u, signals[1][1])
             self._push(self._motion(self.state, u))
         u = self._input(signals, 2)
         if starting:
@@ -213,11 +246,26 @@ class Pass:
         else:
             self._adams_bashforth()
         self._push(self._derivatives(r, signals, u) if to_middle else self._motion(self.state, u))
-        self._residuals(r, self.state, signals[1][2])
+        self._residuals(r, self.state, u, signals[1][2])
 
     # ---- columns and rows ----
 
     def _end_big_step(self, weight: Float32) -> None:
+        x, rate = self._first_order_columns() if self.shape.order == 1 else self._second_order_columns()
+        self._end_rows(x, rate, weight)
+
+    def _first_order_columns(self) -> tuple[Float32, Float32]:
+        """The columns over a big step; at its middle."""
+        s, states = self.column, self.shape.states
+        change = np.zeros_like(s)
+        change[states:] = self.kick_r.T
+        for k in range(self.q):
+            change = change + np.multiply.outer(s[:, k], self.kick_q[:, k])
+        self.column = s + change
+        return s + _F(0.5) * change, s
+
+    def _second_order_columns(self) -> tuple[Float32, Float32]:
+        """Likewise; and their rates."""
         shape, q = self.shape, self.q
         half = _F(0.5 * BIG_STEP) * self.h
         s, v = self.column[:, :q], self.column[:, q:]
@@ -229,10 +277,14 @@ class Pass:
                 total = total + self.kick_q[i, k] * x[:, k]
             for k in range(q):
                 total = total + self.kick_v[i, k] * v[:, k]
-            total[shape.states :] = total[shape.states :] + self.kick_r[:, i]
+            total[shape.states :] = total[shape.states :] + self.kick_r[i]
             following[:, i] = total
         rate = _F(0.5) * (v + following)
         self.column = np.concatenate([x + half * following, following], 1)
+        return x, rate
+
+    def _end_rows(self, x: Float32, rate: Float32, weight: Float32) -> None:
+        shape, q = self.shape, self.q
         of_q, of_v, of_r = self.output_column
         for i in range(shape.outputs):
             row = np.zeros(shape.width, _F)

@@ -34,7 +34,7 @@ Reasons = npt.NDArray[np.uint8]
 N_SUMS, WEIGHT = 58, 57
 W, D1, D2 = range(3)
 W_BITS = RATE_BITS + 1
-MANTISSA_BITS, DELTA_BITS, L_BITS, PIVOT_SHIFT, RHS_BITS, SOLUTION_BITS = 28, W_BITS - 2, 29, 20, 27, 28
+MANTISSA_BITS, DELTA_BITS, L_BITS, PIVOT_SHIFT, RHS_BITS, SOLUTION_BITS = 28, W_BITS - 2, 29, 20, 27, 27
 _FEW = 2**16  # of a square after the shift: fewer bits are too few
 _FAR_BITS, _FAR_TIME = 53, 2
 _FORCE_MAX = 2**61
@@ -425,12 +425,13 @@ class KapitzaEstimatorQ31:
         return reason
 
     def _driven(self, system: _System) -> Int:
-        """g F + (1 - g) sum gradient e."""
+        """sum gradient e + g (F - sum gradient e)."""
         if not self.is_rate:
             return system.f
         shift = system.columns + system.of_row + 2 * self.exponent - 30
         fresh = clamp(scale(self.fresh, shift), _FORCE_MAX)
-        both = times_q31(system.f, 2 * self.gain) + times_q31(fresh, 2 * np.minimum(ONE - self.gain, ONE - 1))
+        part = np.minimum(2 * self.gain, 2**31 - 1)
+        both = np.where(self.gain == ONE, system.f, fresh + times_q31(system.f - fresh, part))
         return np.where(self.gain == 0, fresh, both)
 
     def _at_rest(self, system: _System, factor: _Factor) -> Mask:

@@ -171,6 +171,8 @@ class EstimatorQ31:
         self.noise_margin = lane("noise_margin")
         self.dead_zone = lane("dead_zone")
         self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
+        self.noise_table: dict[tuple[int, int], Scaled] = {}
+        self.noise_rows = 0
         self.rss = np.zeros(lanes, np.int64)
         self.group_weight = np.zeros(lanes, np.int64)
         self.expected = scaled(np.zeros(lanes, np.int64), 0)
@@ -437,9 +439,11 @@ class EstimatorQ31:
                 s[a, b] = (c[there] * t[rows[there]]).sum(axis=0)
         return s
 
-    def _above_noise(self, s: Int, c: Int, h: Int, variance: Scaled) -> Mask:
+    def _above_noise(self, s: Int, c: Int, f: Int, h: Int, variance: Scaled) -> Mask:
         """Whether S minus noise_margin times the information of noise of this variance is positive definite."""
         model = self.model
+        if self.noise_rows:
+            return self._above_table(s, f, variance)
         if model.noisy is None:
             return np.ones(self.lanes, np.bool_)
         first, second = model.noisy
@@ -459,12 +463,26 @@ class EstimatorQ31:
                 rest[a, b] = rest[a, b] - (rows[0, b] * t[0] + rows[1, b] * t[1])
         return np.asarray((self.noise_margin == 0) | cholesky.factor(equilibrated_system(rest)[0]).ok)
 
+    def _above_table(self, s: Int, f: Int, variance: Scaled) -> Mask:
+        """The same of the table of noise."""
+        row = scaled(self.row_sd * self.row_sd, -16)
+        tables = scaled(self.sums[-1], -16).over(scaled(np.full(self.lanes, self.noise_rows), 0))
+        much = scaled(self.noise_margin, -16).times(tables).times(variance.over(row))
+        rest = s.copy()
+        for (a, b), noise in self.noise_table.items():
+            rest[a, b] = clamp(s[a, b] - much.times(noise).fixed(-(f[a] + f[b] + 32)), WIDE)
+        return np.asarray((self.noise_margin == 0) | cholesky.factor(equilibrated_system(rest)[0]).ok)
+
+    def unscaled_jacobian(self) -> tuple[Int, Int]:
+        """(c, f): C_ka = c_k 2^f_a."""
+        return self._jacobian(np.zeros((self.model.n_theta, self.lanes), np.int64))
+
     def _commit(self, fallback: tuple[Mask, Int] | None) -> Reasons:
         model = self.model
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        above_noise = self._above_noise(s, c, h, self.expected_variance)
+        above_noise = self._above_noise(s, c, f, h, self.expected_variance)
         prior = in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
         for a in range(model.n_p):
             s[a, a] = s[a, a] + prior[a]
@@ -613,6 +631,6 @@ class EstimatorQ31:
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        above_noise = self._above_noise(s, c, h, variance)
+        above_noise = self._above_noise(s, c, f, h, variance)
         assess_errors(out, s, f, self.start_sd, *root_of(*variance.times(scaled(self.correlation, -16))))
         return out, above_noise

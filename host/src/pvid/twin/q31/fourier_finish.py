@@ -10,19 +10,22 @@ from pvid.base.errors import PvidError
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierKind
 from pvid.settings.fourier_q31 import FourierDesignQ31
-from pvid.twin.q31 import fourier_white
+from pvid.twin.q31 import fourier_noise, fourier_white
 from pvid.twin.q31.estimator import ROW_LIMIT, EstimatorQ31
 from pvid.twin.q31.gate import GateQ31
 from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
 from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.trust import TrustQ31
-from pvid.twin.record import of_all_lanes
+from pvid.twin.record import Mask, of_all_lanes
 from pvid.twin.weak_schedule import Work
 
 _ENTRIES_PER_STAGE = 4
 _HARMONICS_PER_STAGE = 2
 _ROOTS_PER_STAGE = 4
+_UNITS_PER_STAGE = 2
 _RESIDUALS_PER_STAGE = 2
+_SHARES_PER_STAGE = 1
+_NOISE_WINDOWS = 16
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
 _SMALL_STEP = 2**15
@@ -31,6 +34,12 @@ _MOST = 2**31 - 1
 
 def _parts(count: int, few: int) -> int:
     return max(-(-count // few), 1)
+
+
+def _noise_stages(design: FourierDesignQ31) -> int:
+    """Of a kind, where the noise is computed anew."""
+    harmonics = design.highest + 1
+    return design.power + _parts(harmonics, _SHARES_PER_STAGE) + 2 + len(design.noise)
 
 
 def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int = 0) -> int:
@@ -42,7 +51,7 @@ def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int =
         + _parts(harmonics, _HARMONICS_PER_STAGE)
         + _parts(harmonics, _ROOTS_PER_STAGE)
         + design.power
-        + 1
+        + _parts(harmonics, _UNITS_PER_STAGE)
         + harmonics
         + kind.columns
         + project
@@ -52,9 +61,10 @@ def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int =
     )
 
 
-def number_of_stages(design: FourierDesignQ31, iterations: int, estimator: EstimatorQ31) -> int:
-    """Of a window."""
-    rows = sum(_stages_before_gate(design, kind) + _END_PARTS + design.functions for kind in design.model.kind)
+def number_of_stages(design: FourierDesignQ31, iterations: int, estimator: EstimatorQ31, uses_noise: bool) -> int:
+    """Of a window, at most."""
+    rows = len(design.model.kind) * (_noise_stages(design) if uses_noise else 0)
+    rows += sum(_stages_before_gate(design, kind) + _END_PARTS + design.functions + 1 for kind in design.model.kind)
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
     return rows + solves + estimator.assessment_stages + 1
 
@@ -81,6 +91,31 @@ def _ratio(rss: Int, freedom: Int, expected: Scaled) -> Scaled:
     return scaled(rss, 0).over(scaled(freedom, 0).times(expected))
 
 
+def _of_kind(pull: Sequence[Scaled], own: slice, used: Mask) -> Scaled:
+    """What the noise takes from b of a kind [n_theta, lanes]; nothing of other kinds and in lanes without rows."""
+    places = range(own.start, own.stop)
+    m = [np.where(used, one.m, 0) if j in places else np.zeros_like(one.m) for j, one in enumerate(pull)]
+    return Scaled(np.stack(m), np.stack([one.e if j in places else np.zeros_like(one.e) for j, one in enumerate(pull)]))
+
+
+class NoiseOfWindows:
+    """When the noise is computed anew, and what was found."""
+
+    def __init__(self, design: FourierDesignQ31, estimator: EstimatorQ31, compensation: bool) -> None:
+        self.known = fourier_noise.Known(estimator)
+        self.is_used = fourier_noise.is_used(design, estimator.noise_margin, compensation)
+        self.compensates = compensation and bool(design.noise)
+        self.size = np.zeros(estimator.lanes, np.int64)  # of the last step
+        self._age = _NOISE_WINDOWS
+
+    def begin(self) -> bool:
+        """A window; whether it is computed in it."""
+        large = of_all_lanes(self.size > _SMALL_STEP)
+        renewed = self.is_used and (self._age >= _NOISE_WINDOWS or large)
+        self._age = 1 if renewed else self._age + self.is_used
+        return renewed
+
+
 def stages(
     window: Int,
     design: FourierDesignQ31,
@@ -89,6 +124,7 @@ def stages(
     trust: TrustQ31,
     gates: Sequence[GateQ31],
     formats: tuple[Sequence[int], int],
+    noise: NoiseOfWindows,
 ) -> Work:
     """Processes a window, S_h [channels, H + 1, 2]; yields the reason to report [lanes], or None, after each stage.
 
@@ -97,12 +133,20 @@ def stages(
     lanes = estimator.lanes
     expected = scaled(estimator.row_sd * estimator.row_sd, -16)
     sums = np.broadcast_to(window, (lanes, *window.shape))
+    renewed, known = noise.begin(), noise.known
     used, first = 0, 0
     free = np.zeros(lanes, np.int64)
     for place, kind in enumerate(design.model.kind):
         own = slice(first, first + kind.thetas)
         theta = scaled(estimator.theta[own], -integers(estimator.theta_bits[own])[:, np.newaxis])
-        made = fourier_white.columns(fourier_white.white(design, place, theta), place, sums)
+        white = fourier_white.white(design, place, theta)
+        if renewed:
+            if not place:
+                known.begin(design)
+            known.take(white, design, place, first, theta, formats)
+            for _ in range(_noise_stages(design)):
+                yield None
+        made = fourier_white.columns(white, place, sums)
         n, y = _rows(made, first, *formats)
         first += kind.thetas
         live = _of_all_lanes(made.live)
@@ -130,11 +174,15 @@ def stages(
         for k in range(live, design.functions):
             added = estimator.take_row(n[k], innovations[k], ~saturated, place)
             yield None if (added == Reason.ACCUMULATED).all() else added
+        if noise.compensates:
+            estimator.add_to_b(_of_kind(known.pull, own, ~saturated))
+        yield None
         used += 1
         free = free + freedom
     if not used:
         return
-    estimator.set_expected(expected)
+    sensors = known.expected(expected, len(design.model.kind))
+    estimator.set_expected(sensors)
     reason = np.full(lanes, Reason.ACCUMULATED, np.uint8)
     for iteration in range(iterations):
         fallback = trust.fallback if iteration == 0 else None
@@ -144,9 +192,9 @@ def stages(
                 reason = solved
         if not estimator.was_due or of_all_lanes(estimator.size <= _SMALL_STEP):
             break
-    size = estimator.size
+    size = noise.size = estimator.size
     for _ in range(estimator.assessment_stages):
         yield None
     candidate, above_noise = estimator.judged()
-    ratio = _ratio(estimator.group_rss, free, expected).fixed(_VARIANCE_RATIO_BITS)
+    ratio = _ratio(estimator.group_rss, free, sensors).fixed(_VARIANCE_RATIO_BITS)
     yield trust.judge(reason, size, above_noise, ratio, candidate)

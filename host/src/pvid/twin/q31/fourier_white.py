@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.settings.fourier_q31 import FourierDesignQ31
 from pvid.twin.q31.integer import Int, bit_length, round_shift
@@ -19,7 +20,7 @@ _SUM_BITS = 30  # of the sums of a channel
 _PRODUCT_DOWN = 33
 _NEWTON_STEPS = 4
 _NONE = -(2**31)  # exponent where there is no term
-_FLOOR_BITS = 20
+_FLOOR_BITS = 33
 _LEAST_EXPONENT = -200
 _KEPT_BITS = 20
 _SQUARE_DOWN = 16
@@ -66,13 +67,14 @@ def mirrored(v: Int, x: Int) -> Int:
 
 @dataclass(frozen=True)
 class White:
-    """Of a kind: 1 / sqrt(D_h) = gain 2^exponent, and the reflections.
+    """Of a kind: 1 / sqrt(D_h) = gain 2^exponent of each harmonic, and the reflections.
 
     Attributes
     ----------
     design : of the weak form
     gain : [H + 1, lanes]
-    exponent : [lanes]
+    exponent : [H + 1, lanes]
+    weight : c_j [powers][lanes]
     mirrors : of the real parts, of the imaginary parts [n/2][entries, lanes]
     """
 
@@ -80,6 +82,7 @@ class White:
     gain: Int
     exponent: Int
     mirrors: tuple[list[Int], list[Int]]
+    weight: list[Scaled]
 
     @property
     def cosines(self) -> int:
@@ -101,20 +104,25 @@ def _reflected(mirrors: Sequence[Int], x: Int) -> Int:
     return found
 
 
-def _weight(gain: Int, highest: int, order: int, h: int) -> Int:
-    """(h / H)^order / sqrt(D_h) [lanes]."""
+def _weight(gain: Int, order: int, h: int) -> Int:
+    """h^order / sqrt(D_h) [lanes], but for the exponents of h."""
     weight: Int = gain[h]
     for _ in range(order):
-        weight = (weight * (h * (_ONE // highest))) >> 30
+        weight = (weight * (h << (30 - h.bit_length()))) >> 30
     return weight
+
+
+def _exponent(exponent: Int, order: int, h: int) -> Int:
+    """Of that [lanes]."""
+    return np.asarray(exponent[h] + order * h.bit_length())
 
 
 def _number(x: int, like: Int) -> Scaled:
     return scaled(np.full_like(like, x), 0)
 
 
-def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]:
-    """1 / sqrt(D_h) [H + 1, lanes] as a block with its exponent [lanes], at theta of the kind [thetas, lanes]."""
+def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int, list[Scaled]]:
+    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, and c_j [powers], at theta of the kind [thetas, lanes]."""
     like = theta.m[0]
     thetas = design.model.kind[kind].thetas
     powers = design.powers
@@ -146,17 +154,19 @@ def spectrum(design: FourierDesignQ31, kind: int, theta: Scaled) -> tuple[Int, I
     out = []
     for one_h in found:
         out.append(inverse_root(pick(least.exceeds(one_h), least, one_h)))
-    exponents = np.stack([one.e for one in out])
-    exponent = exponents.max(axis=0)
-    return np.stack([one.m for one in out]) >> np.minimum(exponent - exponents, 63), exponent
+    return np.stack([one.m for one in out]), np.stack([one.e for one in out]), weight
 
 
-def _mirrors(design: FourierDesignQ31, gain: Int, first: int, count: int) -> list[Int]:
+def _mirrors(design: FourierDesignQ31, gain: Int, exponent: Int, first: int, count: int) -> list[Int]:
     """Of a family of `count` harmonics from `first` on."""
     found: list[Int] = []
     for k in range(design.power // 2):
         order = 2 * k + (first > 0)
-        vector = np.stack([_weight(gain, design.highest, order, h) for h in range(first, first + count)])
+        harmonics = range(first, first + count)
+        exponents = np.stack([_exponent(exponent, order, h) for h in harmonics])
+        largest = exponents[1 if order and not first else 0 :].max(axis=0)
+        below = np.clip(largest - exponents, 0, 63)
+        vector = np.stack([_weight(gain, order, h) for h in harmonics]) >> below
         rest = _reflected(found, block(vector)[0])[k:]
         found.append(mirror_of(block(rest)[0]))
     return found
@@ -164,10 +174,13 @@ def _mirrors(design: FourierDesignQ31, gain: Int, first: int, count: int) -> lis
 
 def white(design: FourierDesignQ31, kind: int, theta: Scaled) -> White:
     """At theta of the kind [thetas, lanes]."""
-    gain, exponent = spectrum(design, kind, theta)
+    gain, exponent, weight = spectrum(design, kind, theta)
     cosines = design.highest + 1
-    mirrors = (_mirrors(design, gain, 0, cosines), _mirrors(design, gain, 1, design.parts - cosines))
-    return White(design, gain, exponent, mirrors)
+    mirrors = (
+        _mirrors(design, gain, exponent, 0, cosines),
+        _mirrors(design, gain, exponent, 1, design.parts - cosines),
+    )
+    return White(design, gain, exponent, mirrors, weight)
 
 
 def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
@@ -179,27 +192,30 @@ def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
     own = design.model.kind[kind]
     terms = [t for t in range(own.first, own.end) if design.model.term[t].column == place and design.factor[t][0]]
     lanes = window.shape[0]
-    lifts, exponents = {}, [np.full(lanes, _NONE)]
-    for t in terms:
-        sums = np.abs(window[:, design.model.term[t].channel])
-        length = bit_length(np.bitwise_or.reduce(np.bitwise_or.reduce(sums, axis=-1), axis=-1))
-        lifts[t] = np.where((length == 0) | (length > _SUM_BITS), 0, _SUM_BITS - length)
-        exponents.append(design.factor[t][1] - lifts[t])
-    top = np.max(exponents, axis=0)
-    total = np.zeros((design.parts, lanes), np.int64)
+    found: list[
+        tuple[int, int, Int, Int, npt.NDArray[np.bool_]]
+    ] = []  # term, harmonic, bits that its sums are lifted, exponent, in use
     for t in terms:
         term = design.model.term[t]
+        length = bit_length(np.bitwise_or.reduce(np.abs(window[:, term.channel]), axis=-1))
+        for h in range(1 if term.order else 0, made.cosines):
+            lift = np.maximum(_SUM_BITS - length[:, h], 0)
+            exponent = design.factor[t][1] - lift + _exponent(made.exponent, term.order, h)
+            found.append((t, h, lift, np.where(length[:, h] > 0, exponent, _NONE), length[:, h] > 0))
+    top = np.max([np.full(lanes, _NONE), *(one[3] for one in found)], axis=0)
+    total = np.zeros((design.parts, lanes), np.int64)
+    for t, h, lift, exponent, used in found:
+        term = design.model.term[t]
         negative = (term.order % 4 >= 2, (term.order + 1) % 4 >= 2)
-        below = top - (design.factor[t][1] - lifts[t])
-        for h in range(made.cosines):
-            whole = (_weight(made.gain, design.highest, term.order, h) * design.factor[t][0]) >> 30
-            weight = np.where(below < _SUM_BITS, whole >> np.minimum(below, 63), 0)
-            for part in range(2 if h and made.cosines + h <= design.parts else 1):
-                s = window[:, term.channel, h, (part + term.order) % 2] << lifts[t]
-                place_of = h if part == 0 else made.cosines + h - 1
-                total[place_of] += (s * (-weight if negative[part] else weight)) >> _PRODUCT_DOWN
-    x, exponent = block(total)
-    return x, np.where(top > _NONE, top + made.exponent + 30 + _PRODUCT_DOWN, 0) + exponent
+        below = top - exponent
+        whole = (_weight(made.gain, term.order, h) * design.factor[t][0]) >> 30
+        weight = np.where(used & (below < _SUM_BITS), whole >> np.clip(below, 0, 63), 0)
+        for part in range(2 if h and made.cosines + h <= design.parts else 1):
+            s = window[:, term.channel, h, (part + term.order) % 2] << lift
+            place_of = h if part == 0 else made.cosines + h - 1
+            total[place_of] += (s * (-weight if negative[part] else weight)) >> _PRODUCT_DOWN
+    x, shift = block(total)
+    return x, np.where(top > _NONE, top + 30 + _PRODUCT_DOWN, 0) + shift
 
 
 def square(x: Int) -> Int:

@@ -1,0 +1,105 @@
+/* pvid/text.h. Printed by tools/print_enums.py from pvid/status.h: do not edit. */
+#include "pvid/text.h"
+
+#include <stddef.h>
+
+#if PVID_TEXTS
+
+/* clang-format off */
+static const char *const reasons[] = {
+    "updated",
+    "warming up",
+    "accumulated",
+    "held not excited",
+    "held pivot",
+    "rejected not finite",
+    "rejected outlier",
+    "rejected saturated",
+    "held uncertain",
+    "held out of range",
+    "misfit",
+    "held frozen",
+    "not ready",
+    "held searching",
+    "held block",
+    "held disagrees",
+};
+
+static const char *const statuses[] = {
+    "ok",
+    "bad model: NULL, larger than the PVID_MAX_ bounds, or its kinds do not divide theta",
+    "bad sample rate: not finite or outside 1e-3..1e6 Hz",
+    "bad bank: weights of a bank: NULL, or one that is not finite",
+    "bad length: l1 not finite or not positive",
+    "bad start: start not finite, not positive for a positive parameter, or out of bounds",
+    "bad start sd: not finite or not positive",
+    "bad bounds: not finite, lower >= upper, or lower <= 0 for a positive parameter",
+    "bad row sd: not finite or not positive",
+    "bad update rate: not finite or outside 1e-6..1e6 Hz",
+    "bad forgetting: not finite, negative, or shorter than 4 updates",
+    "bad feedback: not finite or negative",
+    "bad law: not one of pvid_law",
+    "bad divider: 0",
+    "bad step limit: not finite or outside (0, 0.9]",
+    "bad kappa min: not finite or outside [0, 1)",
+    "bad correlation: not finite or below 1",
+    "bad drive min: not finite or negative; q31: or too large",
+    "bad row weight: not finite or outside (0, 1], or not 1 for a model with its own accumulate",
+    "bad design: the design or a table is NULL, or a table is not finite or could overflow",
+    "bad iterations: outside 1..PVID_MAX_ITERATIONS, or too many for the window's hop",
+    "bad noise margin: not finite or outside 0..1e6",
+    "bad publish kappa: kappa_min of trust.h not finite or outside [0, 1)",
+    "bad se max: not finite or not positive",
+    "bad misfit max: not finite, or neither 0 nor at least 1",
+    "bad pivot noise: not finite or negative",
+    "bad angle limit: not finite or negative",
+    "bad angle: full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or friction without zero_unknown or with too small bounds",
+    "bad gate sigmas: not finite, or neither 0 nor 2..1e3",
+    "bad gate patience: not finite or outside 0..1e12 s",
+    "bad dead zone: not finite or outside 0..100",
+    "bad half: of a bank: below 2, or a window over PVID_MAX_WINDOW for every stride",
+    "bad stride: of a bank: 0, or a window with its block over PVID_MAX_WINDOW",
+    "bad centre: of a q31 bank: outside 1..2^30",
+    "bad taps: of a design: even, or outside 5..PVID_MAX_TAPS",
+    "bad decimation: of a design: outside 1..PVID_MAX_DECIMATION",
+    "bad window: of a design: even, or outside 9..PVID_MAX_WEAK_WINDOW",
+    "bad functions: of a design: outside 4..PVID_MAX_FUNCTIONS",
+    "bad lag: of a design: 0",
+    "bad overlap: of a design: not finite or below 1",
+    "bad full scale: phi_max, y_max or u_max of a q31 bank or design: not positive, too large, or too large for the weights",
+    "bad shift: a shift of a q31 bank, row or design: beyond 64 bits, or too small for full scale",
+    "bad u multiplier: of the q31 strong form: not positive",
+    "bad drive ticks: of the q31 strong form: outside 1..2^30",
+    "bad format: p_bits, n_bits or y_bits of a q31 estimator: outside -64..64",
+    "bad renewal: of trust.h: not finite, or neither 0 nor 0.01..1e3",
+    "bad pointer: the object, the configuration or the bank is NULL",
+};
+/* clang-format on */
+
+const char *pvid_reason_text(pvid_reason reason)
+{
+    const size_t place = (size_t)reason;
+    return (place < (sizeof reasons / sizeof reasons[0])) ? reasons[place] : "unknown reason";
+}
+
+const char *pvid_status_text(pvid_status status)
+{
+    const size_t place = (size_t)status;
+    return (place < (sizeof statuses / sizeof statuses[0])) ? statuses[place] : "unknown status";
+}
+
+#else
+
+const char *pvid_reason_text(pvid_reason reason)
+{
+    (void)reason;
+    return "";
+}
+
+const char *pvid_status_text(pvid_status status)
+{
+    (void)status;
+    return "";
+}
+
+#endif

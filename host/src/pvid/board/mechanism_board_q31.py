@@ -1,0 +1,343 @@
+"""A board that identifies a described mechanism by the weak engine in fixed point; as mechanism_board."""
+
+from __future__ import annotations
+
+import secrets
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.board.stream_image import StreamImage, c_string
+from pvid.board.stream_rig import SLOWEST
+from pvid.codegen import files_fourier_q31
+from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.fourier_q31 import JetReaches, fixed_fourier
+from pvid.core.native import Native
+from pvid.core.sizes import raised
+from pvid.design.c_tables import float_literal
+from pvid.design.fourier_q31 import circle_of
+from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
+from pvid.link.names import BoardNames
+from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording
+from pvid.run.engine_design_q31 import (
+    FixedEngine,
+    engine_for_recording,
+    engine_for_simulated_rig,
+    engine_of_parts,
+)
+from pvid.run.mechanism import model_of
+from pvid.settings.fourier_q31 import (
+    FourierConfigQ31,
+    FourierDesignQ31,
+    FourierFilterQ31,
+    FourierFormatQ31,
+    FourierNoiseQ31,
+    Rescale,
+)
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
+from pvid.setup.fourier_sizes import sizes_of_q31
+from pvid.sim.simulated_run import RigSimulation
+from pvid.twin.fourier_q31 import FourierTwinQ31
+
+_COMMAND = "pvid log"
+_PER_PARAMETER = ("start", "start_sd", "lower", "upper")
+_SINGLE = ("row_sd", "forgetting_groups", "gain", "divider")
+_COMPUTED = ("model", "circle", "units", "margins")  # of a design: not in the text
+_WIDTH = 16  # entries a line
+
+
+@dataclass(frozen=True, eq=False)
+class MechanismBoardQ31:
+    """What a stream image is made for.
+
+    Attributes
+    ----------
+    rig : of the mechanism
+    engine : functions, settings and tables
+    recording : what the board's sensors count, int32 [ticks, samples]; empty where the board has sensors of its own
+    """
+
+    configure_frame = ConfigureQ31
+    matrix = "correlation"  # of an estimate
+    rig: MechanismRig
+    engine: FixedEngine
+    recording: npt.NDArray[np.int32]
+
+    @classmethod
+    def of_recording(cls, rig: MechanismRig, recording: Recording) -> MechanismBoardQ31:
+        """As MechanismBoard.of_recording."""
+        recording.refuse_damaged()
+        whole = recording.whole()
+        engine = engine_for_recording(model_of(rig), whole)
+        return cls(rig, engine, engine.counts_of(whole.signals))
+
+    @classmethod
+    def of_shipped_rig(cls, name: str) -> MechanismBoardQ31:
+        """As MechanismBoard.of_shipped_rig."""
+        simulated = simulated_rig(name)
+        rig = MechanismRig(name, simulated.sample_rate, known=simulated.knowns)
+        compiled = model_of(rig)
+        engine = engine_for_simulated_rig(compiled)
+        return cls(rig, engine, engine.counts_of(RigSimulation.of(compiled, simulated).run()))
+
+    def __post_init__(self) -> None:
+        if not self.engine.sample_rate >= SLOWEST:
+            raise PvidError(f"the sample rate is {self.engine.sample_rate:g} Hz, and a board streams at 1 Hz and more")
+
+    @property
+    def config(self) -> FourierConfigQ31:
+        """Settings and tables."""
+        return self.engine.config
+
+    @property
+    def names(self) -> BoardNames:
+        """What the board says about itself."""
+        compiled = self.engine.compiled
+        units = {one.name: one.unit for one in compiled.signals}
+        return BoardNames(
+            self.engine.name,
+            tuple((name, units[name]) for name in self.engine.sample_names),
+            tuple((one.name, one.unit) for one in compiled.unknowns),
+            self.engine.lsb,
+        )
+
+    @property
+    def p_names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(name for name, _ in self.names.parameters)
+
+    @property
+    def sample_rate(self) -> float:
+        """Ticks a second."""
+        return self.engine.sample_rate
+
+    @property
+    def without_recording(self) -> MechanismBoardQ31:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.int32]:
+        """Counts [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.int32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Count.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native_q31(self.engine.made, self.engine.parameters, self.engine.config).identifier()
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
+
+    @property
+    def _sizes(self) -> dict[str, int]:
+        model = self.engine.parameters.model
+        return sizes_of_q31(self.config.design, model.n_p, len(model.c_row))
+
+    @property
+    def stream_image(self) -> StreamImage:
+        """Headers, generated C and sizes."""
+        engine, name, sizes = self.engine, self.engine.name, self._sizes
+        code = {
+            f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, _COMMAND),
+            f"{name}_weak_q31.c": files_fourier_q31.source(engine.made, engine.parameters, _COMMAND),
+            "stream_tables.h": files_fourier_q31.design_header(self.config, name, sizes, _COMMAND, []),
+        }
+        units = ", ".join(float_literal(np.float32(2.0**-bits)) for bits in engine.parameters.p_bits)
+        macros = [
+            f"#define STREAM_CORE {int(Core.Q31)}",
+            f"#define STREAM_FORM {int(Form.FOURIER)}",
+            f"#define STREAM_CONFIG {name}_config_q31",
+            f"#define STREAM_N_P {len(engine.parameters.p_bits)}u",
+            f"#define STREAM_SAMPLES {self.config.design.model.samples}u",
+            f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
+            "#define STREAM_PHI_LSB 0.0f",
+            "#define STREAM_Y_LSB 0.0f",
+            f"#define STREAM_P_UNIT {{{units}}}",
+            f"#define STREAM_NAMES {c_string(self.names.text)}",
+        ]
+        return StreamImage(
+            number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
+            macros=macros,
+            files={**code, "stream_recording.h": _recording(self.recording)},
+            core="q31",
+            form="fourier",
+            identifier="fourier_q31",
+            sensor="sensor_recording.c",
+            sizes={macro: str(value) for macro, value in raised(sizes).items()},
+        )
+
+    def configure(
+        self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC, first_tick: int = 0
+    ) -> Configuration:
+        """The frame that configures a board whose image has these `settings`, with a new session number."""
+        own = self.config.estimator
+        places: dict[str, Any] = {
+            name: (*getattr(own, name), *[0] * (MAX_P - len(own.start))) for name in _PER_PARAMETER
+        }
+        return ConfigureQ31(
+            session=secrets.randbelow(2**32 - 1) + 1,
+            settings=settings,
+            form=int(Form.FOURIER),
+            source=int(source),
+            hash_every=hash_every,
+            estimate_every=estimate_every,
+            phi_offset=0,
+            y_offset=0,
+            first_tick=first_tick,
+            **places,
+            **{name: getattr(own, name) for name in _SINGLE},
+        )
+
+    def twin_of(self, frame: Configuration) -> FourierTwinQ31:
+        """The twin with the values of a Configure frame.
+
+        Raises
+        ------
+        PvidError
+            For one of the other core.
+        """
+        if not isinstance(frame, self.configure_frame):
+            raise PvidError("the board's image contains another core than the log's settings")
+        own = self.config.estimator
+        places: dict[str, Any] = {name: tuple(getattr(frame, name)[: len(own.start)]) for name in _PER_PARAMETER}
+        single = {name: getattr(frame, name) for name in _SINGLE}
+        config = replace(self.config, estimator=replace(own, **places, **single))
+        return FourierTwinQ31(config, self.engine.parameters.model)
+
+    def text(self) -> str:
+        """The rig file with the engine's settings, for a log; `of_tables` gives the same board back."""
+        lines = [f"{name} = {_written(value)}" for name, value in _flat(self.engine).items()]
+        return "\n".join([self.rig.text(), "[engine]", *lines, ""])
+
+    @classmethod
+    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoardQ31:
+        """From the rig and the table `engine` of the text of a log.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, IndexError
+            Where it is damaged.
+        """
+        compiled = model_of(rig)
+        functions = fourier_functions_of(compiled)
+        of_jets = dict(zip(functions.jet_names, map(float, engine["jet_reach"]), strict=True))
+        made = fixed_fourier(functions, JetReaches(run_s=float(engine["run_s"]), of=of_jets))
+
+        def part(name: str) -> dict[str, Any]:
+            keys = {key: value for key, value in engine.items() if key.startswith(f"{name}_")}
+            return {key.removeprefix(f"{name}_"): _tuples(value) for key, value in keys.items()}
+
+        design = part("design")
+        kinds = {"filter": _filter, "run": _rescale, "format": _format, "noise": _noise}
+        design |= {key: tuple(make(one) for one in design[key]) for key, make in kinds.items()}
+        tables = FourierDesignQ31(model=made.model, circle=circle_of(design["hop"]), units=(), margins={}, **design)
+        config = FourierConfigQ31(
+            design=tables,
+            estimator=EstimatorConfigQ31(**part("estimator")),
+            trust=TrustConfigQ31(**part("trust")),
+            gate=GateConfigQ31(**part("gate")),
+            **{
+                one.name: _tuples(engine[one.name])
+                for one in fields(FourierConfigQ31)
+                if one.name in engine and one.name not in ("design", "estimator", "trust", "gate")
+            },
+        )
+        own = engine_of_parts(compiled, made, config, float(engine["sample_rate"]))
+        return cls(rig, own, np.zeros((0, tables.model.samples), np.int32))
+
+
+def _recording(counts: npt.NDArray[np.int32]) -> str:
+    rows = [f"    {{{', '.join(map(str, row))}}}," for row in counts.tolist()]
+    return "\n".join(
+        [
+            "/* Generated by pvid.board.mechanism_board_q31: do not edit. */",
+            "#ifndef STREAM_RECORDING_H",
+            "#define STREAM_RECORDING_H",
+            "",
+            "#define STREAM_PUT pvid_put_i32",
+            f"#define RECORDED_TICKS {len(counts)}u",
+            f"static const int32_t recorded[RECORDED_TICKS][{counts.shape[1]}] = {{",
+            *rows,
+            "};",
+            "",
+            "#endif",
+            "",
+        ]
+    )
+
+
+# ---- the text of the settings: integers, and two reaches that the formats follow from
+
+
+def _flat(engine: FixedEngine) -> dict[str, Any]:
+    config = engine.config
+    parts: dict[str, Any] = {
+        "estimator": config.estimator,
+        "trust": config.trust,
+        "gate": config.gate,
+        "design": config.design,
+    }
+    found: dict[str, Any] = {
+        "core": "q31",
+        "sample_rate": engine.sample_rate,
+        "run_s": engine.made.run_s,
+        "jet_reach": engine.made.reaches,
+    }
+    found |= {one.name: getattr(config, one.name) for one in fields(config) if one.name not in parts}
+    for part, owner in parts.items():
+        names = (one.name for one in fields(owner) if part != "design" or one.name not in _COMPUTED)
+        found |= {f"{part}_{name}": getattr(owner, name) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _written(value: Any) -> str:
+    match value:
+        case bool():
+            return str(value).lower()
+        case str():
+            return f'"{value}"'
+        case FourierFilterQ31():
+            one = value.rescale
+            return _written([value.bits, one.down, one.shift, one.multiplier, *value.weights.tolist()])
+        case Rescale() | FourierFormatQ31():
+            return _written([getattr(value, one.name) for one in fields(value)])
+        case FourierNoiseQ31():
+            return _written([value.kind, value.power, value.a, value.b, *value.factor])
+        case tuple() | list():
+            words = [_written(one) for one in value]
+            rows = [", ".join(words[k : k + _WIDTH]) for k in range(0, len(words), _WIDTH)]
+            together = ",\n".join(rows)
+            return f"[{together}]"
+        case _:
+            return repr(value)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(one) for one in value) if isinstance(value, list | tuple) else value
+
+
+def _filter(given: tuple[int, ...]) -> FourierFilterQ31:
+    bits, down, shift, multiplier, *weights = given
+    return FourierFilterQ31(np.array(weights, np.int32), bits, Rescale(down, shift, multiplier))
+
+
+def _rescale(given: tuple[int, ...]) -> Rescale:
+    return Rescale(*given)
+
+
+def _format(given: tuple[int, ...]) -> FourierFormatQ31:
+    return FourierFormatQ31(*given)
+
+
+def _noise(given: tuple[int, ...]) -> FourierNoiseQ31:
+    kind, power, a, b, m, e = given
+    return FourierNoiseQ31(kind, power, a, b, (m, e))

@@ -1,0 +1,161 @@
+"""What one recording of a fleet gives: its identification, the verification of a log, or why there is none."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from pvid.api.identify import identify
+from pvid.base.errors import PvidError
+from pvid.base.version import __version__
+from pvid.base.wording import reason
+from pvid.board.mechanism_board import board_of
+from pvid.log.file import Segment
+from pvid.log.reader import LogReader
+from pvid.log.rig import LOG_SUFFIX, engine_text_of_log, hello_of_log, rig_of_log
+from pvid.log.verify import Verdict, Verifier
+
+_PIECE = 1 << 20
+_NS = 1e-9
+EQUAL = "equal"
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of every recording; as in `pvid.identify`.
+
+    Attributes
+    ----------
+    verify : whether a log is computed again with the twin, bit for bit
+    """
+
+    model: str | None = None
+    rig: str | None = None
+    columns: str | None = None
+    core: Literal["f32", "q31", "f64"] | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+    verify: bool = True
+
+    def key(self, path: Path) -> str:
+        """Sixteen digits that change with the recording's content, the rig file beside it, the question or the version.
+
+        Raises
+        ------
+        OSError
+            When it cannot be read.
+        """
+        digest = hashlib.sha256(repr((__version__, self, path.name)).encode())
+        others = [Path(one) for one in (self.model, self.rig) if one is not None]
+        for one in (path, path.with_suffix(".toml"), *others):
+            digest.update(b"\0")
+            if one.is_file():
+                with one.open("rb") as file:
+                    while piece := file.read(_PIECE):
+                        digest.update(piece)
+        return digest.hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A recording's.
+
+    Attributes
+    ----------
+    key : of its content and the question
+    path : as it was given
+    board : USB serial number of the board that sent a log, else its name and folder; of a run its folder
+    began : seconds since 1970 of a log's first segment; of a run the time of its file
+    samples : that were identified
+    identified, status, warning : as in pvid.Result; None where the recording was refused
+    verified : of a log: EQUAL, or the first difference, or why it was not; None: not asked, or no log
+    failure : why there is no result; None: there is one
+    parameters : name -> (value, standard error, unit); empty where nothing was identified
+    took : seconds of work
+    """
+
+    key: str
+    path: str
+    board: str
+    began: float
+    samples: int | None = None
+    identified: bool | None = None
+    status: str | None = None
+    warning: str | None = None
+    verified: str | None = None
+    failure: str | None = None
+    parameters: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
+    took: float = 0.0
+
+
+def row_of(path: str, question: Question) -> Row:
+    """Identifies a recording, and verifies it if it is a log; whatever it contains, there is a row."""
+    start = time.monotonic()
+    place = Path(path)
+    key = ""
+    try:
+        key = question.key(place)
+        board, began = _origin(place)
+    except (OSError, PvidError) as error:
+        told = reason(error) if isinstance(error, OSError) else str(error)
+        return Row(key, path, str(place.parent), 0.0, failure=told, took=time.monotonic() - start)
+    try:
+        result = identify(
+            place,
+            model=question.model,
+            rig=question.rig,
+            columns=question.columns,
+            core=question.core,
+            settings=question.settings,
+        )
+    except (PvidError, OSError) as error:
+        told = reason(error) if isinstance(error, OSError) else str(error)
+        return Row(key, path, board, began, failure=told, took=time.monotonic() - start)
+    return Row(
+        key,
+        path,
+        board,
+        began,
+        result.details.get("samples", result.details.get("ticks")),
+        result.identified,
+        result.status,
+        result.warning,
+        _verified(place) if question.verify and place.suffix == LOG_SUFFIX else None,
+        parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
+        took=time.monotonic() - start,
+    )
+
+
+def _origin(path: Path) -> tuple[str, float]:
+    """The board, and when it began."""
+    if path.suffix != LOG_SUFFIX:
+        return str(path.parent), path.stat().st_mtime
+    began, serial = path.stat().st_mtime, ""
+    for record in LogReader(path):
+        if isinstance(record.item, Segment):
+            usb = record.item.description.get("usb")
+            serial = str(usb.get("serial") or "") if isinstance(usb, dict) else ""
+            began = record.item.unix_ns * _NS
+            break
+    if serial:
+        return serial, began
+    hello = hello_of_log(path)
+    return (f"{hello.board} in {path.parent}" if hello is not None else str(path.parent)), began
+
+
+def _verified(path: Path) -> str:
+    """EQUAL, or what is not."""
+    verdict, first = Verdict(), ""
+    try:
+        text = engine_text_of_log(path)
+        rig = rig_of_log(path) if text is None else board_of(text)
+        for stretch in Verifier(rig).stretches(LogReader(path)):
+            verdict.add(stretch)
+            if not first and (stretch.difference is not None or stretch.why_not is not None):
+                first = stretch.text
+    except PvidError as error:
+        return f"not verified: {error}"
+    return EQUAL if not first and verdict.verified and not verdict.left else first or verdict.text

@@ -1,0 +1,144 @@
+"""Rows of a fleet on disk: line by line in a partial file as they come, and at the end in one Parquet file.
+
+A row counts for a recording with the same key (pvid.fleet.row): of a file that has changed there is none.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from pvid.base.atomic_write import appearing
+from pvid.base.errors import PvidError
+from pvid.fleet.row import Row
+
+_PARAMETERS = "parameters"
+_SE = "_se"
+_FIXED = tuple(one.name for one in fields(Row) if one.name != _PARAMETERS)
+
+
+class Store:
+    """The rows that `out` and, until all are there, a partial file beside it contain.
+
+    Parameters
+    ----------
+    out : the Parquet file
+
+    Raises
+    ------
+    PvidError
+        When the name is no .parquet, its folder does not exist, or the file contains something else.
+    """
+
+    def __init__(self, out: Path) -> None:
+        if out.suffix != ".parquet":
+            raise PvidError(f"{out}: rows are written as Parquet; name the file with .parquet")
+        if not out.parent.is_dir():
+            raise PvidError(f"{out}: there is no folder {out.parent}")
+        self.out = out
+        self.partial = out.with_suffix(".partial.jsonl")
+        self.rows: dict[str, Row] = {}
+        for row in (*read_rows(out), *self._begun()):
+            self.rows[row.key] = row
+
+    def _begun(self) -> Iterable[Row]:
+        """What the partial file holds; a line that was cut off while it was written is none."""
+        if not self.partial.exists():
+            return
+        for line in self.partial.read_bytes().split(b"\n"):
+            try:
+                found = json.loads(line)
+                found[_PARAMETERS] = {name: tuple(one) for name, one in found[_PARAMETERS].items()}
+                yield Row(**found)
+            except (ValueError, TypeError, KeyError, AttributeError):
+                continue
+
+    def add(self, row: Row) -> None:
+        """Keeps a row, in the partial file too; a recording that cannot be read is tried again next time.
+
+        Raises
+        ------
+        PvidError
+            When it cannot be written.
+        """
+        if row.key:
+            self.rows[row.key] = row
+        try:
+            with self.partial.open("ab") as file:
+                file.write(b"\n" + json.dumps(asdict(row)).encode())
+        except OSError as error:
+            raise PvidError(f"{self.partial}: cannot be written: {error.strerror}") from error
+
+    def finish(self, rows: Iterable[Row]) -> None:
+        """Writes the Parquet file with these rows; the partial file vanishes.
+
+        Raises
+        ------
+        PvidError
+            When it cannot be written.
+        """
+        arrow, parquet = _arrow()
+        found = list(rows)
+        units = {name: unit for row in found for name, (_, _, unit) in row.parameters.items()}
+        kinds = {
+            "samples": arrow.int64(),
+            "identified": arrow.bool_(),
+            "began": arrow.float64(),
+            "took": arrow.float64(),
+        }
+        schema = [arrow.field(name, kinds.get(name, arrow.string())) for name in _FIXED]
+        for name, unit in units.items():
+            about = {b"unit": unit.encode()}
+            schema += [arrow.field(one, arrow.float64(), metadata=about) for one in (name, name + _SE)]
+        table = arrow.Table.from_pylist([_flat(row) for row in found], schema=arrow.schema(schema))
+        try:
+            with appearing(self.out) as unfinished:
+                parquet.write_table(table, unfinished)
+            self.partial.unlink(missing_ok=True)
+        except OSError as error:
+            raise PvidError(f"{self.out}: cannot be written: {error.strerror}") from error
+
+
+def _flat(row: Row) -> Mapping[str, Any]:
+    flat = {name: getattr(row, name) for name in _FIXED}
+    for name, (value, se, _) in row.parameters.items():
+        flat |= {name: value, name + _SE: se}
+    return flat
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows of a Parquet file; none where there is no file.
+
+    Raises
+    ------
+    PvidError
+        When it is something else.
+    """
+    if not path.exists():
+        return []
+    _, parquet = _arrow()
+    try:
+        table = parquet.read_table(path)
+    except Exception as error:  # pyarrow's own kinds, which cannot be named without importing it
+        raise PvidError(f"{path}: exists and is not a Parquet file: choose another name for -o") from error
+    if not set(_FIXED) <= set(table.column_names):
+        raise PvidError(f"{path}: exists and was not written by pvid batch: choose another name for -o")
+    names = [name for name in table.column_names if name not in _FIXED and name + _SE in table.column_names]
+    units = {name: (table.schema.field(name).metadata or {}).get(b"unit", b"").decode() for name in names}
+    return [
+        Row(
+            **{name: one[name] for name in _FIXED},
+            parameters={name: (one[name], one[name + _SE], units[name]) for name in names if one[name] is not None},
+        )
+        for one in table.to_pylist()
+    ]
+
+
+def _arrow() -> tuple[Any, Any]:
+    import pyarrow
+    import pyarrow.parquet
+
+    return pyarrow, pyarrow.parquet

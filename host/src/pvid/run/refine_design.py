@@ -1,0 +1,135 @@
+"""Settings of the refinement in float32 behind the weak engine, of any mechanism that it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.refine_twin import GeneratedRefine
+from pvid.design.refine import refine_config
+from pvid.model.signals import Jet
+from pvid.settings.fourier import Source
+from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
+
+Float = npt.NDArray[np.float64]
+
+_STILL = 0.04  # h |lambda| up to which Adams-Bashforth is stable for a decay
+_LEAST = 4.0  # periods of the fastest motion in a block
+_STATES = 40  # of the run that are looked at
+_A_PERIOD = 48.0  # steps in a period
+_MARGIN = 1.5  # ranges over what the run has of them
+
+
+def refine_settings(
+    made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float, p: npt.ArrayLike, block_s: float
+) -> RefineConfig:
+    """From a run of the rig.
+
+    Parameters
+    ----------
+    run : name of each signal -> samples
+    rate : [Hz]
+    p : parameters near those of the rig, as the weak form has them
+    block_s : length of a block: about two periods of the slowest motion
+
+    Raises
+    ------
+    PvidError
+        Where the refinement in C does not have an input of the model, or samples are too slow for the motion.
+    """
+    model = made.model
+    engine = fourier_model_of(model)
+    names, sources = engine.sample_names, {one.sample: one.source for one in engine.signal if one.source is Source.HELD}
+    inputs = [_input(made, jet) for jet in made.inputs]
+    samples = [*inputs, *((name, 0, 1.0) for name in made.outputs)]
+    signal = []
+    for name, order, scale in samples:
+        if name not in names:
+            raise PvidError(f"{model.name}: the refinement in C has no input {name}, which is no sample")
+        x = np.asarray(run[name], float)
+        largest = np.nanmax(np.abs(x)) if order == 0 else np.nanmax(np.abs(_curvature(x, rate, block_s)))
+        place = names.index(name)
+        range_ = _MARGIN * float(abs(scale) * largest)
+        signal.append(RefineSignal(place, order, scale, range_, sources.get(place, Source.SAMPLED)))
+    rig = RefineRig(
+        sample_rate=rate,
+        slow_hz=2.0 / block_s,
+        fast_hz=max(fastest_hz(made, p, run, rate), _LEAST / block_s),
+        signal=tuple(signal),
+        sample_sd=tuple(model.signal(name).sd for name in made.outputs),
+        prior_sd=tuple(one.prior_sd for one in made.parameters),
+        gain_sd=(0.0,) * len(made.parameters),
+        state_limit=_state_limit(made, run, rate),
+    )
+    settings = refine_config(rig)
+    return settings if model.refinement.equations else replace(settings, distance=0.0)
+
+
+def _input(made: RefineFunctions, jet: Jet) -> tuple[str, int, float]:
+    """Sample, order of the derivative and factor of an input."""
+    model = made.model
+    value = model.with_knowns(model.opaque.get(jet, jet))
+    found = [one for one in value.atoms(Jet) if one.order in (0, 2)]
+    scale = sp.simplify(value / found[0]) if len(found) == 1 else None
+    if scale is None or not scale.is_number:
+        raise PvidError(f"{model.name}: the refinement in C has no input {value}: only samples and their second rates")
+    return found[0].of, found[0].order, float(scale)
+
+
+def _curvature(x: Float, rate: float, block_s: float) -> Float:
+    """Second derivative of means of a hundredth of a block."""
+    step = max(1, round(block_s * rate / 100))
+    mean = x[: len(x) // step * step].reshape(-1, step).mean(1)
+    return np.asarray(np.diff(mean, 2) * (rate / step) ** 2)
+
+
+def fastest_hz(made: RefineFunctions, p: npt.ArrayLike, run: Mapping[str, npt.ArrayLike], rate: float) -> float:
+    """Of the motion, as an oscillation that needs as short a step: at three quarters of the run's states.
+
+    The others are those in which a soft sign changes.
+    """
+    model, n = GeneratedRefine(made), len(made.coordinates)
+    m = model.constants(model.from_p(np.asarray(p, np.float32)))
+    u = np.zeros(len(made.inputs), np.float32)
+    found = []
+    for q, v in _states(made, run, rate):
+        slopes = model.jacobian(m, q, v, u)
+        K = np.asarray(slopes.K, float)
+        if made.order == 2:
+            K = np.block([[np.zeros((n, n)), np.eye(n)], [K, np.asarray(slopes.D, float)]])
+        rates = np.linalg.eigvals(K)
+        found.append(max(np.abs(rates.imag).max() / (2 * np.pi), np.abs(rates.real).max() / _STILL / _A_PERIOD))
+    return float(np.quantile(found, 0.75))
+
+
+def _states(
+    made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float
+) -> Iterator[tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]]:
+    """q and v of the run; what is not measured is 0."""
+    n = len(next(iter(run.values())))  # type: ignore[arg-type]
+    step = max(n // _STATES, 1)
+    measured = {name: np.asarray(run[name], float) for name in made.outputs}
+    at = np.arange(step, n - step, step)
+    none = np.zeros(len(at))
+    q = np.array([measured[name][at] if name in measured else none for name in made.coordinates], np.float32)
+    half = max(step // 8, 1)
+    slope = {name: (x[at + half] - x[at - half]) * rate / (2 * half) for name, x in measured.items()}
+    v = np.array([slope.get(name, none) for name in made.coordinates], np.float32)
+    for k in range(len(at)):
+        if np.isfinite(q[:, k]).all() and np.isfinite(v[:, k]).all():
+            yield q[:, k], v[:, k] if made.order == 2 else v[:0, k]
+
+
+def _state_limit(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float) -> tuple[float, ...]:
+    """Twenty times the largest measured coordinate and rate; of a hidden one as of the largest."""
+    largest = {name: float(np.nanmax(np.abs(np.asarray(run[name], float)))) for name in made.outputs}
+    most = max(largest.values())
+    places = [20.0 * largest.get(name, most) for name in made.coordinates]
+    return tuple(places) if made.order == 1 else (*places, *(one * rate for one in places))

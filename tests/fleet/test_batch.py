@@ -1,0 +1,177 @@
+"""`pvid batch`: a row for each recording, whatever it contains; resumed; a page that names what drifts."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+from conftest import ROOT
+from program import pvid
+
+from pvid.base.errors import PvidError
+from pvid.cli.batch import command
+from pvid.fleet import run as fleet
+from pvid.fleet.row import EQUAL, Question, Row, row_of
+from pvid.fleet.store import Store, read_rows
+from pvid.fleet.summary import counts_of, drifts_of, page
+from pvid.sim.pendulum import simulate, standard_sensors
+
+LOG = ROOT / "tests" / "data" / "logs" / "two_samples.pvlog"
+DAY = 86400.0
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two folders, of one run each, and a table that is none."""
+    top = tmp_path_factory.mktemp("fleet")
+    for seed, name in ((1, "a"), (2, "b")):
+        run = simulate(sensors=standard_sensors(14), truth="full", duration=20.0, seed=seed).run
+        (top / name).mkdir()
+        np.savez(top / name / "run.npz", t=run.t, phi=run.phi, y=run.y)
+    (top / "b" / "broken.csv").write_text("t,phi,y\n0,one,two\n")
+    return top
+
+
+@contextmanager
+def here(*_: object) -> Iterator[None]:
+    """In place of the worker processes: this one."""
+    yield None
+
+
+@pytest.fixture
+def inline(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The paths that are worked on, in this process."""
+    done: list[str] = []
+
+    def each(_: Any, work: Callable[..., Row], items: list[str], **fixed: Any) -> Iterator[Row]:
+        for item in items:
+            done.append(item)
+            yield work(item, **fixed)
+
+    monkeypatch.setattr(fleet, "client", here)
+    monkeypatch.setattr(fleet, "each", each)
+    return done
+
+
+def asked(**keys: Any) -> Question:
+    return Question(settings={"l1": "0.3"}, **keys)
+
+
+def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fleet.parquet"
+    pattern = str(runs / "*" / "*.*")
+    done = pvid(tmp_path, "batch", pattern, "-o", str(out), "--set", "l1=0.3", "--workers", "2")
+    assert done.returncode == 0, done.stderr
+    assert ": 2 of 3" in done.stdout and "failed: 1 of 3" in done.stdout
+    assert "broken.csv, line 2, column phi" in done.stderr
+    table = pyarrow.parquet.read_table(out)
+    rows = {f"{Path(row['board']).name}/{Path(row['path']).name}": row for row in table.to_pylist()}
+    assert set(rows) == {"a/run.npz", "b/run.npz", "b/broken.csv"}
+    good = rows["a/run.npz"]
+    assert good["identified"] and good["samples"] == 20000
+    assert abs(good["g"] - 9.5) < 5 * good["g_se"] and table.schema.field("g").metadata[b"unit"] == b"m/s^2"
+    assert rows["b/broken.csv"]["g"] is None and rows["b/broken.csv"]["identified"] is None
+    assert "<svg" in (tmp_path / "fleet.html").read_text() and not (tmp_path / "fleet.partial.jsonl").exists()
+
+
+def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(
+    runs: Path, tmp_path: Path, inline: list[str]
+) -> None:
+    paths = []
+    for name in ("a", "b"):
+        paths.append(str(tmp_path / f"{name}.npz"))
+        shutil.copy(runs / name / "run.npz", paths[-1])
+    out = tmp_path / "fleet.parquet"
+    store = Store(out)
+    store.add(row_of(paths[0], asked()))
+    with store.partial.open("ab") as file:
+        file.write(b'\n{"key": "cut o')
+    found = fleet.run(paths, asked(), Store(out), lambda _: None)
+    assert inline == paths[1:] and [row.path for row in found] == paths and found == read_rows(out)
+    shutil.copy(runs / "b" / "run.npz", paths[0])
+    fleet.run(paths, asked(), Store(out), lambda _: None)
+    assert inline == [paths[1], paths[0]]
+    fleet.run(paths, asked(core="q31"), Store(out), lambda _: None)
+    assert inline[2:] == paths
+
+
+def test_a_log_is_identified_and_verified_or_says_why_not() -> None:
+    row = row_of(str(LOG), asked())
+    assert row.failure is not None or row.verified is not None
+    assert row.board.endswith(str(LOG.parent)) and row.began > 0
+
+
+def test_what_is_not_there_has_a_row_too(tmp_path: Path) -> None:
+    row = row_of(str(tmp_path / "nowhere.csv"), asked())
+    assert row.failure is not None and "No such file" in row.failure and row.identified is None
+
+
+def row(board: str, day: float, value: float, se: float = 0.01, **other: Any) -> Row:
+    made = Row(f"{board}{day}", f"{board}/{day}", board, day * DAY, 100, True, "good")
+    return replace(made, parameters={"g": (value, se, "m/s^2")}, **other)
+
+
+def test_a_drift_is_named_and_chance_is_not() -> None:
+    noise = np.random.default_rng(1).normal(0, 0.01, (2, 30))
+    still = [row("still", k, 9.5 + noise[0, k]) for k in range(30)]
+    moving = [row("moving", k, 9.5 + 0.002 * k + noise[1, k]) for k in range(30)]
+    doubted = [row("still", 99, 20.0, warning="no")]
+    a, b = drifts_of([*still, *moving, *doubted])
+    assert not a.drifts and a.recordings == 30 and abs(a.mean - 9.5) < 4 * a.se
+    assert b.drifts and b.slope is not None and b.slope_se is not None and abs(b.slope - 0.002) < 4 * b.slope_se
+    assert a.scatter is not None and 0.5 < a.scatter < 1.7
+    text = page([*still, *moving, *doubted], "<fleet>")
+    assert text.count('class="alarm"') == 1 and "&lt;fleet&gt;" in text and "http" not in text.split("<svg")[0]
+
+
+def test_outcomes_are_counted() -> None:
+    good = row("a", 1, 9.5)
+    rows = [
+        good,
+        replace(good, warning="w"),
+        replace(good, identified=False),
+        replace(good, failure="f", identified=None),
+    ]
+    rows += [replace(good, verified=EQUAL), replace(good, verified="DIFFERENT at p")]
+    assert counts_of(rows) == {
+        "identified": 3,
+        "identified with a warning": 1,
+        "not identified": 1,
+        "failed": 1,
+        "logs that are not equal": 1,
+    }
+
+
+@pytest.mark.parametrize("name", ["rows.csv", "nowhere/rows.parquet"])
+def test_an_output_that_cannot_be_is_refused_before_any_work(tmp_path: Path, name: str) -> None:
+    with pytest.raises(PvidError):
+        Store(tmp_path / name)
+
+
+def test_a_foreign_file_is_not_overwritten(tmp_path: Path) -> None:
+    out = tmp_path / "rows.parquet"
+    out.write_bytes(b"mine")
+    with pytest.raises(PvidError, match="is not a Parquet file"):
+        Store(out)
+    pyarrow.parquet.write_table(pyarrow.table({"x": [1]}), out)
+    with pytest.raises(PvidError, match="was not written by pvid batch"):
+        Store(out)
+
+
+def test_wrong_usage_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for arguments, words in (
+        (["none/*.csv"], "no file has such a name"),
+        (["a.csv", "--set", "l1"], "write KEY=VALUE"),
+    ):
+        with pytest.raises(PvidError, match=words):
+            command.main([*arguments, "-o", "x.parquet"], standalone_mode=False)
+    assert os.listdir(tmp_path) == []

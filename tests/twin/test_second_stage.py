@@ -1,0 +1,143 @@
+"""The refinement as the second stage of the weak engine: bits of its twin, gaps, freezes, snapshots, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+from fourier_rig import EngineRig, engine_rig
+
+from pvid.base.errors import PvidError
+from pvid.codegen.build import refine_functions
+from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.codegen.refine_twin import GeneratedRefine
+from pvid.core.fourier_native import FourierNative, RefinedIdentifier
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.run.refine_design import refine_settings
+from pvid.settings.enums import Reason, SnapshotStatus
+from pvid.settings.f32 import TrustConfig
+from pvid.settings.refine import RefineConfig
+from pvid.twin.refine import RefineTwin
+
+NAME = "rigid_body"  # of order 1, three outputs
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A mechanism with both stages."""
+
+    rig: EngineRig
+    library: FourierNative
+    model: GeneratedRefine
+    settings: RefineConfig
+
+    def identifier(self, **changes: object) -> RefinedIdentifier:
+        """A new one."""
+        trust = TrustConfig(se_max=10.0, groups_min=1)
+        return self.library.refined_of(replace(self.rig.config, trust=trust), replace(self.settings, **changes))  # type: ignore[arg-type]
+
+
+@cache
+def refined(name: str = NAME) -> Refined:
+    rig, made, simulated = engine_rig(name), refine_functions(compiled_of(name)), simulated_rig(name)
+    names = made.model
+    run = {one: rig.samples[:, k] for k, one in enumerate(_samples(name))}
+    settings = refine_settings(made, run, simulated.sample_rate, rig.truth, 2 * simulated.window_s)
+    return Refined(rig, fourier_native(names, rig.config.design, made), GeneratedRefine(made), settings)
+
+
+def _samples(name: str) -> tuple[str, ...]:
+    return fourier_model_of(compiled_of(name)).sample_names
+
+
+def kept(one: RefinedIdentifier) -> bytes:
+    """The refinement's memory without its configuration."""
+    ffi = one.native.headers.ffi
+    return bytes(ffi.buffer(one.refinement))[ffi.offsetof("pvid_refine_f32", "h") :]
+
+
+def test_the_twin_has_the_bits_of_a_first_order_model() -> None:
+    given = refined()
+    core, twin = given.identifier(), RefineTwin(given.model, given.settings)
+    record = core.run_both(given.rig.samples[:6000])
+    expected = twin.run(given.rig.samples[:6000], record.weak_p, record.weak_se)
+    np.testing.assert_array_equal(record.r, expected.r)
+    np.testing.assert_array_equal(record.se, expected.se)
+    np.testing.assert_array_equal(np.array(list(core.refinement.work.state), np.float32), twin.work.state)
+    assert Reason.UPDATED in record.told
+
+
+def test_the_refined_estimate_is_sharper_than_the_weak_one_and_right() -> None:
+    given = refined()
+    core = given.identifier()
+    record = core.run_both(given.rig.samples)
+    names = [one.name for one in given.model.made.parameters]
+    truth = np.array([simulated_rig(NAME).truth[name] for name in names])
+    assert np.all(np.abs(record.r[-1] - truth) < 3.5 * record.se[-1])
+    assert np.all(record.se[-1] <= core.estimate["se"][: len(names)])
+
+
+def test_a_gap_and_a_freeze_reach_both_stages() -> None:
+    given = refined()
+    one, samples = given.identifier(), given.rig.samples
+    one.run_both(samples[:3000])
+    before = bytes(kept(one))
+    one.gap()
+    assert one.refinement.front.next == 0 and kept(one) != before
+    one.freeze(True)
+    linear = list(one.refinement.linear)
+    one.run_both(samples[3000:6000])
+    assert one.refinement.frozen and list(one.refinement.linear) == linear
+    one.freeze(False)
+    assert Reason.UPDATED in one.run_both(samples[6000:12000]).told
+
+
+def test_a_snapshot_keeps_both_stages_and_refuses_other_settings() -> None:
+    given = refined()
+    one, other = given.identifier(), given.identifier()
+    ffi, library = one.native.headers.ffi, one.native.library
+    one.run_both(given.rig.samples[:4321])
+    image = ffi.new("uint8_t[]", 200_000)
+    n = library.pvid_snapshot_save_refine_f32(one.state, one.config_pointer, 1, image, len(image))
+    assert n > ffi.sizeof("pvid_fourier_f32") + ffi.sizeof("pvid_refine_f32") - 300
+
+    def restored(into: RefinedIdentifier) -> SnapshotStatus:
+        return SnapshotStatus(library.pvid_snapshot_restore_refine_f32(into.state, into.config_pointer, image, n))
+
+    assert restored(other) is SnapshotStatus.RESTORED
+    assert kept(other) == kept(one)
+    rest = given.rig.samples[4321:9000]
+    a, b = one.run_both(rest), other.run_both(rest)
+    np.testing.assert_array_equal(a.r, b.r)
+    assert kept(other) == kept(one) and np.any(a.r > 0)
+    for changes in ({"gate": 7.0}, {"first_block": 12}, {"prior_sd": 2 * given.settings.prior_sd}, {"distance": 0.1}):
+        assert restored(given.identifier(**changes)) is SnapshotStatus.OTHER_CONFIG
+    weak = given.library.identifier_of(given.rig.config)
+    assert library.pvid_snapshot_save_refine_f32(weak.state, weak.config_pointer, 1, image, len(image)) == 0
+    status = library.pvid_snapshot_restore_fourier_f32(weak.state, weak.config_pointer, image, n)
+    assert SnapshotStatus(status) is SnapshotStatus.OTHER_KIND
+
+
+def test_what_the_second_stage_refuses_is_refused_by_init() -> None:
+    with pytest.raises(PvidError, match="refused the configuration"):
+        refined().identifier(passes=0)
+
+
+def test_without_a_second_stage_the_weak_form_has_the_same_bits() -> None:
+    given = refined()
+    both, alone = given.identifier(), given.library.identifier_of(given.identifier().config)
+    record = alone.run_samples(given.rig.samples[:3000], hashes=False)
+    both.run_both(given.rig.samples[:3000])
+    np.testing.assert_array_equal(list(both.estimator.p), list(alone.estimator.p))
+    assert len(record.reason) == 3000
+
+
+def test_a_running_integral_is_no_input() -> None:
+    made, rig = refine_functions(compiled_of("battery_2rc")), engine_rig("battery_2rc")
+    run = {one: rig.samples[:, k] for k, one in enumerate(_samples("battery_2rc"))}
+    with pytest.raises(PvidError, match="the refinement in C has no input"):
+        refine_settings(made, run, 10.0, rig.truth, 100.0)
