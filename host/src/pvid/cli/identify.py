@@ -72,8 +72,10 @@ def command(
     signals against the simulated.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
-    reported tick and at the end.
+    reported tick and at the end. It is then the answer of the image's own form, without the refinement.
     """
+    if refine and target is not None:
+        raise PvidError("--refine is in float64 on this computer: omit --on")
     described = mechanism_rig(run_path, rig_path, settings, model)
     if described is not None:
         from pvid.cli.mechanism import identify_run  # loads SymPy
@@ -98,7 +100,7 @@ def command(
     print_notes(notes)
     native = Native()
     noted = replace(run, notes=(*run.notes, *notes))
-    result = identified(noted, rig, native, refine=refine)
+    result = identified(noted, rig, native, refine=refine, of_image=target is not None)
     if target is not None:
         from pvid.board.stream_rig import played_samples, stream_rig
         from pvid.board.target import verify

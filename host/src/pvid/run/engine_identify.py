@@ -6,7 +6,7 @@ run -> description of the mechanism with the rig's values -> analysis (design, v
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -58,15 +58,27 @@ def identify_by_engine(run: Run, rig: RigFile) -> Identification:
     Raises
     ------
     PvidError
-        When the recording is too short, holds a signal beyond all reason, or there is no C compiler.
+        When the recording is too short, or holds a signal beyond all reason.
     """
     if rig.identifier.law != "stationary":
         raise PvidError(f"the weak form has the stationary law alone, not {rig.identifier.law}: use --form strong")
     run, rig = run.whole(), resolved(rig, run)
     answer = identify_mechanism(run.recording, model_of(described(rig)))
+    return _identification(run, *_computed(run, rig, answer))
+
+
+def _computed(run: Run, rig: RigFile, answer: MechanismAnswer) -> tuple[RigFile, MechanismAnswer, _Core]:
+    """By the core of the rig file; where it cannot be, by the analysis alone, which says why."""
     engine = ENGINE_CORES.get(rig.identifier.core)
-    core = _of_analysis(answer, run) if engine is None else _of_core(identify_in_c(answer, engine.name), run)
-    return _identification(run, rig, answer, core)
+    if engine is None:
+        return rig, answer, _of_analysis(answer, run)
+    try:
+        return rig, answer, _of_core(identify_in_c(answer, engine.name), run)
+    except PvidError as error:
+        in_float64 = replace(rig, identifier=replace(rig.identifier, core="f64"))
+        alone = _of_analysis(answer, run)
+        why = f"The answer is that of the float64 analysis alone: {error}"
+        return in_float64, answer, replace(alone, remarks=(why, *alone.remarks))
 
 
 def _of_core(found: CoreAnswer, run: Run) -> _Core:
