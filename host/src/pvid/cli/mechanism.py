@@ -33,11 +33,10 @@ if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
     from pvid.run.mechanism_core import CoreAnswer
 
-ENGINE = "fourier"  # as --form: the weak engine, for a mechanism that has a weak form of its own too
-_FORMS = (("form", "weak"), ("form", ENGINE))
+_FORM = ("form", "weak")
 _IN_C = tuple(("core", name) for name in ENGINE_CORES)
-_POSSIBLE = (("core", "f64"), *_IN_C, *_FORMS)
-_COMPARED = (("core", "all"), *_IN_C, *_FORMS)
+_POSSIBLE = (("core", "f64"), *_IN_C, _FORM)
+_COMPARED = (("core", "all"), *_IN_C, _FORM)
 _STRONG = "strong"  # as --form
 _LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
