@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import tempfile
-from collections import Counter
+from collections import defaultdict
 from pathlib import Path
 
 from pvid.base.errors import PvidError
@@ -61,7 +61,7 @@ def tick_rows(model: str) -> list[tuple[str, ...]]:
     of_boards = []
     for name in BOARD_NAMES:
         counted = profile(BOARDS[name], "weak", "q31", model)
-        parts: Counter[str] = Counter()
+        parts: dict[str, float] = defaultdict(float)
         for (_, file), n in counted.functions.items():
             parts[_part_of(file)] += n
         parts[_OTHERS] += counted.measured - counted.total
