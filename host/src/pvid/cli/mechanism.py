@@ -112,6 +112,8 @@ def identify_run(
     if refine and in_c:
         raise PvidError(f"--refine is in float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
+    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
+        return DIFFERENT
     answer = identify_mechanism(recording, model, weights)
     if refine:
         return _refined(answer, as_json=as_json, figure=figure)
@@ -121,8 +123,6 @@ def identify_run(
 
         core = identify_in_c(answer, in_c.name)
     shown = core or answer
-    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
-        return DIFFERENT
     if as_json:
         click.echo(json.dumps(shown.as_json() | ({} if on is None else {"on": on})))
     elif core is not None:
