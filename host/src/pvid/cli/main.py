@@ -44,6 +44,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
     "Models": {
         "models": "List the mechanisms with their channels, parameters and units.",
         "model": "Check, predict, simulate or build a mechanism of your own or of the list.",
+        "deploy": "Write a mechanism with its rig for Arduino, PlatformIO, ESP-IDF, Zephyr, CMake or CubeMX.",
     },
     "Prove": {
         "compare": "Compare the C core with its numpy twin, bit for bit.",
