@@ -150,6 +150,25 @@ def bench_fixed_cost(mechanism: str, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="float-cost")
+@click.option("--mechanism", default="kapitza", show_default=True, help="Of the shipped ones.")
+@UPDATE
+def bench_float_cost(mechanism: str, update: Path | None) -> int:
+    """Where instructions and bytes of the engine in float32 go on a Cortex-M4F, and those of all mechanisms (needs
+    QEMU)."""
+    from bench import float_cost
+    from pvid.models.mechanisms import names
+
+    put_table(update, "float-tick", markdown(float_cost.TICK_HEADER, float_cost.tick_rows(mechanism)))
+    put_table(update, "float-state", markdown(float_cost.STATE_HEADER, float_cost.state_rows(mechanism)))
+    put_table(update, "float-text", markdown(float_cost.TEXT_HEADER, float_cost.text_rows(mechanism)))
+    with progress_bar("mechanisms", len(names())) as advance:
+        done = iter(range(1, len(names()) + 1))
+        rows = list(float_cost.mechanism_rows(lambda: advance(next(done))))
+    put_table(update, "float-mechanisms", markdown(float_cost.MECHANISMS_HEADER, rows))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:
