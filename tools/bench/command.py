@@ -140,6 +140,18 @@ def bench_engine(chosen: tuple[str, ...], seeds: int, fixed: bool, update: Path 
     return DONE
 
 
+@bench.command(name="fixed-cost")
+@click.option("--mechanism", default="kapitza", show_default=True, help="Of the shipped ones.")
+@UPDATE
+def bench_fixed_cost(mechanism: str, update: Path | None) -> int:
+    """Where the instructions of a tick and the bytes of the state of the engine in fixed point go (needs QEMU)."""
+    from bench import fixed_cost
+
+    put_table(update, "fixed-tick", markdown(fixed_cost.HEADER, fixed_cost.tick_rows(mechanism)))
+    put_table(update, "fixed-state", markdown(fixed_cost.STATE_HEADER, fixed_cost.state_rows(mechanism)))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:

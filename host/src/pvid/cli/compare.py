@@ -67,8 +67,8 @@ def command(
     if described is not None:
         from pvid.cli.mechanism import compare_recording  # loads SymPy
 
-        given = {"core": core, "form": form, "law": law, "on": targets[0] if targets else None}
-        return _shown(compare_recording(run_path, described, columns, **given))
+        given = {"core": core, "form": form, "law": law}
+        return _shown(compare_recording(run_path, described, columns, targets_of(targets), **given))
     rig = with_overrides(rig_for(run_path, rig_path, settings), form=form)
     run = read_input(run_path, rig, columns)
     rig = fitted(rig, run)

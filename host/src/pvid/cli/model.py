@@ -17,6 +17,7 @@ from pvid.cli.input import columns_option
 from pvid.cli.rig_design import model_of_rig, recorded
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
+    from pvid.codegen.strong_twin import StrongModelConfig
     from pvid.model.compiled import CompiledModel
     from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
@@ -158,7 +159,8 @@ def build(
     In the CMakeLists.txt of your firmware: add_subdirectory(OUT) and target_link_libraries(my_firmware PRIVATE NAME).
 
     NAME_design_f32.h has the tables and settings of the weak form for the rig of --run, or for the shipped rig of a
-    shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point.
+    shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point. With --strong,
+    NAME_strong_design_f32.h has the differentiators and settings of the strong form.
     """
     from pvid.codegen import build as generated
     from pvid.codegen.reaches import Reaches
@@ -180,7 +182,8 @@ def build(
     no_fixed_weak = None
     if design is not None:
         fixed_weak, no_fixed_weak = _fixed_weak(compiled, rig, run_path, columns, functions, soft, title)
-    options = generated.Options(limits, soft, strong, design, fixed_weak)
+    strong_design = _strong_design_of(compiled, rig, model, run_path, columns) if strong else None
+    options = generated.Options(limits, soft, strong, design, fixed_weak, strong_design)
     if not only_check:
         for path in generated.build(compiled, out, title, options):
             click.echo(path)
@@ -242,6 +245,25 @@ def simulate(
     settings = write_simulated_run(out, run, simulation)
     write_stderr(f"{out}: {simulation.samples} samples of {', '.join(run)}; rig file {settings}")
     return DONE
+
+
+def _strong_design_of(
+    compiled: CompiledModel, rig: MechanismRig | RigFile | None, model: str, run_path: Path | None, columns: str | None
+) -> StrongModelConfig | None:
+    """Of the strong form for the rig of a recording, or for the shipped rig of a shipped mechanism."""
+    from pvid.models.mechanisms import names as names_of_shipped
+    from pvid.rig.run import Recording
+    from pvid.run.strong_design import strong_design
+    from pvid.sim.simulated_run import simulation_of
+
+    if run_path is not None:
+        return strong_design(compiled, recorded(compiled, rig, run_path, columns)).config
+    if model not in names_of_shipped():
+        return None
+    simulation = simulation_of(model)
+    run = simulation.run()
+    signals = {one.name: run[one.name] for one in compiled.signals}
+    return strong_design(compiled, Recording(run["t"], signals, simulation.rig.sample_rate)).config
 
 
 def _design_of(

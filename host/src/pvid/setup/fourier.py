@@ -47,7 +47,7 @@ def for_engine(design: FourierDesign) -> FourierDesign:
     A soft sign stays one. The engine does not locate reversals.
     """
     block = _STEPS_OF_A_BLOCK
-    least = -(-(design.highest + 1) // block) * block
+    least = -(-2 * (design.highest + 1) // block) * block
     hop = max(round(design.hop / block) * block, least)
     found = replace(design, window_s=2 * hop * design.dt, joint=False, comb=design.decimation > 1)
     return found if design.reversals == "soft" else replace(found, reversals="averaged")
