@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import UPDATE, markdown, put_table
@@ -73,7 +72,6 @@ TABLES = (
     ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
     ("pendulum", "pendulum", "The pendulum through the weak engine, beside its own weak form: errors over 80 seeds."),
     ("refine", "refine", "The refinement behind the weak form: errors beside the Cramer-Rao bound, 80 seeds."),
-    ("tune", "tuning", "Errors against the truth with the default settings and with those that `tune` picks."),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
 )
 
@@ -184,23 +182,6 @@ def bench_cost(update: Path | None) -> int:
     return DONE
 
 
-@bench.command(name="design-cost")
-@click.option("--update", is_flag=True, help="Write the coefficients that `pvid design` computes with.")
-def bench_design_cost(update: bool) -> int:
-    """Instructions of the weak form over a grid of designs beside the formula of `pvid design` (needs valgrind)."""
-    from bench import design_cost
-    from pvid.design import weak_cost
-
-    with progress_bar("designs", len(design_cost.GRID)) as advance:
-        spreads = design_cost.measured_grid(advance)
-    mean, longest = design_cost.fit(spreads) if update else weak_cost.coefficients()
-    if update:
-        write_whole(weak_cost.COEFFICIENTS_FILE, design_cost.as_toml(mean, longest))
-        write_stderr(f"{weak_cost.COEFFICIENTS_FILE.name} written")
-    click.echo(markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
-    return DONE
-
-
 @bench.command(name="cell")
 @click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @UPDATE
@@ -225,6 +206,29 @@ def bench_tick_methods(update: Path | None) -> int:
     with progress_bar("methods", tick_methods.STEPS) as advance:
         rows = list(tick_methods.rows_of(Native(), progress=advance))
     put_table(update, "tick-methods", markdown(tick_methods.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="strong-bytes")
+@UPDATE
+def bench_strong_bytes(update: Path | None) -> int:
+    """Where the bytes of code and state of the strong form in float32 go on a Cortex-M4F."""
+    from bench import strong_bytes
+
+    put_table(update, "strong-text", markdown(strong_bytes.TEXT_HEADER, strong_bytes.text_rows()))
+    put_table(update, "strong-state", markdown(strong_bytes.STATE_HEADER, strong_bytes.state_rows()))
+    return DONE
+
+
+@bench.command(name="strong-schedules")
+@UPDATE
+def bench_strong_schedules(update: Path | None) -> int:
+    """Final p of the strong form's schedules against that of all sums at every row, 40 seeds."""
+    from bench import strong_schedules
+
+    with progress_bar("samplings", len(strong_schedules.SAMPLINGS)) as advance:
+        rows = list(strong_schedules.schedule_rows(Native(), progress=advance))
+    put_table(update, "strong-schedules", markdown(strong_schedules.HEADER, rows))
     return DONE
 
 
