@@ -16,9 +16,9 @@ ROOT = Path(__file__).resolve().parents[1]
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = (
-    *("board/targets", "board/stream", "twin/strong_bits_q31", "log/verify", "run/tune", "log/log", "cli/cli"),
-    *("run/advice", "board/memory", "show/report", "cli/run_input", "bench/longevity", "board/port", "design/design"),
-    *("core/strong_q31", "bench/attack", "board/ports", "design/weak_cost", "twin/gate", "bench/liar", "board/field"),
+    *("board/targets", "board/stream", "twin/strong_bits_q31", "log/verify", "log/log", "cli/cli"),
+    *("run/advice", "board/memory", "show/report", "cli/run_input", "bench/longevity", "board/port"),
+    *("core/strong_q31", "bench/attack", "board/ports", "twin/gate", "bench/liar", "board/field"),
     *("tools/consumer", "core/core_q31", "twin/bits", "core/dead_zone", "twin/weak_bits_q31", "oracle/weak_accuracy"),
     *("bench/hard", "twin/misfit", "core/freeze", "core/bad_config", "bench/year", "cli/readme", "bench/campaign_run"),
     *("bench/cost", "link/link", "twin/compare", "bench/side_by_side", "core/read_while_stepping", "show/view"),
@@ -27,6 +27,7 @@ SLOW = (
     *("tools/proofs", "tools/analysis", "tools/loops", "tools/mutate", "tools/core_rooms", "bench/campaign_population"),
     *("codegen/strong_model", "codegen/generated_q31", "codegen/generated_f32", "codegen/build", "codegen/random"),
     "codegen/model_q31",
+    *("tools/notebooks", "fleet/batch"),
     *("board/generated", "board/engine_boards", "twin/fourier_f32", "oracle/fourier_engine"),
 )
 # Of these, the tests that belong to the inner loop all the same.

@@ -92,6 +92,8 @@ TAKEN_IN_STAGES = (
     "pvid_cholesky_solve_q31",
 )
 
+TAKEN_OF_STRONG_SUMS = (*("pvid_kapitza_project_q31", "pvid_kapitza_exponents_q31", "pvid_kapitza_residual_q31"),)
+
 PROOFS = (
     Proof(
         "integer_q31",
@@ -229,6 +231,59 @@ PROOFS = (
         "the strong form's sums: any row on top of any sums within 2^61, its end at any age and exponent up to 30",
         ("models/kapitza/kapitza_sums_q31.c", "src/number/integer_q31.c"),
         ("-eva-min-loop-unroll", "80"),
+    ),
+    Proof(
+        "kapitza_project_q31",
+        "the strong form's normal equations: any sums within 2^61, any p and formats, near the reference and far from it",
+        ("src/number/integer_q31.c",),
+        ("-eva-min-loop-unroll", "60", "-eva-slevel-function", "pvid_kapitza_project_q31:20,main:20"),
+        taken=("pvid_scale_q31", "pvid_bit_length_q31", "take_mantissas", "take_64", "as_part"),
+    ),
+    Proof(
+        "kapitza_solve_q31",
+        "a row and a solve of the strong form: any such equations, any p, any settings; p stays positive",
+        (
+            *("src/solve/assess_q31.c", "src/solve/settings_q31.c", "src/solve/information_q31.c"),
+            *("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ),
+        (
+            *("-eva-min-loop-unroll", "60", "-eva-split-return", "full", "-eva-slevel-function"),
+            "solve:50,factorise:50,main:20,solve_for:20,take_step:30",
+        ),
+        taken=(
+            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_half_exponent_q31", *SCALED, *TAKEN_OF_STRONG_SUMS),
+            *("pvid_kapitza_add_q31", "pvid_kapitza_end_row_q31"),
+            *("equilibrated", "on_diagonal", "raised", "entry_of_l", "beside"),
+            *("right_hand_side", "lifted", "inverse_of"),
+        ),
+    ),
+    Proof(
+        "kapitza_residual_q31",
+        "the strong form's residual: any sums within 2^61, any p and formats",
+        ("models/kapitza/kapitza_residual_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ("-eva-min-loop-unroll", "60"),
+        taken=("pvid_scale_q31", "pvid_bit_length_q31", *SCALED),
+    ),
+    Proof(
+        "kapitza_assess_q31",
+        "an assessment of the strong form: any such equations and residual, any settings",
+        (
+            *("models/kapitza/kapitza_assess_q31.c", "src/solve/assess_q31.c", "src/solve/system_q31.c"),
+            *("src/solve/settings_q31.c", "src/solve/cholesky_q31.c"),
+            *("src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ),
+        (
+            *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
+            "-eva-slevel-function",
+            "main:50,pvid_system_eliminate_q31:30,pvid_kapitza_estimator_assess_q31:200,pvid_assess_invert_q31:20,factor:60",
+        ),
+        taken=(*TAKEN_IN_STAGES, *TAKEN_OF_STRONG_SUMS),
+        left=(
+            r"function pvid_cholesky_eliminate_q31: precondition self->positive",
+            r"function pvid_cholesky_least_pivot_q31: precondition",
+        ),
+        why="that a factor which is positive so far has its rows and pivots: joined paths forget which of the two holds. "
+        "`estimator_assess_q31` keeps them apart in the same functions",
     ),
     Proof(
         "kapitza_physical_q31",

@@ -15,8 +15,9 @@ from pvid.base.errors import PvidError
 from pvid.board.field import collect
 from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.stream_image import settings_number
-from pvid.board.target import HOST_TARGET, open_target
+from pvid.board.target import HOST_TARGET, judge, open_target, verify
 from pvid.codegen.fourier_library import fourier_native
+from pvid.core.native import Native
 from pvid.link.frames import Code, Estimate, Form, Raw, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader
@@ -90,6 +91,16 @@ def test_a_board_computes_the_bits_of_this_machine(motor: MechanismBoard, target
         assert found == own.hash[tick - 1], tick
     estimate = record.estimates[2000]
     assert isinstance(estimate, Estimate) and estimate.p[:7] == tuple(own.published[1999].tolist())
+
+
+def test_samples_that_the_pc_sends_have_the_bits_of_this_machine(motor: MechanismBoard, native: Native) -> None:
+    board = motor.without_recording
+    verdict = verify(HOST_TARGET, board, native, *motor.recording.T)
+    assert verdict.text == "equal" and verdict.playback.done == TICKS and len(verdict.playback.hashes) == TICKS // 500
+    other = motor.recording.copy()
+    other[1200, 1] += np.float32(0.01)  # the block sums of a step round away a change of the last bit
+    found = judge(verdict.playback, board.hashes(native, *other.T))
+    assert found.first is not None and found.first[0] >= 1000 and "DIFFERENT" in found.text
 
 
 def test_log_of_a_mechanism_is_verified(log: Path) -> None:

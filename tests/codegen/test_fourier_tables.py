@@ -205,7 +205,7 @@ def test_the_nearest_design_of_the_engine() -> None:
     assert (design.hop, design.joint, design.reversals) == (80, False, "averaged")
     assert design.window_s == pytest.approx(0.48)
     short = for_engine(FourierDesign(1000.0, 0.026, 16))  # 13 steps a half, 11 harmonics
-    assert short.hop == 16
+    assert short.hop == 24
     assert for_engine(FourierDesign(1000.0, 1.0, 16, reversals="soft", soft=0.1)).reversals == "soft"
 
 

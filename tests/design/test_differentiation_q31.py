@@ -19,6 +19,7 @@ BANKS = {
     "five points, stride 40": (finite_difference(40), 0.04),
     "241 points, degree 12": (savitzky_golay(241, 12), 0.001),
     "81 points, degree 10, stride 4": (savitzky_golay(81, 10, 4), 0.004),
+    "35 points of nine samples, degree 10": (savitzky_golay(35, 10, 9, 9), 0.009),
 }
 Counts = npt.NDArray[np.int64]
 
@@ -57,14 +58,15 @@ def test_hostile_counts_equal_the_twin(native: Native, name: str) -> None:
 def test_the_proof_names_the_worst_counts(native: Native, name: str) -> None:
     """What interval analysis says is the largest sum is reached by the counts with the signs of the weights."""
     _, bank, _ = bank_of(name)
-    places = np.arange(-bank.half, bank.half + 1) * bank.stride + bank.delay
-    for order, largest in enumerate(largest_sums(bank.weights, bank.centre, PHI_MAX)):
+    points = np.arange(2 * bank.half + 1) * bank.stride
+    samples = points[:, np.newaxis] + np.arange(bank.block)
+    for order, largest in enumerate(largest_sums(bank.weights, bank.centre, PHI_MAX * bank.block)):
         folded = bank.weights[order].astype(np.int64)
         sign = -1 if order % 2 else 1
         centre = (bank.centre if order == 0 else 0) - (0 if order % 2 else 2 * folded.sum())
         taps = np.concatenate([sign * folded[::-1], [centre], folded])
         phi = np.zeros(bank.window, np.int64)
-        phi[places] = PHI_MAX * np.sign(taps)
+        phi[samples] = PHI_MAX * np.sign(taps)[:, np.newaxis]
         d_phi, _, ready = native.derivatives_q31(bank, phi, np.zeros(bank.window, np.int64))
         assert ready[-1]
         assert d_phi[-1, order] == (largest + (1 << bank.phi_shift[order] >> 1)) >> bank.phi_shift[order]

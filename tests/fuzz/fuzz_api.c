@@ -525,6 +525,7 @@ static void configure_strong_q31(bool sound)
     config->bank.phi_max = one_in(5) ? any_i32() : config->bank.phi_max;
     config->bank.centre = one_in(5) ? any_i32() : config->bank.centre;
     config->bank.stride = one_in(8) ? (uint16_t)any_word() : config->bank.stride;
+    config->bank.block = one_in(8) ? (uint16_t)below(400) : config->bank.block;
     config->bank.weights = one_in(20) ? NULL : config->bank.weights;
     config->phi_offset = one_in(5) ? any_i32() : config->phi_offset;
     config->row.phi_shift[3] = one_in(8) ? (int8_t)((int32_t)below(100) - 50) : config->row.phi_shift[3];

@@ -10,7 +10,7 @@
 /* Of what they read but a number is named: a number made of pointers would be none. */
 
 /*@ requires -0x1000000 <= phi <= 0x1000000 && -0x1000000 <= y <= 0x1000000;
-    assigns self->head, self->filled, self->history[0 .. PVID_MAX_WINDOW - 1][0 .. 1] \from phi, y;
+    assigns self->head, self->at, self->missing, self->history[0 .. PVID_MAX_WINDOW - 1][0 .. 1] \from phi, y;
     assigns \result, d_phi[0 .. 4], d_y[0 .. 2] \from phi, y;
     ensures \result == 0 || \result == 1;
     ensures \result != 0 ==> \initialized(d_phi + (0 .. 4)) && \initialized(d_y + (0 .. 2));
@@ -42,8 +42,7 @@ pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pv
 pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self, const pvid_estimator_config_q31 *config,
                                             const pvid_strong_row_q31 *rows);
 
-/* Any state; that its solve keeps to its bounds is not proved (host/docs/proofs.md). */
-/*@ requires -0x10000000 <= e <= 0x10000000;
+/*@ requires -0x10000000 <= e <= 0x0FFFFFFF;
     assigns \result, *self \from row[0 .. 12], e, gradient[0 .. 2];
     ensures self->ready == 1; */
 pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, const int32_t row[PVID_KAPITZA_ROW_Q31],

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from pvid.base.errors import PvidError
 from pvid.rig.described import described
 from pvid.rig.file import Identifier, Nominal, RigFile, Sensor, load
+from pvid.setup.f32 import strong_config
 
 
 def test_only_l1_is_required() -> None:
@@ -305,3 +306,14 @@ def test_a_rig_file_in_the_terms_of_the_description() -> None:
     ratio = (0.1 / 0.08) ** 2
     expected = {"w": 38.0, "d1": 1 + ratio * (1 + 0.25 / 0.1), "d2": 2.5 * ratio, "c": 0.1}
     assert found.nominal == pytest.approx(expected)
+
+
+def test_a_block_makes_points_of_means_in_the_strong_form() -> None:
+    rig = replace(RigFile.standard(), identifier=Identifier(form="strong", window_s=0.315, block=9))
+    config = strong_config(rig, 1000.0)
+    assert (config.half, config.stride, config.block, config.window) == (17, 9, 9, 315)
+    plain = strong_config(replace(rig, identifier=replace(rig.identifier, block=1)), 1000.0)
+    assert config.estimator.correlation == plain.estimator.correlation == 157
+    for wrong, sentence in (({"block": 8}, "must be odd"), ({"differentiator": "finite-difference"}, "omit it")):
+        with pytest.raises(PvidError, match=sentence):
+            strong_config(replace(rig, identifier=replace(rig.identifier, **wrong)), 1000.0)

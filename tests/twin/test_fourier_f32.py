@@ -228,7 +228,7 @@ def random_case(seed: int) -> tuple[EngineRig, FourierConfig, Float32]:
     rig = engine_rig(str(random.choice(mechanisms.names())))
     design, kinds = rig.config.design, rig.config.design.model.kinds
     functions = int(random.integers(4, design.functions + 1))
-    hop = 8 * int(random.integers((functions + design.power) // 16 + 2, 20))
+    hop = 8 * int(random.integers((functions + design.power) // 8 + 2, 20))
     config = rig.resized(functions=functions, hop=hop, decimation=int(random.integers(1, design.decimation + 1)))
     variance = np.where(random.random(kinds) < 0.5, 0.0, 10.0 ** random.uniform(-12, 3, kinds)).astype(np.float32)
     orders = random.integers(0, 3, kinds).astype(np.uint8)

@@ -107,6 +107,73 @@ static void a_shift_rounds_half_up(void **state)
     assert_int_equal(d_phi[4], 3);  /* -48 (-3) + 12 (-10) = 24 */
 }
 
+/* The same samples through blocks of three and, as their sums, without. */
+static void points_are_sums_of_a_block(void **state)
+{
+    (void)state;
+    pvid_fir_bank_q31 bank = five_points(3);
+    pvid_differentiator_q31 single;
+    assert_int_equal(pvid_differentiator_init_q31(&single, &bank), PVID_OK);
+    bank.block = 3;
+    pvid_differentiator_q31 blocks;
+    assert_int_equal(pvid_differentiator_init_q31(&blocks, &bank), PVID_OK);
+    int32_t last[2] = {0, 0};
+    for (int32_t turn = 0; turn < 2; turn++) {
+        for (int32_t tick = 0; tick < 60; tick++) {
+            const int32_t phi = (tick * tick * 37) % 1009;
+            int32_t d[2][PVID_ORDERS];
+            int32_t d_y[2][PVID_Y_ORDERS_Q31];
+            const bool ready = pvid_differentiator_step_q31(&blocks, phi, -phi, d[0], d_y[0]);
+            const int32_t sum = phi + last[0] + last[1];
+            const bool other = pvid_differentiator_step_q31(&single, sum, -sum, d[1], d_y[1]);
+            last[1] = last[0];
+            last[0] = phi;
+            assert_int_equal(ready, tick >= 14);
+            if (ready) {
+                assert_true(other);
+                assert_memory_equal(d[0], d[1], sizeof d[0]);
+                assert_memory_equal(d_y[0], d_y[1], sizeof d_y[0]);
+            }
+        }
+        pvid_differentiator_reset_q31(&blocks);
+    }
+    bank.phi_max = (PVID_COUNTS_LIMIT_Q31 / 3) + 1; /* times three it is beyond */
+    assert_int_equal(pvid_differentiator_init_q31(&blocks, &bank), PVID_BAD_FULL_SCALE);
+    bank.phi_max = 1;
+    bank.y_max = 1;
+    bank.stride = 1;
+    bank.block = PVID_MAX_WINDOW - 5u; /* five points and a block with its sum are one place too many */
+    assert_int_equal(pvid_differentiator_init_q31(&blocks, &bank), PVID_BAD_STRIDE);
+    bank.block--;
+    assert_int_equal(pvid_differentiator_init_q31(&blocks, &bank), PVID_OK);
+}
+
+/* With other shifts the general code computes the same. */
+static void five_points_written_out_equal_the_loop(void **state)
+{
+    (void)state;
+    pvid_fir_bank_q31 bank = five_points(2);
+    pvid_differentiator_q31 written;
+    assert_int_equal(pvid_differentiator_init_q31(&written, &bank), PVID_OK);
+    bank.phi_shift[1] = 1;
+    pvid_differentiator_q31 loop;
+    assert_int_equal(pvid_differentiator_init_q31(&loop, &bank), PVID_OK);
+    assert_true(written.five_points);
+    assert_false(loop.five_points);
+    for (int32_t tick = 0; tick < 50; tick++) {
+        const int32_t phi = ((tick * 7919) % 4001) - 2000;
+        const int32_t y = ((tick * 104729) % 6007) - 3000;
+        int32_t d[2][PVID_ORDERS] = {{0}};
+        int32_t d_y[2][PVID_Y_ORDERS_Q31] = {{0}};
+        (void)pvid_differentiator_step_q31(&written, phi, y, d[0], d_y[0]);
+        (void)pvid_differentiator_step_q31(&loop, phi, y, d[1], d_y[1]);
+        assert_true((d[0][1] == (2 * d[1][1])) || (d[0][1] == ((2 * d[1][1]) - 1)));
+        d[1][1] = d[0][1];
+        assert_memory_equal(d[0], d[1], sizeof d[0]);
+        assert_memory_equal(d_y[0], d_y[1], sizeof d_y[0]);
+    }
+}
+
 static void a_reset_forgets_the_window(void **state)
 {
     (void)state;
@@ -137,6 +204,8 @@ int main(void)
         cmocka_unit_test(a_quartic_in_counts_is_differentiated_without_an_error),
         cmocka_unit_test(full_scale_in_the_worst_order_stays_within_the_limit),
         cmocka_unit_test(a_shift_rounds_half_up),
+        cmocka_unit_test(points_are_sums_of_a_block),
+        cmocka_unit_test(five_points_written_out_equal_the_loop),
         cmocka_unit_test(a_reset_forgets_the_window),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

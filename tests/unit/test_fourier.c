@@ -192,9 +192,9 @@ static void solve(double r[FUNCTIONS][FUNCTIONS], double x[5][FUNCTIONS])
 /* Of a white row: theta's columns, then Y, in whose place is e at the start of p. */
 static double row_entry(int column, size_t row)
 {
-    double entry = (double)self.finish.work.rows.column[column][row];
+    double entry = (double)self.finish.work.rows.of_kind.column[column][row];
     for (int j = 0; (column == 4) && (j < 4); j++) {
-        entry += (double)self.estimator.theta[j] * (double)self.finish.work.rows.column[j][row];
+        entry += (double)self.estimator.theta[j] * (double)self.finish.work.rows.of_kind.column[j][row];
     }
     return entry;
 }

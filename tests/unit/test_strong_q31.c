@@ -54,7 +54,7 @@ static void a_row_has_its_formats(void **state)
 static void a_row_that_does_not_fit_is_refused(void **state)
 {
     (void)state;
-    int32_t phi[PVID_ORDERS] = {0, 0, 0, 0, PVID_ROW_LIMIT_Q31};
+    int32_t phi[PVID_ORDERS] = {0, 0, 0, 0, PVID_ROW_LIMIT_Q31 - 1};
     int32_t u[PVID_Y_ORDERS_Q31] = {0, 0, 0};
     int32_t row[PVID_KAPITZA_ROW_Q31];
     assert_true(pvid_kapitza_strong_row_q31(&exact, phi, u, row));

@@ -22,6 +22,15 @@
 
 static REPLAY_TYPE identifier;
 
+#if defined(REPLAY_HAS_BITS)
+/* A sample from the bits of its float. */
+static REPLAY_SAMPLE sample_of(REPLAY_COUNT word, REPLAY_SAMPLE lsb)
+{
+    uint8_t bits[4];
+    pvid_put_u32(bits, word);
+    return pvid_get_f32(bits) * lsb; /* lsb 1 */
+}
+#else
 /* A count in the identifier's unit: count times step; NaN for a missing sample. */
 static REPLAY_SAMPLE sample_of(REPLAY_COUNT count, REPLAY_SAMPLE lsb)
 {
@@ -33,6 +42,7 @@ static REPLAY_SAMPLE sample_of(REPLAY_COUNT count, REPLAY_SAMPLE lsb)
 #endif
     return (REPLAY_SAMPLE)count * lsb; /* fixed point: lsb 1 */
 }
+#endif
 
 typedef struct {
     uint64_t total; /* counts of pvid_port_instructions */

@@ -230,6 +230,13 @@
 #if PVID_EXACT < 0 || PVID_EXACT > 1
 #error "PVID_EXACT must be 0 or 1"
 #endif
+#if !PVID_EXACT /* counts of the model that no array has as its size */
+#define PVID_EXACT_SIGNALS 0
+#define PVID_EXACT_JETS 0
+#define PVID_EXACT_RUNS 0
+#define PVID_EXACT_SIGNS 0
+#define PVID_EXACT_INTEGRANDS 0
+#endif
 
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your
  * own trap or reset here; by default the misused function does nothing and returns PVID_NOT_READY or

@@ -100,7 +100,7 @@ typedef struct {
                            ends with a cosine */
     uint8_t power;      /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation; /* D, ticks a step, 1..PVID_MAX_DECIMATION */
-    uint16_t hop;       /* steps of half a window, a multiple of 8; H < hop */
+    uint16_t hop;       /* steps of half a window, a multiple of 8; 2 H < hop */
     const pvid_fourier_filter_f32 *compensator; /* [jets] */
     const float *circle;                        /* [5 hop / 2] sin(pi j / hop): a turn and a quarter */
     const pvid_fourier_noise_f32 *noise;        /* [n_noise] */

@@ -32,12 +32,6 @@ static inline int32_t pvid_part_q31(int32_t a, int32_t b)
     return pvid_out_q31(pvid_short_product_q31(a, b));
 }
 
-/* a b with b a rate, both within 2^30. */
-static inline int64_t pvid_by_rate_q31(int32_t a, int32_t b)
-{
-    return pvid_nearest_q31(pvid_short_product_q31(a, b), PVID_KAPITZA_RATE_BITS);
-}
-
 static inline int32_t pvid_larger_q31(int32_t a, int32_t b)
 {
     return (a > b) ? a : b;
@@ -49,17 +43,11 @@ static inline int32_t pvid_moved_q31(int32_t x, int32_t shift)
     if (shift >= 0) {
         return x * (int32_t)((uint32_t)1 << (uint32_t)shift);
     }
-    return (shift < -31) ? 0 : pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(x, (uint32_t)-shift - 1u) + 1, 1);
-}
-
-/* x, and whether it is within +-limit; 0 if not. */
-static inline int32_t pvid_within_q31(int64_t x, int32_t limit, bool *fits)
-{
-    if ((x > limit) || (x < -(int64_t)limit)) {
-        *fits = false;
+    if (shift < -31) {
         return 0;
     }
-    return (int32_t)x;
+    const int32_t above = pvid_floor_shift_32_q31(x, (uint32_t)-shift - 1u); /* its last bit is the half */
+    return pvid_floor_shift_32_q31(above, 1) + (int32_t)((uint32_t)above & 1u);
 }
 
 #endif

@@ -8,7 +8,7 @@ enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
 #define MANTISSA_BITS 28       /* of a moment in a solve; the shift to the present rate makes it grow sixfold at most */
 #define FEW ((int32_t)1 << 16) /* of a square after the shift: fewer bits are too few */
-#define DELTA_BITS (PVID_KAPITZA_W_BITS - 2) /* of w - w_r below a quarter */
+#define DELTA_LIMIT ((int32_t)1 << (PVID_KAPITZA_W_BITS - 2)) /* of w - w_r: a quarter */
 
 /* ---- moments of G = u + w_r in a solve ---- */
 
@@ -24,36 +24,62 @@ static const uint8_t power_of[PVID_SUM_WEIGHT] = {2, 1, 0, 3, 2, 4, 4, 3, 2, 1, 
                                                   4, 3, 2, 1, 4, 3, 2, 1, 0, 6, 5, 4, 3, 2, 6, 5, 4, 3, 2,
                                                   1, 0, 7, 6, 5, 4, 3, 2, 1, 0, 8, 7, 6, 5, 4, 3, 2, 1, 0};
 
-/* sum 2^-shift, shift below 32 and above 0, mask = 2^shift - 1: of its 64 bits the 32 that matter. */
-static inline int32_t middle_of(int64_t sum, uint32_t shift, uint32_t mask)
+/* The sums by the scales of their two columns. */
+enum { OF_AA, OF_AX, OF_AZ, OF_XX, OF_XZ, OF_ZZ, N_FAMILIES };
+
+/* Places where the families begin. */
+static const uint8_t first_of[N_FAMILIES + 1] = {PVID_SUM_AA,  PVID_SUM_A2,  PVID_SUM_A0,    PVID_SUM_K22,
+                                                 PVID_SUM_K20, PVID_SUM_K00, PVID_SUM_WEIGHT};
+
+/* Right shift of each family, >= 0. Returns whether a multiplication does each. */
+static bool shifts_of(const pvid_kapitza_system_q31 *scales, uint32_t shift[N_FAMILIES])
 {
-    const uint64_t bits = (uint64_t)sum;
-    const uint32_t high = (uint32_t)(bits >> 32) & mask;
-    return (int32_t)((high << (32u - shift)) | ((uint32_t)(bits & 0xFFFFFFFFu) >> shift));
+    const uint32_t a = (uint32_t)scales->scale_a;
+    const uint32_t x = (uint32_t)scales->scale_x;
+    const uint32_t z = (uint32_t)scales->scale_z;
+    shift[OF_AA] = 2u * a;
+    shift[OF_AX] = a + x;
+    shift[OF_AZ] = a + z;
+    shift[OF_XX] = 2u * x;
+    shift[OF_XZ] = x + z;
+    shift[OF_ZZ] = 2u * z;
+    const uint32_t least = PVID_SHIFT_DOWN_LEAST / 2u;
+    const uint32_t most = PVID_SHIFT_DOWN_MOST / 2u;
+    return (a >= least) && (x >= least) && (z >= least) && (a <= most) && (x <= most) && (z <= most);
 }
 
-/* m[first ..] = sums[first ..] 2^-shift rounded half up, shift >= 0; below 2^28 by the choice of the scales. */
-PVID_APART static void take_mantissas(const int64_t sums[], size_t first, size_t last, int32_t shift, int32_t m[])
+PVID_SELDOM static void take_any(const int64_t sums[], const uint32_t shift[N_FAMILIES], int32_t m[])
 {
-    const uint32_t down = (uint32_t)shift;
-    if ((down == 0u) || (down > 62u)) { /* seldom */
-        for (size_t i = first; i < last; i++) {
-            m[i] = (int32_t)pvid_round_shift_q31(sums[i], down);
+    for (size_t family = 0; family < N_FAMILIES; family++) {
+        for (size_t i = first_of[family]; i < first_of[family + 1u]; i++) {
+            m[i] = (int32_t)pvid_round_shift_q31(sums[i], shift[family]);
         }
+    }
+}
+
+PVID_ALWAYS_INLINE void take_family(const int64_t sums[], size_t count, uint32_t shift, int32_t m[])
+{
+    const pvid_shift_down_q31 by = pvid_shift_down_by_q31(shift);
+    PVID_UNROLL_BY_FOUR
+    for (size_t i = 0; i < count; i++) {
+        m[i] = pvid_shifted_down_q31(&by, sums[i]);
+    }
+}
+
+/* m = sums 2^-shift rounded half up, below 2^28 by the choice of the scales; that of Y Y is not needed. */
+PVID_APART static void take_mantissas(const int64_t sums[], const pvid_kapitza_system_q31 *scales, int32_t m[])
+{
+    uint32_t shift[N_FAMILIES];
+    if (!shifts_of(scales, shift)) {
+        take_any(sums, shift, m);
         return;
     }
-    const int64_t half = (int64_t)1 << (down - 1u);
-    if (down < 32u) {
-        const uint32_t mask = ((uint32_t)1 << down) - 1u;
-        PVID_UNROLL_BY_FOUR
-        for (size_t i = first; i < last; i++) {
-            m[i] = middle_of(sums[i] + half, down, mask);
-        }
-        return;
-    }
-    for (size_t i = first; i < last; i++) {
-        m[i] = pvid_floor_shift_32_q31((int32_t)pvid_floor_shift_q31(sums[i] + half, 32), down - 32u);
-    }
+    take_family(sums, PVID_SUM_YY, shift[OF_AA], m);
+    take_family(&sums[PVID_SUM_A2], 12, shift[OF_AX], &m[PVID_SUM_A2]);
+    take_family(&sums[PVID_SUM_A0], 15, shift[OF_AZ], &m[PVID_SUM_A0]);
+    take_family(&sums[PVID_SUM_K22], 7, shift[OF_XX], &m[PVID_SUM_K22]);
+    take_family(&sums[PVID_SUM_K20], 8, shift[OF_XZ], &m[PVID_SUM_K20]);
+    take_family(&sums[PVID_SUM_K00], 9, shift[OF_ZZ], &m[PVID_SUM_K00]);
 }
 
 /* ---- shift from G to the present rate G + d ---- */
@@ -159,16 +185,8 @@ typedef struct {
 PVID_APART static void shift_sums(const int64_t sums[], const pvid_kapitza_system_q31 *scales,
                                   const shift_coefficients *c, shifted_sums *out)
 {
-    const int32_t a = scales->scale_a;
-    const int32_t x = scales->scale_x;
-    const int32_t z = scales->scale_z;
     int32_t m[PVID_SUM_WEIGHT];
-    take_mantissas(sums, PVID_SUM_AA, PVID_SUM_A2, 2 * a, m);
-    take_mantissas(sums, PVID_SUM_A2, PVID_SUM_A0, a + x, m);
-    take_mantissas(sums, PVID_SUM_A0, PVID_SUM_K22, a + z, m);
-    take_mantissas(sums, PVID_SUM_K22, PVID_SUM_K20, 2 * x, m);
-    take_mantissas(sums, PVID_SUM_K20, PVID_SUM_K00, x + z, m);
-    take_mantissas(sums, PVID_SUM_K00, PVID_SUM_WEIGHT, 2 * z, m);
+    take_mantissas(sums, scales, m);
     out->aa = m[PVID_SUM_AA];
     out->ae = m[PVID_SUM_AE];
     out->ee = m[PVID_SUM_EE];
@@ -329,16 +347,13 @@ static int32_t longer(int64_t a, int32_t less_a, int64_t b, int32_t less_b)
 /* The moments in units of a time 2^t: scales of their families, then 53 bits of each. */
 static void take_64(const int64_t sums[], int32_t t, pvid_kapitza_system_q31 *scales, int64_t m[])
 {
-    static const uint8_t last[6] = {PVID_SUM_A2,  PVID_SUM_A0,  PVID_SUM_K22,
-                                    PVID_SUM_K20, PVID_SUM_K00, PVID_SUM_WEIGHT};
     const int32_t of_a = longer(sums[PVID_SUM_AA], 2 * t, sums[PVID_SUM_YY], 4 * t);
     const int32_t a = half_of(pvid_larger_q31(length_64(sums[PVID_SUM_EE]), of_a), FAR_BITS);
     const int32_t x = half_of(longer(sums[PVID_SUM_K22 + 6], 0, sums[PVID_SUM_K22], 6 * t), FAR_BITS);
     const int32_t z = half_of(longer(sums[PVID_SUM_K00 + 8], 0, sums[PVID_SUM_K00], 8 * t), FAR_BITS);
-    const int32_t shift[6] = {2 * a, a + x, a + z, 2 * x, x + z, 2 * z};
-    size_t i = 0;
-    for (size_t family = 0; family < 6u; family++) {
-        for (; i < last[family]; i++) {
+    const int32_t shift[N_FAMILIES] = {2 * a, a + x, a + z, 2 * x, x + z, 2 * z};
+    for (size_t family = 0; family < N_FAMILIES; family++) {
+        for (size_t i = first_of[family]; i < first_of[family + 1u]; i++) {
             m[i] = pvid_scale_q31(sums[i], shift[family] + ((int32_t)power_of[i] * t));
         }
     }
@@ -347,8 +362,9 @@ static void take_64(const int64_t sums[], int32_t t, pvid_kapitza_system_q31 *sc
     scales->scale_z = z;
 }
 
-PVID_SELDOM static void shift_far(const int64_t sums[], int32_t beyond, const int32_t lengths[2],
-                                  pvid_kapitza_system_q31 *scales, shifted_sums *out)
+/* Returns d in the time unit that it chooses, Q30: a quarter at most. */
+PVID_SELDOM static int32_t shift_far(const int64_t sums[], int32_t beyond, const int32_t lengths[2],
+                                     pvid_kapitza_system_q31 *scales, shifted_sums *out)
 {
     const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(beyond));
     const int32_t t = pvid_larger_q31(length - PVID_KAPITZA_W_BITS, 0);
@@ -392,29 +408,29 @@ PVID_SELDOM static void shift_far(const int64_t sums[], int32_t beyond, const in
     out->k22 = out_triple(&m[PVID_SUM_K22], 2 * x, 6);
     out->k20 = out_triple(&m[PVID_SUM_K20], x + z, 7);
     out->k00 = out_triple(&m[PVID_SUM_K00], 2 * z, 8);
+    return (int32_t)pvid_round_shift_q31(d, FAR_TIME + 1u);
 }
 
 void pvid_kapitza_project_q31(const pvid_kapitza_estimator_q31 *self, pvid_kapitza_system_q31 *system)
 {
     const int32_t beyond = self->p[W] - self->reference; /* w - w_r */
-    const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(beyond));
     const int32_t lengths[2] = {length_of(3 * (int64_t)self->p[D1], self->bits[0]),
                                 length_of(4 * (int64_t)self->p[D2], self->bits[1])};
     shift_coefficients c;
     shifted_sums shifted;
-    bool is_near = length <= DELTA_BITS;
+    bool is_near = false;
+    int32_t d = 0; /* w - w_r, Q30 */
     system->time = 0;
-    if (is_near) {
+    if ((beyond < DELTA_LIMIT) && (beyond > -DELTA_LIMIT)) {
+        d = beyond * (int32_t)((uint32_t)1 << (30u - PVID_KAPITZA_W_BITS));
         scale_families(self->sums, lengths, system);
-        shift_by(beyond * (int32_t)((uint32_t)1 << (30u - PVID_KAPITZA_W_BITS)), &c);
+        shift_by(d, &c);
         shift_sums(self->sums, system, &c, &shifted);
         is_near = (shifted.k22.high >= FEW) && (shifted.k00.high >= FEW);
     }
     if (!is_near) {
-        shift_far(self->sums, beyond, lengths, system, &shifted);
+        d = shift_far(self->sums, beyond, lengths, system, &shifted);
     }
-    const int64_t exact = (int64_t)beyond * ((int64_t)1 << (30u - PVID_KAPITZA_W_BITS));
-    const int32_t d = (int32_t)pvid_round_shift_q31(exact, (uint32_t)system->time);
     const int32_t d1 = as_part(self->p[D1], system->of_x - self->bits[0], 3);
     const int32_t d2 = as_part(self->p[D2], system->of_z - self->bits[1], 4);
     const shape p = {d1, 3 * d1, d2, 4 * d2};

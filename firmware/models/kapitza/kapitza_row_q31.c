@@ -1,93 +1,157 @@
 /* A row of the strong form in integers, and its innovation. */
 #include "kapitza_integer_q31.h"
 
-#include <string.h>
+#include "number/unroll.h"
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
-#define PART_LIMIT ((int32_t)1 << 30)
+#define ENTRY_BITS 28 /* of an entry of a row beside its sign */
+#define PART_BITS 30  /* of what entries are made of */
+#define TERM_BITS 29  /* of a term of N^T theta and of its slope */
 
-/* x 2^shift as an entry of a row. */
-static inline int32_t shifted_entry(int32_t x, int32_t shift, bool *fits)
+/* x 2^-24 rounded half up; whether it is within -2^bits..2^bits - 1. |x| < 2^62. */
+PVID_ALWAYS_INLINE bool of_rates(int64_t x, uint32_t bits, int32_t *out)
 {
-    if (shift <= 0) {
-        return pvid_within_q31(pvid_round_shift_q31(x, (uint32_t)-shift), PVID_ROW_LIMIT_Q31, fits);
-    }
-    const uint32_t up = (shift < 31) ? (uint32_t)shift : 31u;
-    return pvid_within_q31(x * ((int64_t)1 << up), PVID_ROW_LIMIT_Q31, fits);
+    const int64_t above = x + ((int64_t)1 << (PVID_KAPITZA_RATE_BITS - 1));
+    const int32_t high = (int32_t)pvid_floor_shift_q31(above, 32);
+    const int32_t limit = (int32_t)((uint32_t)1 << (bits - (32u - PVID_KAPITZA_RATE_BITS)));
+    const uint32_t low = (uint32_t)((uint64_t)above & 0xFFFFFFFFu);
+    const bool fits = (high >= -limit) && (high < limit);
+    *out = fits ? ((high * 256) + (int32_t)(low >> PVID_KAPITZA_RATE_BITS)) : 0;
+    return fits;
 }
 
-static inline int32_t entry(int64_t x, bool *fits)
+/* a b with b a rate, both within 2^30, as an entry. */
+PVID_ALWAYS_INLINE bool by_rate(int32_t a, int32_t b, int32_t *out)
 {
-    return pvid_within_q31(x, PVID_ROW_LIMIT_Q31, fits);
+    return of_rates(pvid_short_product_q31(a, b), ENTRY_BITS, out);
 }
 
-/* out[count - 1], .., out[0] = -x, -G x, -G^2 x .. */
-static inline void powers(int32_t x, int32_t g, size_t count, int32_t out[], bool *fits)
+/* x 2^shift as an entry, |shift| <= 62. */
+static inline bool shifted_entry(int32_t x, int32_t shift, int32_t *out)
 {
-    out[count - 1u] = -x;
-    for (size_t k = count - 1u; k > 0u; k--) {
-        out[k - 1u] = entry(pvid_by_rate_q31(out[k], g), fits);
+    const uint32_t up = (shift < 0) ? 0u : ((shift < ENTRY_BITS) ? (uint32_t)shift : (uint32_t)ENTRY_BITS);
+    const int32_t right = (shift < 0) ? pvid_moved_q31(x, shift) : x;
+    const int32_t limit = (int32_t)((uint32_t)1 << ((uint32_t)ENTRY_BITS - up));
+    const bool fits = (shift > ENTRY_BITS) ? (x == 0) : ((right >= -limit) && (right < limit));
+    *out = fits ? (right * (int32_t)((uint32_t)1 << up)) : 0;
+    return fits;
+}
+
+/* out[2], out[1], out[0] = G out[3], G^2 out[3], G^3 out[3]. */
+static bool three_powers(int32_t g, int32_t out[])
+{
+    return by_rate(out[3], g, &out[2]) && by_rate(out[2], g, &out[1]) && by_rate(out[1], g, &out[0]);
+}
+
+/* out[3], .., out[0] = x, G x, G^2 x, G^3 x. */
+static inline bool powers_to_3(int32_t x, int32_t g, int32_t out[])
+{
+    out[3] = x;
+    return three_powers(g, out);
+}
+
+/* out[4], .., out[0] = x, G x, .., G^4 x. */
+static inline bool powers_to_4(int32_t x, int32_t g, int32_t out[])
+{
+    out[4] = x;
+    return by_rate(x, g, &out[3]) && three_powers(g, out);
+}
+
+/* The derivatives of phi in their units. */
+typedef struct {
+    int32_t phi0;
+    int32_t phi2;
+    int32_t phi3;
+    int32_t phi4;
+    int32_t x; /* phi'' in the unit of -G^k phi'' */
+} angles;
+
+static bool take_angles(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS], angles *out)
+{
+    const int64_t third = pvid_nearest_q31(pvid_product_q31(phi[3], format->phi3), 30);
+    if ((third >= PVID_ONE_Q30) || (third < -PVID_ONE_Q30)) {
+        return false;
     }
+    return shifted_entry(phi[0], format->phi_shift[0], &out->phi0) &&
+           shifted_entry(phi[2], format->phi_shift[2], &out->phi2) &&
+           shifted_entry((int32_t)third, format->phi_shift[3], &out->phi3) &&
+           shifted_entry(phi[4], format->phi_shift[4], &out->phi4) &&
+           shifted_entry(phi[2], (int32_t)format->phi_shift[2] + format->finer[0], &out->x);
 }
 
 bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS],
                                  const int32_t u[PVID_Y_ORDERS_Q31], int32_t row[PVID_KAPITZA_ROW_Q31])
 {
-    bool fits = true;
-    const int32_t phi0 = shifted_entry(phi[0], format->phi_shift[0], &fits);
-    const int32_t phi2 = shifted_entry(phi[2], format->phi_shift[2], &fits);
-    const int32_t third =
-        pvid_within_q31(pvid_nearest_q31(pvid_product_q31(phi[3], format->phi3), 30), PART_LIMIT, &fits);
-    const int32_t phi3 = shifted_entry(third, format->phi_shift[3], &fits);
-    const int32_t phi4 = shifted_entry(phi[4], format->phi_shift[4], &fits);
-    const int32_t x = shifted_entry(phi[2], format->phi_shift[2] + format->finer[0], &fits);
+    angles of;
+    if (!take_angles(format, phi, &of)) {
+        return false;
+    }
     const int32_t g = u[0] + format->reference;
-    /* Y = 2 u' (u' phi'') - G (u'' phi'' + 2 u' phi''' - G phi''''), and N_1 is that bracket less G phi'''' */
-    const int64_t g_phi4 = pvid_short_product_q31(g, phi4);
-    const int64_t bracket = (pvid_short_product_q31(u[2], phi2) + (2 * pvid_short_product_q31(u[1], phi3))) - g_phi4;
-    const int32_t part = pvid_within_q31(pvid_nearest_q31(bracket, PVID_KAPITZA_RATE_BITS), PART_LIMIT, &fits);
-    const int32_t u1_phi2 = pvid_within_q31(pvid_by_rate_q31(phi2, u[1]), PART_LIMIT, &fits);
+    /* Y = 2 u' (u' phi2) - G (u'' phi2 + 2 u' phi3 - G phi4), and N_1 is that bracket less G phi4 */
+    const int64_t g_phi4 = pvid_short_product_q31(g, of.phi4);
+    const int64_t bracket =
+        (pvid_short_product_q31(u[2], of.phi2) + (2 * pvid_short_product_q31(u[1], of.phi3))) - g_phi4;
+    int32_t part;
+    int32_t u1_phi2;
+    if (!of_rates(bracket, PART_BITS, &part) || !of_rates(pvid_short_product_q31(of.phi2, u[1]), PART_BITS, &u1_phi2) ||
+        !of_rates(bracket - g_phi4, ENTRY_BITS, &row[PVID_ROW_A])) {
+        return false;
+    }
     const int64_t y = (2 * pvid_short_product_q31(u[1], u1_phi2)) - pvid_short_product_q31(g, part);
-    row[PVID_ROW_A] = entry(pvid_nearest_q31(bracket - g_phi4, PVID_KAPITZA_RATE_BITS), &fits);
-    row[PVID_ROW_E] = -phi4;
-    powers(x, g, 4, &row[PVID_ROW_X], &fits);
-    powers(phi0, g, 5, &row[PVID_ROW_Z], &fits);
-    row[PVID_ROW_Y] = entry(pvid_nearest_q31(y, PVID_KAPITZA_RATE_BITS), &fits);
+    row[PVID_ROW_E] = -of.phi4;
     row[PVID_KAPITZA_ROW_G] = g;
-    return fits;
+    return of_rates(y, ENTRY_BITS, &row[PVID_ROW_Y]) && powers_to_3(-of.x, g, &row[PVID_ROW_X]) &&
+           powers_to_4(-of.phi0, g, &row[PVID_ROW_Z]);
 }
 
-/* A product with d, the parameter a, without the bits of its format. */
-static inline int64_t term(const pvid_kapitza_estimator_q31 *self, size_t a, int64_t product)
+/* A product with d, the parameter a, without the bits of its format; whether it is within -2^29..2^29 - 1. */
+static inline bool term(const pvid_kapitza_estimator_q31 *self, size_t a, int64_t product, int32_t *out)
 {
-    return pvid_round_shift_q31(product, (uint32_t)self->bits[a - 1u]);
+    return pvid_narrows_q31(product, (uint32_t)self->bits[a - 1u], TERM_BITS, out);
+}
+
+static inline bool is_within(int64_t x, int32_t limit)
+{
+    return (x >= -(int64_t)limit) && (x < limit);
 }
 
 bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
                                          const int32_t row[PVID_KAPITZA_ROW_Q31], int32_t *e,
                                          int32_t gradient[PVID_KAPITZA_P])
 {
-    bool fits = true;
     const int32_t beyond = (int32_t)pvid_nearest_q31((int64_t)self->p[W] - self->reference, 1); /* w - w_r */
-    const int32_t g = pvid_within_q31((int64_t)row[PVID_KAPITZA_ROW_G] + beyond, PART_LIMIT, &fits);
-    const int32_t g1_x = entry(pvid_by_rate_q31(row[PVID_ROW_X + 3], g), &fits);
-    const int32_t g2_x = entry(pvid_by_rate_q31(g1_x, g), &fits);
-    const int32_t g3_x = entry(pvid_by_rate_q31(g2_x, g), &fits);
-    const int32_t g1_z = entry(pvid_by_rate_q31(row[PVID_ROW_Z + 4], g), &fits);
-    const int32_t g2_z = entry(pvid_by_rate_q31(g1_z, g), &fits);
-    const int32_t g3_z = entry(pvid_by_rate_q31(g2_z, g), &fits);
-    const int32_t g4_z = entry(pvid_by_rate_q31(g3_z, g), &fits);
-    const int64_t of_e = pvid_by_rate_q31(row[PVID_ROW_E], beyond);
-    const int32_t inner = pvid_within_q31(row[PVID_ROW_A] + of_e, PART_LIMIT, &fits);
-    const int64_t d1_g2_x = pvid_product_q31(self->p[D1], g2_x);
-    const int64_t known = pvid_by_rate_q31(inner, beyond) + term(self, D1, pvid_product_q31(self->p[D1], g3_x)) +
-                          term(self, D2, pvid_product_q31(self->p[D2], g4_z));
-    const int64_t slope = (inner + of_e) + term(self, D1, d1_g2_x + (2 * d1_g2_x)) +
-                          term(self, D2, 4 * pvid_product_q31(self->p[D2], g3_z));
-    gradient[W] = pvid_within_q31(slope, PART_LIMIT, &fits);
-    gradient[D1] = g3_x;
-    gradient[D2] = g4_z;
-    *e = entry(row[PVID_ROW_Y] - known, &fits);
-    return fits;
+    const int64_t rate = (int64_t)row[PVID_KAPITZA_ROW_G] + beyond;
+    if (!is_within(rate, PVID_ONE_Q30)) {
+        return false;
+    }
+    const int32_t g = (int32_t)rate;
+    int32_t g_x[4];
+    int32_t g_z[5];
+    int32_t of_e;
+    if (!powers_to_3(row[PVID_ROW_X + 3], g, g_x) || !powers_to_4(row[PVID_ROW_Z + 4], g, g_z) ||
+        !of_rates(pvid_short_product_q31(row[PVID_ROW_E], beyond), TERM_BITS, &of_e)) {
+        return false;
+    }
+    const int32_t inner = row[PVID_ROW_A] + of_e;
+    const int64_t d1_g2_x = pvid_product_q31(self->p[D1], g_x[1]);
+    int32_t of_w;
+    int32_t of_d1;
+    int32_t of_d2;
+    int32_t slope_d1;
+    int32_t slope_d2;
+    if (!of_rates(pvid_short_product_q31(inner, beyond), TERM_BITS, &of_w) ||
+        !term(self, D1, pvid_product_q31(self->p[D1], g_x[0]), &of_d1) ||
+        !term(self, D2, pvid_product_q31(self->p[D2], g_z[0]), &of_d2) ||
+        !term(self, D1, d1_g2_x + (2 * d1_g2_x), &slope_d1) ||
+        !term(self, D2, 4 * pvid_product_q31(self->p[D2], g_z[1]), &slope_d2)) {
+        return false;
+    }
+    const int32_t rest = row[PVID_ROW_Y] - (of_w + of_d1 + of_d2);
+    const int64_t slope = ((int64_t)inner + of_e) + slope_d1 + slope_d2;
+    gradient[W] = (int32_t)pvid_clamp_q31(slope, PVID_ONE_Q30);
+    gradient[D1] = g_x[0];
+    gradient[D2] = g_z[0];
+    *e = rest;
+    return is_within(rest, PVID_ROW_LIMIT_Q31) && is_within(slope, PVID_ONE_Q30);
 }

@@ -13,10 +13,10 @@
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
-#define L_BITS 29u       /* of L, |.| <= 2 */
-#define PIVOT_SHIFT 20u  /* a pivot below this part of its diagonal entry is rounding, not data */
+#define L_BITS 29u       /* of L, |.| < 2 */
+#define PIVOT_SHIFT 20u  /* a pivot not above this part of its diagonal entry is rounding, not data */
 #define RHS_BITS 27      /* of a right-hand side */
-#define SOLUTION_BITS 28 /* of a solution */
+#define SOLUTION_BITS 27 /* of a solution without the terms beside the diagonal: with them it fits 32 bits */
 #define FORCE_MAX ((int64_t)1 << 61)
 #define STEP_MAX ((int64_t)1 << 40) /* of |dp|, far beyond the bounds of p */
 #define SHIFT_MAX 31
@@ -101,7 +101,7 @@ typedef struct {
 
 /* x 2^exponent = (S + H0)^-1 F: w', d1', d2' of the system; b: F equilibrated, times 2^of_b. */
 typedef struct {
-    int64_t x[PVID_KAPITZA_P];
+    int32_t x[PVID_KAPITZA_P];
     int32_t b[PVID_KAPITZA_P];
     int32_t of_b;
     int32_t exponent; /* of x[a], less g[a] */
@@ -116,11 +116,17 @@ static int32_t inverse_of(int32_t d)
     return (r * 8192) + more;
 }
 
+/* x 2^up in [2^29, 2^30), 1 <= x < 2^30. */
+static int32_t raised(int32_t x, uint32_t *up)
+{
+    *up = 30u - pvid_bit_length_q31((uint64_t)x);
+    return x * (int32_t)((uint32_t)1 << *up);
+}
+
 static void invert(factors *factor, size_t a, int64_t pivot)
 {
     const int32_t below = (int32_t)((pivot < PVID_ONE_Q30) ? pivot : (PVID_ONE_Q30 - 1));
-    factor->up[a] = 30u - pvid_bit_length_q31((uint64_t)below);
-    factor->inverse[a] = inverse_of(below * (int32_t)((uint32_t)1 << factor->up[a]));
+    factor->inverse[a] = inverse_of(raised(below, &factor->up[a]));
 }
 
 /* a b with b in the format of L. */
@@ -135,19 +141,33 @@ static inline int32_t over_pivot(const factors *factor, size_t a, int32_t x)
     return by_l(x, factor->inverse[a]);
 }
 
-/* The same as an entry of L, |.| <= 2. */
+/* The same as an entry of L, |.| < 2: a product with an entry of S fits 32 bits. */
 static inline int32_t entry_of_l(const factors *factor, size_t a, int32_t x)
 {
     const uint32_t up = factor->up[a];
     const int32_t l = over_pivot(factor, a, x);
-    const int32_t most = pvid_floor_shift_32_q31(PVID_ONE_Q30, up);
+    const int32_t most = pvid_floor_shift_32_q31(PVID_ONE_Q30 - 1, up);
     const int32_t above = (l < -most) ? -most : l;
     return pvid_moved_q31((above > most) ? most : above, (int32_t)up);
 }
 
+/* s 2^-g, 0 <= s, of 32 bits as a rule; 2^30 at most by the choice of g. */
 static inline int32_t equilibrated(int64_t s, int32_t g)
 {
-    return (int32_t)pvid_clamp_q31(pvid_scale_q31(s, g), PVID_ONE_Q30);
+    return (s <= INT32_MAX) ? pvid_moved_q31((int32_t)s, -g)
+                            : (int32_t)pvid_clamp_q31(pvid_scale_q31(s, g), PVID_ONE_Q30);
+}
+
+/* The same on the diagonal, 1 <= s: in [2^28, 2^30] by the choice of g. */
+static inline int32_t on_diagonal(int64_t s, int32_t g)
+{
+    return equilibrated(s, 2 * g);
+}
+
+/* x 2^-shift rounded half up, saturated at +-PVID_WIDE; to the right as a rule. */
+static inline int64_t scaled_down(int32_t x, int32_t shift)
+{
+    return (shift >= 0) ? pvid_moved_q31(x, -shift) : pvid_scale_q31(x, shift);
 }
 
 /* An entry beside the diagonal, |.| <= 2^30. */
@@ -164,7 +184,7 @@ static int64_t with_prior(const pvid_kapitza_estimator_q31 *self, size_t a, int6
     const int32_t shift = (int32_t)self->settings.prior_exponent[a] + (2 * (of + (int32_t)self->exponent));
     *prior = 0;
     if (shift < 32) {
-        *prior = pvid_clamp_q31(pvid_scale_q31(self->settings.prior[a], shift), PVID_WIDE / 4);
+        *prior = pvid_clamp_q31(scaled_down(self->settings.prior[a], shift), PVID_WIDE / 4);
     }
     return s + *prior;
 }
@@ -190,24 +210,24 @@ PVID_APART static bool factorise(const pvid_kapitza_estimator_q31 *self, const p
     const int32_t q01 = beside(system->s[1], g[W] + g[D1]);
     const int32_t q02 = beside(system->s[2], g[W] + g[D2]);
     const int32_t q12 = beside(system->s[4], g[D1] + g[D2]);
-    const int32_t q11 = equilibrated(s11, 2 * g[D1]);
-    factor->s00 = equilibrated(s00, 2 * g[W]);
+    const int32_t q11 = on_diagonal(s11, g[D1]);
+    factor->s00 = on_diagonal(s00, g[W]);
     factor->prior = equilibrated(prior_w, 2 * g[W]);
-    invert(factor, D2, equilibrated(s22, 2 * g[D2]));
+    invert(factor, D2, on_diagonal(s22, g[D2]));
     factor->l02 = entry_of_l(factor, D2, q02);
     factor->l12 = entry_of_l(factor, D2, q12);
     const int64_t p1 = (int64_t)q11 - by_l(factor->l12, q12);
-    if (p1 < pvid_floor_shift_32_q31(q11, PIVOT_SHIFT)) {
+    if (p1 <= pvid_floor_shift_32_q31(q11, PIVOT_SHIFT)) {
         return false;
     }
     invert(factor, D1, p1);
     const int32_t c01 = (int32_t)pvid_clamp_q31((int64_t)q01 - by_l(factor->l02, q12), PVID_ONE_Q30);
     factor->l01 = entry_of_l(factor, D1, c01);
     const int64_t p0 = ((int64_t)factor->s00 - by_l(factor->l02, q02)) - by_l(factor->l01, c01);
-    if (p0 < pvid_floor_shift_32_q31(factor->s00, PIVOT_SHIFT)) {
+    if (p0 <= pvid_floor_shift_32_q31(factor->s00, PIVOT_SHIFT)) {
         return false;
     }
-    factor->p0 = (int32_t)p0;
+    factor->p0 = (int32_t)((p0 < PVID_ONE_Q30) ? p0 : PVID_ONE_Q30);
     invert(factor, W, factor->p0);
     return true;
 }
@@ -221,6 +241,18 @@ static inline int32_t bits_beyond(int32_t x, uint32_t up)
     return (beyond > 0) ? beyond : 0;
 }
 
+/* f 2^-shift rounded half up, of 27 bits by the choice of the shift. */
+static inline int32_t right_hand_side(int64_t f, int32_t shift)
+{
+    return pvid_narrowed_q31(f, shift);
+}
+
+/* y 2^(up - down), of 27 bits by the choice of down. */
+static inline int32_t lifted(int32_t y, uint32_t up, int32_t down)
+{
+    return pvid_moved_q31(y, (int32_t)up - down);
+}
+
 /* The solution for f, |f| < 2^62. */
 PVID_APART static void solve_for(const factors *factor, const int64_t f[PVID_KAPITZA_P], solutions *solution)
 {
@@ -232,7 +264,7 @@ PVID_APART static void solve_for(const factors *factor, const int64_t f[PVID_KAP
     h -= RHS_BITS;
     int32_t *b = solution->b;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
-        b[a] = (int32_t)pvid_scale_q31(f[a], factor->g[a] + h);
+        b[a] = right_hand_side(f[a], factor->g[a] + h);
     }
     solution->of_b = h - 30;
     const int32_t z1 = b[D1] - by_l(factor->l12, b[D2]);
@@ -243,12 +275,12 @@ PVID_APART static void solve_for(const factors *factor, const int64_t f[PVID_KAP
     const int32_t down =
         pvid_larger_q31(pvid_larger_q31(bits_beyond(y0, factor->up[W]), bits_beyond(y1, factor->up[D1])),
                         bits_beyond(y2, factor->up[D2]));
-    const int32_t x0 = pvid_moved_q31(y0, (int32_t)factor->up[W] - down);
-    const int32_t x1 = pvid_moved_q31(y1, (int32_t)factor->up[D1] - down) - by_l(factor->l01, x0);
-    const int32_t x2 = pvid_moved_q31(y2, (int32_t)factor->up[D2] - down);
+    const int32_t x0 = lifted(y0, factor->up[W], down);
+    const int32_t x1 = lifted(y1, factor->up[D1], down) - by_l(factor->l01, x0);
+    const int32_t x2 = lifted(y2, factor->up[D2], down);
     solution->x[W] = x0;
     solution->x[D1] = x1;
-    solution->x[D2] = ((int64_t)x2 - by_l(factor->l02, x0)) - by_l(factor->l12, x1);
+    solution->x[D2] = (x2 - by_l(factor->l02, x0)) - by_l(factor->l12, x1);
     solution->exponent = (solution->of_b - (int32_t)L_BITS) + down;
 }
 
@@ -263,7 +295,7 @@ static int64_t fresh_force(const pvid_kapitza_estimator_q31 *self, const pvid_ka
     return pvid_clamp_q31(pvid_scale_q31(self->fresh[a], shift), FORCE_MAX);
 }
 
-/* g F + (1 - g) sum gradient e. */
+/* sum gradient e + g (F - sum gradient e). */
 static void drive(const pvid_kapitza_estimator_q31 *self, const pvid_kapitza_system_q31 *system,
                   int64_t f[PVID_KAPITZA_P])
 {
@@ -276,9 +308,7 @@ static void drive(const pvid_kapitza_estimator_q31 *self, const pvid_kapitza_sys
                                                system->scale_z + (4 * t)};
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
         const int64_t fresh = fresh_force(self, system, a, of_column[a]);
-        f[a] = (gain == 0) ? fresh
-                           : (pvid_times_q31(f[a], 2 * gain) +
-                              pvid_times_q31(fresh, (int32_t)(2 * ((int64_t)PVID_ONE_Q30 - gain))));
+        f[a] = (gain == 0) ? fresh : (fresh + pvid_times_q31(f[a] - fresh, 2 * gain));
     }
 }
 
@@ -308,20 +338,10 @@ PVID_SELDOM static bool is_in_dead_zone(const pvid_kapitza_estimator_q31 *self, 
 
 /* ---- step ---- */
 
-static bool is_long(const pvid_kapitza_estimator_q31 *self, size_t a, int64_t dp)
+/* Largest |dp| of a step that is not shortened. */
+static int32_t reach_of(const pvid_kapitza_estimator_q31 *self, size_t a)
 {
-    const int64_t limit = pvid_floor_shift_q31(pvid_product_q31(self->p[a], (int32_t)self->settings.step_limit), 16);
-    return (dp > limit) || (dp < -limit);
-}
-
-/* p + dp within its bounds. */
-static int32_t bounded(const pvid_kapitza_estimator_q31 *self, size_t a, int64_t dp, bool *stopped)
-{
-    const int64_t x = self->p[a] + dp;
-    const int64_t above = (x < self->settings.lower[a]) ? self->settings.lower[a] : x;
-    const int64_t within = (above > self->settings.upper[a]) ? self->settings.upper[a] : above;
-    *stopped = *stopped || (within != x);
-    return (int32_t)within;
+    return (int32_t)pvid_floor_shift_q31(pvid_product_q31(self->p[a], (int32_t)self->settings.step_limit), 16);
 }
 
 PVID_SELDOM static void take_long_step(pvid_kapitza_estimator_q31 *self, const int64_t dp[])
@@ -331,15 +351,32 @@ PVID_SELDOM static void take_long_step(pvid_kapitza_estimator_q31 *self, const i
     pvid_count_step(&self->counters, solution.limited, solution.bounded);
 }
 
+/* p + dp within its bounds, |dp| < p: below 2^32. */
+static int32_t bounded(const pvid_kapitza_estimator_q31 *self, size_t a, int32_t dp, bool *stopped)
+{
+    const uint32_t x = (uint32_t)((int64_t)self->p[a] + dp);
+    const uint32_t lower = (uint32_t)self->settings.lower[a];
+    const uint32_t upper = (uint32_t)self->settings.upper[a];
+    const uint32_t above = (x < lower) ? lower : x;
+    const uint32_t within = (above > upper) ? upper : above;
+    *stopped = *stopped || (within != x);
+    return (int32_t)within;
+}
+
 PVID_APART static void take_step(pvid_kapitza_estimator_q31 *self, const int64_t dp[])
 {
-    if (is_long(self, W, dp[W]) || is_long(self, D1, dp[D1]) || is_long(self, D2, dp[D2])) {
+    bool is_long = false;
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        const int32_t reach = reach_of(self, a);
+        is_long = is_long || (dp[a] > reach) || (dp[a] < -(int64_t)reach);
+    }
+    if (is_long) {
         take_long_step(self, dp);
         return;
     }
     bool stopped = false;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
-        self->p[a] = bounded(self, a, dp[a], &stopped);
+        self->p[a] = bounded(self, a, (int32_t)dp[a], &stopped);
     }
     pvid_count_step(&self->counters, false, stopped);
 }
@@ -375,7 +412,7 @@ PVID_APART static pvid_reason solve(pvid_kapitza_estimator_q31 *self)
     int64_t dp[PVID_KAPITZA_P];
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
         const int32_t up = (solution.exponent - factor.g[a]) + bits[a];
-        dp[a] = pvid_clamp_q31(pvid_scale_q31(solution.x[a], -up), STEP_MAX);
+        dp[a] = pvid_clamp_q31(scaled_down(solution.x[a], -up), STEP_MAX);
     }
     take_step(self, dp);
     pvid_count_up(&self->counters.updates);

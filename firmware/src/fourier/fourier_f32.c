@@ -215,7 +215,6 @@ void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen)
 /* The reason why a complete window is dropped; PVID_ACCUMULATED if it is used. */
 static pvid_reason drop_reason(pvid_fourier_f32 *self)
 {
-    const pvid_fourier_design_f32 *design = self->design;
     if (self->frozen) {
         return PVID_HELD_FROZEN;
     }
@@ -223,7 +222,7 @@ static pvid_reason drop_reason(pvid_fourier_f32 *self)
         pvid_count_up(&self->estimator.counters.held_out_of_range);
         return PVID_HELD_OUT_OF_RANGE;
     }
-    if (pvid_fourier_watch_still_f32(&self->watch, design->model->samples, self->sums.target, design->hop)) {
+    if (self->watch.still) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
@@ -248,16 +247,12 @@ PVID_SELDOM static pvid_reason end_half(pvid_fourier_f32 *self)
 }
 
 /* The channels of a step to the present block. */
-PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason form(pvid_fourier_f32 *self)
 {
     const pvid_fourier_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
-    const size_t half = self->sums.half;
     pvid_reason dropped = PVID_ACCUMULATED;
     if (pvid_fourier_step_take_f32(&self->history, design, self->dt, index, pvid_fourier_sums_place_f32(&self->sums))) {
-        if (self->watches) {
-            pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
-        }
         if (pvid_fourier_sums_count_f32(&self->sums, design->hop, self->channels)) {
             dropped = end_half(self);
         }
@@ -277,16 +272,20 @@ PVID_SELDOM static pvid_reason reject(pvid_fourier_f32 *self)
 /* Some harmonics of the last block are added, or of the last window joined. */
 static pvid_reason add(pvid_fourier_f32 *self)
 {
-    uint32_t left = self->items_per_tick;
-    do {
-        if (pvid_fourier_sums_advance_f32(&self->sums, self->design, self->harmonics, self->channels, self->dt,
-                                          self->finish.work.rows.window)) {
-            pvid_fourier_finish_begin_f32(&self->finish);
+    pvid_fourier_sums_f32 *sums = &self->sums;
+    for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
+        if (pvid_fourier_sums_joins_f32(sums)) {
+            pvid_fourier_sums_join_one_f32(sums, self->design, self->channels, self->dt, self->finish.work.rows.window);
+            if (sums->joined == self->harmonics) {
+                pvid_fourier_finish_begin_f32(&self->finish);
+                rest(self);
+            }
+        } else {
+            pvid_fourier_sums_add_f32(sums, self->design, self->channels);
+            if (!pvid_fourier_sums_is_busy_f32(sums, self->harmonics)) {
+                rest(self);
+            }
         }
-        left--;
-    } while (left > 0u);
-    if (!pvid_fourier_sums_is_busy_f32(&self->sums, self->harmonics)) {
-        rest(self);
     }
     return idle(self);
 }
@@ -306,17 +305,32 @@ static pvid_reason process(pvid_fourier_f32 *self)
     return reason;
 }
 
+/* The samples of the tick of a step, whose channels follow. */
+static void watch(pvid_fourier_f32 *self, const float sample[])
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    const uint16_t index = self->sums.index;
+    const size_t half = self->sums.half;
+    pvid_fourier_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
+    if (index + 1u == design->hop) {
+        pvid_fourier_watch_half_f32(&self->watch, design->model->samples, half, design->hop);
+    }
+}
+
 /* The last tick of a block. */
 PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sample[])
 {
     const uint8_t decimation = self->front.decimation;
     const bool steps =
         pvid_fourier_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
+    if (steps && self->watches && (self->history.known > 1u)) {
+        watch(self, sample);
+    }
     if (steps && (decimation >= PVID_FOURIER_TWO_TICKS)) {
         self->rest = FORM;
         return idle(self);
     }
-    const pvid_reason formed = steps ? form(self, sample) : idle(self);
+    const pvid_reason formed = steps ? form(self) : idle(self);
     if ((decimation > 1u) || (self->rest <= FORM)) {
         return formed;
     }
@@ -325,55 +339,70 @@ PVID_SELDOM static pvid_reason end_block(pvid_fourier_f32 *self, const float sam
 }
 
 /* A tick with something to do. */
-PVID_SELDOM static pvid_reason due(pvid_fourier_f32 *self, const float sample[])
+PVID_SELDOM static pvid_reason due(pvid_fourier_f32 *self)
 {
-    if (self->rest == PROCESS) {
-        return process(self);
+    if (self->rest == ADD) {
+        return add(self);
     }
-    return (self->rest == ADD) ? add(self) : form(self, sample);
+    return (self->rest == PROCESS) ? process(self) : form(self);
 }
 
-/* A tick whose samples need more than to be added. */
+/* Behind the samples of a tick. */
+static inline pvid_reason follow(pvid_fourier_f32 *self, const float sample[])
+{
+    self->front.wait--;
+    if (self->front.wait == 0u) {
+        return end_block(self, sample);
+    }
+    const uint32_t rested = self->rest;
+    return (rested >= FORM) ? due(self) : (pvid_reason)rested;
+}
+
+/* Of samples with one that is not finite or beyond its range: returns whether all are finite. */
+PVID_SELDOM static bool are_finite(pvid_fourier_f32 *self, const float sample[])
+{
+    const bool finite = all_finite(sample, self->design->model->samples);
+    if (finite) {
+        self->watch.beyond = self->watch.delay;
+    }
+    return finite;
+}
+
+/* A tick whose signals are not the samples. */
 PVID_SELDOM static pvid_reason other_tick(pvid_fourier_f32 *self, const float sample[])
 {
     if (!is_ready(self) || (sample == NULL)) {
         return PVID_NOT_READY;
     }
     const pvid_fourier_model_f32 *model = self->design->model;
-    if (!all_finite(sample, model->samples)) {
+    if (!pvid_fourier_front_fits_f32(&self->front, model->samples, sample) && !are_finite(self, sample)) {
         return reject(self);
     }
-    if (self->watch.range != NULL) {
-        pvid_fourier_watch_sample_f32(&self->watch, model->samples, sample);
-    }
     pvid_fourier_front_derive_f32(&self->front, model, sample);
-    self->front.wait--;
-    if (self->front.wait == 0u) {
-        return end_block(self, sample);
+    return follow(self, sample);
+}
+
+/* A tick with a sample that is not finite or beyond its range. */
+PVID_SELDOM static pvid_reason odd_tick(pvid_fourier_f32 *self, const float sample[])
+{
+    if (!are_finite(self, sample)) {
+        return reject(self);
     }
-    return (self->rest >= FORM) ? due(self, sample) : (pvid_reason)self->rest;
+    pvid_fourier_front_add_f32(&self->front, self->plain, sample);
+    return follow(self, sample);
 }
 
 /* A tick of the weak form. */
 static inline pvid_reason weak_tick(pvid_fourier_f32 *self, const float sample[])
 {
-    const uint32_t plain = (self != NULL) ? self->plain : 0u;
-    if ((plain == 0u) || (sample == NULL)) {
+    if ((self == NULL) || (sample == NULL) || (self->plain == 0u)) {
         return other_tick(self, sample);
     }
-    bool beyond = false;
-    if (!pvid_fourier_front_add_f32(&self->front, plain, sample, &beyond)) {
-        return reject(self);
+    if (!pvid_fourier_front_fits_f32(&self->front, self->plain, sample)) {
+        return odd_tick(self, sample);
     }
-    if (beyond) {
-        self->watch.beyond = self->watch.delay;
-    }
-    self->front.wait--;
-    if (self->front.wait == 0u) {
-        return end_block(self, sample);
-    }
-    const uint32_t rested = self->rest;
-    return (rested >= FORM) ? due(self, sample) : (pvid_reason)rested;
+    pvid_fourier_front_add_f32(&self->front, self->plain, sample);
+    return follow(self, sample);
 }
 
 /* A tick of both stages. */

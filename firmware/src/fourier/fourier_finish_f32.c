@@ -13,7 +13,7 @@
 #include "fourier/scores_f32.h"
 #include "fourier/white_f32.h"
 #include "number/count.h"
-#include "number/unroll.h"
+#include "number/exact.h"
 #include "solve/information_f32.h"
 #include "solve/products_f32.h"
 #include "solve/staged_f32.h"
@@ -36,9 +36,11 @@ enum {
     STAGE_ADD,      /* a few products of columns to the estimator */
     /* for the window */
     STAGE_SCORE,   /* C^T (sum N e + g) */
+    STAGE_BEGIN,   /* of the solves */
     STAGE_SOLVE,   /* `iterations` solves, several stages each */
     STAGE_MEAN,    /* the scores to their means */
-    STAGE_ASSESS,  /* several stages; this and the next two only behind a solve that was due */
+    STAGE_PREPARE, /* of the assessment; this and the next three only behind a solve that was due */
+    STAGE_ASSESS,  /* several stages */
     STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
     STAGE_GROW,    /* the covariance grows with the standard errors */
     STAGE_JUDGE,   /* trust.h publishes the estimate or holds it */
@@ -48,6 +50,15 @@ enum {
 /* Entries of the noise table, and products of the residuals and of columns, in a stage. */
 #define ENTRIES_PER_STAGE 8u
 #define PRODUCTS_PER_STAGE 30u
+
+/* Non-zeros of C that a stage lists by rows. */
+#define NONZEROS_PER_STAGE 8u
+
+/* Pairs of columns whose noise a stage adds. */
+#define PAIRS_PER_STAGE 1u
+
+/* Most functions with which a stage reflects the real and the imaginary parts of a column. */
+#define BOTH_FAMILIES 16u
 
 /* Parts whose share a stage forms. */
 #define SHARES_PER_STAGE 4u
@@ -97,7 +108,6 @@ static void begin_kind(pvid_fourier_finish_f32 *self)
     self->moment = 0;
     self->live = 0;
     self->rss = 0.0f;
-    memset(self->work.rows.part, 0, sizeof self->work.rows.part);
     self->stage = STAGE_WEIGH;
 }
 
@@ -120,7 +130,6 @@ void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self)
     self->expected = 0.0f;
     self->free = 0.0f;
     self->square = 0.0f;
-    memset(self->work.rows.score, 0, sizeof self->work.rows.score);
     begin_kind(self);
 }
 
@@ -167,24 +176,41 @@ PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
     if ((finish->index == 0u) && (finish->kind == 0u)) {
         memset(finish->candidate.covariance, 0, sizeof finish->candidate.covariance);
     }
-    if (!finish->shares && (finish->index == 0u)) {
-        pvid_fourier_noise_shares_f32(&finish->white, design, finish->white.share);
+    pvid_fourier_slopes_f32 *slopes = &finish->work.rows.of_kind.before.slopes;
+    if (finish->phase == 0u) {
+        if (!finish->shares) {
+            pvid_fourier_noise_shares_f32(&finish->white, design, finish->white.share);
+        }
+        design->model->model->jacobian(self->estimator.p, slopes->c);
+        finish->phase = 1;
+        return true;
     }
-    const size_t place = pvid_fourier_noise_next_f32(design, finish->kind, finish->index);
-    if (place >= design->n_noise) {
-        return false;
+    if (finish->phase == 1u) {
+        const size_t n_c = design->model->model->n_c;
+        const size_t end = (size_t)finish->index + NONZEROS_PER_STAGE;
+        const size_t last = (end < n_c) ? end : n_c;
+        pvid_fourier_noise_list_f32(design, finish->theta, kind_of(self)->thetas, finish->index, last, slopes);
+        finish->index = (uint16_t)last;
+        if (last == n_c) {
+            finish->index = (uint16_t)pvid_fourier_noise_next_f32(design, finish->kind, 0);
+            finish->phase = 2;
+        }
+        return true;
     }
-    float c[PVID_MAX_THETA * PVID_MAX_P];
-    design->model->model->jacobian(self->estimator.p, c);
-    finish->index = (uint16_t)pvid_fourier_noise_add_f32(design, place, finish->theta, finish->white.share,
-                                                         rows_of(self), c, finish->candidate.covariance);
-    return pvid_fourier_noise_next_f32(design, finish->kind, finish->index) < design->n_noise;
+    size_t place = finish->index;
+    for (size_t left = PAIRS_PER_STAGE; (left > 0u) && (place < design->n_noise); left--) {
+        place = pvid_fourier_noise_add_f32(design, place, finish->white.share, rows_of(self), slopes,
+                                           finish->candidate.covariance);
+        place = pvid_fourier_noise_next_f32(design, finish->kind, place);
+    }
+    finish->index = (uint16_t)place;
+    return place < design->n_noise;
 }
 
 PVID_SELDOM static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_fourier_white_basis_f32(&finish->white, finish->index, &finish->work.rows.basis);
+    pvid_fourier_white_basis_f32(&finish->white, finish->index, &finish->work.rows.of_kind.before.basis);
     finish->index++;
     return finish->index < pvid_fourier_basis_stages(self->design);
 }
@@ -195,7 +221,8 @@ PVID_SELDOM static bool share_stage(pvid_fourier_f32 *self)
     const size_t parts = pvid_fourier_parts(self->design);
     const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
     const size_t last = (end < parts) ? end : parts;
-    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.basis.leverage, finish->index, last);
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.of_kind.before.basis.leverage,
+                                 finish->index, last);
     finish->index = (uint16_t)last;
     return last < parts;
 }
@@ -215,30 +242,71 @@ static bool gather_term(pvid_fourier_f32 *self)
     return (finish->term < end) && (term[finish->term].column == finish->index);
 }
 
+/* No terms yet. */
+static void clear_parts(pvid_fourier_finish_f32 *self)
+{
+    const size_t parts = PVID_COUNT(PVID_MAX_FUNCTIONS + PVID_MAX_POWER, self->white.parts);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < parts; i++) {
+        self->work.rows.part[i] = 0.0f;
+    }
+}
+
+PVID_SELDOM static void scale_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_fourier_white_scale_f32(&finish->white, self->harmonics);
+    clear_parts(finish);
+    for (size_t i = 0; (finish->kind == 0u) && (i < (size_t)PVID_MAX_THETA); i++) {
+        finish->work.rows.score[i] = 0.0f;
+    }
+}
+
+/* Rows of a family of the present column from its parts. */
+static void reflect_parts(pvid_fourier_finish_f32 *self, size_t family)
+{
+    const pvid_fourier_white_f32 *white = &self->white;
+    const size_t vectors = PVID_COUNT(PVID_MAX_POWER / 2, white->vectors);
+    const size_t cosines = PVID_COUNT(PVID_MAX_HARMONICS, white->cosines);
+    const size_t parts = PVID_COUNT(PVID_MAX_FUNCTIONS + PVID_MAX_POWER, white->parts);
+    const size_t first = (family == 0u) ? 0u : cosines;
+    const size_t rows = ((family == 0u) ? cosines : (parts - cosines)) - vectors;
+    float *row = &self->work.rows.of_kind.column[self->index][(family == 0u) ? 0u : (cosines - vectors)];
+    float *part = &self->work.rows.part[first];
+    pvid_fourier_white_reflect_f32(white, family, self->work.rows.part);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < rows; i++) {
+        row[i] = part[vectors + i];
+    }
+}
+
 /* The present column: its parts, then the rows of one family after the other. */
 PVID_SELDOM static bool column_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    const pvid_fourier_white_f32 *white = &finish->white;
     if (finish->phase == 0u) {
         finish->phase = (uint8_t)(gather_term(self) ? 0u : 1u);
         return true;
     }
-    const size_t family = (size_t)finish->phase - 1u;
-    const size_t vectors = white->vectors;
-    const size_t cosines = white->cosines;
-    const size_t rows = (family == 0u) ? (cosines - vectors) : ((white->parts - cosines) - vectors);
-    pvid_fourier_white_reflect_f32(white, family, finish->work.rows.part);
-    memcpy(&finish->work.rows.column[finish->index][(family == 0u) ? 0u : (cosines - vectors)],
-           &finish->work.rows.part[((family == 0u) ? 0u : cosines) + vectors], rows * sizeof(float));
-    if (family == 0u) {
+    if (finish->phase == 1u) {
+        reflect_parts(finish, 0);
+    }
+    if ((finish->phase == 1u) && (self->design->functions > BOTH_FAMILIES)) {
         finish->phase = 2;
         return true;
     }
-    memset(finish->work.rows.part, 0, finish->white.parts * sizeof finish->work.rows.part[0]);
+    reflect_parts(finish, 1);
+    clear_parts(finish);
     finish->phase = 0;
     finish->index++;
     return finish->index < columns_of(kind_of(self));
+}
+
+/* Columns that a stage projects. */
+static size_t projections_per_stage(const pvid_fourier_design_f32 *design)
+{
+    return ((2u * (size_t)design->functions) < PRODUCTS_PER_STAGE) ? (PRODUCTS_PER_STAGE / (2u * design->functions))
+                                                                   : 1u;
 }
 
 /* Of each nuisance in order: part 0 its inverse square, then the columns without it, those of theta, Y and the
@@ -257,22 +325,25 @@ PVID_SELDOM static bool project_stage(pvid_fourier_f32 *self)
         if (finish->index == 0u) {
             for (size_t i = first; i < columns_of(kind); i++) {
                 finish->work.rows.own[i] =
-                    pvid_product_f32(finish->work.rows.column[i], finish->work.rows.column[i], rows);
+                    pvid_product_f32(finish->work.rows.of_kind.column[i], finish->work.rows.of_kind.column[i], rows);
             }
         }
         const bool kept =
-            pvid_fourier_columns_keep_f32(rows, finish->work.rows.column[nuisance], finish->work.rows.own[nuisance],
-                                          &finish->work.rows.own[nuisance]);
+            pvid_fourier_columns_keep_f32(rows, finish->work.rows.of_kind.column[nuisance],
+                                          finish->work.rows.own[nuisance], &finish->work.rows.own[nuisance]);
         finish->live = (uint8_t)(finish->live + (kept ? 1u : 0u));
         finish->phase = 1;
         return true;
     }
-    const size_t place = finish->phase - 1u;
-    const size_t column = (place < first) ? place : (place + finish->index + 1u);
-    pvid_fourier_columns_project_f32(rows, finish->work.rows.column[nuisance], finish->work.rows.own[nuisance],
-                                     finish->work.rows.column[column]);
-    finish->phase++;
-    if (finish->phase > (first + kind->nuisances) - (finish->index + 1u)) {
+    const size_t others = (first + kind->nuisances) - (finish->index + 1u);
+    for (size_t left = projections_per_stage(self->design); (left > 0u) && (finish->phase <= others); left--) {
+        const size_t place = finish->phase - 1u;
+        const size_t column = (place < first) ? place : (place + finish->index + 1u);
+        pvid_fourier_columns_project_f32(rows, finish->work.rows.of_kind.column[nuisance],
+                                         finish->work.rows.own[nuisance], finish->work.rows.of_kind.column[column]);
+        finish->phase++;
+    }
+    if (finish->phase > others) {
         finish->phase = 0;
         finish->index++;
     }
@@ -300,12 +371,12 @@ PVID_SELDOM static bool residual_stage(pvid_fourier_f32 *self)
     const size_t rows = self->design->functions;
     const size_t end = (size_t)finish->index + rows_per_stage(kind);
     const size_t last = (end < rows) ? end : rows;
-    float *e = finish->work.rows.column[kind->thetas];
+    float *e = finish->work.rows.of_kind.column[kind->thetas];
     float rss = finish->rss;
     for (size_t k = finish->index; k < last; k++) {
         float left = e[k];
         for (size_t j = 0; j < kind->thetas; j++) {
-            left -= theta[j] * finish->work.rows.column[j][k];
+            left -= theta[j] * finish->work.rows.of_kind.column[j][k];
         }
         e[k] = left;
         rss += left * left;
@@ -322,8 +393,8 @@ PVID_SELDOM static bool squares_stage(pvid_fourier_f32 *self)
     const size_t end = (size_t)finish->index + products_per_stage(self->design);
     const size_t last = (end < thetas) ? end : thetas;
     for (size_t j = finish->index; j < last; j++) {
-        finish->work.rows.own[j] =
-            pvid_product_f32(finish->work.rows.column[j], finish->work.rows.column[j], self->design->functions);
+        finish->work.rows.own[j] = pvid_product_f32(finish->work.rows.of_kind.column[j],
+                                                    finish->work.rows.of_kind.column[j], self->design->functions);
     }
     finish->index = (uint16_t)last;
     return last < thetas;
@@ -373,15 +444,19 @@ PVID_SELDOM static bool add_stage(pvid_fourier_f32 *self)
     float *low = self->estimator.information.low;
     pvid_block block;
     pvid_information_block_f32(self->estimator.model, finish->theta, &block);
-    for (size_t left = products_per_stage(self->design); left > 0u; left--) {
+    if (finish->index == thetas) {
+        pvid_products_end_f32(&self->estimator, &block, finish->work.rows.gradient, finish->rss, (uint32_t)rows);
+        return false;
+    }
+    for (size_t left = products_per_stage(self->design); (left > 0u) && (finish->index < thetas); left--) {
         const size_t i = finish->index;
         if (finish->other == 0u) {
             low[block.moment + finish->moment] += finish->work.rows.own[i];
             finish->moment++;
             finish->other = (uint8_t)(i + 1u);
         }
-        const float product =
-            pvid_product_f32(finish->work.rows.column[i], finish->work.rows.column[finish->other], rows);
+        const float product = pvid_product_f32(finish->work.rows.of_kind.column[i],
+                                               finish->work.rows.of_kind.column[finish->other], rows);
         if (finish->other < thetas) {
             low[block.moment + finish->moment] += product;
             finish->moment++;
@@ -393,10 +468,6 @@ PVID_SELDOM static bool add_stage(pvid_fourier_f32 *self)
         finish->work.rows.score[finish->theta + i] += product;
         finish->other = 0;
         finish->index++;
-        if (finish->index == thetas) {
-            pvid_products_end_f32(&self->estimator, &block, finish->work.rows.gradient, finish->rss, (uint32_t)rows);
-            return false;
-        }
     }
     return true;
 }
@@ -542,7 +613,7 @@ static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
     case STAGE_GATE:
         return gated(self, reason);
     case STAGE_MEAN: /* no assessment if no solve was due */
-        return (self->finish.reason == PVID_ACCUMULATED) ? (uint8_t)STAGE_JUDGE : (uint8_t)STAGE_ASSESS;
+        return (self->finish.reason == PVID_ACCUMULATED) ? (uint8_t)STAGE_JUDGE : (uint8_t)STAGE_PREPARE;
     case STAGE_JUDGE:
         return STAGE_IDLE;
     default:
@@ -558,12 +629,6 @@ PVID_SELDOM static void next_stage(pvid_fourier_f32 *self, pvid_reason *reason)
     finish->phase = 0;
     if (finish->stage == (uint8_t)STAGE_SCORE) {
         end_kind(self);
-    } else if (finish->stage == (uint8_t)STAGE_SOLVE) {
-        begin_solves(self);
-    } else if (finish->stage == (uint8_t)STAGE_ASSESS) {
-        pvid_estimator_assess_solved_f32(&self->estimator, &finish->work.solve, &finish->candidate);
-    } else {
-        /* nothing to begin */
     }
 }
 
@@ -579,7 +644,7 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind, self->harmonics);
         break;
     case STAGE_SCALE:
-        pvid_fourier_white_scale_f32(&finish->white, self->harmonics);
+        scale_stage(self);
         break;
     case STAGE_NOISE:
         repeat = noise_stage(self);
@@ -616,8 +681,14 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
     case STAGE_SCORE:
         pvid_fourier_scores_take_f32(&finish->scores, &self->estimator, finish->work.rows.score);
         break;
+    case STAGE_BEGIN:
+        begin_solves(self);
+        break;
     case STAGE_SOLVE:
         repeat = solve_stage(self);
+        break;
+    case STAGE_PREPARE:
+        pvid_estimator_assess_solved_f32(&self->estimator, &finish->work.solve, &finish->candidate);
         break;
     case STAGE_ASSESS:
         repeat = !pvid_estimator_assess_advance_f32(&self->estimator, &finish->work.solve);
@@ -661,22 +732,41 @@ static uint32_t gather_stages(const pvid_fourier_design_f32 *design, const pvid_
     return stages;
 }
 
+/* For a column. */
+static uint32_t reflect_stages(const pvid_fourier_design_f32 *design)
+{
+    return (design->functions <= BOTH_FAMILIES) ? 1u : 2u;
+}
+
+/* For nuisance i its square, then all columns but itself and those before it. */
+static uint32_t project_stages(const pvid_fourier_design_f32 *design, const pvid_fourier_kind *kind)
+{
+    uint32_t stages = 0;
+    for (uint32_t i = 0; i < kind->nuisances; i++) {
+        const uint32_t others = ((uint32_t)columns_of(kind) - 1u) - i;
+        stages += 1u + parts_of(others, (uint32_t)projections_per_stage(design));
+    }
+    return (stages > 0u) ? stages : 1u;
+}
+
 static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
 {
     const pvid_fourier_design_f32 *design = self->design;
     const uint32_t columns = (uint32_t)columns_of(kind);
     const uint32_t thetas = kind->thetas;
     const uint32_t entries = parts_of(design->n_noise, ENTRIES_PER_STAGE);
-    const uint32_t nuisances = kind->nuisances;
     const uint32_t products = (uint32_t)products_per_stage(design);
-    /* nuisance i: its square, then all columns but itself and those before it */
-    const uint32_t project = (nuisances > 0u) ? ((nuisances * columns) - ((nuisances * (nuisances - 1u)) / 2u)) : 1u;
     const uint32_t pairs = (uint32_t)pvid_fourier_noise_pairs_f32(design, (uint8_t)(kind - design->model->kind));
-    const uint32_t noise = (checks_noise(self) && (pairs > 0u)) ? pairs : 1u;
+    const uint32_t noise =
+        checks_noise(self)
+            ? (1u + parts_of(design->model->model->n_c, NONZEROS_PER_STAGE) + parts_of(pairs, PAIRS_PER_STAGE))
+            : 1u;
     uint32_t stages = entries + 3u + noise; /* SPECTRUM, SCALE, GATE */
-    stages += (uint32_t)pvid_fourier_basis_stages(design) + gather_stages(design, kind) + (2u * columns) + project;
+    stages +=
+        (uint32_t)pvid_fourier_basis_stages(design) + gather_stages(design, kind) + (reflect_stages(design) * columns);
+    stages += project_stages(design, kind);
     stages += parts_of(design->functions, (uint32_t)rows_per_stage(kind)) + parts_of(thetas, products);
-    stages += parts_of((thetas * (thetas + 1u)) / 2u, products);
+    stages += parts_of((thetas * (thetas + 1u)) / 2u, products) + 1u;
     if (self->finish.shares) {
         stages += parts_of((uint32_t)pvid_fourier_parts(design), SHARES_PER_STAGE) + entries + 1u; /* CORRECT */
     }
@@ -686,7 +776,7 @@ static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_
 uint32_t pvid_fourier_finish_stages_f32(const pvid_fourier_f32 *self)
 {
     const pvid_fourier_model_f32 *model = self->design->model;
-    uint32_t stages = 4u + model->model->n_p; /* SCORE, MEAN, GROW, JUDGE; CLUSTER */
+    uint32_t stages = 6u + model->model->n_p; /* SCORE, BEGIN, MEAN, PREPARE, GROW, JUDGE; CLUSTER */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }

@@ -30,7 +30,8 @@ enum {
     STAGE_FORMAT,   /* for theta's columns and Y: their format */
     STAGE_RESIDUAL, /* a few rows of e, in place of Y; at the end the gate accepts or rejects the kind */
     STAGE_FADE,     /* before the first rows of the window: the factor of a renewal on the sums, in parts */
-    STAGE_ADD,      /* K times, less the nuisances: a row to the estimator; at the end what the noise takes from b */
+    STAGE_ADD,      /* K times, less the nuisances: a row to the estimator */
+    STAGE_PULL,     /* what the noise takes from b */
     /* for the window */
     STAGE_SOLVE,  /* `iterations` solves, several stages each */
     STAGE_ASSESS, /* several stages */
@@ -41,8 +42,8 @@ enum {
 #define ENTRIES_PER_STAGE 4u
 #define HARMONICS_PER_STAGE 2u
 #define ROOTS_PER_STAGE 4u
-#define UNITS_PER_STAGE 4u
-#define SHARES_PER_STAGE 2u
+#define UNITS_PER_STAGE 2u
+#define SHARES_PER_STAGE 1u
 #define RESIDUALS_PER_STAGE 2u
 
 /* Relative step of p behind which there is no other one on the same sums: 2^-7, Q22. The next is below the square of
@@ -207,7 +208,7 @@ static void begin_noise(pvid_fourier_q31 *self)
     }
 }
 
-/* C at p and what the sensors explain, then an entry of the table each. */
+/* C at p; what the sensors explain; then an entry of the table each. */
 static bool noise_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
@@ -220,16 +221,17 @@ static bool noise_stage(pvid_fourier_q31 *self)
             begin_noise(self);
         }
         pvid_system_jacobian_q31(&self->estimator, h, work->c, work->f);
+    } else if (finish->index == 1u) {
         finish->known.sensors = pvid_scaled_plus_q31(finish->known.sensors,
                                                      pvid_fourier_noise_sensors_q31(&rows->white, design, work->share));
-    } else if (design->noise[finish->index - 1u].kind == finish->kind) {
-        pvid_fourier_noise_take_q31(&self->estimator, design, &design->noise[finish->index - 1u], work, rows->of_theta,
+    } else if (design->noise[finish->index - 2u].kind == finish->kind) {
+        pvid_fourier_noise_take_q31(&self->estimator, design, &design->noise[finish->index - 2u], work, rows->of_theta,
                                     finish->theta, finish->n_bits, finish->y_bits, &finish->known.pull[finish->theta]);
     } else {
         /* an entry of another kind */
     }
     finish->index++;
-    return finish->index <= design->n_noise;
+    return finish->index < (design->n_noise + 2u);
 }
 
 static bool unit_stage(pvid_fourier_q31 *self)
@@ -402,15 +404,17 @@ static bool add_stage(pvid_fourier_q31 *self, pvid_reason *reason)
         pvid_estimator_add_row_q31(&self->estimator, &block, n, e, pvid_square_q31(e));
     }
     finish->index++;
-    if ((k + 1u) < self->design->functions) {
-        return true;
-    }
+    return (k + 1u) < self->design->functions;
+}
+
+static void pull_stage(pvid_fourier_q31 *self)
+{
+    pvid_fourier_finish_q31 *finish = &self->finish;
     if (finish->known.compensates && !finish->saturated) {
         pvid_scaled_q31 pull[PVID_MAX_THETA_Q31] = {{0, 0}};
         memcpy(&pull[finish->theta], &finish->known.pull[finish->theta], kind_of(self)->thetas * sizeof pull[0]);
         (void)pvid_estimator_add_to_b_q31(&self->estimator, pull);
     }
-    return false;
 }
 
 /* ---- steps of p and verdict ---- */
@@ -528,8 +532,12 @@ static bool advance_kind(pvid_fourier_q31 *self, pvid_reason *reason)
     case STAGE_FADE:
         more = fade_stage(self);
         break;
-    default: /* STAGE_ADD */
+    case STAGE_ADD:
         more = add_stage(self, reason);
+        break;
+    default: /* STAGE_PULL */
+        pull_stage(self);
+        more = false;
         break;
     }
     return more;
@@ -545,7 +553,7 @@ static void step_kind(pvid_fourier_q31 *self, pvid_reason *reason)
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         *reason = PVID_REJECTED_OUTLIER;
         end_kind(self);
-    } else if (finish->stage == (uint8_t)STAGE_ADD) {
+    } else if (finish->stage == (uint8_t)STAGE_PULL) {
         finish->used++;
         finish->free = (uint16_t)(finish->free + (uint16_t)freedom_of(self));
         end_kind(self);
@@ -599,12 +607,12 @@ static uint32_t stages_of_kind(const pvid_fourier_q31 *self, const pvid_fourier_
         project += ((size_t)kind->thetas + 1u + kind->nuisances) - i;
     }
     const uint32_t noise = self->finish.known.used ? ((uint32_t)pvid_fourier_mirrors_q31(design) +
-                                                      stages_of(harmonics, SHARES_PER_STAGE) + 1u + design->n_noise)
+                                                      stages_of(harmonics, SHARES_PER_STAGE) + 2u + design->n_noise)
                                                    : 0u;
     return noise + stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
            stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_fourier_mirrors_q31(design) +
            stages_of(harmonics, UNITS_PER_STAGE) + (uint32_t)(harmonics + columns_of(kind)) + (uint32_t)project +
-           kind->thetas + 1u + stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows;
+           kind->thetas + 1u + stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
 }
 
 uint32_t pvid_fourier_finish_stages_q31(const pvid_fourier_q31 *self)

@@ -15,7 +15,7 @@ pvid_status pvid_fourier_finish_init_q31(pvid_fourier_finish_q31 *self, const pv
 void pvid_fourier_finish_begin_q31(pvid_fourier_finish_q31 *self, const pvid_fourier_design_q31 *design);
 
 /* The stage behind the last one. */
-#define PVID_FOURIER_IDLE_Q31 17u
+#define PVID_FOURIER_IDLE_Q31 18u
 
 /* Whether a window is being processed. */
 static inline bool pvid_fourier_finish_is_busy_q31(const pvid_fourier_finish_q31 *self)

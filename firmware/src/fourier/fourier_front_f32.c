@@ -16,7 +16,7 @@
 #include <string.h>
 
 #include "fourier/fourier_signals.h"
-#include "number/unroll.h"
+#include "number/exact.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
 
@@ -76,18 +76,29 @@ void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self)
 }
 
 /* The samples before: all equal to the first one since a restart. */
-static void remember(pvid_fourier_front_f32 *self, size_t samples, const float sample[])
+static void begin(pvid_fourier_front_f32 *self, size_t samples, const float sample[])
 {
     for (size_t i = 0; i < samples; i++) {
-        self->before[2][i] = self->seen ? self->before[1][i] : sample[i];
-        self->before[1][i] = self->seen ? self->before[0][i] : sample[i];
+        self->before[2][i] = sample[i];
+        self->before[1][i] = sample[i];
         self->before[0][i] = sample[i];
     }
     self->seen = true;
 }
 
-/* A signal of the tick before, from the next sample and the three before it. */
-static float held_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float next)
+static void remember(pvid_fourier_front_f32 *self, size_t count, const float sample[])
+{
+    const size_t samples = PVID_COUNT(PVID_MAX_SAMPLES, count);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < samples; i++) {
+        self->before[2][i] = self->before[1][i];
+        self->before[1][i] = self->before[0][i];
+        self->before[0][i] = sample[i];
+    }
+}
+
+/* A signal of the tick before, whose sample is x, from the next sample and the two before it. */
+static inline float held_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float next)
 {
     const size_t i = signal->sample;
     const float x = self->before[0][i];
@@ -98,7 +109,7 @@ static float held_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_
 }
 
 /* A signal of this tick. */
-static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float x)
+static inline float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float x)
 {
     return (signal->source == (uint8_t)PVID_SIGNAL_JUMP) ? (self->jump_scale * (x - self->before[0][signal->sample]))
                                                          : x;
@@ -107,21 +118,22 @@ static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier
 PVID_SELDOM void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
                                                const float sample[])
 {
-    const bool first = !self->seen;
-    if (first) {
-        remember(self, model->samples, sample);
-    }
-    if (first && (self->needs == PVID_FOURIER_NEEDS_NEXT)) {
-        self->wait++; /* the next sample is missing */
-    } else {
-        for (size_t i = 0; i < model->signals; i++) {
-            const pvid_fourier_signal *signal = &model->signal[i];
-            const float x = sample[signal->sample];
-            float *sums = &self->line[2u * i];
-            sums[0] +=
-                (self->needs == PVID_FOURIER_NEEDS_NEXT) ? held_signal(self, signal, x) : plain_signal(self, signal, x);
-            sums[1] += sums[0];
+    const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, model->signals);
+    const bool next = self->needs == PVID_FOURIER_NEEDS_NEXT;
+    if (!self->seen) {
+        begin(self, model->samples, sample);
+        if (next) {
+            self->wait++; /* the next sample is missing */
+            return;
         }
+    }
+    for (size_t i = 0; i < signals; i++) {
+        const pvid_fourier_signal *signal = &model->signal[i];
+        const float x = sample[signal->sample];
+        float *sums = &self->line[2u * i];
+        const float once = sums[0] + (next ? held_signal(self, signal, x) : plain_signal(self, signal, x));
+        sums[0] = once;
+        sums[1] += once;
     }
     if (self->needs != PVID_FOURIER_NEEDS_NOTHING) {
         remember(self, model->samples, sample);
@@ -157,20 +169,21 @@ static inline float jet_of(const pvid_fourier_filter_f32 *filter, uint8_t order,
 bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourier_design_f32 *design, float jet[])
 {
     const pvid_fourier_model_f32 *model = design->model;
-    const size_t signals = self->signals;
+    const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, self->signals);
+    const size_t jets = PVID_COUNT(PVID_EXACT_JETS, model->jets);
     const size_t length = (2u * (size_t)self->half) + 1u;
     float *sums = self->line;
     float *carry = &sums[2u * signals];
     float *outputs = &carry[signals];
     float *place = &outputs[self->head * signals];
+    PVID_UNROLL_EXACT
     for (size_t i = 0; i < signals; i++) {
-        const float once = sums[0];
-        const float twice = sums[1];
+        const float once = sums[2u * i];
+        const float twice = sums[(2u * i) + 1u];
         const float output = self->scale * (twice + carry[i]);
         carry[i] = (self->ticks * once) - twice;
-        sums[0] = 0.0f;
-        sums[1] = 0.0f;
-        sums = &sums[2];
+        sums[2u * i] = 0.0f;
+        sums[(2u * i) + 1u] = 0.0f;
         place[i] = output;
         place[(length * signals) + i] = output;
     }
@@ -181,7 +194,8 @@ bool pvid_fourier_front_step_f32(pvid_fourier_front_f32 *self, const pvid_fourie
         return false;
     }
     const float *centre = &outputs[((size_t)self->head + self->half) * signals];
-    for (size_t i = 0; i < model->jets; i++) {
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < jets; i++) {
         jet[i] = jet_of(&design->compensator[i], model->jet[i].order, &centre[model->jet[i].signal], signals);
     }
     return true;

@@ -40,28 +40,31 @@ static inline uint32_t pvid_fourier_front_limit_f32(float largest)
     return pvid_bits_f32(largest) << 1u;
 }
 
-/* Adds this number of samples of a tick, at least 1, to the block; sets *beyond if one is beyond its limit. Returns
- * false if one is not finite; the front end must then be reset. */
-static inline bool pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[],
-                                              bool *beyond)
+/* Returns whether none of this number of samples, at least 1, is beyond its limit. */
+static inline bool pvid_fourier_front_fits_f32(const pvid_fourier_front_f32 *self, uint32_t number,
+                                               const float sample[])
 {
-    float *sums = self->line;
-    const uint32_t *limit = self->limit;
     const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < count; i++) {
-        const float x = sample[i];
-        if ((pvid_bits_f32(x) << 1u) > limit[i]) {
-            if (!pvid_finite_f32(x)) {
-                return false;
-            }
-            *beyond = true;
+        if ((pvid_bits_f32(sample[i]) << 1u) > self->limit[i]) {
+            return false;
         }
-        const float once = sums[2u * i] + x;
+    }
+    return true;
+}
+
+/* Adds this number of finite samples of a tick to the block. */
+static inline void pvid_fourier_front_add_f32(pvid_fourier_front_f32 *self, uint32_t number, const float sample[])
+{
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
+    float *sums = self->line;
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        const float once = sums[2u * i] + sample[i];
         sums[2u * i] = once;
         sums[(2u * i) + 1u] += once;
     }
-    return true;
 }
 
 #endif

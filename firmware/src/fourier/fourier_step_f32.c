@@ -18,6 +18,7 @@
 
 #include <stddef.h>
 
+#include "number/exact.h"
 #include "pvid/elementary.h"
 
 void pvid_fourier_step_init_f32(pvid_fourier_history_f32 *self, float lead)
@@ -53,7 +54,8 @@ static float mean_sign(float v, float slope)
 static void find_signs(const pvid_fourier_history_f32 *self, const pvid_fourier_design_f32 *design, const float next[],
                        float sign[])
 {
-    for (size_t i = 0; i < design->model->signs; i++) {
+    const size_t signs = PVID_COUNT(PVID_EXACT_SIGNS, design->model->signs);
+    for (size_t i = 0; i < signs; i++) {
         const float v = self->v[0][i];
         const float width = design->sign_width[i];
         const float slope = (self->known > 1u) ? (0.5f * (next[i] - self->v[1][i])) : (next[i] - v);
@@ -73,36 +75,38 @@ static void move_runs(pvid_fourier_history_f32 *self, size_t runs, float half_dt
 }
 
 /* Integrals at the step whose integrands are `now`; `next`: those of the step behind it. */
-static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float dt, bool begins, const float now[],
+static void integrate(pvid_fourier_history_f32 *self, size_t integrands, float dt, const float now[],
                       const float next[])
 {
     const float part = dt / 24.0f;
     const float half = 0.5f * dt;
     const float end = (dt * dt) / 12.0f;
-    const size_t known = self->known;
-    float *integral = self->integral;
+    const bool starts = self->known <= 2u;
+    const bool second = self->known == 3u;
+    PVID_UNROLL_EXACT
     for (size_t i = 0; i < integrands; i++) {
         const float last = self->f[0][i];
         const float f = now[i];
-        float once = 0.0f;
-        float twice = 0.0f;
-        if (known > 2u) {
-            const float before = (known > 3u) ? self->f[1][i] : ((2.0f * last) - f);
-            const float rise = part * (((-before + (13.0f * last)) + (13.0f * f)) - next[i]);
-            once = integral[0] + rise;
-            twice = integral[1] + ((half * (integral[0] + once)) - (end * (f - last)));
-        }
-        if (begins) {
-            self->edge[0][i] = once;
-            self->edge[1][i] = twice;
-            once = 0.0f;
-            twice = 0.0f;
-        }
-        integral[0] = once;
-        integral[1] = twice;
-        integral = &integral[2];
+        const float before = second ? ((2.0f * last) - f) : self->f[1][i];
+        const float rise = part * (((-before + (13.0f * last)) + (13.0f * f)) - next[i]);
+        const float from = self->integral[2u * i];
+        const float once = from + rise;
+        const float twice = self->integral[(2u * i) + 1u] + ((half * (from + once)) - (end * (f - last)));
+        self->integral[2u * i] = starts ? 0.0f : once;
+        self->integral[(2u * i) + 1u] = starts ? 0.0f : twice;
         self->f[1][i] = last;
         self->f[0][i] = f;
+    }
+}
+
+/* A half window begins: the integrals begin anew. */
+static void begin_half(pvid_fourier_history_f32 *self, size_t integrands)
+{
+    for (size_t i = 0; i < integrands; i++) {
+        self->edge[0][i] = self->integral[2u * i];
+        self->edge[1][i] = self->integral[(2u * i) + 1u];
+        self->integral[2u * i] = 0.0f;
+        self->integral[(2u * i) + 1u] = 0.0f;
     }
 }
 
@@ -111,7 +115,11 @@ bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fouri
 {
     const pvid_fourier_model_f32 *model = design->model;
     float arguments[PVID_MAX_INPUTS] = {0.0f}; /* of the newest step: derivatives of the runs, then arguments of sgn */
-    const float *v = &arguments[model->runs];
+    const size_t runs = PVID_COUNT(PVID_EXACT_RUNS, model->runs);
+    const size_t signs = PVID_COUNT(PVID_EXACT_SIGNS, model->signs);
+    const size_t jets = PVID_COUNT(PVID_EXACT_JETS, model->jets);
+    const size_t integrands = PVID_COUNT(PVID_EXACT_INTEGRANDS, model->integrands);
+    const float *v = &arguments[runs];
     const bool complete = self->known > 1u;
     float *newest = self->inputs[self->newest];
     self->newest ^= 1u;
@@ -120,31 +128,34 @@ bool pvid_fourier_step_take_f32(pvid_fourier_history_f32 *self, const pvid_fouri
         model->prepare(newest, arguments);
     }
     if (self->known > 0u) {
-        find_signs(self, design, v, &before[model->jets + model->runs]);
+        find_signs(self, design, v, &before[jets + runs]);
         const float *now = self->out[self->latest];
         self->latest ^= 1u;
         float *next = self->out[self->latest];
         model->values(before, next);
         if (complete) {
-            integrate(self, model->integrands, dt, index == 0u, &now[model->gains], &next[model->gains]);
+            integrate(self, integrands, dt, &now[model->gains], &next[model->gains]);
+            if (index == 0u) {
+                begin_half(self, integrands);
+            }
             model->form(now, self->integral, dt * (float)index, channel);
         }
-        move_runs(self, model->runs, 0.5f * dt, arguments);
+        move_runs(self, runs, 0.5f * dt, arguments);
     } else if (!self->ran) {
-        for (size_t i = 0; i < model->runs; i++) {
+        for (size_t i = 0; i < runs; i++) {
             self->run[i] = self->lead * arguments[i];
         }
         self->ran = true;
     } else {
         /* a gap: the runs stay */
     }
-    for (size_t i = 0; i < model->signs; i++) {
+    for (size_t i = 0; i < signs; i++) {
         self->v[1][i] = self->v[0][i];
         self->v[0][i] = v[i];
     }
-    for (size_t i = 0; i < model->runs; i++) {
+    for (size_t i = 0; i < runs; i++) {
         self->rate[i] = arguments[i];
-        newest[model->jets + i] = self->run[i];
+        newest[jets + i] = self->run[i];
     }
     self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
     return complete;

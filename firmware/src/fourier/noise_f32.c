@@ -69,11 +69,28 @@ size_t pvid_fourier_noise_pairs_f32(const pvid_fourier_design_f32 *design, uint8
     return pairs;
 }
 
-size_t pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, size_t place, size_t first,
-                                  const float share[PVID_MAX_POWER], float rows, const float c[], float s[][PVID_MAX_P])
+void pvid_fourier_noise_list_f32(const pvid_fourier_design_f32 *design, size_t first, size_t thetas, size_t from,
+                                 size_t to, pvid_fourier_slopes_f32 *slopes)
 {
-    const pvid_model_f32 *model = design->model->model;
+    const uint8_t *c_row = design->model->model->c_row;
+    for (size_t row = 0; (from == 0u) && (row < thetas); row++) {
+        slopes->count[row] = 0;
+    }
+    for (size_t k = from; k < to; k++) {
+        const size_t row = (size_t)c_row[k] - first; /* beyond `thetas` also for a row before the kind's */
+        if ((row < thetas) && (slopes->count[row] < (uint8_t)PVID_MAX_P)) {
+            slopes->place[row][slopes->count[row]] = (uint8_t)k;
+            slopes->count[row]++;
+        }
+    }
+}
+
+size_t pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, size_t place, const float share[], float rows,
+                                  const pvid_fourier_slopes_f32 *slopes, float s[][PVID_MAX_P])
+{
     const pvid_fourier_noise_f32 *one = &design->noise[place];
+    const uint8_t *c_column = design->model->model->c_column;
+    const float *c = slopes->c;
     float sum = one->factor * share[one->power];
     size_t end = place + 1u;
     while ((end < design->n_noise) && goes_on(design, end)) {
@@ -82,30 +99,16 @@ size_t pvid_fourier_noise_add_f32(const pvid_fourier_design_f32 *design, size_t 
     }
     const bool same = one->a == one->b;
     const float own = (same ? sum : (0.5f * sum)) / rows;
-    uint8_t of_a[PVID_MAX_P];
-    uint8_t of_b[PVID_MAX_P];
-    size_t n_a = 0; /* non-zeros of these rows of C */
-    size_t n_b = 0;
-    const uint8_t *c_row = model->c_row;
-    for (size_t k = 0; k < model->n_c; k++) {
-        const size_t row = (size_t)c_row[k] - first;
-        if ((row == one->a) && (n_a < (size_t)PVID_MAX_P)) {
-            of_a[n_a] = (uint8_t)k;
-            n_a++;
-        }
-        if ((row == one->b) && (n_b < (size_t)PVID_MAX_P)) {
-            of_b[n_b] = (uint8_t)k;
-            n_b++;
-        }
-    }
-    for (size_t k = 0; k < n_a; k++) {
-        for (size_t l = 0; l < n_b; l++) {
-            const size_t i = model->c_column[of_a[k]];
-            const size_t j = model->c_column[of_b[l]];
+    for (size_t k = 0; k < slopes->count[one->a]; k++) {
+        const size_t of_a = slopes->place[one->a][k];
+        const size_t i = c_column[of_a];
+        for (size_t l = 0; l < slopes->count[one->b]; l++) {
+            const size_t of_b = slopes->place[one->b][l];
+            const size_t j = c_column[of_b];
             if (same && (j < i)) {
                 continue;
             }
-            const float x = own * (c[of_a[k]] * c[of_b[l]]);
+            const float x = own * (c[of_a] * c[of_b]);
             float *entry = (i < j) ? &s[i][j] : &s[j][i];
             *entry += (!same && (i == j)) ? (x + x) : x;
         }

@@ -60,8 +60,8 @@ static size_t place_of(size_t n, size_t i, size_t j)
 }
 
 /* `own` times C_a^T C_b to the table, both ways for different rows. */
-static void add_information(pvid_estimator_q31 *estimator, size_t a, size_t b, pvid_scaled_q31 own, const int32_t c[],
-                            const int16_t f[])
+static void add_information(pvid_estimator_q31 *estimator, size_t a, size_t b, pvid_scaled_q31 own,
+                            const pvid_fourier_noise_work_q31 *work)
 {
     const pvid_model_q31 *model = estimator->model;
     const bool same = a == b;
@@ -69,15 +69,15 @@ static void add_information(pvid_estimator_q31 *estimator, size_t a, size_t b, p
         if (model->c_row[k] != a) {
             continue;
         }
-        const pvid_scaled_q31 part = pvid_scaled_times_q31(own, pvid_scaled_of_q31(c[k], f[model->c_column[k]]));
+        const size_t i = model->c_column[k];
+        const pvid_scaled_q31 part = pvid_scaled_times_q31(own, pvid_scaled_of_q31(work->c[k], work->f[i]));
         for (size_t l = 0; l < model->n_c; l++) {
-            const size_t i = model->c_column[k];
             const size_t j = model->c_column[l];
             if ((model->c_row[l] != b) || (same && (j < i))) {
                 continue;
             }
             const int32_t twice = (!same && (i == j)) ? 1 : 0;
-            const pvid_scaled_q31 x = pvid_scaled_times_q31(part, pvid_scaled_of_q31(c[l], (int32_t)f[j] + twice));
+            const pvid_scaled_q31 x = pvid_scaled_times_q31(part, pvid_scaled_of_q31(work->c[l], work->f[j] + twice));
             int32_t *place = &estimator->noise_table[(i < j) ? place_of(model->n_p, i, j) : place_of(model->n_p, j, i)];
             *place = pvid_scaled_packed_q31(pvid_scaled_plus_q31(pvid_scaled_unpacked_q31(*place), x));
         }
@@ -106,7 +106,7 @@ void pvid_fourier_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_fouri
     if ((one->a < thetas) && (one->b < thetas)) {
         const int32_t bits = (int32_t)n_bits[first + one->a] + n_bits[first + one->b];
         const pvid_scaled_q31 own = pvid_scaled_shifted_q31((one->a == one->b) ? whole : half, bits);
-        add_information(estimator, first + one->a, first + one->b, own, work->c, work->f);
+        add_information(estimator, first + one->a, first + one->b, own, work);
     }
 }
 

@@ -18,8 +18,8 @@ void pvid_fourier_noise_share_q31(const pvid_fourier_white_q31 *white, const pvi
                                   const int32_t leverage[], size_t h, pvid_scaled_q31 share[]);
 
 /* An entry of the design's noise table, whose kind has these theta [thetas], the first of them `first`: adds its bias
- * to `pull` [thetas] of the kind, in units of b, and its information to the estimator's table, with n_bits of all
- * theta. work: with Q_j and C as of pvid_system_jacobian_q31 for exponents h of 0. */
+ * to `pull` [thetas] of the kind, in units of b, and its information to the estimator's table. work: with Q_j and C.
+ * n_bits: of all theta. */
 void pvid_fourier_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_fourier_design_q31 *design,
                                  const pvid_fourier_noise_q31 *one, const pvid_fourier_noise_work_q31 *work,
                                  const pvid_scaled_q31 theta[], size_t first, const int8_t n_bits[], int32_t y_bits,

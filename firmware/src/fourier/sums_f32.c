@@ -36,11 +36,6 @@ void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
     self->joined = harmonics;
 }
 
-float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self)
-{
-    return self->block[self->filling][self->index % PVID_FOURIER_BLOCK];
-}
-
 /* s_j and d_j of the step `place` behind the centre and its partner. */
 static void pair(float (*block)[PVID_MAX_CHANNELS], size_t place, size_t channels)
 {
@@ -86,8 +81,7 @@ void pvid_fourier_sums_join_f32(pvid_fourier_sums_f32 *self, float edge[2][PVID_
 /* What the sums of a half begin with. */
 static const float nothing[PVID_MAX_CHANNELS][2];
 
-/* Adds a block to one harmonic of all channels. */
-static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
+void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels)
 {
     const uint32_t h = self->harmonic;
     const uint32_t turn = 2u * (uint32_t)design->hop;
@@ -101,14 +95,14 @@ static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32
     at = 0;
     PVID_UNROLL
     for (size_t j = 1; j <= CENTRE; j++) {
-        at += h;
-        at = (at >= turn) ? (at - turn) : at;
+        at += h; /* at most 4 H: within a turn */
         cosine[j] = of_cosine[at];
         sine[j] = of_sine[at];
     }
     float (*sum)[2] = self->sum[self->target][h];
     const float (*last)[2] = (self->start == 0u) ? nothing : (const float (*)[2])sum;
     const float *x = self->block[self->filling ^ 1u][0];
+    PVID_UNROLL_BY_TWO
     for (size_t c = 0; c < channels; c++) {
         float even = x[CENTRE * PVID_MAX_CHANNELS];
         float odd = 0.0f;
@@ -124,6 +118,7 @@ static void add_block(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32
         sum[c][1] = (last[c][1] + (sine[0] * even)) + (cosine[0] * odd);
         x = &x[1];
     }
+    self->harmonic++;
 }
 
 /* I^1 or I^2 of an integrand at the end of the window's first half. */
@@ -135,11 +130,12 @@ static float edge_of(const pvid_fourier_sums_f32 *self, const pvid_fourier_chann
     return self->edge[fold - 1u][one->integrand];
 }
 
-/* One harmonic of all channels of the window whose second half is the last one. */
-static void join(const pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                 float half_time, float window[][2][PVID_MAX_HARMONICS])
+void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
+                                    float dt, float window[][2][PVID_MAX_HARMONICS])
 {
+    const float half_time = dt * (float)design->hop;
     const size_t h = self->joined;
+    self->joined++;
     const float (*a)[2] = (const float (*)[2])self->sum[self->target ^ 1u][h];
     const float (*b)[2] = (const float (*)[2])self->sum[self->target][h];
     for (size_t c = 0; c < channels; c++) {
@@ -161,21 +157,4 @@ static void join(const pvid_fourier_sums_f32 *self, const pvid_fourier_design_f3
         window[c][0][h] = ((h % 2u) != 0u) ? (a[c][0] - re) : (a[c][0] + re);
         window[c][1][h] = ((h % 2u) != 0u) ? (a[c][1] - im) : (a[c][1] + im);
     }
-}
-
-bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
-                                   uint8_t harmonics, uint8_t channels, float dt, float window[][2][PVID_MAX_HARMONICS])
-{
-    /* a window's harmonic is joined right behind the addition to it */
-    if (self->joined < self->harmonic) {
-        const float half_time = dt * (float)design->hop;
-        join(self, design, channels, half_time, window);
-        self->joined++;
-        return self->joined == harmonics;
-    }
-    if (self->harmonic < harmonics) {
-        add_block(self, design, channels);
-        self->harmonic++;
-    }
-    return false;
 }

@@ -11,7 +11,10 @@
 void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics);
 
 /* Where the values of the next step belong. */
-float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self);
+static inline float *pvid_fourier_sums_place_f32(pvid_fourier_sums_f32 *self)
+{
+    return self->block[self->filling][self->index % PVID_FOURIER_BLOCK];
+}
 
 /* Counts that step, of so many channels. Returns true if it completes a half; index 0 then follows. */
 bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop, size_t channels);
@@ -26,9 +29,17 @@ static inline bool pvid_fourier_sums_is_busy_f32(const pvid_fourier_sums_f32 *se
     return (self->harmonic < harmonics) || (self->joined < harmonics);
 }
 
-/* Adds the block to one harmonic, or joins one harmonic to `window`. Returns true if this completes the window. */
-bool pvid_fourier_sums_advance_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design,
-                                   uint8_t harmonics, uint8_t channels, float dt,
-                                   float window[][2][PVID_MAX_HARMONICS]);
+/* Returns whether a harmonic of a window is to be joined: right behind the addition to it. */
+static inline bool pvid_fourier_sums_joins_f32(const pvid_fourier_sums_f32 *self)
+{
+    return self->joined < self->harmonic;
+}
+
+/* Adds the block to the next harmonic of all channels. */
+void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels);
+
+/* Joins the next harmonic of all channels to `window`. */
+void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
+                                    float dt, float window[][2][PVID_MAX_HARMONICS]);
 
 #endif

@@ -159,7 +159,10 @@ static bool is_exact(const pvid_fourier_design_f32 *design)
     const uint32_t harmonics = ((uint32_t)design->functions / 2u) + ((uint32_t)design->power / 2u) + 1u;
     return (design->functions == PVID_MAX_FUNCTIONS) && (design->power == PVID_MAX_POWER) &&
            (harmonics == PVID_MAX_HARMONICS) && (model->samples == PVID_MAX_SAMPLES) &&
-           (model->model->n_p == PVID_MAX_P) && (model->model->n_gated == 0u);
+           (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
+           (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
+           (model->integrands == PVID_EXACT_INTEGRANDS) && (model->model->n_p == PVID_MAX_P) &&
+           (model->model->n_gated == 0u);
 }
 
 static pvid_status sizes_are_valid(const pvid_fourier_design_f32 *design)
@@ -175,7 +178,7 @@ static pvid_status sizes_are_valid(const pvid_fourier_design_f32 *design)
         return PVID_BAD_FUNCTIONS;
     }
     if ((design->hop < (2u * PVID_FOURIER_BLOCK)) || (design->hop > 16384u) ||
-        ((design->hop % PVID_FOURIER_BLOCK) != 0u) || (design->hop < harmonics)) {
+        ((design->hop % PVID_FOURIER_BLOCK) != 0u) || (design->hop < (2u * harmonics))) {
         return PVID_BAD_WINDOW;
     }
     return PVID_OK;

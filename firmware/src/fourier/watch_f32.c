@@ -1,12 +1,14 @@
 #include "number/uncontracted.h"
 
-/* Every tick compares each sample with its range. A sample beyond it counts for the present step and for all later ones
- * that contain it.
+/* Every tick compares each sample with its range (fourier_front_f32.h). A sample beyond it counts for the present step
+ * and for all later ones that contain it.
  *
  * At every step each sample x adds x - r and (x - r)^2 to its half, r the half's first sample. With d = r_B - r_A the
  * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps
  * is (q - s^2/N) / N of both halves together. */
 #include "fourier/watch_f32.h"
+
+#include "number/exact.h"
 
 void pvid_fourier_watch_init_f32(pvid_fourier_watch_f32 *self, const pvid_fourier_config_f32 *config, uint16_t delay)
 {
@@ -23,23 +25,15 @@ void pvid_fourier_watch_reset_f32(pvid_fourier_watch_f32 *self)
     self->out[1] = false;
 }
 
-void pvid_fourier_watch_sample_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[])
-{
-    for (size_t i = 0; i < samples; i++) {
-        const float limit = self->range[i];
-        if ((sample[i] > limit) || (sample[i] < -limit)) {
-            self->beyond = self->delay;
-        }
-    }
-}
-
 void pvid_fourier_watch_step_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[], size_t half,
                                  bool first)
 {
     self->out[half] = (!first && self->out[half]) || (self->beyond > 0u);
     self->beyond = (uint16_t)((self->beyond > 0u) ? (self->beyond - 1u) : 0u);
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, samples);
     if (self->drive_min != NULL) {
-        for (size_t i = 0; i < samples; i++) {
+        PVID_UNROLL_EXACT
+        for (size_t i = 0; i < count; i++) {
             pvid_fourier_spread_f32 *spread = &self->spread[half][i];
             if (first) {
                 spread->reference = sample[i];
@@ -58,7 +52,7 @@ bool pvid_fourier_watch_beyond_f32(const pvid_fourier_watch_f32 *self)
     return self->out[0] || self->out[1];
 }
 
-bool pvid_fourier_watch_still_f32(const pvid_fourier_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
+void pvid_fourier_watch_half_f32(pvid_fourier_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
 {
     bool still = false;
     const float n = (float)hop;
@@ -71,5 +65,5 @@ bool pvid_fourier_watch_still_f32(const pvid_fourier_watch_f32 *self, size_t sam
         const float variance = (square - ((sum * sum) / (2.0f * n))) / (2.0f * n);
         still = still || (variance < (self->drive_min[i] * self->drive_min[i]));
     }
-    return still;
+    self->still = still;
 }

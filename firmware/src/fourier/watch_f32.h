@@ -13,17 +13,15 @@ void pvid_fourier_watch_init_f32(pvid_fourier_watch_f32 *self, const pvid_fourie
 /* Forgets samples beyond their ranges. */
 void pvid_fourier_watch_reset_f32(pvid_fourier_watch_f32 *self);
 
-/* Takes the samples of a tick; only if there are ranges. */
-void pvid_fourier_watch_sample_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[]);
-
 /* Takes a step of a half, at a tick with these samples. first: it is the half's first step. */
 void pvid_fourier_watch_step_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[], size_t half,
                                  bool first);
 
-/* Whether a sample of the window of two halves of so many steps each was beyond its range; whether one moved too
- * little.
- */
+/* Behind the last step of the half `later`, which has so many: sets `still` if a sample moved too little in it and the
+ * half before. */
+void pvid_fourier_watch_half_f32(pvid_fourier_watch_f32 *self, size_t samples, size_t later, uint16_t hop);
+
+/* Whether a sample of the last two halves was beyond its range. */
 bool pvid_fourier_watch_beyond_f32(const pvid_fourier_watch_f32 *self);
-bool pvid_fourier_watch_still_f32(const pvid_fourier_watch_f32 *self, size_t samples, size_t later, uint16_t hop);
 
 #endif

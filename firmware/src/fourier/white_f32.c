@@ -84,15 +84,17 @@ void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fo
                                      uint8_t harmonics)
 {
     float mean = 0.0f;
-    const size_t order = design->error_order[kind];
-    const float error = design->error_variance[kind];
+    float c[PVID_MAX_POWER]; /* of the sensors and the equation */
+    for (size_t j = 0; j < self->powers; j++) {
+        c[j] = self->weight[j];
+    }
+    c[design->error_order[kind]] += design->error_variance[kind];
     for (size_t h = 0; h < harmonics; h++) {
         const float rate = (float)h * self->omega;
         const float square = rate * rate;
         float sum = 0.0f;
         for (size_t j = self->powers; j > 0u; j--) {
-            const float own = (j - 1u == order) ? (self->weight[j - 1u] + error) : self->weight[j - 1u];
-            sum = (sum * square) + own;
+            sum = (sum * square) + c[j - 1u];
         }
         self->scale[h] = samples_of(design, h) * sum;
         mean += self->scale[h];

@@ -36,6 +36,7 @@ static uint32_t bank_of(uint32_t hash, const pvid_fir_bank_q31 *bank)
     const int32_t limits[] = {bank->phi_max, bank->y_max, bank->centre};
     uint32_t running = pvid_fnv_word(hash, bank->half);
     running = pvid_fnv_word(running, bank->stride);
+    running = pvid_fnv_word(running, bank->block);
     running = pvid_fingerprint_words(running, limits, sizeof limits / sizeof limits[0]);
     running = pvid_fingerprint_bytes(running, bank->phi_shift, sizeof bank->phi_shift);
     running = pvid_fingerprint_bytes(running, bank->y_shift, sizeof bank->y_shift);

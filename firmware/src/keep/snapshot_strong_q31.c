@@ -10,7 +10,7 @@
 static const uint32_t layout[] = {
     sizeof(pvid_strong_q31),
     sizeof(void *),
-    PLACE(differentiator.filled),
+    PLACE(differentiator.missing),
     PLACE(differentiator.history),
     PLACE(row),
     PLACE(drive),

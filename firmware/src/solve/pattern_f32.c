@@ -78,24 +78,15 @@ void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], 
     const uint8_t *c_column = model->c_column;
     const size_t n_c = model->n_c;
     const size_t n_p = model->n_p;
-    float row[PVID_MAX_P] = {0.0f};
-    for (size_t k = start; k < n_c; k++) {
-        row[c_column[k]] += c[k] * t[c_row[k]];
-    }
+    size_t k = start;
     for (size_t b = c_column[start]; b < n_p; b++) {
-        s[b] = row[b];
+        float sum = 0.0f;
+        while ((k < n_c) && (c_column[k] == b)) {
+            sum += c[k] * t[c_row[k]];
+            k++;
+        }
+        s[b] = sum;
     }
-}
-
-float pvid_pattern_dot_f32(const pvid_model_f32 *model, const float c[], size_t start, const float x[])
-{
-    const uint8_t *c_row = model->c_row;
-    const size_t end = pvid_pattern_end_f32(model, start);
-    float sum = 0.0f;
-    for (size_t k = start; k < end; k++) {
-        sum += c[k] * x[c_row[k]];
-    }
-    return sum;
 }
 
 float pvid_pattern_times_f32(size_t n, const float m[], size_t i, const float x[])

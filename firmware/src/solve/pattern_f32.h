@@ -26,9 +26,6 @@ void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], 
 void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], size_t start, const float t[],
                                   float s[]);
 
-/* c_a^T x, x[n_theta]. */
-float pvid_pattern_dot_f32(const pvid_model_f32 *model, const float c[], size_t start, const float x[]);
-
 /* Place of M_ii in a packed block of order n. */
 static inline size_t pvid_pattern_diagonal_f32(size_t n, size_t i)
 {

@@ -20,7 +20,8 @@
 
 enum {
     STAGE_READ,        /* the sums and C */
-    STAGE_PROJECT,     /* for each column c_a of C: M c_a, a few non-zeros at a time, then row a of S and F */
+    STAGE_PROJECT,     /* for each column c_a of C: M c_a, a few non-zeros at a time, then row a of S */
+    STAGE_FORCE,       /* F */
     STAGE_ABOVE_NOISE, /* whether S contains more information than noise alone */
     STAGE_FACTOR,      /* Cholesky factor of S + H0; whether p[0] is excited */
     STAGE_STEP,        /* dp, and p after the step */
@@ -118,16 +119,18 @@ static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 
     solve->system.weight = tail[1];
 }
 
-/* Adds a part of M c_a; when M c_a is complete, computes row a of S and F. Returns whether the stage is to be repeated.
+/* Adds a part of M c_a; when M c_a is complete, computes row a of S. Returns whether the stage is to be repeated.
  */
 static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
     const size_t a = solve->index;
     const size_t next = solve->next;
-    const size_t end = pvid_pattern_end_f32(model, solve->start);
+    const size_t end = solve->end;
     if (next == solve->start) {
-        memset(solve->product, 0, sizeof solve->product);
+        for (size_t i = 0; i < model->n_theta; i++) {
+            solve->product[i] = 0.0f;
+        }
     }
     if (next < end) {
         const size_t last = ((end - next) > COLUMNS_PER_STAGE) ? (next + COLUMNS_PER_STAGE) : end;
@@ -136,10 +139,15 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
         return true;
     }
     pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->product, solve->system.s[a]);
-    solve->system.force[a] = pvid_pattern_dot_f32(model, solve->c, solve->start, &solve->sums[model->n_moments]);
     solve->start = (uint8_t)end;
+    solve->end = (uint8_t)pvid_pattern_end_f32(model, end);
     solve->index++;
     return solve->index < model->n_p;
+}
+
+static void force_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    pvid_pattern_project_row_f32(self->model, solve->c, 0, &solve->sums[self->model->n_moments], solve->system.force);
 }
 
 /* The noise has row_sd^2 in a solve, because the residuals are larger while p is far from the solution, and the
@@ -199,7 +207,9 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
         rhs[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
         self->innovation[a] = 0.0f;
     }
-    memcpy(solve->p, self->p, sizeof solve->p);
+    for (size_t a = 0; a < model->n_p; a++) {
+        solve->p[a] = self->p[a];
+    }
     if (solve->reason == PVID_UPDATED) {
         take_step(self, solve, rhs);
     }
@@ -284,8 +294,9 @@ static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
     }
 }
 
-static void reset_solve(pvid_estimator_solve_f32 *solve)
+static void reset_solve(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
+    solve->end = (uint8_t)pvid_pattern_end_f32(self->model, 0);
     solve->reason = PVID_ACCUMULATED;
     solve->index = 0;
     solve->start = 0;
@@ -303,9 +314,9 @@ static void reset_solve(pvid_estimator_solve_f32 *solve)
 
 void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
 {
-    reset_solve(solve);
+    reset_solve(self, solve);
     solve->ends_group = ends_group;
-    if (self->settings.engine == PVID_ENGINE_DIRECT) {
+    if (pvid_is_direct_f32(self)) {
         solve->stage = STAGE_DIRECT;
     } else if (ends_group) {
         solve->group_rss = self->group_rss;
@@ -321,7 +332,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
 void pvid_estimator_begin_assessment_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
                                          pvid_estimate_f32 *estimate)
 {
-    reset_solve(solve);
+    reset_solve(self, solve);
     memset(estimate, 0, sizeof *estimate);
     memcpy(estimate->p, self->p, sizeof estimate->p);
     solve->estimate = estimate;
@@ -359,6 +370,8 @@ static bool advance_shared(const pvid_estimator_f32 *self, pvid_estimator_solve_
         return false;
     case STAGE_PROJECT:
         return project_stage(self, solve);
+    case STAGE_FORCE:
+        return false; /* an assessment needs none */
     default:
         above_noise_stage(self, solve);
         return false;
@@ -380,9 +393,16 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
     bool repeat = false;
     switch (solve->stage) {
     case STAGE_READ:
+        read_stage(self, solve);
+        break;
     case STAGE_PROJECT:
+        repeat = project_stage(self, solve);
+        break;
+    case STAGE_FORCE:
+        force_stage(self, solve);
+        break;
     case STAGE_ABOVE_NOISE:
-        repeat = advance_shared(self, solve);
+        above_noise_stage(self, solve);
         break;
     case STAGE_FACTOR:
         factor_stage(self, solve);
@@ -404,7 +424,9 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
         pvid_information_end_group_f32(&self->information);
         break;
     case STAGE_DIRECT:
-        solve->reason = pvid_direct_solve_f32(self, solve->ends_group);
+        if (pvid_is_direct_f32(self)) {
+            solve->reason = pvid_direct_solve_f32(self, solve->ends_group);
+        }
         break;
     default:
         return true;
@@ -419,6 +441,7 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
     switch (solve->stage) {
     case STAGE_READ:
     case STAGE_PROJECT:
+    case STAGE_FORCE:
     case STAGE_ABOVE_NOISE:
         repeat = advance_shared(self, solve);
         break;
@@ -446,10 +469,10 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
     return finish_stage(solve, repeat);
 }
 
-/* Number of stages of READ and PROJECT. */
+/* Number of stages of READ, PROJECT and FORCE. */
 static size_t projection_stages(const pvid_model_f32 *model)
 {
-    size_t stages = 1u;
+    size_t stages = 2u;
     size_t place = 0; /* in a column of C */
     for (size_t k = 0; k < model->n_c; k++) {
         const bool first = (k == 0u) || (model->c_column[k] != model->c_column[k - 1u]);
@@ -463,7 +486,7 @@ static size_t projection_stages(const pvid_model_f32 *model)
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
 {
     const pvid_model_f32 *model = self->model;
-    if (self->settings.engine == PVID_ENGINE_DIRECT) {
+    if (pvid_is_direct_f32(self)) {
         return 1;
     }
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;

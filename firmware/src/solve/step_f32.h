@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "number/exact.h"
 #include "number/finite_f32.h"
 #include "solve/assess_f32.h"
 #include "solve/cholesky_f32.h"
@@ -40,7 +41,9 @@ static inline uint32_t pvid_step_relative_f32(const pvid_solve_settings_f32 *set
 static inline float pvid_step_size_f32(const pvid_solve_settings_f32 *settings, const float p[], const float dp[])
 {
     uint32_t largest = 0;
-    for (size_t a = 0; a < settings->n_p; a++) {
+    const size_t n_p = PVID_COUNT(PVID_MAX_P, settings->n_p);
+    PVID_UNROLL_EXACT
+    for (size_t a = 0; a < n_p; a++) {
         const uint32_t relative_step = pvid_step_relative_f32(settings, p, a, dp[a]);
         largest = (relative_step > largest) ? relative_step : largest;
     }
@@ -137,7 +140,9 @@ static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_
     }
     solution->size = size;
     const float part = pvid_step_shortening_f32(settings, size, &solution->limited);
-    for (size_t a = 0; a < settings->n_p; a++) {
+    const size_t n_p = PVID_COUNT(PVID_MAX_P, settings->n_p);
+    PVID_UNROLL_EXACT
+    for (size_t a = 0; a < n_p; a++) {
         solution->p[a] = pvid_step_bounded_f32(settings, p, a, part * dp[a], &solution->bounded);
     }
 }

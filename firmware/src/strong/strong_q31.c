@@ -12,6 +12,8 @@
 #include "number/scaled_q31.h"
 
 #define SHIFT_MAX 62u
+#define DERIVATIVE_LIMIT_BITS 30u /* of PVID_DERIVATIVE_LIMIT_Q31 */
+#define RATE_LIMIT_BITS 29u       /* of PVID_KAPITZA_RATE_LIMIT_Q31 */
 #define DRIVE_TICKS_MAX ((uint32_t)1 << 30)
 #define DRIVE_MAX ((int64_t)PVID_DERIVATIVE_LIMIT_Q31 * PVID_DERIVATIVE_LIMIT_Q31) /* a mean of such squares */
 
@@ -127,15 +129,12 @@ static pvid_reason refuse(pvid_strong_q31 *self)
 /* u[k] = y_A^(k+2)/l1; false where one is beyond the expected range. */
 static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int32_t u[])
 {
-    for (size_t k = 0; k < PVID_Y_ORDERS_Q31; k++) {
-        const int64_t exact = pvid_round_shift_q31(pvid_product_q31(d_y[k], self->u_multiplier[k]), self->u_shift[k]);
-        const int64_t limit = (k == 0u) ? PVID_KAPITZA_RATE_LIMIT_Q31 : PVID_DERIVATIVE_LIMIT_Q31;
-        if ((exact > limit) || (exact < -limit)) {
-            return false;
-        }
-        u[k] = (int32_t)exact;
+    bool within = true;
+    for (size_t k = 0; within && (k < PVID_Y_ORDERS_Q31); k++) {
+        within = pvid_narrows_q31(pvid_product_q31(d_y[k], self->u_multiplier[k]), self->u_shift[k],
+                                  (k == 0u) ? RATE_LIMIT_BITS : DERIVATIVE_LIMIT_BITS, &u[k]);
     }
-    return true;
+    return within;
 }
 
 /* Returns whether the gate accepts a row with an innovation of this square. */

@@ -83,6 +83,7 @@ struct pvid_estimator_solve_f32 {
     uint8_t index; /* of the row or column within the stage */
     uint8_t start; /* first non-zero of the present column of C */
     uint8_t next;  /* next non-zero of this column */
+    uint8_t end;   /* behind its last one */
     bool ends_group;
     bool in_dead_zone; /* within the dead zone: no step is taken */
     float gain;        /* g of this solve */

@@ -62,6 +62,7 @@ typedef struct {
     uint16_t delay;                                      /* steps from a sample to the last step that it is part of */
     uint16_t beyond;                                     /* steps that may yet contain a sample beyond its range */
     bool out[2];                                         /* of each half: contains such a step */
+    bool still;                                          /* a sample moved too little in the last two halves */
     pvid_fourier_spread_f32 spread[2][PVID_MAX_SAMPLES]; /* of each half, if a sample has a least deviation */
 } pvid_fourier_watch_f32;
 
@@ -119,6 +120,22 @@ typedef struct {
     float leverage[PVID_FOURIER_PARTS]; /* sum of the squares of all */
 } pvid_fourier_basis_f32;
 
+/* C at p, and the places of the non-zeros of each row of a kind. */
+typedef struct {
+    float c[PVID_MAX_THETA * PVID_MAX_P];
+    uint8_t count[PVID_MAX_THETA];
+    uint8_t place[PVID_MAX_THETA][PVID_MAX_P];
+} pvid_fourier_slopes_f32;
+
+/* What the columns of a kind need before they are formed, and they themselves. */
+typedef union {
+    struct {
+        pvid_fourier_basis_f32 basis;
+        pvid_fourier_slopes_f32 slopes;
+    } before;
+    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
+} pvid_fourier_columns_f32;
+
 /* What the rows of a window need until the last of them is added. */
 typedef struct {
     pvid_reason reason; /* of the solve, with its pointers: they keep their place (pvid/snapshot_fourier.h) */
@@ -129,9 +146,8 @@ typedef struct {
     float pull[PVID_MAX_THETA];     /* g: what the sensors' noise takes from B */
     float score[PVID_MAX_THETA];    /* sum N e + g of the window */
     float gradient[PVID_MAX_THETA]; /* sum N e of the kind */
-    pvid_fourier_basis_f32 basis;
-    float part[PVID_FOURIER_PARTS];                     /* of the present column */
-    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
+    float part[PVID_FOURIER_PARTS]; /* of the present column */
+    pvid_fourier_columns_f32 of_kind;
 } pvid_fourier_rows_f32;
 
 /* The rows of a window, and behind them the solve and the assessment. */

@@ -19,17 +19,19 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_design, files_fourier
 from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Source
+from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, samples_of
+from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, config_to_identify, samples_of
 from pvid.run.mechanism import model_of
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
@@ -67,8 +69,12 @@ class MechanismBoard:
     recording: npt.NDArray[np.float32]
 
     @classmethod
-    def of_recording(cls, rig: MechanismRig, recording: Recording) -> MechanismBoard:
+    def of_recording(cls, rig: MechanismRig, recording: Recording, to_identify: bool = False) -> MechanismBoard:
         """With the design and the tables that a recording of the rig asks for; the board's sensors read it.
+
+        Parameters
+        ----------
+        to_identify : as `identify` does: what is published is judged on this machine
 
         Raises
         ------
@@ -78,7 +84,7 @@ class MechanismBoard:
         compiled = model_of(rig)
         recording.refuse_damaged()
         whole = recording.whole()
-        config = config_for_recording(compiled, whole)
+        config = (config_to_identify if to_identify else config_for_recording)(compiled, whole)
         return cls(rig, compiled, config, samples_of(config, whole.signals))
 
     @classmethod
@@ -121,6 +127,14 @@ class MechanismBoard:
         return self.config.sample_rate
 
     @property
+    def _shared(self) -> FourierConfig:
+        """The settings of an image: neutral values for what a Configure frame brings."""
+        ones = np.ones(len(self.compiled.unknowns), np.float32)
+        neutral: dict[str, Any] = {**dict.fromkeys(_PER_PARAMETER, ones), "row_sd": 1.0, "forgetting_s": 0.0}
+        own = replace(self.config.estimator, feedback_hz=0.0, divider=1, law=Law.STATIONARY, **neutral)
+        return replace(self.config, estimator=own)
+
+    @property
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         model, design = self.config.design.model, self.config.design
@@ -130,7 +144,7 @@ class MechanismBoard:
             f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), _COMMAND),
             f"{made.name}_weak_f32.c": files_fourier.source(made, model, _COMMAND),
             "stream_tables.h": files_design.header(
-                self.config, sizes_of_design(design), _COMMAND, self.compiled.title, listed
+                self._shared, sizes_of_design(design), _COMMAND, self.compiled.title, listed
             ),
         }
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
@@ -200,6 +214,24 @@ class MechanismBoard:
     def twin_of(self, frame: Configuration) -> FourierTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
         return FourierTwin(self.configured(frame))
+
+    @property
+    def without_recording(self) -> MechanismBoard:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """Signals [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.float32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Sample.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""

@@ -16,11 +16,13 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_fourier_q31
 from pvid.codegen.fourier import fourier_functions_of
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.codegen.fourier_q31 import JetReaches, fixed_fourier
+from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
 from pvid.design.fourier_q31 import circle_of
-from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Form, Source
+from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
 from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
@@ -30,6 +32,7 @@ from pvid.run.engine_design_q31 import (
     engine_for_recording,
     engine_for_simulated_rig,
     engine_of_parts,
+    engine_to_identify,
 )
 from pvid.run.mechanism import model_of
 from pvid.settings.fourier_q31 import (
@@ -70,11 +73,11 @@ class MechanismBoardQ31:
     recording: npt.NDArray[np.int32]
 
     @classmethod
-    def of_recording(cls, rig: MechanismRig, recording: Recording) -> MechanismBoardQ31:
+    def of_recording(cls, rig: MechanismRig, recording: Recording, to_identify: bool = False) -> MechanismBoardQ31:
         """As MechanismBoard.of_recording."""
         recording.refuse_damaged()
         whole = recording.whole()
-        engine = engine_for_recording(model_of(rig), whole)
+        engine = (engine_to_identify if to_identify else engine_for_recording)(model_of(rig), whole)
         return cls(rig, engine, engine.counts_of(whole.signals))
 
     @classmethod
@@ -116,6 +119,24 @@ class MechanismBoardQ31:
     def sample_rate(self) -> float:
         """Ticks a second."""
         return self.engine.sample_rate
+
+    @property
+    def without_recording(self) -> MechanismBoardQ31:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.int32]:
+        """Counts [ticks] as the identifier takes them [ticks, samples]."""
+        return np.stack([np.asarray(one, np.int32) for one in signals], axis=1)
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+        return Count.of_values(*readings.T)
+
+    def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the engine on this machine [ticks]."""
+        identifier = fourier_native_q31(self.engine.made, self.engine.parameters, self.engine.config).identifier()
+        return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     @property
     def _sizes(self) -> dict[str, int]:

@@ -181,9 +181,22 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
 
 
 def build_with(
-    target: Board, name: str, files: Mapping[str, str], sizes: Mapping[str, int], core: Core, refined: bool = False
+    target: Board,
+    name: str,
+    files: Mapping[str, str],
+    sizes: Mapping[str, int],
+    core: Core,
+    room: str = "fourier",
+    *,
+    refined: bool = False,
 ) -> tuple[Path, Path]:
-    """The same from generated files: name -> text. `refined`: those of the second stage are among them."""
+    """The same from generated files: name -> text.
+
+    Parameters
+    ----------
+    room : of the core, of the form
+    refined : the files of the second stage are among them
+    """
     stamp = zlib.crc32("".join(files.values()).encode())
     whole = f"{name}-{stamp:08x}"
     folder = BUILD / "runs" / whole
@@ -191,7 +204,7 @@ def build_with(
         keep_header((folder / file).parent, Path(file).name, text)
     options = {
         "PVID_REPLAY_RUN": str(folder),
-        "PVID_LEAVE_OUT": left_out("fourier", core, *(["refine"] if refined else [])),
+        "PVID_LEAVE_OUT": left_out(room, core, *(["refine"] if refined else [])),
     }
     if refined:
         options["PVID_REFINE_MODEL"] = str(folder)

@@ -76,17 +76,18 @@ class StreamRig:
         """phi and y [n] as the identifier gets them, from what the board's own sensors count [n, 2]."""
         return self.case.from_counts(counts, (self.phi_lsb, self.y_lsb))
 
-    def samples(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Samples, Samples]:
-        """phi [n] and y [n] as the identifier takes them: float32 in rad and m, or counts."""
-        return np.asarray(phi, self.case.sample_type), np.asarray(y, self.case.sample_type)
+    def readings(self, *signals: npt.ArrayLike) -> Samples:
+        """phi [n] and y [n] as the identifier takes them [n, 2]: float32 in rad and m, or counts."""
+        return np.stack([np.asarray(one, self.case.sample_type) for one in signals], axis=1)
 
-    def sample(self, phi: Samples, y: Samples) -> Message:
-        """The frame of consecutive samples."""
-        made: Message = self.case.frame.of_values(phi, y)
+    def frame(self, readings: Samples) -> Message:
+        """The frame of consecutive ticks [n, 2]."""
+        made: Message = self.case.frame.of_values(*readings.T)
         return made
 
-    def hashes(self, native: Native, phi: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the core on this machine, uint32 [n]."""
+        phi, y = signals
         return native.identifier(self.config).run(phi, y, sums=False).hash
 
     def configure(

@@ -14,6 +14,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -42,10 +43,26 @@ from pvid.link.frames import Status as BoardStatus
 from pvid.link.port import Port, open_port
 from pvid.settings.enums import Status
 
-SAMPLES_A_FRAME = 64
+NUMBERS_A_FRAME = 128  # samples of all sensors: what a board receives at once
 HOST_TARGET = "stream-host"
 EMULATORS = tuple(name for name, board in BOARDS.items() if board.toolchain != "avr")
 _COMING_UP_S = 20.0  # longest wait for an emulator's first word: it always has one, however busy the machine
+
+
+class PlayedBoard(Streamed, Protocol):
+    """A board with the engine of a described mechanism, for which a run can be played."""
+
+    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[Any]:
+        """The signals [ticks] as the identifier takes them [ticks, samples]."""
+
+    def frame(self, readings: npt.NDArray[Any]) -> Message:
+        """The frame of consecutive ticks [ticks, samples]."""
+
+    def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
+        """Running hash after every tick in the core on this machine [ticks]."""
+
+
+Played = StreamRig | PlayedBoard
 
 
 class PortGoneError(Exception):
@@ -202,9 +219,8 @@ class Player:
     def __init__(
         self,
         target: Target,
-        rig: StreamRig,
-        phi: npt.ArrayLike,
-        y: npt.ArrayLike,
+        rig: Played,
+        signals: tuple[npt.ArrayLike, ...],
         hash_every: int,
         estimate_every: int,
         reopen: Callable[[], Target] | None,
@@ -213,11 +229,11 @@ class Player:
         self.target = target
         self.rig = rig
         self.settings = settings_number(rig)
-        self.phi, self.y = rig.samples(phi, y)
+        self.readings = rig.readings(*signals)
         self.estimate_every = estimate_every
         self.reopen = reopen
         self.progress = progress
-        self.account = Playback(ticks=len(self.phi), hash_every=hash_every)
+        self.account = Playback(ticks=len(self.readings), hash_every=hash_every)
         self.decoder = Decoder(self.account.received)
         self.sequence = 0
         self.furthest = 0  # first sample that has never been sent in this session
@@ -240,8 +256,8 @@ class Player:
     def _send_samples(self) -> None:
         limit = min(self.account.ticks, self.account.done + self.room)
         while self.running and self.next < limit:
-            end = min(self.next + SAMPLES_A_FRAME, limit)
-            self._send(self.rig.sample(self.phi[self.next : end], self.y[self.next : end]), self.next)
+            end = min(self.next + NUMBERS_A_FRAME // self.readings.shape[1], limit)
+            self._send(self.rig.frame(self.readings[self.next : end]), self.next)
             self.account.sent += end - self.next
             self.account.repeated += max(0, min(self.furthest, end) - self.next)
             self.furthest = max(self.furthest, end)
@@ -399,10 +415,8 @@ def refusal(status: BoardStatus) -> str:
 
 def play(
     target: Target,
-    rig: StreamRig,
-    phi: npt.ArrayLike,
-    y: npt.ArrayLike,
-    *,
+    rig: Played,
+    *signals: npt.ArrayLike,
     hash_every: int = 500,
     estimate_every: int = 0,
     patience_s: float = 20.0,
@@ -415,8 +429,8 @@ def play(
 
     Parameters
     ----------
-    phi, y
-        [ticks], in rad and m; in counts for the fixed-point core.
+    signals
+        Of every sensor [ticks], in its unit; in counts for the fixed-point core. Of the pendulum phi and y.
     hash_every, estimate_every
         Ticks between checkpoints of the running hash and between estimates; 0: the last only.
     patience_s
@@ -433,7 +447,7 @@ def play(
     PvidError
         When the target refuses the configuration.
     """
-    player = Player(target, rig, phi, y, hash_every, estimate_every, reopen, progress)
+    player = Player(target, rig, signals, hash_every, estimate_every, reopen, progress)
     try:
         return player.run(patience_s, resend_s, reconnects if reopen is not None else 0)
     finally:
@@ -495,10 +509,9 @@ def targets_of(names: tuple[str, ...]) -> list[str]:
 
 def verify(
     name: str,
-    rig: StreamRig,
+    rig: Played,
     native: Native,
-    phi: npt.ArrayLike,
-    y: npt.ArrayLike,
+    *signals: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,
 ) -> Verdict:
     """Plays a run on a target, an emulator being started again should it die, and judges it by the host's core.
@@ -508,6 +521,6 @@ def verify(
     PvidError
         When the target cannot be started or refuses the configuration.
     """
-    expected = rig.hashes(native, phi, y)
+    expected = rig.hashes(native, *signals)
     reopen = (lambda: open_target(name, rig)) if name in (HOST_TARGET, *EMULATORS) else None
-    return judge(play(open_target(name, rig), rig, phi, y, reopen=reopen, progress=progress), expected)
+    return judge(play(open_target(name, rig), rig, *signals, reopen=reopen, progress=progress), expected)

@@ -16,6 +16,7 @@ from pvid.codegen import (
     files_q31,
     files_refine,
     files_strong,
+    files_strong_design,
     refine_twin,
     self_test,
     twin_file,
@@ -28,6 +29,7 @@ from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches, reaches_of
 from pvid.codegen.refine import RefineFunctions, default_widths, has_skew, refine_functions_of, without_optional
 from pvid.codegen.strong import renamed, strong_functions_of
+from pvid.codegen.strong_twin import StrongModelConfig
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
@@ -102,6 +104,7 @@ class Options:
     strong : the strong form as well, an identifier from derivatives of the signals
     design : of the weak form for a rig; None: no NAME_design_f32.h
     fixed_weak : files of the fixed-point weak form for a rig, name -> text (pvid.run.engine_files_q31)
+    strong_design : settings of the strong form for a rig; None: no NAME_strong_design_f32.h
     """
 
     reaches: Reaches = field(default_factory=Reaches)
@@ -109,6 +112,7 @@ class Options:
     strong: bool = False
     design: FourierConfig | None = None
     fixed_weak: Mapping[str, str] = field(default_factory=dict)
+    strong_design: StrongModelConfig | None = None
 
 
 def files_of(compiled: CompiledModel, command: str, options: Options | None = None) -> dict[str, str]:
@@ -141,6 +145,8 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         files[f"{name}_strong.h"] = files_strong.header(named, command)
         files[f"{name}_strong_f32.c"] = files_strong.source(named, command)
         apart.append(f"{name}_strong_f32.c")
+        if chosen.strong_design is not None:
+            files[f"{name}_strong_design_f32.h"] = files_strong_design.header(named, chosen.strong_design, command)
     if refine_refusal(compiled) is None:
         refined = refine_functions(compiled, chosen)
         files["pvid/refine_shape.h"] = files_refine.shape(refined, command)

@@ -126,7 +126,7 @@ def _design(design: FourierDesign32) -> str:
         "sign_width": f"{name}_sign_width" if design.model.signs else "NULL",
         "overlap": float_literal(np.float32(design.overlap)),
     }
-    return _initialised(f"static const pvid_fourier_design_f32 {name}_design_f32", fields)
+    return initialised(f"static const pvid_fourier_design_f32 {name}_design_f32", fields)
 
 
 def _checks(config: FourierConfig) -> list[str]:
@@ -144,55 +144,59 @@ def _config(config: FourierConfig) -> str:
     name = config.design.model.name
     trust, gate = config.trust, config.gate
     fields = {
-        "sample_rate_hz": _number(config.sample_rate),
+        "sample_rate_hz": number(config.sample_rate),
         "design": f"&{name}_design_f32",
         "range": "NULL" if config.range is None else f"{name}_range",
         "drive_min": "NULL" if config.drive_min is None else f"{name}_drive_min",
         "compensation": str(config.compensation).lower(),
         "iterations": config.iterations,
-        "estimator": _inner(_estimator(config.estimator)),
-        "trust": _inner(
+        "estimator": inner(estimator_fields(config.estimator)),
+        "trust": inner(
             {
-                "kappa_min": _number(trust.kappa_min),
-                "se_max": _number(trust.se_max),
-                "misfit_max": _number(trust.misfit_max),
+                "kappa_min": number(trust.kappa_min),
+                "se_max": number(trust.se_max),
+                "misfit_max": number(trust.misfit_max),
                 "groups_min": trust.groups_min,
                 "revert_after": trust.revert_after,
-                "renewal": _number(trust.renewal),
+                "renewal": number(trust.renewal),
             }
         ),
-        "gate": _inner({"sigmas": _number(gate.sigmas), "patience_s": _number(gate.patience_s)}),
+        "gate": inner({"sigmas": number(gate.sigmas), "patience_s": number(gate.patience_s)}),
     }
-    return _initialised(f"static const pvid_fourier_config_f32 {name}_config_f32", fields)
+    return initialised(f"static const pvid_fourier_config_f32 {name}_config_f32", fields)
 
 
-def _estimator(config: EstimatorConfig) -> dict[str, object]:
+def estimator_fields(config: EstimatorConfig) -> dict[str, object]:
+    """Field -> value in C, in the order of estimator.h."""
     arrays = {"start": config.start, "start_sd": config.start_sd, "lower": config.lower, "upper": config.upper}
     return {
         **{field: "{" + ", ".join(map(float_literal, values)) + "}" for field, values in arrays.items()},
-        "row_sd": _number(config.row_sd),
-        "forgetting_s": _number(config.forgetting_s),
-        "feedback_hz": _number(config.feedback_hz),
-        "correlation": _number(config.correlation),
-        "row_weight": _number(config.row_weight),
-        "step_limit": _number(config.step_limit),
-        "kappa_min": _number(config.kappa_min),
-        "noise_margin": _number(config.noise_margin),
-        "dead_zone": _number(config.dead_zone),
+        "row_sd": number(config.row_sd),
+        "forgetting_s": number(config.forgetting_s),
+        "feedback_hz": number(config.feedback_hz),
+        "correlation": number(config.correlation),
+        "row_weight": number(config.row_weight),
+        "step_limit": number(config.step_limit),
+        "kappa_min": number(config.kappa_min),
+        "noise_margin": number(config.noise_margin),
+        "dead_zone": number(config.dead_zone),
         "law": f"PVID_LAW_{config.law.name}",
         "divider": config.divider,
     }
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """A float32 in C."""
     return float_literal(np.float32(value))
 
 
-def _inner(fields: Mapping[str, object]) -> str:
+def inner(fields: Mapping[str, object]) -> str:
+    """The value of a struct within a struct."""
     lines = [f"        .{name} = {value}," for name, value in fields.items()]
     return "\n".join(["{", *lines, "    }"])
 
 
-def _initialised(declaration: str, fields: Mapping[str, object]) -> str:
+def initialised(declaration: str, fields: Mapping[str, object]) -> str:
+    """A constant struct of these fields."""
     lines = [f"    .{name} = {value}," for name, value in fields.items()]
     return "\n".join([f"{declaration} = {{", *lines, "};"])

@@ -8,6 +8,7 @@ from pvid.codegen.parameters_q31 import ParametersQ31
 from pvid.core.fourier_native_q31 import FourierNativeQ31
 from pvid.core.model_library import model_library
 from pvid.core.sizes import raised
+from pvid.settings.engine_cores import FIXED
 from pvid.settings.fourier_q31 import FourierConfigQ31
 from pvid.setup.fourier_sizes import sizes_of_q31
 
@@ -34,4 +35,4 @@ def fourier_native_q31(made: FixedFourier, parameters: ParametersQ31, config: Fo
         f"extern const pvid_fourier_config_q31 *{name}_settings_q31;\n",
     }
     headers = ("configuration.h",)
-    return FourierNativeQ31(name, model_library(name, texts, raised(needed), "q31", headers), config)
+    return FourierNativeQ31(name, model_library(name, texts, raised(needed), FIXED, headers), config)

@@ -13,6 +13,8 @@ from pvid.codegen.strong import StrongFunctions
 from pvid.codegen.twin_file import loaded, namespace
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.record import Record
+from pvid.settings.tables import Folded
 from pvid.twin.f32.differentiator import derivatives, segments
 from pvid.twin.f32.estimator import RelativeEstimator
 
@@ -21,13 +23,13 @@ Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class StrongModelConfig:
+class StrongModelConfig(Folded):
     """Settings of the strong form of any model, as in NAME_strong.h.
 
     Attributes
     ----------
     sample_rate : [Hz]
-    weights, stride : the folded bank of all differentiators, float32 [5, half]; see pvid.design.fir
+    weights, stride, block : the folded bank of all differentiators, float32 [5, half]; see pvid.design.fir
     row_sd : expected standard deviation of Y - N^T theta of each kind of row [unit of its Y]
     estimator : its row_sd is ignored
     """
@@ -37,6 +39,12 @@ class StrongModelConfig:
     stride: int
     row_sd: tuple[float, ...]
     estimator: EstimatorConfig
+    block: int = 1
+
+    @property
+    def bank(self) -> StrongModelConfig:
+        """The bank, whose fields are among these."""
+        return self
 
 
 class StrongModelTwin:
@@ -53,26 +61,24 @@ class StrongModelTwin:
         estimator = replace(config.estimator, row_sd=1.0)
         self.estimator = RelativeEstimator([estimator], config.sample_rate, self._twin.pattern)
 
-    def run(self, samples: npt.ArrayLike) -> tuple[Float32, npt.NDArray[np.uint8]]:
-        """Steps through a run [ticks, signals] from its first sample.
-
-        Returns
-        -------
-        p after every tick [ticks, n_p], and its reason [ticks].
-        """
+    def run(self, samples: npt.ArrayLike, progress: Callable[[int], None] | None = None) -> Record:
+        """Steps through a run [ticks, signals] from its first sample: p, sums and reason after every tick."""
         given = np.asarray(samples, np.float32)
         finite = _finite(given)
         columns, ready = self.columns(given)
-        p = np.empty((len(given), len(self.estimator.p)), np.float32)
-        reasons = np.full(len(given), Reason.WARMING_UP, np.uint8)
-        for tick in range(len(given)):
+        estimator, ticks = self.estimator, len(given)
+        p, sums = (np.empty((ticks, len(one)), np.float32) for one in (estimator.p, estimator.sums))
+        reasons = np.full(ticks, Reason.WARMING_UP, np.uint8)
+        for tick in range(ticks):
             if not finite[tick]:
                 reasons[tick] = Reason.REJECTED_NOT_FINITE
-                self.estimator.counters["rejected_not_finite"] += 1
+                estimator.counters["rejected_not_finite"] += 1
             elif ready[tick]:
                 reasons[tick] = self._take(columns[:, tick])
-            p[tick] = self.estimator.p[:, 0]
-        return p, reasons
+            p[tick], sums[tick] = estimator.p[:, 0], estimator.sums[:, 0]
+            if progress is not None:
+                progress(1)
+        return Record(p=p, sums=sums, reason=reasons)
 
     def _take(self, columns: Float32) -> int:
         """The rows of an instant [columns]; the reason of the solve."""
@@ -96,7 +102,10 @@ class StrongModelTwin:
             channels = [_centred(one, finite, is_held) for one, is_held in zip(channels, held, strict=True)]
             usable = _from_the_fourth(finite)
         config = self._config
-        found = [derivatives(one, usable, config.weights, config.stride, config.sample_rate) for one in channels]
+        found = [
+            derivatives(one, usable, config.weights, config.stride, config.sample_rate, config.block)
+            for one in channels
+        ]
         inputs = np.stack([found[one.channel][0][:, one.order] for one in self._strong.sources])
         return self._row(inputs), found[0][1]
 

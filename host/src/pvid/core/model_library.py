@@ -14,12 +14,11 @@ from pathlib import Path
 from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
-from pvid.settings.engine_cores import ENGINE_CORES
-from pvid.settings.enums import Core
+from pvid.settings.engine_cores import FLOAT, EngineCore
 
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
-_ROOMS = ("number", "solve", "judge", "fourier", "keep")
+_ROOMS = ("number", "solve", "judge", "keep")  # of every form
 _REFINED = "refine_model_f32.h"  # a text that comes with the second stage
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"
@@ -29,7 +28,7 @@ def model_library(
     name: str,
     texts: Mapping[str, str],
     sizes: Mapping[str, int],
-    core: Core = "f32",
+    engine: EngineCore = FLOAT,
     headers: Sequence[str] | None = None,
 ) -> Path:
     """The shared library, beside it what cffi reads.
@@ -39,7 +38,7 @@ def model_library(
     name : of the mechanism, for the file's name
     texts : file name -> generated C
     sizes : PVID_MAX_ macro -> value
-    core : arithmetic
+    engine : its arithmetic, or the strong form
     headers : names of the texts that cffi reads; None: all headers
 
     Raises
@@ -50,12 +49,12 @@ def model_library(
     compiler = host_compiler(_WHAT)
     definitions = [f"-D{macro}={size}" for macro, size in sorted(sizes.items())]
     key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
-    folder = build_folder() / "cache" / "models" / f"{name}-{core}-{key.hexdigest()[:20]}"
+    folder = build_folder() / "cache" / "models" / f"{name}-{engine.name}-{key.hexdigest()[:20]}"
     library = folder / f"lib{name}.so"
     if not library.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
         declared = headers or sorted(one for one in texts if one.endswith(".h"))
-        _build(compiler, texts, definitions, library, core, declared)
+        _build(compiler, texts, definitions, library, engine, declared)
     return library
 
 
@@ -64,14 +63,12 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def _sources(core: Core, refined: bool) -> list[Path]:
-    names = (*_ROOMS, "refine") if refined else _ROOMS
-    rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in names]
-    return [
-        *(path for path in rooms if not path.stem.endswith(ENGINE_CORES[core].without)),
-        NATIVE / f"{ENGINE_CORES[core].replay}.c",
-        *([NATIVE / "replay_refine.c"] if refined else []),
-    ]
+def _sources(engine: EngineCore, refined: bool) -> list[Path]:
+    rooms = (*_ROOMS, engine.room, *(["refine"] if refined else []))
+    found = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in rooms]
+    replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if refined else [])]
+    kept = [path for path in found if not path.stem.endswith(engine.without)]
+    return [*kept, *(NATIVE / f"{name}.c" for name in replays)]
 
 
 @cache
@@ -90,7 +87,7 @@ def _build(
     texts: Mapping[str, str],
     definitions: list[str],
     library: Path,
-    core: Core,
+    engine: EngineCore,
     headers: Sequence[str],
 ) -> None:
     """Whole or not at all: several processes may build the same."""
@@ -102,9 +99,9 @@ def _build(
             (folder / name).write_text(text, encoding="utf-8")
         options = [*_FLAGS, *definitions, f"-I{folder}", *INCLUDES, f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        objects = objects_of(compiler, options, [*code, *_sources(core, _REFINED in texts)], Path(made))
+        objects = objects_of(compiler, options, [*code, *_sources(engine, _REFINED in texts)], Path(made))
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
-        declared = _declarations(compiler, headers, options, Path(made), core)
+        declared = _declarations(compiler, headers, options, Path(made), engine)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
         try:
             folder.rename(library.parent)
@@ -113,14 +110,14 @@ def _build(
                 raise
 
 
-def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, core: Core) -> str:
+def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, engine: EngineCore) -> str:
     """The headers, preprocessed: cffi knows the types of the standard ones."""
     empty = folder / "no_standard_headers"
     empty.mkdir()
     for name in _STANDARD:
         (empty / f"{name}.h").write_text("", encoding="utf-8")
-    replays = [f"{ENGINE_CORES[core].replay}.h", *(["replay_refine.h"] if _REFINED in headers else [])]
-    own = [f'#include "{name}"' for name in (*replays, *headers) if name != _REFINED]
+    replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if _REFINED in headers else [])]
+    own = [*(f"{name}.h" for name in replays), *(name for name in headers if name != _REFINED)]
     top = folder / "native.h"
-    top.write_text("\n".join([*own, ""]), encoding="utf-8")
+    top.write_text("".join(f'#include "{name}"\n' for name in own), encoding="utf-8")
     return run_compiler([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])

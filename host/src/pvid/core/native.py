@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,18 +25,48 @@ Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
 
 
+class _Estimator(NamedTuple):
+    """An estimator of the core. sizes: its numbers of parameters and of sums; assess: the function in C, of the
+    identifier or of the estimator in it."""
+
+    sizes: Callable[[Any], tuple[int, int]]
+    assess: str
+    of_identifier: bool = False
+
+
 class _Arithmetic(NamedTuple):
-    """Properties of a core. sample, sums: numpy types of samples and p, and of the sums."""
+    """Properties of a core. sample, sums: numpy types of samples and p, and of the sums; any_model, strong: the
+    estimator of any model, and the strong form's own, which has the pendulum's sums."""
 
     sample: type[np.generic]
     sums: type[np.generic]
     exponents: bool  # of the sums
     misfit_unit: float
+    any_model: _Estimator
+    strong: _Estimator
+
+
+def _sizes_f32(one: Any) -> tuple[int, int]:
+    return int(one.model.n_p), int(one.information.n_moments + one.information.n_theta + 2)
 
 
 _ARITHMETIC: dict[Core, _Arithmetic] = {
-    "f32": _Arithmetic(np.float32, np.float32, False, 1.0),
-    "q31": _Arithmetic(np.int32, np.int64, True, 2.0**-16),
+    "f32": _Arithmetic(
+        np.float32,
+        np.float32,
+        False,
+        1.0,
+        _Estimator(_sizes_f32, "pvid_estimator_assess_f32"),
+        _Estimator(lambda one: (len(one.p), len(one.sums.low)), "pvid_strong_assess_f32", of_identifier=True),
+    ),
+    "q31": _Arithmetic(
+        np.int32,
+        np.int64,
+        True,
+        2.0**-16,
+        _Estimator(lambda one: (int(one.model.n_p), int(one.information.n_sums)), "pvid_estimator_assess_q31"),
+        _Estimator(lambda one: (len(one.p), len(one.sums)), f"pvid_{DEFAULT}_estimator_assess_q31"),
+    ),
 }
 
 # Models of the fixed-point core by the lengths of p and theta.
@@ -173,6 +203,7 @@ class Stepper:
     """
 
     _configured: str | None = None  # pvid_<..>_config_<core> is the configuration's type; None: <name>
+    _prefix = "pvid_"  # of its names in C; generated ones have none
 
     def __init__(self, native: Native, name: str, core: Core, config: Any, *, replay: str, **given: Any) -> None:
         ffi = native.headers.ffi
@@ -180,16 +211,17 @@ class Stepper:
         self.core = core
         self._name = name
         self._replay = replay
-        self._filled = self._filled_with(native, f"pvid_{self._configured or name}_config_{core}", config)
+        self._filled = self._filled_with(native, f"{self._prefix}{self._configured or name}_config_{core}", config)
         for field, value in given.items():
             setattr(self.config_struct, field, value)
         self._hash = np.array([0x811C9DC5], np.uint32)
-        self.state: Any = ffi.new(f"pvid_{name}_{core} *")
+        self.state: Any = ffi.new(f"{self._prefix}{name}_{core} *")
         status = self.initialise()
         if status is not Status.OK:
             raise PvidError(f"the core refused the configuration: {status.text}")
         self._arithmetic = _ARITHMETIC[core]
-        self.n_p, self._n_sums = self._sizes()
+        self._kind = self._kind_of(self._arithmetic)
+        self.n_p, self._n_sums = self._kind.sizes(self.estimator)
 
     def _filled_with(self, native: Native, kind: str, config: Any) -> Filled:
         """The configuration in C."""
@@ -197,16 +229,11 @@ class Stepper:
 
     def _call(self, verb: str, *arguments: Any) -> Any:
         """Its function pvid_<name>_<verb>_<core>."""
-        return getattr(self.native.library, f"pvid_{self._name}_{verb}_{self.core}")(self.state, *arguments)
+        return getattr(self.native.library, f"{self._prefix}{self._name}_{verb}_{self.core}")(self.state, *arguments)
 
-    def _sizes(self) -> tuple[int, int]:
-        """Number of parameters and of sums."""
-        estimator = self.estimator
-        if not hasattr(estimator, "model"):  # the strong form's own
-            return len(estimator.p), len(getattr(estimator.sums, "low", estimator.sums))
-        sums = estimator.information
-        n_sums = sums.n_sums if hasattr(sums, "n_sums") else sums.n_moments + sums.n_theta + 2
-        return int(estimator.model.n_p), int(n_sums)
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        """Its estimator."""
+        return arithmetic.any_model
 
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
@@ -309,13 +336,8 @@ class Stepper:
         """Standard errors and kappa at the present state: pvid_estimate_<core>, shape ()."""
         headers = self.native.headers
         out = np.empty((), self._estimate_type)
-        own = not hasattr(self.estimator, "model")
-        if own and hasattr(self.estimator.sums, "low"):  # in float32 it needs the settings beside it
-            self.native.library.pvid_strong_assess_f32(self.state, headers.pointer(out))
-            return out
-        owner = f"{DEFAULT}_estimator" if own else "estimator"
-        assess = getattr(self.native.library, f"pvid_{owner}_assess_{self.core}")
-        assess(headers.ffi.addressof(self.estimator), headers.pointer(out))
+        assess = getattr(self.native.library, self._kind.assess)
+        assess(self.state if self._kind.of_identifier else headers.ffi.addressof(self.estimator), headers.pointer(out))
         return out
 
 
@@ -327,6 +349,9 @@ class StrongStepper(Stepper):
         """pvid_strong_estimator_f32 in it."""
         return self.state.estimator
 
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        return arithmetic.strong
+
 
 class StrongEstimatorQ31(Stepper):
     """The fixed-point estimator of the strong form; its input are rows."""
@@ -336,6 +361,9 @@ class StrongEstimatorQ31(Stepper):
     def __init__(self, native: Native, config: EstimatorConfigQ31, row_format: RowFormatQ31) -> None:
         self._row_format = native.headers.filled("pvid_strong_row_q31", row_format)
         super().__init__(native, f"{DEFAULT}_estimator", "q31", config, replay=f"{DEFAULT}_rows")
+
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        return arithmetic.strong
 
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
@@ -402,6 +430,9 @@ class Identifier(Publisher):
         if "angle" in dict(native.headers.ffi.typeof(kind).fields):  # storage of the correction for large angles
             self._angle = given["angle"] = native.headers.ffi.new("pvid_weak_angle_f32 *")
         super().__init__(native, config.form, config.core, config, replay=config.form, **given)
+
+    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+        return arithmetic.any_model if FORMS[self.form].uses_windows else arithmetic.strong
 
     @property
     def publishes(self) -> bool:

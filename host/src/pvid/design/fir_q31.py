@@ -2,6 +2,9 @@
 
 All orders come out in one format in one time unit tau = 2^tau_bits points: one unit of order k is
 2^-bits / denominator counts per tau^k. Products of derivatives whose orders add up to the same then need no alignment.
+
+With a block of samples each point is their sum, which is exact and up to `block` times full scale; the denominator
+makes it the mean that the design in float64 means.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ _OWN_WEIGHT = 1e-12
 
 
 def largest_sums(weights: Int32, centre: int, full_scale: int) -> list[int]:
-    """Largest |sum| of each order over all counts within +-full_scale: each sample with the sign of its weight."""
+    """Largest |sum| of each order over all points within +-full_scale: each with the sign of its weight."""
     largest = []
     for order in range(ORDERS):
         row = [int(w) for w in weights[order]]
@@ -59,20 +62,23 @@ def integer_bank(bank: FirBank, phi_max: int, y_max: int, rate_max: float) -> Fi
         Where counts within full scale could overflow.
     """
     for name, counts in (("phi_range", phi_max), ("y_range", y_max)):
-        if not 16 <= counts <= COUNTS_LIMIT:
-            raise PvidError(f"{name} is {counts} counts of the sensor and the fixed-point core takes 16 to 2^24")
+        if not 16 <= counts <= COUNTS_LIMIT // bank.block:
+            most = "2^24" if bank.block == 1 else f"2^24 / {bank.block}, samples of a block,"
+            raise PvidError(f"{name} is {counts} counts of the sensor and the fixed-point core takes 16 to {most}")
+    phi_point, y_point = phi_max * bank.block, y_max * bank.block
+    full_scale = max(phi_point, y_point)
     if bank.kind == "finite-difference":
         denominator, tau_bits = FIVE_POINTS_DENOMINATOR, 0
         weights = np.rint(bank.weights * denominator).astype(np.int32)
         weight_bits, centre = [0] * ORDERS, denominator
     else:
-        denominator, tau_bits = 1, max(0, round(-math.log2(rate_max)))
-        weights, weight_bits = _rounded(bank, max(phi_max, y_max), rate_max)
+        denominator, tau_bits = bank.block, max(0, round(-math.log2(rate_max)))
+        weights, weight_bits = _rounded(bank, full_scale, rate_max)
         centre = 1 << weight_bits[0]
     for order in range(ORDERS):
-        reach = max(phi_max, y_max) * (2 if order % 2 else 4)
-        if np.abs(weights[order].astype(np.int64)).max() * reach >= 2**31:
-            raise PvidError(f"the full scale of {max(phi_max, y_max)} counts is too many for the derivative {order}")
+        reach = full_scale * (2 if order % 2 else 4)
+        if bank.block == 1 and np.abs(weights[order].astype(np.int64)).max() * reach >= 2**31:
+            raise PvidError(f"the full scale of {full_scale} counts is too many for the derivative {order}")
     weights.setflags(write=False)
     margins: dict[str, float] = {}
 
@@ -88,8 +94,8 @@ def integer_bank(bank: FirBank, phi_max: int, y_max: int, rate_max: float) -> Fi
                 raise PvidError(f"the derivative {k} of {name} needs a shift of {shift} bits: shorten the window")
         return found, bits
 
-    phi_shift, phi_bits = shifts("phi", phi_max, 0)
-    y_shift, y_bits = shifts("y", y_max, Y_LOWEST)
+    phi_shift, phi_bits = shifts("phi", phi_point, 0)
+    y_shift, y_bits = shifts("y", y_point, Y_LOWEST)
     return FirBankQ31(
         weights=weights,
         stride=bank.stride,
@@ -103,13 +109,15 @@ def integer_bank(bank: FirBank, phi_max: int, y_max: int, rate_max: float) -> Fi
         y_bits=y_bits,
         tau_bits=tau_bits,
         margins=margins,
+        block=bank.block,
     )
 
 
 def _rounded(bank: FirBank, full_scale: int, rate_max: float) -> tuple[Int32, list[int]]:
-    """Weights as integers such that a weight times a difference of counts fits 32 bits, and their formats.
+    """Weights as integers and their formats: without a block a weight times a difference of counts fits 32 bits.
 
-    The rounding errors of an order are chosen such that motion up to rate_max hardly sees them.
+    The rounding errors of an order are chosen such that motion up to rate_max hardly sees them. With blocks there are
+    few weights to choose, and points of many bits: there a weight has all of its 31 bits.
     """
     rates = rate_max * np.arange(1, _RATES + 1) / _RATES
     angle = np.arange(1, bank.half + 1)[:, None] * rates
@@ -119,7 +127,8 @@ def _rounded(bank: FirBank, full_scale: int, rate_max: float) -> tuple[Int32, li
     for order in range(ORDERS):
         reach = full_scale * (2 if order % 2 else 4)
         largest = float(np.abs(bank.weights[order]).max())
-        bits = min(bits_for(largest * reach * 1.01, 32), 62 if order else 30)
+        room = bits_for(largest * reach * 1.01, 32) if bank.block == 1 else bits_for(largest * 1.01, 31)
+        bits = min(room, 62 if order else 30)
         # relative to what the derivative of a motion of that rate is
         seen = (odd if order % 2 else even) / rates**order
         out[order] = shaped(bank.weights[order] * 2.0**bits, slow_factor(seen / np.abs(seen).max(), _OWN_WEIGHT))

@@ -108,12 +108,12 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
     PvidError
         When the recording is too short, or holds a signal beyond all reason.
     """
-    _refuse_constant(recording, model)
+    refuse_constant(recording, model)
     found = identified_by(model, recording.signals, recording.sample_rate, weights=weights)
     return MechanismAnswer(model, found, _values(model, found), recording, weights)
 
 
-def _refuse_constant(recording: Recording, model: CompiledModel) -> None:
+def refuse_constant(recording: Recording, model: CompiledModel) -> None:
     """A sensor that never moves is dead or not connected."""
     for one in model.signals:
         if one.kind == "sensor" and np.ptp(recording.signals[one.name]) == 0:

@@ -1,4 +1,4 @@
-"""The weak engine in float32 and in fixed point: what differs by name alone."""
+"""The weak engine in float32 and in fixed point, and the strong form of any model: what differs by name alone."""
 
 from __future__ import annotations
 
@@ -10,22 +10,32 @@ from pvid.settings.enums import Core
 
 @dataclass(frozen=True)
 class EngineCore:
-    """An arithmetic of the engine.
+    """An arithmetic of the engine, or the strong form.
 
     Attributes
     ----------
     name : f32 or q31
     words : what a user calls it
-    replay : source of host/native that steps the engine through a recording
+    replay : source of host/native that steps the engine through a recording; None: it is generated
     without : ends of the names of sources that the engine does without
+    room : of the core, beside those that every form has
     """
 
     name: Core
     words: str
-    replay: str
+    replay: str | None
     without: tuple[str, ...]
+    room: str = "fourier"
 
 
 FLOAT = EngineCore("f32", "float32", "replay_fourier", ("_q31", "_strong_f32", "_weak_f32"))
 FIXED = EngineCore("q31", "fixed point", "replay_fourier_q31", ("_f32", "_strong_q31", "_weak_q31", "fingerprint_q31"))
+STRONG = EngineCore(
+    "f32",
+    "float32",
+    None,
+    ("_q31", "strong_f32", "_weak_f32", "_fourier_f32", "_refine_f32", "derivatives_f32", "fingerprint_f32"),
+    "strong",
+)
+STRONG_CORES = (STRONG.name, "f64")  # of a described mechanism: in C, and its analysis in float64
 ENGINE_CORES: Mapping[str, EngineCore] = {one.name: one for one in (FLOAT, FIXED)}

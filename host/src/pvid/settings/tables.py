@@ -71,7 +71,8 @@ class FirBankQ31(Folded):
     ----------
     weights : int32 [5, half], folded
     stride : samples from point to point
-    centre : weight of the centre sample in order 0
+    block : samples whose sum is a point
+    centre : weight of the centre point in order 0
     phi_max, y_max : full scale of the counts
     phi_shift, y_shift : of orders 0..4 of phi and 2..4 of y
     denominator : angles and heights come out in 1/denominator counts
@@ -92,6 +93,13 @@ class FirBankQ31(Folded):
     y_bits: int
     tau_bits: int
     margins: dict[str, float]
+    block: int = 1
+
+    @property
+    def memory(self) -> int:
+        """Places of PVID_MAX_WINDOW that it needs: sums of integers are exact, so one sum of a block is enough."""
+        points = 2 * self.half * self.stride + 1
+        return points + self.block + 1 if self.block > 1 else points
 
 
 RATE_BITS = 24  # after the point of u, u', u'' and w_r in fixed point; w has one more

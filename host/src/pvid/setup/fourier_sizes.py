@@ -39,7 +39,11 @@ def sizes_for_one(design: FourierDesign32) -> dict[str, int]:
     are those of the design (PVID_EXACT)."""
     needed = sizes_of_design(design)
     found = at_least(needed)
-    return found | {"PVID_EXACT": int(found == needed)}
+    if found != needed:
+        return found
+    model = design.model
+    counts = ("signals", "jets", "runs", "signs", "integrands")
+    return found | {"PVID_EXACT": 1} | {f"PVID_EXACT_{one.upper()}": getattr(model, one) for one in counts}
 
 
 def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]:

@@ -123,7 +123,7 @@ class FourierTwin:
             return Stretch(steps, free, np.zeros((0, 0, 2, 0), np.float32), [])
         count = len(windows)
         drop = np.full(count, Reason.ACCUMULATED)
-        later = ticks[2:]  # of the channels
+        later = ticks[2:] - self.ticks.apart  # of the steps whose channels follow
         if self.config.drive_min is not None:
             still = fourier_watch.windows_still(samples[later], np.asarray(self.config.drive_min, np.float32), hop)
             drop[still] = Reason.HELD_NOT_EXCITED

@@ -44,7 +44,8 @@ class StrongTwinQ31(Twin):
         within = (np.abs(phi) <= design.bank.phi_max) & (np.abs(y) <= design.bank.y_max)
         d_phi, d_y, ready = derivatives(phi, y, within, design.bank)
         u = model.accelerations(d_y, design.u_multiplier, design.u_shift)
-        usable = ready & (np.abs(u) <= (RATE_LIMIT, DERIVATIVE_LIMIT, DERIVATIVE_LIMIT)).all(axis=1)
+        limits = np.array([RATE_LIMIT, DERIVATIVE_LIMIT, DERIVATIVE_LIMIT])
+        usable = ready & ((u >= -limits) & (u < limits)).all(axis=1)
         u[~usable] = 0
         rows, fits = model.rows(design.row, d_phi, u)
         driven = self._driven(u[:, 0], usable)

@@ -7,8 +7,9 @@
  *
  * The estimator keeps 57 repeated moments as exact 64-bit sums. A solve shifts them from G to the present u + w in 28
  * bits and a common power of two for each family of columns, and factors S = L D L^T with one division of 32 bits a
- * pivot. Law, reasons and settings are those of estimator_q31.h. For every row no sum wraps, no division is by 0, and p
- * stays within its bounds. Not thread-safe.
+ * pivot. Law, reasons and settings are those of estimator_q31.h. For every sequence of rows no sum wraps, no division is
+ * by 0, and p stays within its bounds (proved but for what Cauchy-Schwarz says of the sums: host/docs/proofs.md). Not
+ * thread-safe.
  */
 #ifndef PVID_KAPITZA_STRONG_Q31_H
 #define PVID_KAPITZA_STRONG_Q31_H
@@ -50,8 +51,8 @@ typedef struct {
 } pvid_strong_row_q31;
 
 /* One row from phi[k] = d^k phi/dt^k within +-PVID_DERIVATIVE_LIMIT_Q31 and u = y_A''/l1 within
- * +-PVID_KAPITZA_RATE_LIMIT_Q31, u', u'' within twice that. Fails (returns false, row undefined) iff an entry or a part
- * of Y exceeds +-PVID_ROW_LIMIT_Q31. Cost: 13 products of 32 by 32 bits. */
+ * +-PVID_KAPITZA_RATE_LIMIT_Q31, u', u'' within twice that. Fails (returns false, row undefined) iff an entry is
+ * outside -2^28..2^28 - 1 or a part of one outside -2^30..2^30 - 1. Cost: 13 products of 32 by 32 bits. */
 bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS],
                                  const int32_t u[PVID_Y_ORDERS_Q31], int32_t row[PVID_KAPITZA_ROW_Q31]);
 

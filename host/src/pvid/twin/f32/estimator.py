@@ -364,7 +364,7 @@ class RelativeEstimator(Estimator):
     @property
     def _projection_stages(self) -> int:
         columns = self.model.c_column
-        return 1 + sum(1 + -(-columns.count(a) // self._COLUMNS_PER_STAGE) for a in range(self.model.n_p))
+        return 2 + sum(1 + -(-columns.count(a) // self._COLUMNS_PER_STAGE) for a in range(self.model.n_p))
 
     def solve_stages(self, ends_group: bool) -> int:
         """Stages of a solve that is due."""

@@ -24,6 +24,7 @@ Stages = Iterator[Reasons | None]
 
 _F = np.float32
 _ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 30, 4
+_NONZEROS_PER_STAGE, _PAIRS_PER_STAGE, _BOTH_FAMILIES = 8, 1, 16
 _GATE_MEMORY = _F(4)
 _VARIANCE_MAX = _F(1e36)
 
@@ -64,14 +65,18 @@ class Finish:
         """Stages of a kind up to its gate."""
         own = self.design.model.kind[kind]
         nuisances = own.nuisances
-        project = nuisances * own.columns - nuisances * (nuisances - 1) // 2 if nuisances else 1
+        at_once = max(1, _PRODUCTS_PER_STAGE // (2 * self.design.functions))
+        project = sum(1 + _parts(own.columns - 1 - i, at_once) for i in range(nuisances)) or 1
         residual = _parts(self.design.functions, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
         squares = _parts(own.thetas, self._products)
         basis = 2 * self.design.power + self._stages_of_share
-        noise = max(1, len(pairs_of(self.design, kind))) if self._checks_noise else 1
+        listed = _parts(len(self.estimator.model.c_row), _NONZEROS_PER_STAGE)
+        pairs = _parts(len(pairs_of(self.design, kind)), _PAIRS_PER_STAGE)
+        noise = 1 + listed + pairs if self._checks_noise else 1
+        reflect = 1 if self.design.functions <= _BOTH_FAMILIES else 2
         terms = [one.column for one in self.design.model.terms_of(kind)]
         gather = sum(max(1, terms.count(column)) for column in range(own.columns))
-        return self._entries() + 3 + noise + basis + gather + 2 * own.columns + project + residual + squares
+        return self._entries() + 3 + noise + basis + gather + reflect * own.columns + project + residual + squares
 
     @property
     def _checks_noise(self) -> bool:
@@ -93,7 +98,7 @@ class Finish:
     def _stages_of_adding(self, kind: int) -> int:
         """Stages of a kind behind its gate."""
         thetas = self.design.model.kind[kind].thetas
-        return _parts(thetas * (thetas + 1) // 2, self._products)
+        return _parts(thetas * (thetas + 1) // 2, self._products) + 1
 
     @property
     def _stages_of_share(self) -> int:
@@ -112,7 +117,7 @@ class Finish:
             for kind in range(self.design.model.kinds)
         )
         solves = estimator.solve_stages(True) + (self.iterations - 1) * estimator.solve_stages(False)
-        return of_kinds + 4 + len(estimator.p) + solves + estimator.assess_solved_stages
+        return of_kinds + 6 + len(estimator.p) + solves + estimator.assess_solved_stages
 
     # ---- a window
 
@@ -191,8 +196,9 @@ class Finish:
                         score[i] = score[i] + product
                         self.estimator.add_gradient(kind, i, product)
                 done += 1
-                if i < thetas - 1 and done % self._products == 0:
+                if done % self._products == 0 and done < thetas * (thetas + 1) // 2:
                     yield None
+        yield None
         self.estimator.end_rows(kind, gradient, rss, self.design.functions)
         yield None
 
@@ -220,6 +226,7 @@ class Finish:
         """From the rows in the sums to the verdict."""
         estimator = self.estimator
         self.scores.take(estimator.model, estimator.p, score)
+        yield None
         estimator.set_expected(expected)
         yield None
         reason = np.full(score.shape[1], Reason.ACCUMULATED, np.uint8)
@@ -240,7 +247,7 @@ class Finish:
         if not estimator.was_due:
             yield self.trust.judge(reason, size, estimator.everywhere, variance_ratio, self.trust.estimate)
             return
-        for _ in range(estimator.assess_solved_stages + 1 + len(estimator.p)):
+        for _ in range(1 + estimator.assess_solved_stages + len(estimator.p) + 1):
             yield None
         with np.errstate(all="ignore"):
             candidate, above_noise = estimator.judged_as_solved()

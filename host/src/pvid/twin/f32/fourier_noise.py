@@ -60,8 +60,8 @@ class Noise:
         one = pair[0]
         model, same = self._model, one.a == one.b
         whole = one.factor * share[one.power]
-        for more in pair[1:]:
-            whole = whole + more.factor * share[more.power]
+        for entry in pair[1:]:
+            whole = whole + entry.factor * share[entry.power]
         own = (whole if same else _F(0.5) * whole) / self._rows
         pattern = list(enumerate(zip(model.c_row, model.c_column, strict=True)))
         for k, (row, i) in pattern:

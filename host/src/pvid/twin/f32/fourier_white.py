@@ -99,7 +99,8 @@ class White:
         x = (rows.harmonic.astype(np.float32) * (_F(1) / _F(rows.cosines - 1)))[:, None]
         scale = self.scale[rows.harmonic]
         lanes = scale.shape[1]
-        u, before, leverage = scale, np.zeros_like(scale), np.zeros_like(scale)
+        leverage: Float32 = np.zeros(scale.shape, np.float32)
+        u, before = scale, np.zeros_like(scale)
         norm, slope = np.zeros((2, lanes), np.float32), np.zeros((2, lanes), np.float32)
         for k in range(rows.vectors):
             following = np.zeros_like(u)
@@ -123,7 +124,7 @@ class White:
         v = u
         for place in range(len(self.reflections)):
             v = self._reflected(place, v)
-        out = np.zeros_like(v)
+        out: Float32 = np.zeros(v.shape, np.float32)
         for family in self.rows.families:
             own = slice(family.start + len(self.reflections), family.stop)
             out[own] = _reflection(v[own])

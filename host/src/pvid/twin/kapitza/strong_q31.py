@@ -14,17 +14,18 @@ N_ROW = 13  # N_1 .. N_11, Y, G
 A, E, X, Z, Y, G = 0, 1, 2, 6, 11, 12
 ROW_LIMIT = 2**28
 PART_LIMIT = 2**30
+TERM_LIMIT = 2**29
 
 
 class Fitting:
-    """Numbers that must stay within a limit, elementwise; `ok` tells where all of them did."""
+    """Numbers that must stay within -limit..limit - 1, elementwise; `ok` tells where all of them did."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self.ok = np.ones(shape, np.bool_)
 
     def within(self, x: Int, limit: int = ROW_LIMIT) -> Int:
-        """x; 0 where it is beyond the limit."""
-        fits = np.abs(x) <= limit
+        """x; 0 where it is outside -limit..limit - 1."""
+        fits = (x >= -limit) & (x < limit)
         self.ok &= fits
         return np.where(fits, x, 0)
 
@@ -85,13 +86,14 @@ def innovation(row: Int, p: Int, reference: Int, bits: tuple[int, int]) -> tuple
         return found
 
     def term(d: Int, own_bits: int, factor: int, x: Int) -> Int:
-        return round_shift(factor * (d * x), own_bits)
+        return fitting.within(round_shift(factor * (d * x), own_bits), TERM_LIMIT)
 
     g2_x, g3_x = chain(row[X + 3], 3)[-2:]
     g3_z, g4_z = chain(row[Z + 4], 4)[-2:]
-    of_e = by_rate(row[E], beyond)
-    inner = fitting.within(row[A] + of_e, PART_LIMIT)
-    known = by_rate(inner, beyond) + term(d1, bits[0], 1, g3_x) + term(d2, bits[1], 1, g4_z)
+    of_e = fitting.within(by_rate(row[E], beyond), TERM_LIMIT)
+    inner = row[A] + of_e
+    of_w = fitting.within(by_rate(inner, beyond), TERM_LIMIT)
+    known = of_w + term(d1, bits[0], 1, g3_x) + term(d2, bits[1], 1, g4_z)
     slope = fitting.within(inner + of_e + term(d1, bits[0], 3, g2_x) + term(d2, bits[1], 4, g3_z), PART_LIMIT)
     e = fitting.within(row[Y] - known)
     return e, np.stack([slope, g3_x, g4_z]), fitting.ok

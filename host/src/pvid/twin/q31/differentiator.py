@@ -34,23 +34,31 @@ def derivatives(phi: Int, y: Int, within: Mask, bank: FirBankQ31) -> tuple[Int, 
     out_phi = np.zeros((len(phi), ORDERS), np.int64)
     out_y = np.zeros((len(phi), ORDERS - Y_LOWEST), np.int64)
     ready = np.zeros(len(phi), np.bool_)
-    delay = bank.delay
     for first, last in segments(within):
-        count = last - first - 2 * delay
+        count = last - first - bank.window + 1
         if count <= 0:
             continue
-        now = slice(first + 2 * delay, last)
+        now = slice(first + bank.window - 1, last)
         ready[now] = True
+        phi_points, y_points = _points(phi[first:last], bank.block), _points(y[first:last], bank.block)
         for k in range(ORDERS):
-            out_phi[now, k] = round_shift(_sum(phi[first:last], count, bank, k), bank.phi_shift[k])
+            out_phi[now, k] = round_shift(_sum(phi_points, count, bank, k), bank.phi_shift[k])
         for k in range(Y_LOWEST, ORDERS):
-            out_y[now, k - Y_LOWEST] = round_shift(_sum(y[first:last], count, bank, k), bank.y_shift[k - Y_LOWEST])
+            out_y[now, k - Y_LOWEST] = round_shift(_sum(y_points, count, bank, k), bank.y_shift[k - Y_LOWEST])
     return out_phi, out_y, ready
 
 
+def _points(x: Int, block: int) -> Int:
+    """The sums of `block` samples up to each from the first full one on."""
+    if block == 1:
+        return x
+    sums = np.concatenate([np.zeros(1, np.int64), np.cumsum(x)])
+    return np.asarray(sums[block:] - sums[:-block])
+
+
 def _sum(x: Int, count: int, bank: FirBankQ31, order: int) -> Int:
-    """The exact sum of one order in each of the `count` full windows."""
-    delay = bank.delay
+    """The exact sum of one order of the points x in each of the `count` full windows."""
+    delay = bank.half * bank.stride
     middle = x[delay : delay + count]
     total = middle * bank.centre if order == 0 else np.zeros(count, np.int64)
     for i in range(bank.half):

@@ -22,9 +22,9 @@ from pvid.twin.weak_schedule import Work
 _ENTRIES_PER_STAGE = 4
 _HARMONICS_PER_STAGE = 2
 _ROOTS_PER_STAGE = 4
-_UNITS_PER_STAGE = 4
+_UNITS_PER_STAGE = 2
 _RESIDUALS_PER_STAGE = 2
-_SHARES_PER_STAGE = 2
+_SHARES_PER_STAGE = 1
 _NOISE_WINDOWS = 16
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
@@ -39,7 +39,7 @@ def _parts(count: int, few: int) -> int:
 def _noise_stages(design: FourierDesignQ31) -> int:
     """Of a kind, where the noise is computed anew."""
     harmonics = design.highest + 1
-    return design.power + _parts(harmonics, _SHARES_PER_STAGE) + 1 + len(design.noise)
+    return design.power + _parts(harmonics, _SHARES_PER_STAGE) + 2 + len(design.noise)
 
 
 def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int = 0) -> int:
@@ -64,7 +64,7 @@ def _stages_before_gate(design: FourierDesignQ31, kind: FourierKind, live: int =
 def number_of_stages(design: FourierDesignQ31, iterations: int, estimator: EstimatorQ31, uses_noise: bool) -> int:
     """Of a window, at most."""
     rows = len(design.model.kind) * (_noise_stages(design) if uses_noise else 0)
-    rows += sum(_stages_before_gate(design, kind) + _END_PARTS + design.functions for kind in design.model.kind)
+    rows += sum(_stages_before_gate(design, kind) + _END_PARTS + design.functions + 1 for kind in design.model.kind)
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
     return rows + solves + estimator.assessment_stages + 1
 
@@ -173,9 +173,10 @@ def stages(
             yield from estimator.fade(trust.next_fade_factor())
         for k in range(live, design.functions):
             added = estimator.take_row(n[k], innovations[k], ~saturated, place)
-            if noise.compensates and k == design.functions - 1:
-                estimator.add_to_b(_of_kind(known.pull, own, ~saturated))
             yield None if (added == Reason.ACCUMULATED).all() else added
+        if noise.compensates:
+            estimator.add_to_b(_of_kind(known.pull, own, ~saturated))
+        yield None
         used += 1
         free = free + freedom
     if not used:

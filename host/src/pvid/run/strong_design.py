@@ -1,0 +1,168 @@
+"""The strong form of a described mechanism: the window of its differentiators and its settings from a recording.
+
+Longer windows take the noise out of the derivatives, shorter ones follow the motion: noise in the regressors biases an
+estimate one way, a polynomial that is too stiff the other. Both show as a change of p with the window, so the window is
+the one at which this change and the scatter of the rows are least together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
+from pvid.codegen.strong_twin import Float32, StrongModelConfig, StrongModelTwin
+from pvid.design.fir import MAX_DEGREE, savitzky_golay
+from pvid.model.compiled import CompiledModel
+from pvid.model.strong import strong_form
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.strong_described import StrongModel, StrongSettings, all_rows, standard_errors
+from pvid.rig.run import Recording
+from pvid.settings.enums import Law
+from pvid.settings.f32 import EstimatorConfig
+
+_STEP = 1.25  # from window to window
+_LONGEST = 401  # samples of a window
+_REACH = 2.05  # windows within this factor of another are compared with it
+_WINDOWS = 8  # that a recording has at least
+_EVERY = 4  # samples from row to row in float64
+_MORE = 4  # degrees of the polynomial above the highest derivative
+_LEAST_DEGREE = 6
+_FLOOR = 1e-12  # of the residuals of a kind, relative to its Y
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The estimate of all rows of a recording with one window.
+
+    Attributes
+    ----------
+    taps : of the window
+    p : [n_p]
+    noise : standard errors from the scatter of the rows [n_p]
+    change : largest change of p to a window between half and twice this one [n_p]
+    """
+
+    taps: int
+    p: Float
+    noise: Float
+    change: Float
+
+    @property
+    def error(self) -> Float:
+        """Both together [n_p]."""
+        return np.hypot(self.noise, self.change)
+
+
+@dataclass(frozen=True, eq=False)
+class StrongDesign:
+    """What a recording is identified with.
+
+    Attributes
+    ----------
+    strong : functions of the strong form, named NAME_strong
+    config : settings in float32
+    fitted : the estimate in float64 with the same window
+    samples : of the recording, float32 [ticks, signals]
+    """
+
+    strong: StrongFunctions
+    config: StrongModelConfig
+    fitted: Fitted
+    samples: Float32
+
+
+def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY) -> StrongDesign:
+    """Window and settings for a recording without missing samples.
+
+    Raises
+    ------
+    PvidError
+        Where the recording is too short, or the strong form of the model needs what the core does not have.
+    """
+    strong = renamed(strong_functions_of(strong_form(model)))
+    oracle = StrongModel(model)
+    degree = min(max(oracle.order + _MORE, _LEAST_DEGREE), MAX_DEGREE)
+    best = _best(_compared(list(_fits(oracle, recording, degree))), oracle.parameters)
+    if best is None:
+        raise PvidError(f"{len(recording)} samples are too few for derivatives of order {oracle.order}")
+    samples = np.stack([np.asarray(recording.signals[one.name], np.float32) for one in strong.signals], axis=1)
+    config = _config(strong, oracle.parameters, recording.sample_rate, best, degree, law)
+    columns, ready = StrongModelTwin(strong, config).columns(samples)
+    sd = _residual_sd(strong, columns[:, ready].astype(np.float64), oracle.parameters.theta(best.p))
+    return StrongDesign(strong, replace(config, row_sd=sd), best, samples)
+
+
+def _fits(oracle: StrongModel, recording: Recording, degree: int) -> Iterator[Fitted]:
+    """With longer and longer windows, before they are compared."""
+    taps = degree + 3 | 1
+    at_most = min(_LONGEST, len(recording) // _WINDOWS)
+    start = oracle.parameters.checked(None)
+    while taps <= at_most:
+        settings = StrongSettings(taps, degree, _EVERY)
+        try:
+            rows = oracle.rows(recording.signals, recording.sample_rate, settings)
+        except PvidError:  # too few rows are left
+            return
+        p, weights = all_rows(oracle.parameters, rows, start)
+        noise = standard_errors(oracle.parameters, rows, p, weights, max(1, -(-taps // _EVERY)))
+        yield Fitted(taps, p, noise, np.zeros_like(p))
+        taps = max(round(_STEP * taps), taps + 2) | 1
+
+
+def _compared(tried: list[Fitted]) -> list[Fitted]:
+    """Each with its change; one window alone says nothing about it."""
+
+    def change(one: Fitted) -> Float:
+        near = [other for other in tried if 1 / _REACH < other.taps / one.taps < _REACH]
+        return np.asarray(np.max([np.abs(other.p - one.p) for other in near], axis=0))
+
+    return [replace(one, change=change(one)) for one in tried] if len(tried) > 1 else []
+
+
+def _best(tried: list[Fitted], parameters: Parameters) -> Fitted | None:
+    """The least error in the mean; where noise drives an estimate out of its range, only if all do."""
+
+    def error(one: Fitted) -> tuple[bool, float]:
+        inside = all(unknown.low <= p <= unknown.high for unknown, p in zip(unknowns, one.p, strict=True))
+        relative = one.error / np.where(parameters.positive, np.abs(one.p), parameters.sd)
+        return not inside, float(np.mean(np.log(np.maximum(relative, 1e-300))))
+
+    unknowns = parameters.model.unknowns
+    return min(tried, key=error, default=None)
+
+
+def _config(
+    strong: StrongFunctions, parameters: Parameters, sample_rate: float, fitted: Fitted, degree: int, law: Law
+) -> StrongModelConfig:
+    """With rows of weight 1."""
+    bank = savitzky_golay(fitted.taps, degree)
+    start = parameters.checked(None)
+    unknowns = parameters.model.unknowns
+    literally = law is Law.PSEUDOVELOCITY
+    estimator = EstimatorConfig(
+        start=start.astype(np.float32),
+        start_sd=(np.abs(parameters.unit(start)) / np.sqrt(parameters.prior(start))).astype(np.float32),
+        lower=np.array([min(one.low, value) for one, value in zip(unknowns, start, strict=True)], np.float32),
+        upper=np.array([max(one.high, value) for one, value in zip(unknowns, start, strict=True)], np.float32),
+        row_sd=1.0,
+        correlation=float(bank.half),  # rows closer than half a window share samples
+        law=law,
+        divider=1 if literally else bank.half,
+    )
+    ones = (1.0,) * len(strong.functions.kinds)
+    return StrongModelConfig(sample_rate, bank.weights32, bank.stride, ones, estimator)
+
+
+def _residual_sd(strong: StrongFunctions, columns: Float, theta: list[Float]) -> tuple[float, ...]:
+    """Of each kind, from its columns [columns, ticks]."""
+    found = []
+    for kind, own in zip(strong.functions.kinds, theta, strict=True):
+        n, y = columns[kind.columns.start : kind.known], columns[kind.known]
+        size = float(np.sqrt(np.mean((n * own[:, np.newaxis]) ** 2))) or 1.0
+        found.append(max(float(np.std(y - own @ n)), _FLOOR * size))
+    return tuple(found)

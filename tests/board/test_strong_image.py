@@ -1,0 +1,92 @@
+"""The strong form of a described mechanism by the command line: identified, compared with its twin and on a board."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from pvid.base.console import DONE, NOTHING_IDENTIFIED
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.models import mechanisms
+from pvid.rig.run import Recording
+from pvid.run.strong_compare import StrongComparison
+from pvid.run.strong_design import strong_design
+from pvid.settings.enums import Law
+from pvid.sim.simulated_run import simulation_of
+
+TICKS = 1200
+
+
+def pvid(*arguments: str | Path) -> Result:
+    """A command in this process; a refusal raises."""
+    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False, standalone_mode=False)
+
+
+def recording(name: str, ticks: int = TICKS) -> Recording:
+    """The first samples of a mechanism's shipped rig."""
+    simulation = simulation_of(name)
+    run = simulation.run(seed=1)
+    signals = {one.name: run[one.name][:ticks] for one in simulation.model.signals}
+    return Recording(run["t"][:ticks], signals, simulation.rig.sample_rate)
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("body") / "body.csv"
+    assert pvid("model", "simulate", "rigid_body", path, "--duration", "1.5", "--seed", "2").return_value == DONE
+    return path
+
+
+def test_inertias_of_a_rigid_body_by_either_core(body: Path) -> None:
+    truth = simulation_of("rigid_body").rig.truth
+    for core in ("f32", "f64"):
+        shown = json.loads(pvid("identify", body, "--form", "strong", "--core", core, "--json").stdout)
+        assert (shown["identified"], shown["form"], shown["core"]) == (True, "strong", core)
+        assert "noise biases its regressors" in shown["warning"]
+        for name, value in truth.items():
+            one = shown["parameters"][name]
+            assert abs(one["value"] - value) < 5 * one["se"], name
+
+
+def test_the_board_has_the_hash_of_the_twin(body: Path) -> None:
+    done = pvid("compare", body, "--form", "strong", "--on", "mps2-an386")
+    host, board = [line.split("│") for line in done.stdout.splitlines() if "rigid" not in line and "equal" in line]
+    assert done.return_value == DONE and host[6] == board[6] and len(host[6].strip()) == 8
+
+
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long) for one in mechanisms.names()])
+def test_every_mechanism_has_the_bits_of_its_twin(name: str) -> None:
+    run = StrongComparison.of(simulation_of(name).model, recording(name))
+    assert run.found.equal and run.found.ticks == TICKS
+
+
+def test_the_papers_law_solves_at_every_row() -> None:
+    model = simulation_of("rigid_body").model
+    design = strong_design(model, recording("rigid_body"), Law.PSEUDOVELOCITY)
+    assert (design.config.estimator.law, design.config.estimator.divider) == (Law.PSEUDOVELOCITY, 1)
+
+
+def test_noise_that_decides_the_answer_is_no_answer(tmp_path: Path) -> None:
+    """Of the furuta pendulum with a coarse encoder: each window gives another estimate."""
+    path = tmp_path / "furuta.csv"
+    pvid("model", "simulate", "furuta", path, "--duration", "4")
+    done = pvid("identify", path, "--form", "strong")
+    assert done.return_value == NOTHING_IDENTIFIED and "does not determine" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--core", "q31"), "--core q31: the strong form of rigid_body is in float32 and float64"),
+        (("--refine",), "--figure, --refine and --weights are for the weak form"),
+        (("--on", "mps2-an386"), "is for `compare`"),
+    ],
+)
+def test_what_the_strong_form_does_not_have_is_refused(body: Path, options: tuple[str, ...], sentence: str) -> None:
+    with pytest.raises(PvidError) as caught:
+        pvid("identify", body, "--form", "strong", *options)
+    assert sentence in str(caught.value)

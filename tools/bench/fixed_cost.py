@@ -1,0 +1,111 @@
+"""Where the instructions and the bytes of the weak engine in fixed point go: a tick by part, the state by struct."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tempfile
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from pvid.base.errors import PvidError
+from pvid.board.boards import BOARDS
+from pvid.board.mechanism_image_q31 import fixed_run
+from pvid.board.profile import profile
+from pvid.core.sources import INCLUDES
+from pvid.settings.enums import Core
+
+Parts = Sequence[tuple[str, str]]
+
+BOARD_NAMES = ("mps2-an386", "microbit")
+HEADER = ("part of a tick", *(f"{BOARDS[name].core}" for name in BOARD_NAMES))
+STATE_HEADER = ("state", "bytes")
+
+# Sources that a part of the engine has of its own; what is left is arithmetic that all parts share.
+_PARTS = (
+    ("samples to the block sums, schedule", r"fourier_q31|collect_q31"),
+    ("jets at a step", r"fourier_front_q31"),
+    ("channels and integrals of a step", r"values_q31|_weak_q31|elementary_q31"),
+    ("half-window sums and their join", r"sums_q31"),
+    ("a window: white columns, rows, residuals", r"fourier_finish_q31|columns_q31|white_q31|mirror_q31|rescale_q31"),
+    ("a window: the sensors' noise", r"noise_q31"),
+    (
+        "a window: sums, solves, assessment",
+        r"staged_q31|system_q31|cholesky_q31|information_q31|row_q31|step_q31|assess_q31|estimator_q31|scaled_model_q31",
+    ),
+    ("a window: gate, trust, publication", r"trust_q31|gate_q31|publication|misfit_q31"),
+    ("products, shifts and numbers of any size", r"integer_q31|scaled_q31"),
+)
+_OTHERS = "division, memcpy, the call"
+
+# Of the state: what it is, and its size in C.
+_STRUCTS = (
+    ("block sums and the line of the compensators", "sizeof(pvid_fourier_front_q31)"),
+    ("inputs, gains and integrals of the last steps", "sizeof(pvid_fourier_values_q31)"),
+    ("sums of two half windows", "sizeof(((pvid_fourier_sums_q31 *)0)->sum)"),
+    ("two blocks of four steps", "sizeof(((pvid_fourier_sums_q31 *)0)->block)"),
+    ("sums of the last whole window", "sizeof(pvid_fourier_window_q31)"),
+    ("rows while they are made, or a solve", "sizeof(pvid_fourier_work_q31)"),
+    (
+        "gates, noise, formats of the rows",
+        "sizeof(pvid_fourier_finish_q31) - sizeof(pvid_fourier_work_q31) - sizeof(pvid_estimate_q31)",
+    ),
+    ("estimates: candidate, published, its copy", "3 * sizeof(pvid_estimate_q31)"),
+    ("sums M, b and rr", "sizeof(pvid_information_q31)"),
+    ("the rest of the estimator", "sizeof(pvid_estimator_q31) - sizeof(pvid_information_q31)"),
+    ("trust", "sizeof(pvid_trust_q31) - 2 * sizeof(pvid_estimate_q31)"),
+    ("drive", "sizeof(pvid_fourier_drive_q31)"),
+)
+_ALL = ("all", "sizeof(pvid_fourier_q31)")
+
+
+def tick_rows(model: str) -> list[tuple[str, ...]]:
+    """Instructions of a tick by part, on each board, as in HEADER."""
+    return tick_parts(model, "q31", BOARD_NAMES, _PARTS)
+
+
+def tick_parts(model: str, core: Core, boards: Sequence[str], named: Parts) -> list[tuple[str, ...]]:
+    """The same of either arithmetic: titles, each with the sources of its part."""
+    of_boards = []
+    for name in boards:
+        counted = profile(BOARDS[name], "weak", core, model)
+        parts: defaultdict[str, float] = defaultdict(float)
+        for (_, file), n in counted.functions.items():
+            parts[part_of(file, named)] += n
+        parts[_OTHERS] += counted.measured - counted.total
+        of_boards.append((parts, counted.measured))
+    titles = [title for title, _ in named] + [_OTHERS]
+    rows = [(title, *(f"{parts[title]:.0f}" for parts, _ in of_boards)) for title in titles]
+    return [*rows, ("**all**", *(f"{mean:.0f}" for _, mean in of_boards))]
+
+
+def part_of(file: str, named: Parts) -> str:
+    """The title whose sources contain a file."""
+    for title, sources in named:
+        if re.fullmatch(rf"\w*({sources})\.[ch]", file):
+            return title
+    return _OTHERS
+
+
+def state_rows(model: str) -> list[tuple[str, ...]]:
+    """Bytes of the state by part on a Cortex-M, with the arrays of the sizes that the mechanism needs."""
+    return struct_rows(fixed_run(model).sizes, "pvid/fourier_q31.h", _STRUCTS, _ALL)
+
+
+def struct_rows(sizes: Mapping[str, int], header: str, structs: Parts, whole: tuple[str, str]) -> list[tuple[str, ...]]:
+    """Bytes of parts of a state of a header, each a title and its size in C, in a build with these sizes."""
+    lines = [f"char size_{k}[{size}];" for k, (_, size) in enumerate((*structs, whole))]
+    prefix = BOARDS[BOARD_NAMES[0]].tool_prefix
+    with tempfile.TemporaryDirectory() as folder:
+        source, made = Path(folder) / "a.c", Path(folder) / "a.o"
+        source.write_text("\n".join([f'#include "{header}"', *lines, ""]), encoding="ascii")
+        macros = [f"-D{name}={value}" for name, value in sizes.items()]
+        command = [f"{prefix}gcc", "-mcpu=cortex-m4", "-mthumb", "-c", *macros, *INCLUDES, str(source), "-o", str(made)]
+        if subprocess.run(command, check=False).returncode != 0:
+            raise PvidError("the sizes of the state did not compile")
+        listed = subprocess.run([f"{prefix}nm", "-S", str(made)], capture_output=True, text=True, check=True).stdout
+    found = {int(k): int(size, 16) for size, k in re.findall(r"^\w+ (\w+) \w size_(\d+)$", listed, re.MULTILINE)}
+    rows = [(title, str(found[k])) for k, (title, _) in enumerate(structs)]
+    named, everything = sum(int(n) for _, n in rows), found[len(structs)]
+    return [*rows, ("schedule, pointers, padding", str(everything - named)), (f"**{whole[0]}**", str(everything))]
