@@ -209,6 +209,29 @@ def bench_tick_methods(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="strong-bytes")
+@UPDATE
+def bench_strong_bytes(update: Path | None) -> int:
+    """Where the bytes of code and state of the strong form in float32 go on a Cortex-M4F."""
+    from bench import strong_bytes
+
+    put_table(update, "strong-text", markdown(strong_bytes.TEXT_HEADER, strong_bytes.text_rows()))
+    put_table(update, "strong-state", markdown(strong_bytes.STATE_HEADER, strong_bytes.state_rows()))
+    return DONE
+
+
+@bench.command(name="strong-schedules")
+@UPDATE
+def bench_strong_schedules(update: Path | None) -> int:
+    """Final p of the strong form's schedules against that of all sums at every row, 40 seeds."""
+    from bench import strong_schedules
+
+    with progress_bar("samplings", len(strong_schedules.SAMPLINGS)) as advance:
+        rows = list(strong_schedules.schedule_rows(Native(), progress=advance))
+    put_table(update, "strong-schedules", markdown(strong_schedules.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="compare-methods")
 @UPDATE
 def bench_compare_methods(update: Path | None) -> int:

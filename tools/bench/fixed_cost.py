@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import tempfile
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
-from pvid.base.errors import PvidError
+from bench.struct_sizes import state_table
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.profile import profile
-from pvid.core.sources import INCLUDES
 from pvid.settings.enums import Core
 
 Parts = Sequence[tuple[str, str]]
@@ -57,7 +53,7 @@ _STRUCTS = (
     ("trust", "sizeof(pvid_trust_q31) - 2 * sizeof(pvid_estimate_q31)"),
     ("drive", "sizeof(pvid_fourier_drive_q31)"),
 )
-_ALL = ("all", "sizeof(pvid_fourier_q31)")
+_ALL = "sizeof(pvid_fourier_q31)"
 
 
 def tick_rows(model: str) -> list[tuple[str, ...]]:
@@ -90,22 +86,5 @@ def part_of(file: str, named: Parts) -> str:
 
 def state_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the state by part on a Cortex-M, with the arrays of the sizes that the mechanism needs."""
-    return struct_rows(fixed_run(model).sizes, "pvid/fourier_q31.h", _STRUCTS, _ALL)
-
-
-def struct_rows(sizes: Mapping[str, int], header: str, structs: Parts, whole: tuple[str, str]) -> list[tuple[str, ...]]:
-    """Bytes of parts of a state of a header, each a title and its size in C, in a build with these sizes."""
-    lines = [f"char size_{k}[{size}];" for k, (_, size) in enumerate((*structs, whole))]
-    prefix = BOARDS[BOARD_NAMES[0]].tool_prefix
-    with tempfile.TemporaryDirectory() as folder:
-        source, made = Path(folder) / "a.c", Path(folder) / "a.o"
-        source.write_text("\n".join([f'#include "{header}"', *lines, ""]), encoding="ascii")
-        macros = [f"-D{name}={value}" for name, value in sizes.items()]
-        command = [f"{prefix}gcc", "-mcpu=cortex-m4", "-mthumb", "-c", *macros, *INCLUDES, str(source), "-o", str(made)]
-        if subprocess.run(command, check=False).returncode != 0:
-            raise PvidError("the sizes of the state did not compile")
-        listed = subprocess.run([f"{prefix}nm", "-S", str(made)], capture_output=True, text=True, check=True).stdout
-    found = {int(k): int(size, 16) for size, k in re.findall(r"^\w+ (\w+) \w size_(\d+)$", listed, re.MULTILINE)}
-    rows = [(title, str(found[k])) for k, (title, _) in enumerate(structs)]
-    named, everything = sum(int(n) for _, n in rows), found[len(structs)]
-    return [*rows, ("schedule, pointers, padding", str(everything - named)), (f"**{whole[0]}**", str(everything))]
+    sizes = fixed_run(model).sizes
+    return state_table("pvid/fourier_q31.h", _STRUCTS, _ALL, "schedule, pointers, padding", sizes)

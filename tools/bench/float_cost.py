@@ -7,7 +7,8 @@ import subprocess
 from collections import Counter
 from collections.abc import Callable, Iterator
 
-from bench.fixed_cost import part_of, struct_rows, tick_parts
+from bench.fixed_cost import part_of, tick_parts
+from bench.struct_sizes import state_table
 from pvid.board.boards import BOARDS
 from pvid.board.engine_image import engine_image
 from pvid.board.mechanism_image import mechanism_run
@@ -64,7 +65,7 @@ def tick_rows(model: str) -> list[tuple[str, ...]]:
 def state_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the state by part, as in STATE_HEADER."""
     sizes = sizes_for_one(mechanism_run(model).config.design)
-    return struct_rows(sizes, "pvid/fourier.h", _STRUCTS, ("all", "sizeof(pvid_fourier_f32)"))
+    return state_table("pvid/fourier.h", _STRUCTS, "sizeof(pvid_fourier_f32)", "schedule, pointers, padding", sizes)
 
 
 def text_rows(model: str) -> list[tuple[str, ...]]:

@@ -12,10 +12,10 @@ enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
 /* ---- moments of G = u + w_r in a solve ---- */
 
-/* Half the bits that a square has beyond those of a mantissa, rounded up. */
-static int32_t half_beyond(int64_t square)
+/* Half the bits that squares, of which these are the bits, have beyond those of a mantissa, rounded up. */
+static int32_t half_beyond(uint64_t bits)
 {
-    const int32_t beyond = (int32_t)pvid_bit_length_q31((uint64_t)square) - MANTISSA_BITS;
+    const int32_t beyond = (int32_t)pvid_bit_length_q31(bits) - MANTISSA_BITS;
     return (beyond > 0) ? ((beyond + 1) / 2) : 0;
 }
 
@@ -285,10 +285,10 @@ static void relate(int32_t of_a, const int32_t lengths[2], pvid_kapitza_system_q
 /* Scales that bring every moment below 2^28. */
 static void scale_families(const int64_t sums[], const int32_t lengths[2], pvid_kapitza_system_q31 *out)
 {
-    const int32_t of_ay = pvid_larger_q31(half_beyond(sums[PVID_SUM_AA]), half_beyond(sums[PVID_SUM_YY]));
-    out->scale_x = pvid_larger_q31(half_beyond(sums[PVID_SUM_K22 + 6]), half_beyond(sums[PVID_SUM_K22]));
-    out->scale_z = pvid_larger_q31(half_beyond(sums[PVID_SUM_K00 + 8]), half_beyond(sums[PVID_SUM_K00]));
-    relate(pvid_larger_q31(half_beyond(sums[PVID_SUM_EE]), of_ay), lengths, out);
+    const uint64_t of_a = (uint64_t)sums[PVID_SUM_AA] | (uint64_t)sums[PVID_SUM_EE] | (uint64_t)sums[PVID_SUM_YY];
+    out->scale_x = half_beyond((uint64_t)sums[PVID_SUM_K22 + 6] | (uint64_t)sums[PVID_SUM_K22]);
+    out->scale_z = half_beyond((uint64_t)sums[PVID_SUM_K00 + 8] | (uint64_t)sums[PVID_SUM_K00]);
+    relate(half_beyond(of_a), lengths, out);
 }
 
 /* ---- far from the reference ---- */

@@ -241,7 +241,7 @@ class Problem:
 
     def _share(self, d_r: Float) -> float:
         """Of a step that a pass takes at most."""
-        return float(min(1.0, _LARGEST / max(np.abs(d_r[self.log]).max(initial=0.0), 1e-12)))
+        return min(1.0, _LARGEST / max(float(np.abs(d_r[self.log]).max(initial=0.0)), 1e-12))
 
     def _damped(
         self,
