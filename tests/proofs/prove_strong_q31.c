@@ -8,9 +8,10 @@
 
 /* Its branch by the upper word is shown in integer_q31: the bound of the result is a relation between two words. */
 /*@ requires -0x4000000000000000 <= x <= 0x4000000000000000 && shift <= 62 && 29 <= bits <= 30;
+    requires \initialized(out) && *out == 0;
     assigns \result, *out \from x, shift, bits;
     ensures \result == 0 || \result == 1;
-    ensures \result == 0 || (\initialized(out) && -0x40000000 <= *out <= 0x3FFFFFFF); */
+    ensures \initialized(out) && -0x40000000 <= *out <= 0x3FFFFFFF; */
 static bool acceleration(int64_t x, uint32_t shift, uint32_t bits, int32_t *out);
 
 #include "../../firmware/src/strong/strong_q31.c"

@@ -29,7 +29,7 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
 
 /*@ assigns \result, *self \from bank->phi_max;
     ensures 0 <= \result <= 100;
-    ensures \result == 0 || \result >= 1;
+    ensures \result != 0 ==> \result >= 1;
     ensures \result == 0 ==> \initialized(&self->bank.phi_max) && 1 <= self->bank.phi_max <= 0x1000000;
     ensures \result == 0 ==> \initialized(&self->bank.y_max) && 1 <= self->bank.y_max <= 0x1000000; */
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
@@ -41,23 +41,24 @@ void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self);
 /*@ requires \subset(phi[0 .. 4], (-0x40000000 .. 0x40000000)) && \subset(u[0 .. 2], (-0x40000000 .. 0x40000000));
     assigns \result, row[0 .. 12] \from *format, phi[0 .. 4], u[0 .. 2];
     ensures \result == 0 || \result == 1;
-    ensures \result == 0 || \initialized(row + (0 .. 12)); */
+    ensures \result != 0 ==> \initialized(row + (0 .. 12)); */
 bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS],
                                  const int32_t u[PVID_Y_ORDERS_Q31], int32_t row[PVID_KAPITZA_ROW_Q31]);
 
-/*@ requires \initialized(row + (0 .. 12));
+/* The row is one that fits. */
+/*@ requires \initialized(e) && *e == 0 && \initialized(gradient + (0 .. 2)) && \subset(gradient[0 .. 2], (0 .. 0));
     assigns \result, *e, gradient[0 .. 2] \from *self, row[0 .. 12];
     ensures \result == 0 || \result == 1;
-    ensures \result == 0 || (\initialized(e) && \initialized(gradient + (0 .. 2)));
-    ensures \result == 0 || -0x10000000 <= *e <= 0x0FFFFFFF;
-    ensures \result == 0 || \subset(gradient[0 .. 2], (-0x40000000 .. 0x3FFFFFFF)); */
+    ensures \initialized(e) && \initialized(gradient + (0 .. 2));
+    ensures -0x10000000 <= *e <= 0x0FFFFFFF;
+    ensures \subset(gradient[0 .. 2], (-0x40000000 .. 0x3FFFFFFF)); */
 bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
                                          const int32_t row[PVID_KAPITZA_ROW_Q31], int32_t *e,
                                          int32_t gradient[PVID_KAPITZA_P]);
 
 /*@ assigns \result, *self \from config->row_sd, rows->reference;
     ensures 0 <= \result <= 100;
-    ensures \result == 0 || \result >= 1;
+    ensures \result != 0 ==> \result >= 1;
     ensures \result == 0 ==> \initialized(&self->settings.row_sd) && 1 <= self->settings.row_sd;
     ensures self->ready == 0 || self->ready == 1; */
 pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self, const pvid_estimator_config_q31 *config,

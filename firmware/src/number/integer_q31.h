@@ -97,12 +97,13 @@ static inline bool pvid_narrows_q31(int64_t x, uint32_t s, uint32_t bits, int32_
 {
     if ((s > PVID_SHIFT_DOWN_LEAST) && (s <= PVID_SHIFT_DOWN_MOST)) {
         const pvid_shift_down_q31 down = pvid_shift_down_by_q31(s);
-        const int32_t high = (int32_t)pvid_floor_shift_q31(x + down.half, 32);
+        const int64_t above = x + down.half;
+        const int32_t high = (int32_t)pvid_floor_shift_q31(above, 32);
         const int32_t limit = (int32_t)((uint32_t)1 << ((s + bits) - 32u));
         if ((high >= limit) || (high < -limit)) {
             return false;
         }
-        *out = pvid_shifted_down_q31(&down, x);
+        *out = (high * down.up) + (int32_t)((uint32_t)((uint64_t)above & 0xFFFFFFFFu) >> s);
         return true;
     }
     const int64_t y = (s > PVID_SHIFT_DOWN_MOST)

@@ -153,8 +153,8 @@ static bool passes(pvid_strong_q31 *self, int64_t square)
 static pvid_reason take_row(pvid_strong_q31 *self, const int32_t row[PVID_KAPITZA_ROW_Q31])
 {
     pvid_kapitza_estimator_q31 *estimator = &self->estimator;
-    int32_t gradient[PVID_KAPITZA_P];
-    int32_t e;
+    int32_t gradient[PVID_KAPITZA_P] = {0, 0, 0};
+    int32_t e = 0;
     if (!pvid_kapitza_estimator_innovate_q31(estimator, row, &e, gradient)) {
         return refuse(self);
     }
@@ -191,7 +191,7 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
     if (!pvid_differentiator_step_q31(&self->differentiator, (int32_t)angle, (int32_t)height, d_phi, d_y)) {
         return PVID_WARMING_UP;
     }
-    int32_t u[PVID_Y_ORDERS_Q31];
+    int32_t u[PVID_Y_ORDERS_Q31] = {0, 0, 0};
     if (!accelerations(self, d_y, u)) {
         return refuse(self);
     }
