@@ -37,7 +37,6 @@ _BOTH: dict[str, Length] = {
     "drive_min": lambda config, model: model.samples,
     "design": lambda config, model: 1,
     "design.model": lambda design, model: 1,
-    "design.circle": lambda design, model: 5 * design.hop // 2,
     "design.noise": lambda design, model: design.n_noise,
     "design.error_order": lambda design, model: model.kinds,
     "design.error_variance": lambda design, model: model.kinds,
@@ -56,11 +55,13 @@ _LENGTHS: dict[str, dict[str, Length]] = {
     "f32": {
         **_BOTH,
         "range": lambda config, model: model.samples,
+        "design.circle": lambda design, model: 5 * design.hop // 2,
         "design.compensator": lambda design, model: model.jets,
         "design.compensator.weights": lambda filter_, model: filter_.half,
     },
     "q31": {
         **_BOTH,
+        "design.circle": lambda design, model: 2 * design.hop,
         "offset": lambda config, model: model.samples,
         "design.full_scale": lambda design, model: model.samples,
         "design.down": lambda design, model: model.signals,

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pvid/fnv.h"
 #include "pvid/fnv_refine.h"
 
 static void put_latest(const pvid_refine_f32 *refinement, uint32_t tick, float r[], float se[])
@@ -39,7 +40,8 @@ void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_sa
 }
 
 void pvid_replay_both_stages_f32(pvid_fourier_f32 *self, uint32_t ticks, const float samples[], uint8_t told[],
-                                 float weak_p[], float weak_se[], float r[], float se[])
+                                 float weak_p[], float weak_se[], float r[], float se[], uint32_t *running_hash,
+                                 uint32_t hash[])
 {
     const uint32_t n_samples = self->design->model->samples;
     const pvid_refine_f32 *refinement = self->refine->storage;
@@ -53,6 +55,11 @@ void pvid_replay_both_stages_f32(pvid_fourier_f32 *self, uint32_t ticks, const f
         }
         if (told != NULL) {
             told[tick] = (uint8_t)pvid_refine_reason_f32(refinement);
+        }
+        if (hash != NULL) {
+            *running_hash = pvid_fnv_estimator_f32(*running_hash, &self->estimator, reason);
+            *running_hash = pvid_fnv_refine_f32(*running_hash, refinement, pvid_refine_reason_f32(refinement));
+            hash[tick] = *running_hash;
         }
         put_latest(refinement, tick, r, se);
     }

@@ -14,7 +14,7 @@ SOURCE = ROOT / "host" / "src"
 
 # Each imports from itself and from those before it.
 ORDER = """
-base settings model models core rig sim design oracle setup twin codegen link cases run board log show api fleet
+base settings model models core rig sim design oracle setup twin codegen link cases run deploy board log show api fleet
 cli
 """.split()
 

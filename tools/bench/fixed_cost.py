@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import defaultdict
+from collections.abc import Sequence
 
 from bench.struct_sizes import state_table
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.profile import profile
+from pvid.settings.enums import Core
+
+Parts = Sequence[tuple[str, str]]
 
 BOARD_NAMES = ("mps2-an386", "microbit")
 HEADER = ("part of a tick", *(f"{BOARDS[name].core}" for name in BOARD_NAMES))
@@ -54,21 +58,27 @@ _ALL = "sizeof(pvid_fourier_q31)"
 
 def tick_rows(model: str) -> list[tuple[str, ...]]:
     """Instructions of a tick by part, on each board, as in HEADER."""
+    return tick_parts(model, "q31", BOARD_NAMES, _PARTS)
+
+
+def tick_parts(model: str, core: Core, boards: Sequence[str], named: Parts) -> list[tuple[str, ...]]:
+    """The same of either arithmetic: titles, each with the sources of its part."""
     of_boards = []
-    for name in BOARD_NAMES:
-        counted = profile(BOARDS[name], "weak", "q31", model)
-        parts: Counter[str] = Counter()
+    for name in boards:
+        counted = profile(BOARDS[name], "weak", core, model)
+        parts: defaultdict[str, float] = defaultdict(float)
         for (_, file), n in counted.functions.items():
-            parts[_part_of(file)] += n
+            parts[part_of(file, named)] += n
         parts[_OTHERS] += counted.measured - counted.total
         of_boards.append((parts, counted.measured))
-    titles = [title for title, _ in _PARTS] + [_OTHERS]
+    titles = [title for title, _ in named] + [_OTHERS]
     rows = [(title, *(f"{parts[title]:.0f}" for parts, _ in of_boards)) for title in titles]
     return [*rows, ("**all**", *(f"{mean:.0f}" for _, mean in of_boards))]
 
 
-def _part_of(file: str) -> str:
-    for title, sources in _PARTS:
+def part_of(file: str, named: Parts) -> str:
+    """The title whose sources contain a file."""
+    for title, sources in named:
         if re.fullmatch(rf"\w*({sources})\.[ch]", file):
             return title
     return _OTHERS

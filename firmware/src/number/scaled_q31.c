@@ -5,7 +5,8 @@
 pvid_scaled_q31 pvid_scaled_of_q31(int64_t x, int32_t exponent)
 {
     const int32_t shift = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(x)) - DIGITS;
-    const pvid_scaled_q31 result = {pvid_narrowed_q31(x, shift), exponent + shift};
+    const int64_t m = (shift >= 0) ? pvid_round_shift_q31(x, (uint32_t)shift) : pvid_scale_q31(x, shift);
+    const pvid_scaled_q31 result = {(int32_t)m, exponent + shift};
     return result;
 }
 
@@ -22,17 +23,7 @@ pvid_scaled_q31 pvid_scaled_plus_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
 
 pvid_scaled_q31 pvid_scaled_times_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
 {
-    const int64_t product = pvid_product_q31(a.m, b.m);
-    const uint64_t size = pvid_magnitude_q31(product) >> 58;
-    if ((size == 0u) || (size > 3u)) { /* not of 59 or 60 bits: 0, or two powers of two */
-        return pvid_scaled_of_q31(product, a.e + b.e);
-    }
-    if (size == 1u) {
-        const pvid_scaled_q31 shorter = {(int32_t)pvid_round_shift_q31(product, 29), a.e + b.e + 29};
-        return shorter;
-    }
-    const pvid_scaled_q31 longer = {(int32_t)pvid_round_shift_q31(product, 30), a.e + b.e + 30};
-    return longer;
+    return pvid_scaled_of_q31(pvid_product_q31(a.m, b.m), a.e + b.e);
 }
 
 pvid_scaled_q31 pvid_scaled_over_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)

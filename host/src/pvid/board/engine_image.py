@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
-from pvid.board.mechanism_image_q31 import build_fixed_image, steady_run
+from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 
@@ -46,7 +46,7 @@ def _in_float(board: Board, model: str) -> EngineImage:
 
 
 def _in_fixed_point(board: Board, model: str) -> EngineImage:
-    run = steady_run(model, board.toolchain)
+    run = fixed_run(model)
     return EngineImage(*build_fixed_image(board, run), run.name, run.measure_from)
 
 

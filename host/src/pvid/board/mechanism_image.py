@@ -181,15 +181,33 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
 
 
 def build_with(
-    target: Board, name: str, files: Mapping[str, str], sizes: Mapping[str, int], core: Core, room: str = "fourier"
+    target: Board,
+    name: str,
+    files: Mapping[str, str],
+    sizes: Mapping[str, int],
+    core: Core,
+    room: str = "fourier",
+    *,
+    refined: bool = False,
 ) -> tuple[Path, Path]:
-    """The same from generated files: name -> text; `room`: of the core, of the form."""
+    """The same from generated files: name -> text.
+
+    Parameters
+    ----------
+    room : of the core, of the form
+    refined : the files of the second stage are among them
+    """
     stamp = zlib.crc32("".join(files.values()).encode())
     whole = f"{name}-{stamp:08x}"
     folder = BUILD / "runs" / whole
     for file, text in files.items():
-        keep_header(folder, file, text)
-    options = {"PVID_REPLAY_RUN": str(folder), "PVID_LEAVE_OUT": left_out(room, core)}
+        keep_header((folder / file).parent, Path(file).name, text)
+    options = {
+        "PVID_REPLAY_RUN": str(folder),
+        "PVID_LEAVE_OUT": left_out(room, core, *(["refine"] if refined else [])),
+    }
+    if refined:
+        options["PVID_REFINE_MODEL"] = str(folder)
     options |= {macro: str(size) for macro, size in at_least(sizes).items()}
     tree = build(target, BUILD / f"{target.name}-{whole}", options)
     return tree / "apps" / "replay" / "replay.elf", tree

@@ -22,11 +22,6 @@ from pvid.setup.fourier_sizes import sizes_of_q31
 from pvid.twin import fnv
 from pvid.twin.fourier_q31 import FourierTwinQ31
 
-SETTLING = 4  # half windows behind the first estimate
-NOISE_WINDOWS = 16  # of fourier_finish_q31.c
-
-_MOST_BYTES = {"avr": 2**15 - 1}  # of an array
-
 MADE_BY = "pvid.board.mechanism_image_q31"
 
 
@@ -75,20 +70,6 @@ def fixed_run(name: str, ticks: int | None = None) -> FixedRun:
         raise PvidError(f"the run of {name} has {len(counts)} samples, too few for {wanted}")
     whole = max((wanted - engine.ticks_needed) // period, 0)
     return FixedRun(engine, counts[:wanted], wanted - whole * period if whole else wanted // 2)
-
-
-def steady_run(name: str, toolchain: str = "") -> FixedRun:
-    """A longer run of it, for the mean cost of a tick: of the last half windows, as many as the noise is computed anew
-    in, or as its rig's run has behind the first ones, in which p settles, or as an array of the toolchain holds."""
-    engine = fixed_run(name).engine
-    period = engine.config.design.hop * engine.config.design.decimation
-    counts = engine.counts_of(simulated_run_of(engine.compiled)[0])
-    first = engine.ticks_needed + SETTLING * period
-    most = min(len(counts), _MOST_BYTES.get(toolchain, 2**31) // (2 * counts.shape[1]))
-    whole = min(NOISE_WINDOWS, (most - first) // period)
-    if whole < 1:
-        return fixed_run(name)
-    return FixedRun(engine, counts[: first + whole * period], first)
 
 
 def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:

@@ -92,6 +92,7 @@ def play_demo(
 
 
 @click.command(name="demo")
+@click.argument("model", required=False)
 @click.option(
     "--figure",
     type=FigurePath(),
@@ -102,11 +103,18 @@ def play_demo(
 @click.option("--bits", default=14, show_default=True, type=click.IntRange(8, 32), help="Resolution of the encoder.")
 @click.option("--form", type=click.Choice(["weak", "strong"]), default="weak", show_default=True)
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="linear", show_default=True)
-def command(figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
-    """Simulates the standard rig, streams it to the firmware on an emulated board and compares every bit."""
+def command(model: str | None, figure: Path, seed: int, bits: int, form: str, truth: str) -> int:
+    """Simulates the standard rig, streams it to the firmware on an emulated board and compares every bit.
+
+    With MODEL, a mechanism of `pvid models`, it is that mechanism's rig with its own sensors.
+    """
     on = target()
     if on.lacking is not None:
         write_stderr(f"{on.lacking}: the firmware runs on {on.where}")
+    if model is not None:
+        from pvid.cli.mechanism_demo import demo  # loads SymPy
+
+        return demo(model, on.name, on.where, seed, figure)
     simulation = simulate(sensors=standard_sensors(bits), truth=truth, seed=seed)  # type: ignore[arg-type]
     run = simulation.run
     standard = RigFile.standard()

@@ -14,13 +14,13 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option
+from pvid.cli.rig_design import model_of_rig, recorded
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.codegen.strong_twin import StrongModelConfig
     from pvid.model.compiled import CompiledModel
     from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
-    from pvid.rig.run import Recording
     from pvid.settings.fourier import FourierConfig
 
 _MODEL = click.argument("model", metavar="MODEL")
@@ -165,7 +165,7 @@ def build(
     from pvid.codegen import build as generated
     from pvid.codegen.reaches import Reaches
 
-    compiled, rig = _of_rig(model, rig_path, run_path)
+    compiled, rig = model_of_rig(model, rig_path, run_path)
     design = _design_of(compiled, rig, model, run_path, columns, functions)
     limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
     soft = _numbers(soft_signs, "--soft-sign")
@@ -247,24 +247,6 @@ def simulate(
     return DONE
 
 
-def _of_rig(
-    model: str, rig_path: Path | None, run_path: Path | None
-) -> tuple[CompiledModel, MechanismRig | RigFile | None]:
-    """The model with the values of a rig file, and that file; the one beside a run counts."""
-    from pvid.log.mechanism_settings import mechanism_rig
-    from pvid.log.rig_settings import rig_for
-    from pvid.models.mechanisms import compiled_of
-    from pvid.rig.described import described
-
-    if rig_path is None and run_path is None:
-        return compiled_of(model), None
-    rig = mechanism_rig(run_path, rig_path, (), model)
-    if rig is not None:
-        return rig.applied(compiled_of(model)), rig
-    own = rig_for(run_path, rig_path)
-    return described(own).applied(compiled_of(model)), own
-
-
 def _strong_design_of(
     compiled: CompiledModel, rig: MechanismRig | RigFile | None, model: str, run_path: Path | None, columns: str | None
 ) -> StrongModelConfig | None:
@@ -275,7 +257,7 @@ def _strong_design_of(
     from pvid.sim.simulated_run import simulation_of
 
     if run_path is not None:
-        return strong_design(compiled, _recorded(compiled, rig, run_path, columns)).config
+        return strong_design(compiled, recorded(compiled, rig, run_path, columns)).config
     if model not in names_of_shipped():
         return None
     simulation = simulation_of(model)
@@ -301,7 +283,7 @@ def _design_of(
     if weak_refusal(compiled) is not None:
         return None
     if run_path is not None:
-        return config_for_recording(compiled, _recorded(compiled, rig, run_path, columns), functions)
+        return config_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions)
     if model in names_of_shipped():
         return config_for_simulated_rig(compiled, functions)
     if functions is not None:
@@ -326,27 +308,10 @@ def _fixed_weak(
         if run_path is None:
             engine = engine_for_simulated_rig(compiled, functions, soft_signs)
         else:
-            engine = engine_for_recording(compiled, _recorded(compiled, rig, run_path, columns), functions, soft_signs)
+            engine = engine_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions, soft_signs)
     except PvidError as error:
         return {}, str(error)
     return files_of(engine, title), None
-
-
-def _recorded(
-    compiled: CompiledModel, rig: MechanismRig | RigFile | None, run_path: Path, columns: str | None
-) -> Recording:
-    from pvid.cli.mechanism import recording_of
-    from pvid.rig.columns import parsed
-    from pvid.rig.file import RigFile
-    from pvid.rig.mechanism_file import channels_of
-    from pvid.rig.run import read_recording
-
-    if isinstance(rig, RigFile):
-        return recording_of(run_path, rig, columns)[0]
-    rate = None if rig is None else rig.sample_rate
-    recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
-    recording.refuse_damaged()
-    return recording.whole()
 
 
 def _numbers(given: tuple[str, ...], option: str) -> dict[str, float]:

@@ -92,6 +92,7 @@ class RefinedRecord:
     told : reason of the refinement's last block, uint8 [ticks]
     weak_p, weak_se : estimates of the weak form, trusted or not, where they are new [ticks, p]; NaN at all others
     r, se : published parameters and standard errors of the refinement [ticks, parameters]; 0 before the first one
+    hash : running hash of both stages, uint32 [ticks]
     """
 
     told: npt.NDArray[np.uint8]
@@ -99,6 +100,7 @@ class RefinedRecord:
     weak_se: Float32
     r: Float32
     se: Float32
+    hash: npt.NDArray[np.uint32]
 
 
 class RefinedIdentifier(FourierIdentifier):
@@ -129,7 +131,10 @@ class RefinedIdentifier(FourierIdentifier):
             weak_se=np.full((len(given), p), np.nan, np.float32),
             r=np.zeros((len(given), n), np.float32),
             se=np.zeros((len(given), n), np.float32),
+            hash=np.zeros(len(given), np.uint32),
         )
-        arrays = (given, record.told, record.weak_p, record.weak_se, record.r, record.se)
+        arrays = (
+            given, record.told, record.weak_p, record.weak_se, record.r, record.se, self._hash, record.hash
+        )  # fmt: skip
         self.native.library.pvid_replay_both_stages_f32(self.state, len(given), *map(headers.pointer, arrays))
         return record

@@ -64,13 +64,11 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
 
 
 def _sources(engine: EngineCore, refined: bool) -> list[Path]:
-    names = (*_ROOMS, engine.room, *(["refine"] if refined else []))
-    rooms = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in names]
+    rooms = (*_ROOMS, engine.room, *(["refine"] if refined else []))
+    found = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in rooms]
     replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if refined else [])]
-    return [
-        *(path for path in rooms if not path.stem.endswith(engine.without)),
-        *(NATIVE / f"{replay}.c" for replay in replays),
-    ]
+    kept = [path for path in found if not path.stem.endswith(engine.without)]
+    return [*kept, *(NATIVE / f"{name}.c" for name in replays)]
 
 
 @cache
@@ -118,9 +116,8 @@ def _declarations(compiler: str, headers: Sequence[str], options: list[str], fol
     empty.mkdir()
     for name in _STANDARD:
         (empty / f"{name}.h").write_text("", encoding="utf-8")
-    refine = ["replay_refine.h"] if _REFINED in headers else []
-    replays = [*([] if engine.replay is None else [f"{engine.replay}.h"]), *refine]
-    own = [f'#include "{name}"' for name in (*replays, *headers) if name != _REFINED]
+    replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if _REFINED in headers else [])]
+    own = [*(f"{name}.h" for name in replays), *(name for name in headers if name != _REFINED)]
     top = folder / "native.h"
-    top.write_text("\n".join([*own, ""]), encoding="utf-8")
+    top.write_text("".join(f'#include "{name}"\n' for name in own), encoding="utf-8")
     return run_compiler([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])

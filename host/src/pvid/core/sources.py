@@ -37,9 +37,12 @@ def sources_of(core: str) -> list[Path]:
     return [path for path in core_sources() if not path.stem.endswith(_CORES) or path.stem.endswith(f"_{core}")]
 
 
-def left_out(form: str, core: str) -> str:
-    """PVID_LEAVE_OUT of an image with a form's identifier: a regular expression of what it does not link."""
-    rooms = "|".join(room for room in _FORMS if room != form)
+def left_out(form: str, core: str, *also: str) -> str:
+    """PVID_LEAVE_OUT of an image with a form's identifier: a regular expression of what it does not link.
+
+    `also`: further rooms that it links.
+    """
+    rooms = "|".join(room for room in _FORMS if room not in (form, *also))
     cores = "|".join(other for other in _CORES if other != f"_{core}")
     return rf"/src/({rooms})/|({cores})\.c$"
 

@@ -1,0 +1,91 @@
+"""`pvid deploy`: the identifier of a mechanism and its rig as a package of an ecosystem."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pvid.base.console import DONE, write_stderr
+from pvid.base.errors import PvidError
+from pvid.cli.input import columns_option
+from pvid.cli.rig_design import model_of_rig, recorded
+from pvid.settings.engine_cores import ENGINE_CORES, FIXED, FLOAT
+
+if TYPE_CHECKING:
+    from pvid.deploy.deployment import Deployment
+    from pvid.settings.enums import Core
+
+_DEFAULT = FLOAT.name
+_TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "amalgamation")
+
+
+@click.command(name="deploy")
+@click.argument("model", metavar="MODEL")
+@click.option("--for", "target", required=True, type=click.Choice(_TARGETS), help="The ecosystem.")
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder to write.")
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file, whose values are the model's.")
+@click.option("--run", "run_path", type=click.Path(path_type=Path), help="A recording of the rig, for its design.")
+@columns_option
+@click.option("--core", type=click.Choice(list(ENGINE_CORES)), default=_DEFAULT, show_default=True, help="Arithmetic.")
+@click.option("--functions", type=click.IntRange(4, 64), help="Test functions of the design.  [default: chosen]")
+def command(
+    model: str,
+    target: str,
+    out: Path,
+    rig_path: Path | None,
+    run_path: Path | None,
+    columns: str | None,
+    core: Core,
+    functions: int | None,
+) -> int:
+    """Writes MODEL with the tables of a rig as an Arduino, PlatformIO, ESP-IDF, Zephyr, CMake or CubeMX package.
+
+    OUT gets the sources of the C core with the smallest sizes that hold the rig, its configuration, an example that
+    identifies a recorded motion, and a README. `--for amalgamation` writes two files to copy.
+
+    The rig is that of --run, a recording, or the shipped rig of a shipped mechanism.
+    """
+    from pvid.deploy.targets import write_package
+
+    if columns is not None and run_path is None:
+        raise PvidError("--columns needs --run")
+    given = [f"--rig {rig_path.name}"] if rig_path is not None else []
+    given += [f"--run {run_path.name}"] if run_path is not None else []
+    given += [f"--core {core}"] if core != _DEFAULT else []
+    given += [f"--functions {functions}"] if functions is not None else []
+    title = " ".join(["pvid deploy", Path(model).name, f"--for {target}", *given])
+    is_integer = ENGINE_CORES[core] is FIXED
+    made = _deployment(model, rig_path, run_path, columns, is_integer, functions, title)
+    paths = write_package(made, target, out)
+    write_stderr(f"{out}: {len(paths)} files; start with {out / 'README.md'}")
+    return DONE
+
+
+def _deployment(
+    model: str,
+    rig_path: Path | None,
+    run_path: Path | None,
+    columns: str | None,
+    is_integer: bool,
+    functions: int | None,
+    title: str,
+) -> Deployment:
+    from pvid.deploy.of_rig import deployment_f32, deployment_q31
+    from pvid.models.mechanisms import names as names_of_shipped
+    from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, simulated_run_of
+    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
+
+    compiled, rig = model_of_rig(model, rig_path, run_path)
+    if run_path is not None:
+        recording = recorded(compiled, rig, run_path, columns)
+        if is_integer:
+            return deployment_q31(engine_for_recording(compiled, recording, functions), recording.signals, title)
+        return deployment_f32(compiled, config_for_recording(compiled, recording, functions), recording.signals, title)
+    if model not in names_of_shipped():
+        raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
+    run = simulated_run_of(compiled)[0]
+    if is_integer:
+        return deployment_q31(engine_for_simulated_rig(compiled, functions), run, title)
+    return deployment_f32(compiled, config_for_simulated_rig(compiled, functions), run, title)

@@ -1,0 +1,54 @@
+"""What --rig, --run and --columns of `pvid model build` and `pvid deploy` name: the model with its rig, a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # SymPy takes a third of a second to load
+    from pvid.model.compiled import CompiledModel
+    from pvid.rig.file import RigFile
+    from pvid.rig.mechanism_file import MechanismRig
+    from pvid.rig.run import Recording
+
+
+def model_of_rig(
+    model: str, rig_path: Path | None, run_path: Path | None
+) -> tuple[CompiledModel, MechanismRig | RigFile | None]:
+    """The model with the values of a rig file, and that file; the one beside a run counts."""
+    from pvid.log.mechanism_settings import mechanism_rig
+    from pvid.log.rig_settings import rig_for
+    from pvid.models.mechanisms import compiled_of
+    from pvid.rig.described import described
+
+    if rig_path is None and run_path is None:
+        return compiled_of(model), None
+    rig = mechanism_rig(run_path, rig_path, (), model)
+    if rig is not None:
+        return rig.applied(compiled_of(model)), rig
+    own = rig_for(run_path, rig_path)
+    return described(own).applied(compiled_of(model)), own
+
+
+def recorded(
+    compiled: CompiledModel, rig: MechanismRig | RigFile | None, run_path: Path, columns: str | None
+) -> Recording:
+    """All of a recording in the units of the model.
+
+    Raises
+    ------
+    PvidError
+        Where it cannot be read or is damaged.
+    """
+    from pvid.cli.mechanism import recording_of
+    from pvid.rig.columns import parsed
+    from pvid.rig.file import RigFile
+    from pvid.rig.mechanism_file import channels_of
+    from pvid.rig.run import read_recording
+
+    if isinstance(rig, RigFile):
+        return recording_of(run_path, rig, columns)[0]
+    rate = None if rig is None else rig.sample_rate
+    recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
+    recording.refuse_damaged()
+    return recording.whole()

@@ -1,0 +1,135 @@
+"""A deployment from a mechanism's model and the engine that is designed for its rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen import files_design, files_fourier
+from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
+from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.core.sizes import smallest
+from pvid.deploy.arithmetic import FIXED, FLOAT
+from pvid.deploy.deployment import Deployment, Playback, Quantity
+from pvid.model.compiled import CompiledModel
+from pvid.run.engine_design import Run, samples_of
+from pvid.run.engine_design_q31 import FixedEngine
+from pvid.run.engine_files_q31 import files_of
+from pvid.settings.enums import Reason
+from pvid.settings.fourier import FourierConfig, Source
+from pvid.settings.record import Record
+from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model, sizes_of_q31
+
+_MOST_NUMBERS = 30_000  # of the example's motion: 60 kB of flash
+_LONGER = 3  # half windows behind the first estimate
+_LARGEST = 30_000  # count of a signal without a resolution
+_PUBLISHED = (Reason.UPDATED, Reason.MISFIT)
+
+
+def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, command: str) -> Deployment:
+    """In float32.
+
+    Parameters
+    ----------
+    config : settings and tables for the rig
+    run : of the rig, for the example: name of each signal -> samples [n]
+    command : that makes it, for the banners
+
+    Raises
+    ------
+    PvidError
+        Where the engine does not have what the model needs.
+    """
+    made, design = fourier_functions_of(compiled), config.design
+    model, name = design.model, design.model.name
+    units = {one.name: one.unit for one in compiled.signals}
+    resolution = {one.name: one.resolution for one in compiled.signals}
+    titles = [f"{one.name} [{one.unit or '1'}]" for one in compiled.unknowns]
+    needed = sizes_of_design(design)
+    samples = samples_of(config, run)
+    largest = np.abs(samples).max(axis=0)
+    lsb = np.array(
+        [resolution[one] or float(top) / _LARGEST or 1.0 for one, top in zip(model.sample_names, largest, strict=True)],
+        np.float32,
+    )
+    counts = np.rint(samples.astype(np.float64) / lsb).astype(np.int32)[: _most_ticks(model.samples)]
+    record = (
+        fourier_native(compiled, design)
+        .identifier_of(config)
+        .run_samples(counts.astype(np.float32) * lsb, sums=False, hashes=False)
+    )
+    hop = design.hop * design.decimation
+    return Deployment(
+        name=name,
+        title=compiled.title,
+        arithmetic=FLOAT,
+        sample_rate=config.sample_rate,
+        samples=tuple(Quantity(one, units[one], note=_note(made, k)) for k, one in enumerate(model.sample_names)),
+        parameters=tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
+        sizes=smallest(needed),
+        generated={
+            f"{name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), command),
+            f"{name}_weak_f32.c": files_fourier.source(made, model, command),
+            f"{name}_design_f32.h": files_design.header(config, needed, command, compiled.title, titles),
+        },
+        command=command,
+        first_s=config.ticks_needed / config.sample_rate,
+        playback=_playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns))),
+    )
+
+
+def deployment_q31(engine: FixedEngine, run: Run, command: str) -> Deployment:
+    """In fixed point; parameters as of deployment_f32."""
+    compiled, design = engine.compiled, engine.config.design
+    units = {one.name: one.unit for one in compiled.signals}
+    counts = engine.counts_of(run)[: _most_ticks(len(engine.lsb))]
+    native = fourier_native_q31(engine.made, engine.parameters, engine.config)
+    record = native.identifier().run_samples(counts, sums=False, hashes=False)
+    scale = engine.values(np.ones(len(compiled.unknowns)))
+    model = engine.parameters.model
+    notes = [
+        f"one count is {lsb:.6g} {units[one] or '1'}".rstrip()
+        for one, lsb in zip(engine.sample_names, engine.lsb, strict=True)
+    ]
+    return Deployment(
+        name=engine.name,
+        title=compiled.title,
+        arithmetic=FIXED,
+        sample_rate=engine.sample_rate,
+        samples=tuple(
+            Quantity(one, units[one], lsb, note)
+            for one, lsb, note in zip(engine.sample_names, engine.lsb, notes, strict=True)
+        ),
+        parameters=tuple(
+            Quantity(one.name, one.unit, float(x)) for one, x in zip(compiled.unknowns, scale, strict=True)
+        ),
+        sizes=smallest(sizes_of_q31(design, model.n_p, len(model.c_row))),
+        generated=files_of(engine, command),
+        command=command,
+        first_s=engine.ticks_needed / engine.sample_rate,
+        playback=_playback(counts, list(engine.lsb), record, design.hop * design.decimation, scale),
+    )
+
+
+def _note(made: FourierFunctions, place: int) -> str:
+    held = any(one.sample == place and one.source is Source.HELD for one in made.signal)
+    return "held until the next" if held else ""
+
+
+def _most_ticks(samples: int) -> int:
+    return _MOST_NUMBERS // samples
+
+
+def _playback(
+    counts: npt.NDArray[np.int32], lsb: Sequence[float], record: Record, hop: int, scale: npt.NDArray[np.float64]
+) -> Playback:
+    """Some half windows longer than up to the first estimate; all of it where there is none."""
+    published = np.flatnonzero(np.isin(record.reason, _PUBLISHED))
+    if not len(published):
+        return Playback(counts, tuple(lsb), None, None)
+    ticks = min(int(published[0]) + 1 + _LONGER * hop, len(counts))
+    value, error = (np.asarray(one[ticks - 1], np.float64) * scale for one in (record.published, record.published_se))
+    return Playback(counts[:ticks], tuple(lsb), value, error)

@@ -1,0 +1,64 @@
+"""The README of a package: one screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pvid.deploy import memory
+from pvid.deploy.deployment import Deployment
+from pvid.deploy.example import expected
+
+
+def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequence[str] = ()) -> str:
+    """README.md.
+
+    Parameters
+    ----------
+    where : the ecosystem, as in "for Arduino"
+    steps : how to build and run the example, one a line
+    notes : what is special there
+    """
+    d = deployment
+    names = _named([one.name for one in d.parameters])
+    period = f"{1e6 / d.sample_rate:g} us"
+    return (
+        "\n".join(
+            [
+                f"# pvid: {d.title}, {where}",
+                "",
+                f"Identifies {names} of this rig while it runs, each with a standard error:",
+                f"{d.arithmetic.samples}, {d.sample_rate:g} samples a second, static memory. Made by `{d.command}`.",
+                "",
+                "| | sample | unit | |",
+                "|---|---|---|---|",
+                *(
+                    f"| `sample[{k}]` | {one.name} | {one.unit or '1'} | {one.note} |"
+                    for k, one in enumerate(d.samples)
+                ),
+                "",
+                "## The example",
+                "",
+                *(f"{k + 1}. {step}" for k, step in enumerate(steps)),
+                "",
+                f"It identifies a recorded motion of {len(d.playback.counts) / d.sample_rate:.3g} s and prints",
+                "",
+                *(f"    {line}" for line in expected(d)),
+                "",
+                "## Your sensors",
+                "",
+                f"Call `{d.name}_begin()` once and `{d.name}_step(sample)` every {period}, from a timer;",
+                f"samples at irregular times are wrong. The first estimate needs {d.first_s:.3g} s of motion at least.",
+                f"`{d.name}_read(value, error)` may be called from any context; `pvid_reason_text(reason)` is why",
+                f"there is no estimate yet; `{d.name}_gap()` is for missing samples.",
+                f"Delete `{d.name}_example.c` and `.h` then.",
+                "",
+                *(f"- {one}" for one in (memory.note(d), *notes) if one),
+                "",
+            ]
+        ).rstrip()
+        + "\n"
+    )
+
+
+def _named(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

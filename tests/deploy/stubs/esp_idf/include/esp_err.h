@@ -1,0 +1,1 @@
+#define ESP_ERROR_CHECK(call) (void)(call)

@@ -1,0 +1,172 @@
+"""What `pvid deploy` writes is built by the ecosystems' own files, and its example identifies the motor."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+import yaml  # type: ignore[import-untyped]
+from conftest import ROOT
+from packages import STUBS, built, run
+from program import pvid
+
+from pvid.base.errors import PvidError
+from pvid.board.boards import BOARDS
+from pvid.board.boards import run as run_on
+from pvid.deploy.deployment import Deployment
+from pvid.deploy.example import expected
+from pvid.deploy.of_rig import deployment_f32, deployment_q31
+from pvid.deploy.targets import TARGETS, write_package
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
+from pvid.run.engine_design_q31 import engine_for_simulated_rig
+
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
+
+
+@pytest.fixture(scope="module")
+def motor() -> Deployment:
+    compiled = compiled_of("dc_motor")
+    return deployment_f32(compiled, config_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
+
+
+@pytest.fixture(scope="module")
+def fixed_motor() -> Deployment:
+    compiled = compiled_of("dc_motor")
+    return deployment_q31(engine_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
+
+
+def written(deployment: Deployment, target: str, folder: Path) -> Path:
+    write_package(deployment, target, folder)
+    return folder
+
+
+def test_the_example_comes_near_the_truth(motor: Deployment, fixed_motor: Deployment) -> None:
+    truth = simulated_rig("dc_motor").truth
+    for one in (motor, fixed_motor):
+        assert one.playback.value is not None
+        for parameter, value in zip(one.parameters, one.playback.value, strict=True):
+            assert value == pytest.approx(truth[parameter.name], rel=5e-3)  # of one second; b and Tc are nearly alike
+
+
+def test_cmake(motor: Deployment, tmp_path: Path) -> None:
+    tree = built(written(motor, "cmake", tmp_path / "p"), tmp_path / "b")
+    assert run(tree / "dc_motor_example").splitlines() == expected(motor)
+
+
+def test_a_folder_of_something_else_is_refused(motor: Deployment, tmp_path: Path) -> None:
+    written(motor, "amalgamation", tmp_path)
+    written(motor, "amalgamation", tmp_path)  # again: the same files
+    with pytest.raises(PvidError, match="files that are not of this package"):
+        write_package(motor, "cmake", tmp_path)
+
+
+@pytest.mark.parametrize("core", ["f32", "q31"])
+def test_two_files_are_c99_and_cpp_includes_them(
+    core: str, motor: Deployment, fixed_motor: Deployment, tmp_path: Path
+) -> None:
+    made = motor if core == "f32" else fixed_motor
+    written(made, "amalgamation", tmp_path)
+    c = [*WARNINGS, "-Wno-maybe-uninitialized", "-std=c99", "-O1", "-I.", "-c"]
+    run("gcc", *c, "pvid_dc_motor.c", "example/dc_motor_example.c", cwd=tmp_path)
+    (tmp_path / "main.cpp").write_text((tmp_path / "example" / "main.c").read_text(encoding="utf-8"), encoding="utf-8")
+    objects = ("pvid_dc_motor.o", "dc_motor_example.o")
+    run("g++", *WARNINGS, "-std=c++14", "-I.", "-Iexample", "main.cpp", *objects, "-lm", "-o", "it", cwd=tmp_path)
+    assert run(tmp_path / "it").splitlines() == expected(made)
+    symbols = re.findall(r"^\w+ ([A-Z]) (\w+)$", run("nm", "--defined-only", tmp_path / objects[0]), re.MULTILINE)
+    strange = [name for kind, name in symbols if kind != "W" and not name.startswith("dc_motor_")]
+    assert not strange, "two mechanisms in one program would clash"
+
+
+def test_two_files_have_the_bits_of_the_core_under_gnu17(motor: Deployment, tmp_path: Path) -> None:
+    """gcc's default standard fuses a * b + c unless the file forbids it."""
+    written(motor, "amalgamation", tmp_path)
+    cpu = ["-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard", "-mthumb", "-ffreestanding", "-fbuiltin"]
+    headers = f"-I{ROOT}/firmware/ports/freestanding/include"
+    run("arm-none-eabi-gcc", *cpu, headers, "-std=gnu17", "-O2", "-I.", "-c", "pvid_dc_motor.c", cwd=tmp_path)
+    assert "vfma" not in run("arm-none-eabi-objdump", "-d", tmp_path / "pvid_dc_motor.o")
+
+
+def test_esp_idf(motor: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IDF_PATH", str(STUBS / "esp_idf"))
+    folder = written(motor, "esp-idf", tmp_path / "p")
+    tree = built(folder / "examples" / "dc_motor", tmp_path / "b")
+    assert run(tree / "dc_motor_example").splitlines() == [f"I pvid: {line}" for line in expected(motor)]
+    manifest = yaml.safe_load((folder / "idf_component.yml").read_text(encoding="utf-8"))
+    assert set(manifest) == {"version", "description", "license", "dependencies"}
+    assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    example = folder / "examples" / "dc_motor" / "main"
+    (path,) = yaml.safe_load((example / "idf_component.yml").read_text(encoding="utf-8"))["dependencies"].values()
+    assert (example / path["override_path"]).resolve() == folder.resolve()
+
+
+def test_zephyr(motor: Deployment, tmp_path: Path) -> None:
+    folder = written(motor, "zephyr", tmp_path / "p")
+    tree = built(folder / "samples" / "dc_motor", tmp_path / "b", f"-DZephyr_DIR={STUBS / 'zephyr'}")
+    assert run(tree / "app").splitlines() == expected(motor)
+    module = yaml.safe_load((folder / "zephyr" / "module.yml").read_text(encoding="utf-8"))
+    assert module == {"name": "pvid_dc_motor", "build": {"cmake": ".", "kconfig": "Kconfig"}}
+    sample = yaml.safe_load((folder / "samples" / "dc_motor" / "sample.yaml").read_text(encoding="utf-8"))
+    (pattern,) = sample["tests"]["sample.pvid_dc_motor"]["harness_config"]["regex"]
+    assert re.search(pattern, expected(motor)[0])
+
+
+def test_cubemx_on_an_emulated_stm32(motor: Deployment, tmp_path: Path) -> None:
+    """Without newlib-nano, which is not on every machine: the package needs puts, memcpy, memset and sqrtf."""
+    folder = written(motor, "cubemx", tmp_path / "p")
+    toolchain = ROOT / "firmware" / "cmake" / "cortex-m.cmake"
+    options = (f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DPVID_MATH_LIBRARY=", f"-DPVID_PACKAGE={folder}")
+    board = (f"-DPVID_FIRMWARE={ROOT / 'firmware'}", "-DCMAKE_BUILD_TYPE=Release")
+    tree = built(STUBS / "stm32", tmp_path / "b", *options, *board)
+    done = run_on(BOARDS["netduinoplus2"], tree / "cube.elf", 60)
+    lines = done.text.splitlines()
+    assert done.exit_code == 0
+    assert lines[-len(motor.parameters) :] == expected(motor)
+    assert len(lines) > len(motor.parameters)  # estimates before the last one
+
+
+def test_platformios_manifest_names_what_is_there(motor: Deployment, tmp_path: Path) -> None:
+    folder = written(motor, "platformio", tmp_path)
+    manifest = json.loads((folder / "library.json").read_text(encoding="utf-8"))
+    assert re.fullmatch(r"[\w. -]+", manifest["name"]) and re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    assert (folder / manifest["build"]["srcDir"] / manifest["headers"]).is_file()
+    assert "-ffp-contract=off" in manifest["build"]["flags"]
+    for example in manifest["examples"]:
+        assert all((folder / example["base"] / one).is_file() for one in example["files"])
+
+
+def test_arduinos_properties_are_those_of_its_specification(motor: Deployment, tmp_path: Path) -> None:
+    folder = written(motor, "arduino", tmp_path)
+    lines = (folder / "library.properties").read_text(encoding="utf-8").splitlines()
+    found = dict(line.split("=", 1) for line in lines)
+    needed = {"name", "version", "author", "maintainer", "sentence", "paragraph", "category", "url", "architectures"}
+    assert set(found) == needed | {"includes"}
+    assert (folder / "src" / found["includes"]).is_file()
+    assert (folder / "examples" / "dc_motor" / "dc_motor.ino").is_file()
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_readme_is_one_screen(target: str, motor: Deployment) -> None:
+    lines = TARGETS[target](motor)["README.md"].splitlines()
+    assert len(lines) <= 48
+    assert all(f"    {line}" in lines for line in expected(motor))
+
+
+@pytest.mark.slow
+def test_the_command_takes_a_recording(tmp_path: Path) -> None:
+    """A mechanism of one's own: its model file, a recording of it, and from there to a program that identifies it."""
+    shipped = ROOT / "host" / "src" / "pvid" / "models" / "dc_motor" / "mechanism.py"
+    (tmp_path / "my_motor.py").write_text(shipped.read_text(encoding="utf-8"), encoding="utf-8")
+    done = pvid(tmp_path, "model", "simulate", "dc_motor", "run.csv", "--duration", "2")
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "run.toml").unlink()  # it names the shipped model
+    command = ("deploy", "my_motor.py", "--for", "amalgamation", "-o", "out")
+    refused = pvid(tmp_path, *command)
+    assert refused.returncode == 2 and "give a recording of yours with --run" in refused.stderr
+    done = pvid(tmp_path, *command, "--run", "run.csv")
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
+    assert "--run run.csv" in text and "    R = 1.2" in text
