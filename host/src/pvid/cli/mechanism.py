@@ -99,7 +99,7 @@ def identify_run(
     if only_in_c.get("form") == _STRONG:
         if figure is not None or refine or weights != "residuals":
             raise PvidError("--figure, --refine and --weights are for the weak form; omit --form strong")
-        return _identified_by_strong_form(path, rig, columns, as_json=as_json, **only_in_c)
+        return _identified_by_strong_form(path, rig, columns, as_json=as_json, on=on, **only_in_c)
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
