@@ -92,6 +92,8 @@ TAKEN_IN_STAGES = (
     "pvid_cholesky_solve_q31",
 )
 
+TAKEN_OF_STRONG_SUMS = (*("pvid_kapitza_project_q31", "pvid_kapitza_exponents_q31", "pvid_kapitza_residual_q31"),)
+
 PROOFS = (
     Proof(
         "integer_q31",
@@ -134,20 +136,26 @@ PROOFS = (
             *("-eva-slevel-function", "any_bank:10,prepare:10,pvid_differentiator_init_q31:10"),
         ),
         left=(
-            r"signed overflow\. assert .*\* \(?(even|odd)_",
+            r"signed overflow\.\s+assert .*\b48 \* (phi|y)_even",
+            r"signed overflow\.\s+assert .*(phi|y)\d \+ tmp",
             r"signed downcast\.\s+assert .*\btmp\b",
             r"signed downcast\. assert largest ",
             r"signed overflow\.\s+assert tmp \+ 1 ",
         ),
-        why="what `init` itself finds by sums over the weights, and intervals forget: a weight times the largest "
-        "difference fits 32 bits, hence the sum over all weights 55, and the sum that any counts can reach fits a "
-        "derivative. `differentiator_q31` shows it for the bank of five points",
+        why="what `init` itself finds by sums over the weights, and intervals forget: the sum over all weights times "
+        "the largest difference fits 62 bits, with five points written out 32, and the sum that any counts can reach "
+        "fits a derivative. `differentiator_q31` shows it for the bank of five points",
     ),
     Proof(
         "kapitza_q31",
         "theta and Jacobian of the weak models within 2^60 for any p, their formats; the strong form's rows",
-        ("models/kapitza/kapitza_weak_q31.c", "models/kapitza/kapitza_row_q31.c", "src/number/integer_q31.c"),
-        ("-eva-auto-loop-unroll", "200"),
+        ("models/kapitza/kapitza_weak_q31.c", "src/number/integer_q31.c"),
+        (
+            *("-eva-auto-loop-unroll", "200", "-eva-split-return", "full", "-eva-slevel-function"),
+            "pvid_kapitza_strong_row_q31:100,take_angles:50,three_powers:20,powers_to_3:20,powers_to_4:20,"
+            "pvid_kapitza_estimator_innovate_q31:200,any_innovation:50",
+        ),
+        taken=("term",),
     ),
     Proof(
         "block_q31",
@@ -206,8 +214,7 @@ PROOFS = (
         "strong_q31",
         "any configuration; any tick on top of any state, whatever the bank's derivatives",
         (
-            *("src/strong/strong_q31.c", "src/judge/gate_q31.c", "src/strong/differentiator_q31.c"),
-            *("src/solve/assess_q31.c", "models/kapitza/kapitza_row_q31.c"),
+            *("src/judge/gate_q31.c", "src/solve/assess_q31.c"),
             *("src/number/scaled_q31.c", "src/number/integer_q31.c"),
         ),
         (
@@ -219,7 +226,8 @@ PROOFS = (
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
-            *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31"),
+            *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31", "pvid_differentiator_reset_q31"),
+            *("pvid_kapitza_strong_row_q31", "pvid_kapitza_estimator_innovate_q31", "acceleration"),
             *("pvid_kapitza_estimator_init_q31", "pvid_kapitza_estimator_take_q31"),
             *("pvid_misfit_init_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
         ),
@@ -229,6 +237,59 @@ PROOFS = (
         "the strong form's sums: any row on top of any sums within 2^61, its end at any age and exponent up to 30",
         ("models/kapitza/kapitza_sums_q31.c", "src/number/integer_q31.c"),
         ("-eva-min-loop-unroll", "80"),
+    ),
+    Proof(
+        "kapitza_project_q31",
+        "the strong form's normal equations: any sums within 2^61, any p and formats, near the reference and far off",
+        ("src/number/integer_q31.c",),
+        ("-eva-min-loop-unroll", "60", "-eva-slevel-function", "pvid_kapitza_project_q31:20,main:20"),
+        taken=("pvid_scale_q31", "pvid_bit_length_q31", "take_mantissas", "take_64", "as_part"),
+    ),
+    Proof(
+        "kapitza_solve_q31",
+        "a row and a solve of the strong form: any such equations, any p, any settings; p stays positive",
+        (
+            *("src/solve/assess_q31.c", "src/solve/settings_q31.c", "src/solve/information_q31.c"),
+            *("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ),
+        (
+            *("-eva-min-loop-unroll", "60", "-eva-split-return", "full", "-eva-slevel-function"),
+            "solve:50,factorise:50,main:20,solve_for:20,take_step:30",
+        ),
+        taken=(
+            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_half_exponent_q31", *SCALED, *TAKEN_OF_STRONG_SUMS),
+            *("pvid_kapitza_add_q31", "pvid_kapitza_end_row_q31"),
+            *("equilibrated", "on_diagonal", "raised", "entry_of_l", "beside"),
+            *("right_hand_side", "lifted", "inverse_of"),
+        ),
+    ),
+    Proof(
+        "kapitza_residual_q31",
+        "the strong form's residual: any sums within 2^61, any p and formats",
+        ("models/kapitza/kapitza_residual_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ("-eva-min-loop-unroll", "60"),
+        taken=("pvid_scale_q31", "pvid_bit_length_q31", *SCALED),
+    ),
+    Proof(
+        "kapitza_assess_q31",
+        "an assessment of the strong form: any such equations and residual, any settings",
+        (
+            *("models/kapitza/kapitza_assess_q31.c", "src/solve/assess_q31.c", "src/solve/system_q31.c"),
+            *("src/solve/settings_q31.c", "src/solve/cholesky_q31.c"),
+            *("src/number/scaled_q31.c", "src/number/integer_q31.c"),
+        ),
+        (
+            *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
+            "-eva-slevel-function",
+            "main:50,pvid_system_eliminate_q31:30,pvid_kapitza_estimator_assess_q31:200,pvid_assess_invert_q31:20,factor:60",
+        ),
+        taken=(*TAKEN_IN_STAGES, *TAKEN_OF_STRONG_SUMS),
+        left=(
+            r"function pvid_cholesky_eliminate_q31: precondition self->positive",
+            r"function pvid_cholesky_least_pivot_q31: precondition",
+        ),
+        why="that a factor which is positive so far has its rows and pivots: joined paths forget which of the two "
+        "holds. `estimator_assess_q31` keeps them apart in the same functions",
     ),
     Proof(
         "kapitza_physical_q31",

@@ -10,10 +10,11 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pytest
-from test_stream import KINDS, standard_rig
+from test_stream import KINDS, SHORT, rig_of
 
 from pvid.base.errors import PvidError
 from pvid.board.field import FieldRecord, collect
+from pvid.board.replay_image import standard_run
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig
 from pvid.board.target import HOST_TARGET, Target, open_target
@@ -23,6 +24,11 @@ from pvid.link.port import Port
 from pvid.twin.sensor import SensorConstants, counts
 
 TICKS = 9000  # two announcements more in the weak form's 1 kHz
+
+
+def standard_rig(form: str, core: str = "f32") -> StreamRig:
+    """Of a board that simulates a sensor."""
+    return rig_of(standard_run(form, 5000, core))
 
 
 @cache
@@ -48,8 +54,14 @@ def assert_replays(record: FieldRecord, rig: StreamRig, form: str, native: Nativ
     assert all(hashes[tick - 1] == value for tick, value in record.hashes.items())
 
 
-@pytest.mark.parametrize(("form", "core"), KINDS)
-@pytest.mark.parametrize("name", [HOST_TARGET, "microbit", "mps2-an386", "virt-rv32imac"])
+@pytest.mark.parametrize(
+    ("name", "form", "core"),
+    [
+        pytest.param(name, *kind, marks=() if (name, *kind) in SHORT else pytest.mark.long)
+        for name in (HOST_TARGET, "microbit", "mps2-an386", "virt-rv32imac")
+        for kind in KINDS
+    ],
+)
 def test_a_board_samples_by_itself(name: str, form: str, core: str, native: Native) -> None:
     rig = standard_rig(form, core)
     ticks = 5000 if form == "weak" else 1000

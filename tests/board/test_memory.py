@@ -86,7 +86,7 @@ def play_over_a_bad_line(form: str, core: str, native: Native) -> Verdict:
     """A standard run over a line that spoils one byte in 5000."""
     random = np.random.default_rng(3)
     opened = open_target(HOST_TARGET, standard_rig(form, core), lambda port: Faulty(port, 1e-4, random))
-    return judge(play_standard(opened, form, core, patience_s=120.0), expected(form, native, core))
+    return judge(play_standard(opened, form, core, patience_s=120.0), expected(form, core))
 
 
 def start_by(monkeypatch: pytest.MonkeyPatch, script: Path, prefix: str) -> None:

@@ -46,7 +46,7 @@ def start() -> Iterator[Start]:
 
 def assert_equal_through(name: str, native: Native) -> None:
     playback = play_standard(open_target(name, standard_rig("weak")), "weak")
-    assert judge(playback, expected("weak", native)).equal, playback.account
+    assert judge(playback, expected("weak")).equal, playback.account
     assert playback.done == TICKS
 
 

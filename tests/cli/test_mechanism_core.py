@@ -130,7 +130,6 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     [
         ("identify", ("--law", "stationary"), "--law stationary: dc_motor is identified in float64, or in C by"),
         ("identify", ("--core", "f32", "--form", "strong"), "--form strong: dc_motor is identified in float64"),
-        ("compare", ("--on", "stream-host"), "--on stream-host: dc_motor is compared in float32"),
         ("compare", ("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is compared in float32"),
     ],
 )

@@ -19,6 +19,7 @@ int64_t pvid_scale_q31(int64_t x, int32_t s);
 
 /*@ assigns \result \from x;
     ensures 0 <= \result <= 64;
+    ensures x <= 0x7FFFFFFF ==> \result <= 31;
     ensures x <= 0x4000000000000000 ==> \result <= 63; */
 uint32_t pvid_bit_length_q31(uint64_t x);
 

@@ -42,9 +42,9 @@ static void any_bank(uint16_t half, uint16_t stride)
         differentiator.history[i][1] = any_i32(-y_max, y_max);
     }
     differentiator.head = (uint16_t)any_u32(0, length - 1u);
-    differentiator.filled = (uint16_t)any_u32(0, length);
+    differentiator.missing = (uint16_t)any_u32(0, length);
     (void)pvid_differentiator_step_q31(&differentiator, any_i32(-phi_max, phi_max), any_i32(-y_max, y_max), phi, y);
-    /*@ assert differentiator.head < length && differentiator.filled <= length; */
+    /*@ assert differentiator.head < length && differentiator.missing <= length; */
 }
 
 void main(void)

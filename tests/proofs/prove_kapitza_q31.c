@@ -6,6 +6,16 @@
 #include "pvid/kapitza_strong_q31.h"
 #include "pvid/kapitza_weak_q31.h"
 
+/* Its branch by the upper word is shown in integer_q31: the bound of the result is a relation between two words. */
+/*@ requires -0x4000000000000000 <= product <= 0x4000000000000000;
+    requires \initialized(out) && *out == 0;
+    assigns \result, *out \from *self, a, product;
+    ensures \result == 0 || \result == 1;
+    ensures \initialized(out) && -0x20000000 <= *out <= 0x1FFFFFFF; */
+static bool term(const pvid_kapitza_estimator_q31 *self, size_t a, int64_t product, int32_t *out);
+
+#include "kapitza_row_q31.c"
+
 static void any_model(const pvid_model_q31 *model)
 {
     int32_t p[PVID_MAX_P];
@@ -70,8 +80,12 @@ static void any_innovation(void)
     estimator.reference = any_i32(0, 2 * PVID_KAPITZA_RATE_LIMIT_Q31);
     estimator.bits[0] = (int8_t)any_i32(0, 60);
     estimator.bits[1] = (int8_t)any_i32(0, 60);
-    (void)pvid_kapitza_estimator_innovate_q31(&estimator, row, &e, gradient);
-    /*@ assert -0x10000000 <= e <= 0x10000000; */
+    if (pvid_kapitza_estimator_innovate_q31(&estimator, row, &e, gradient)) {
+        /*@ assert -0x10000000 <= e <= 0x0FFFFFFF; */
+        for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+            /*@ assert -0x40000000 <= gradient[a] <= 0x3FFFFFFF; */
+        }
+    }
 }
 
 void main(void)

@@ -6,7 +6,15 @@
 #include "strong_contracts.h"
 #include "pvid/strong_q31.h"
 
-#define DRIVE_MAX ((int64_t)1 << 60)
+/* Its branch by the upper word is shown in integer_q31: the bound of the result is a relation between two words. */
+/*@ requires -0x4000000000000000 <= x <= 0x4000000000000000 && shift <= 62 && 29 <= bits <= 30;
+    assigns \result, *out \from x, shift, bits;
+    ensures \result == 0 || \result == 1;
+    ensures \result == 0 || (\initialized(out) && -0x40000000 <= *out <= 0x3FFFFFFF); */
+static bool acceleration(int64_t x, uint32_t shift, uint32_t bits, int32_t *out);
+
+#include "../../firmware/src/strong/strong_q31.c"
+
 #define ONE_Q30 ((int32_t)1 << 30)
 
 static pvid_strong_q31 identifier; /* zeroed by init */

@@ -10,7 +10,7 @@
 /* Of what they read but a number is named: a number made of pointers would be none. */
 
 /*@ requires -0x1000000 <= phi <= 0x1000000 && -0x1000000 <= y <= 0x1000000;
-    assigns self->head, self->filled, self->history[0 .. PVID_MAX_WINDOW - 1][0 .. 1] \from phi, y;
+    assigns self->head, self->at, self->missing, self->history[0 .. PVID_MAX_WINDOW - 1][0 .. 1] \from phi, y;
     assigns \result, d_phi[0 .. 4], d_y[0 .. 2] \from phi, y;
     ensures \result == 0 || \result == 1;
     ensures \result != 0 ==> \initialized(d_phi + (0 .. 4)) && \initialized(d_y + (0 .. 2));
@@ -34,6 +34,27 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
     ensures \result == 0 ==> \initialized(&self->bank.y_max) && 1 <= self->bank.y_max <= 0x1000000; */
 pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
 
+/*@ assigns self->head, self->at, self->missing \from \nothing;
+    assigns self->history[0 .. PVID_MAX_WINDOW - 1][0 .. 1] \from \nothing; */
+void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self);
+
+/*@ requires \subset(phi[0 .. 4], (-0x40000000 .. 0x40000000)) && \subset(u[0 .. 2], (-0x40000000 .. 0x40000000));
+    assigns \result, row[0 .. 12] \from *format, phi[0 .. 4], u[0 .. 2];
+    ensures \result == 0 || \result == 1;
+    ensures \result == 0 || \initialized(row + (0 .. 12)); */
+bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS],
+                                 const int32_t u[PVID_Y_ORDERS_Q31], int32_t row[PVID_KAPITZA_ROW_Q31]);
+
+/*@ requires \initialized(row + (0 .. 12));
+    assigns \result, *e, gradient[0 .. 2] \from *self, row[0 .. 12];
+    ensures \result == 0 || \result == 1;
+    ensures \result == 0 || (\initialized(e) && \initialized(gradient + (0 .. 2)));
+    ensures \result == 0 || -0x10000000 <= *e <= 0x0FFFFFFF;
+    ensures \result == 0 || \subset(gradient[0 .. 2], (-0x40000000 .. 0x3FFFFFFF)); */
+bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
+                                         const int32_t row[PVID_KAPITZA_ROW_Q31], int32_t *e,
+                                         int32_t gradient[PVID_KAPITZA_P]);
+
 /*@ assigns \result, *self \from config->row_sd, rows->reference;
     ensures 0 <= \result <= 100;
     ensures \result == 0 || \result >= 1;
@@ -42,8 +63,7 @@ pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pv
 pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self, const pvid_estimator_config_q31 *config,
                                             const pvid_strong_row_q31 *rows);
 
-/* Any state; that its solve keeps to its bounds is not proved (host/docs/proofs.md). */
-/*@ requires -0x10000000 <= e <= 0x10000000;
+/*@ requires -0x10000000 <= e <= 0x0FFFFFFF;
     assigns \result, *self \from row[0 .. 12], e, gradient[0 .. 2];
     ensures self->ready == 1; */
 pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, const int32_t row[PVID_KAPITZA_ROW_Q31],

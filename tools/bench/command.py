@@ -150,6 +150,25 @@ def bench_fixed_cost(mechanism: str, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="float-cost")
+@click.option("--mechanism", default="kapitza", show_default=True, help="Of the shipped ones.")
+@UPDATE
+def bench_float_cost(mechanism: str, update: Path | None) -> int:
+    """Where instructions and bytes of the engine in float32 go on a Cortex-M4F, and those of all mechanisms (needs
+    QEMU)."""
+    from bench import float_cost
+    from pvid.models.mechanisms import names
+
+    put_table(update, "float-tick", markdown(float_cost.TICK_HEADER, float_cost.tick_rows(mechanism)))
+    put_table(update, "float-state", markdown(float_cost.STATE_HEADER, float_cost.state_rows(mechanism)))
+    put_table(update, "float-text", markdown(float_cost.TEXT_HEADER, float_cost.text_rows(mechanism)))
+    with progress_bar("mechanisms", len(names())) as advance:
+        done = iter(range(1, len(names()) + 1))
+        rows = list(float_cost.mechanism_rows(lambda: advance(next(done))))
+    put_table(update, "float-mechanisms", markdown(float_cost.MECHANISMS_HEADER, rows))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:
@@ -187,6 +206,29 @@ def bench_tick_methods(update: Path | None) -> int:
     with progress_bar("methods", tick_methods.STEPS) as advance:
         rows = list(tick_methods.rows_of(Native(), progress=advance))
     put_table(update, "tick-methods", markdown(tick_methods.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="strong-bytes")
+@UPDATE
+def bench_strong_bytes(update: Path | None) -> int:
+    """Where the bytes of code and state of the strong form in float32 go on a Cortex-M4F."""
+    from bench import strong_bytes
+
+    put_table(update, "strong-text", markdown(strong_bytes.TEXT_HEADER, strong_bytes.text_rows()))
+    put_table(update, "strong-state", markdown(strong_bytes.STATE_HEADER, strong_bytes.state_rows()))
+    return DONE
+
+
+@bench.command(name="strong-schedules")
+@UPDATE
+def bench_strong_schedules(update: Path | None) -> int:
+    """Final p of the strong form's schedules against that of all sums at every row, 40 seeds."""
+    from bench import strong_schedules
+
+    with progress_bar("samplings", len(strong_schedules.SAMPLINGS)) as advance:
+        rows = list(strong_schedules.schedule_rows(Native(), progress=advance))
+    put_table(update, "strong-schedules", markdown(strong_schedules.HEADER, rows))
     return DONE
 
 

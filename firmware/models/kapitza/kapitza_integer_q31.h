@@ -43,7 +43,11 @@ static inline int32_t pvid_moved_q31(int32_t x, int32_t shift)
     if (shift >= 0) {
         return x * (int32_t)((uint32_t)1 << (uint32_t)shift);
     }
-    return (shift < -31) ? 0 : pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(x, (uint32_t)-shift - 1u) + 1, 1);
+    if (shift < -31) {
+        return 0;
+    }
+    const int32_t above = pvid_floor_shift_32_q31(x, (uint32_t)-shift - 1u); /* its last bit is the half */
+    return pvid_floor_shift_32_q31(above, 1) + (int32_t)((uint32_t)above & 1u);
 }
 
 #endif

@@ -8,14 +8,14 @@ enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
 #define MANTISSA_BITS 28       /* of a moment in a solve; the shift to the present rate makes it grow sixfold at most */
 #define FEW ((int32_t)1 << 16) /* of a square after the shift: fewer bits are too few */
-#define DELTA_BITS (PVID_KAPITZA_W_BITS - 2) /* of w - w_r below a quarter */
+#define DELTA_LIMIT ((int32_t)1 << (PVID_KAPITZA_W_BITS - 2)) /* of w - w_r: a quarter */
 
 /* ---- moments of G = u + w_r in a solve ---- */
 
-/* Half the bits that a square has beyond those of a mantissa, rounded up. */
-static int32_t half_beyond(int64_t square)
+/* Half the bits that squares, of which these are the bits, have beyond those of a mantissa, rounded up. */
+static int32_t half_beyond(uint64_t bits)
 {
-    const int32_t beyond = (int32_t)pvid_bit_length_q31((uint64_t)square) - MANTISSA_BITS;
+    const int32_t beyond = (int32_t)pvid_bit_length_q31(bits) - MANTISSA_BITS;
     return (beyond > 0) ? ((beyond + 1) / 2) : 0;
 }
 
@@ -285,10 +285,10 @@ static void relate(int32_t of_a, const int32_t lengths[2], pvid_kapitza_system_q
 /* Scales that bring every moment below 2^28. */
 static void scale_families(const int64_t sums[], const int32_t lengths[2], pvid_kapitza_system_q31 *out)
 {
-    const int32_t of_ay = pvid_larger_q31(half_beyond(sums[PVID_SUM_AA]), half_beyond(sums[PVID_SUM_YY]));
-    out->scale_x = pvid_larger_q31(half_beyond(sums[PVID_SUM_K22 + 6]), half_beyond(sums[PVID_SUM_K22]));
-    out->scale_z = pvid_larger_q31(half_beyond(sums[PVID_SUM_K00 + 8]), half_beyond(sums[PVID_SUM_K00]));
-    relate(pvid_larger_q31(half_beyond(sums[PVID_SUM_EE]), of_ay), lengths, out);
+    const uint64_t of_a = (uint64_t)sums[PVID_SUM_AA] | (uint64_t)sums[PVID_SUM_EE] | (uint64_t)sums[PVID_SUM_YY];
+    out->scale_x = half_beyond((uint64_t)sums[PVID_SUM_K22 + 6] | (uint64_t)sums[PVID_SUM_K22]);
+    out->scale_z = half_beyond((uint64_t)sums[PVID_SUM_K00 + 8] | (uint64_t)sums[PVID_SUM_K00]);
+    relate(half_beyond(of_a), lengths, out);
 }
 
 /* ---- far from the reference ---- */
@@ -362,8 +362,9 @@ static void take_64(const int64_t sums[], int32_t t, pvid_kapitza_system_q31 *sc
     scales->scale_z = z;
 }
 
-PVID_SELDOM static void shift_far(const int64_t sums[], int32_t beyond, const int32_t lengths[2],
-                                  pvid_kapitza_system_q31 *scales, shifted_sums *out)
+/* Returns d in the time unit that it chooses, Q30: a quarter at most. */
+PVID_SELDOM static int32_t shift_far(const int64_t sums[], int32_t beyond, const int32_t lengths[2],
+                                     pvid_kapitza_system_q31 *scales, shifted_sums *out)
 {
     const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(beyond));
     const int32_t t = pvid_larger_q31(length - PVID_KAPITZA_W_BITS, 0);
@@ -407,29 +408,29 @@ PVID_SELDOM static void shift_far(const int64_t sums[], int32_t beyond, const in
     out->k22 = out_triple(&m[PVID_SUM_K22], 2 * x, 6);
     out->k20 = out_triple(&m[PVID_SUM_K20], x + z, 7);
     out->k00 = out_triple(&m[PVID_SUM_K00], 2 * z, 8);
+    return (int32_t)pvid_round_shift_q31(d, FAR_TIME + 1u);
 }
 
 void pvid_kapitza_project_q31(const pvid_kapitza_estimator_q31 *self, pvid_kapitza_system_q31 *system)
 {
     const int32_t beyond = self->p[W] - self->reference; /* w - w_r */
-    const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(beyond));
     const int32_t lengths[2] = {length_of(3 * (int64_t)self->p[D1], self->bits[0]),
                                 length_of(4 * (int64_t)self->p[D2], self->bits[1])};
     shift_coefficients c;
     shifted_sums shifted;
-    bool is_near = length <= DELTA_BITS;
+    bool is_near = false;
+    int32_t d = 0; /* w - w_r, Q30 */
     system->time = 0;
-    if (is_near) {
+    if ((beyond < DELTA_LIMIT) && (beyond > -DELTA_LIMIT)) {
+        d = beyond * (int32_t)((uint32_t)1 << (30u - PVID_KAPITZA_W_BITS));
         scale_families(self->sums, lengths, system);
-        shift_by(beyond * (int32_t)((uint32_t)1 << (30u - PVID_KAPITZA_W_BITS)), &c);
+        shift_by(d, &c);
         shift_sums(self->sums, system, &c, &shifted);
         is_near = (shifted.k22.high >= FEW) && (shifted.k00.high >= FEW);
     }
     if (!is_near) {
-        shift_far(self->sums, beyond, lengths, system, &shifted);
+        d = shift_far(self->sums, beyond, lengths, system, &shifted);
     }
-    const int64_t exact = (int64_t)beyond * ((int64_t)1 << (30u - PVID_KAPITZA_W_BITS));
-    const int32_t d = (int32_t)pvid_round_shift_q31(exact, (uint32_t)system->time);
     const int32_t d1 = as_part(self->p[D1], system->of_x - self->bits[0], 3);
     const int32_t d2 = as_part(self->p[D2], system->of_z - self->bits[1], 4);
     const shape p = {d1, 3 * d1, d2, 4 * d2};

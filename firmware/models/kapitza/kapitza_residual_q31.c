@@ -76,7 +76,7 @@ int64_t pvid_kapitza_residual_q31(const pvid_kapitza_estimator_q31 *self)
             known += pvid_times_q31(pvid_round_shift_q31(moment, GUARD_BITS), theta[j]);
         }
         const int64_t of_y = pvid_round_shift_q31(sums[place_of_y(i)], exponent + GUARD_BITS);
-        residual += pvid_times_q31(pvid_clamp_q31(known - (2 * of_y), PVID_WIDE), theta[i]);
+        residual += pvid_times_q31(pvid_clamp_q31(known - (2 * of_y), PVID_WIDE / 8), theta[i]);
     }
     const int64_t found = pvid_scale_q31(pvid_clamp_q31(residual, PVID_WIDE), -(int32_t)((2u * exponent) + GUARD_BITS));
     return (found > 0) ? found : 0;

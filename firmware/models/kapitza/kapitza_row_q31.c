@@ -16,9 +16,11 @@ PVID_ALWAYS_INLINE bool of_rates(int64_t x, uint32_t bits, int32_t *out)
     const int32_t high = (int32_t)pvid_floor_shift_q31(above, 32);
     const int32_t limit = (int32_t)((uint32_t)1 << (bits - (32u - PVID_KAPITZA_RATE_BITS)));
     const uint32_t low = (uint32_t)((uint64_t)above & 0xFFFFFFFFu);
-    const bool fits = (high >= -limit) && (high < limit);
-    *out = fits ? ((high * 256) + (int32_t)(low >> PVID_KAPITZA_RATE_BITS)) : 0;
-    return fits;
+    if ((high >= limit) || (high < -limit)) {
+        return false;
+    }
+    *out = (high * 256) + (int32_t)(low >> PVID_KAPITZA_RATE_BITS);
+    return true;
 }
 
 /* a b with b a rate, both within 2^30, as an entry. */
@@ -30,12 +32,24 @@ PVID_ALWAYS_INLINE bool by_rate(int32_t a, int32_t b, int32_t *out)
 /* x 2^shift as an entry, |shift| <= 62. */
 static inline bool shifted_entry(int32_t x, int32_t shift, int32_t *out)
 {
-    const uint32_t up = (shift < 0) ? 0u : ((shift < ENTRY_BITS) ? (uint32_t)shift : (uint32_t)ENTRY_BITS);
-    const int32_t right = (shift < 0) ? pvid_moved_q31(x, shift) : x;
-    const int32_t limit = (int32_t)((uint32_t)1 << ((uint32_t)ENTRY_BITS - up));
-    const bool fits = (shift > ENTRY_BITS) ? (x == 0) : ((right >= -limit) && (right < limit));
-    *out = fits ? (right * (int32_t)((uint32_t)1 << up)) : 0;
-    return fits;
+    if (shift > ENTRY_BITS) {
+        *out = 0;
+        return x == 0;
+    }
+    if (shift <= 0) {
+        const int32_t down = pvid_moved_q31(x, shift);
+        if ((down >= PVID_ROW_LIMIT_Q31) || (down < -PVID_ROW_LIMIT_Q31)) {
+            return false;
+        }
+        *out = down;
+        return true;
+    }
+    const int64_t y = x * ((int64_t)1 << (uint32_t)shift);
+    if ((y >= PVID_ROW_LIMIT_Q31) || (y < -PVID_ROW_LIMIT_Q31)) {
+        return false;
+    }
+    *out = (int32_t)y;
+    return true;
 }
 
 /* out[2], out[1], out[0] = G out[3], G^2 out[3], G^3 out[3]. */
@@ -83,7 +97,7 @@ static bool take_angles(const pvid_strong_row_q31 *format, const int32_t phi[PVI
 bool pvid_kapitza_strong_row_q31(const pvid_strong_row_q31 *format, const int32_t phi[PVID_ORDERS],
                                  const int32_t u[PVID_Y_ORDERS_Q31], int32_t row[PVID_KAPITZA_ROW_Q31])
 {
-    angles of;
+    angles of = {0, 0, 0, 0, 0};
     if (!take_angles(format, phi, &of)) {
         return false;
     }
@@ -111,18 +125,13 @@ static inline bool term(const pvid_kapitza_estimator_q31 *self, size_t a, int64_
     return pvid_narrows_q31(product, (uint32_t)self->bits[a - 1u], TERM_BITS, out);
 }
 
-static inline bool is_within(int64_t x, int32_t limit)
-{
-    return (x >= -(int64_t)limit) && (x < limit);
-}
-
 bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
                                          const int32_t row[PVID_KAPITZA_ROW_Q31], int32_t *e,
                                          int32_t gradient[PVID_KAPITZA_P])
 {
     const int32_t beyond = (int32_t)pvid_nearest_q31((int64_t)self->p[W] - self->reference, 1); /* w - w_r */
     const int64_t rate = (int64_t)row[PVID_KAPITZA_ROW_G] + beyond;
-    if (!is_within(rate, PVID_ONE_Q30)) {
+    if ((rate >= PVID_ONE_Q30) || (rate < -PVID_ONE_Q30)) {
         return false;
     }
     const int32_t g = (int32_t)rate;
@@ -136,10 +145,10 @@ bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
     const int32_t inner = row[PVID_ROW_A] + of_e;
     const int64_t d1_g2_x = pvid_product_q31(self->p[D1], g_x[1]);
     int32_t of_w;
-    int32_t of_d1;
-    int32_t of_d2;
-    int32_t slope_d1;
-    int32_t slope_d2;
+    int32_t of_d1 = 0;
+    int32_t of_d2 = 0;
+    int32_t slope_d1 = 0;
+    int32_t slope_d2 = 0;
     if (!of_rates(pvid_short_product_q31(inner, beyond), TERM_BITS, &of_w) ||
         !term(self, D1, pvid_product_q31(self->p[D1], g_x[0]), &of_d1) ||
         !term(self, D2, pvid_product_q31(self->p[D2], g_z[0]), &of_d2) ||
@@ -149,9 +158,13 @@ bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
     }
     const int32_t rest = row[PVID_ROW_Y] - (of_w + of_d1 + of_d2);
     const int64_t slope = ((int64_t)inner + of_e) + slope_d1 + slope_d2;
-    gradient[W] = (int32_t)pvid_clamp_q31(slope, PVID_ONE_Q30);
+    if ((rest >= PVID_ROW_LIMIT_Q31) || (rest < -PVID_ROW_LIMIT_Q31) || (slope >= PVID_ONE_Q30) ||
+        (slope < -PVID_ONE_Q30)) {
+        return false;
+    }
+    gradient[W] = (int32_t)slope;
     gradient[D1] = g_x[0];
     gradient[D2] = g_z[0];
     *e = rest;
-    return is_within(rest, PVID_ROW_LIMIT_Q31) && is_within(slope, PVID_ONE_Q30);
+    return true;
 }

@@ -13,8 +13,8 @@
 
 enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2 };
 
-#define L_BITS 29u       /* of L, |.| <= 2 */
-#define PIVOT_SHIFT 20u  /* a pivot below this part of its diagonal entry is rounding, not data */
+#define L_BITS 29u       /* of L, |.| < 2 */
+#define PIVOT_SHIFT 20u  /* a pivot not above this part of its diagonal entry is rounding, not data */
 #define RHS_BITS 27      /* of a right-hand side */
 #define SOLUTION_BITS 27 /* of a solution without the terms beside the diagonal: with them it fits 32 bits */
 #define FORCE_MAX ((int64_t)1 << 61)
@@ -116,11 +116,17 @@ static int32_t inverse_of(int32_t d)
     return (r * 8192) + more;
 }
 
+/* x 2^up in [2^29, 2^30), 1 <= x < 2^30. */
+static int32_t raised(int32_t x, uint32_t *up)
+{
+    *up = 30u - pvid_bit_length_q31((uint64_t)x);
+    return x * (int32_t)((uint32_t)1 << *up);
+}
+
 static void invert(factors *factor, size_t a, int64_t pivot)
 {
     const int32_t below = (int32_t)((pivot < PVID_ONE_Q30) ? pivot : (PVID_ONE_Q30 - 1));
-    factor->up[a] = 30u - pvid_bit_length_q31((uint64_t)below);
-    factor->inverse[a] = inverse_of(below * (int32_t)((uint32_t)1 << factor->up[a]));
+    factor->inverse[a] = inverse_of(raised(below, &factor->up[a]));
 }
 
 /* a b with b in the format of L. */
@@ -135,21 +141,27 @@ static inline int32_t over_pivot(const factors *factor, size_t a, int32_t x)
     return by_l(x, factor->inverse[a]);
 }
 
-/* The same as an entry of L, |.| <= 2. */
+/* The same as an entry of L, |.| < 2: a product with an entry of S fits 32 bits. */
 static inline int32_t entry_of_l(const factors *factor, size_t a, int32_t x)
 {
     const uint32_t up = factor->up[a];
     const int32_t l = over_pivot(factor, a, x);
-    const int32_t most = pvid_floor_shift_32_q31(PVID_ONE_Q30, up);
+    const int32_t most = pvid_floor_shift_32_q31(PVID_ONE_Q30 - 1, up);
     const int32_t above = (l < -most) ? -most : l;
     return pvid_moved_q31((above > most) ? most : above, (int32_t)up);
 }
 
-/* s 2^-g as an entry on the diagonal, 0 <= s, of 32 bits as a rule; 2^30 at most by the choice of g. */
+/* s 2^-g, 0 <= s, of 32 bits as a rule; 2^30 at most by the choice of g. */
 static inline int32_t equilibrated(int64_t s, int32_t g)
 {
     return (s <= INT32_MAX) ? pvid_moved_q31((int32_t)s, -g)
                             : (int32_t)pvid_clamp_q31(pvid_scale_q31(s, g), PVID_ONE_Q30);
+}
+
+/* The same on the diagonal, 1 <= s: in [2^28, 2^30] by the choice of g. */
+static inline int32_t on_diagonal(int64_t s, int32_t g)
+{
+    return equilibrated(s, 2 * g);
 }
 
 /* x 2^-shift rounded half up, saturated at +-PVID_WIDE; to the right as a rule. */
@@ -198,24 +210,24 @@ PVID_APART static bool factorise(const pvid_kapitza_estimator_q31 *self, const p
     const int32_t q01 = beside(system->s[1], g[W] + g[D1]);
     const int32_t q02 = beside(system->s[2], g[W] + g[D2]);
     const int32_t q12 = beside(system->s[4], g[D1] + g[D2]);
-    const int32_t q11 = equilibrated(s11, 2 * g[D1]);
-    factor->s00 = equilibrated(s00, 2 * g[W]);
+    const int32_t q11 = on_diagonal(s11, g[D1]);
+    factor->s00 = on_diagonal(s00, g[W]);
     factor->prior = equilibrated(prior_w, 2 * g[W]);
-    invert(factor, D2, equilibrated(s22, 2 * g[D2]));
+    invert(factor, D2, on_diagonal(s22, g[D2]));
     factor->l02 = entry_of_l(factor, D2, q02);
     factor->l12 = entry_of_l(factor, D2, q12);
     const int64_t p1 = (int64_t)q11 - by_l(factor->l12, q12);
-    if (p1 < pvid_floor_shift_32_q31(q11, PIVOT_SHIFT)) {
+    if (p1 <= pvid_floor_shift_32_q31(q11, PIVOT_SHIFT)) {
         return false;
     }
     invert(factor, D1, p1);
     const int32_t c01 = (int32_t)pvid_clamp_q31((int64_t)q01 - by_l(factor->l02, q12), PVID_ONE_Q30);
     factor->l01 = entry_of_l(factor, D1, c01);
     const int64_t p0 = ((int64_t)factor->s00 - by_l(factor->l02, q02)) - by_l(factor->l01, c01);
-    if (p0 < pvid_floor_shift_32_q31(factor->s00, PIVOT_SHIFT)) {
+    if (p0 <= pvid_floor_shift_32_q31(factor->s00, PIVOT_SHIFT)) {
         return false;
     }
-    factor->p0 = (int32_t)p0;
+    factor->p0 = (int32_t)((p0 < PVID_ONE_Q30) ? p0 : PVID_ONE_Q30);
     invert(factor, W, factor->p0);
     return true;
 }
@@ -229,6 +241,18 @@ static inline int32_t bits_beyond(int32_t x, uint32_t up)
     return (beyond > 0) ? beyond : 0;
 }
 
+/* f 2^-shift rounded half up, of 27 bits by the choice of the shift. */
+static inline int32_t right_hand_side(int64_t f, int32_t shift)
+{
+    return pvid_narrowed_q31(f, shift);
+}
+
+/* y 2^(up - down), of 27 bits by the choice of down. */
+static inline int32_t lifted(int32_t y, uint32_t up, int32_t down)
+{
+    return pvid_moved_q31(y, (int32_t)up - down);
+}
+
 /* The solution for f, |f| < 2^62. */
 PVID_APART static void solve_for(const factors *factor, const int64_t f[PVID_KAPITZA_P], solutions *solution)
 {
@@ -240,7 +264,7 @@ PVID_APART static void solve_for(const factors *factor, const int64_t f[PVID_KAP
     h -= RHS_BITS;
     int32_t *b = solution->b;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
-        b[a] = pvid_narrowed_q31(f[a], factor->g[a] + h);
+        b[a] = right_hand_side(f[a], factor->g[a] + h);
     }
     solution->of_b = h - 30;
     const int32_t z1 = b[D1] - by_l(factor->l12, b[D2]);
@@ -251,9 +275,9 @@ PVID_APART static void solve_for(const factors *factor, const int64_t f[PVID_KAP
     const int32_t down =
         pvid_larger_q31(pvid_larger_q31(bits_beyond(y0, factor->up[W]), bits_beyond(y1, factor->up[D1])),
                         bits_beyond(y2, factor->up[D2]));
-    const int32_t x0 = pvid_moved_q31(y0, (int32_t)factor->up[W] - down);
-    const int32_t x1 = pvid_moved_q31(y1, (int32_t)factor->up[D1] - down) - by_l(factor->l01, x0);
-    const int32_t x2 = pvid_moved_q31(y2, (int32_t)factor->up[D2] - down);
+    const int32_t x0 = lifted(y0, factor->up[W], down);
+    const int32_t x1 = lifted(y1, factor->up[D1], down) - by_l(factor->l01, x0);
+    const int32_t x2 = lifted(y2, factor->up[D2], down);
     solution->x[W] = x0;
     solution->x[D1] = x1;
     solution->x[D2] = (x2 - by_l(factor->l02, x0)) - by_l(factor->l12, x1);

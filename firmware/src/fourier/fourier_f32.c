@@ -358,18 +358,25 @@ static inline pvid_reason follow(pvid_fourier_f32 *self, const float sample[])
     return (rested >= FORM) ? due(self) : (pvid_reason)rested;
 }
 
-/* A tick whose samples need more than to be added. */
+/* Of samples with one that is not finite or beyond its range: returns whether all are finite. */
+PVID_SELDOM static bool are_finite(pvid_fourier_f32 *self, const float sample[])
+{
+    const bool finite = all_finite(sample, self->design->model->samples);
+    if (finite) {
+        self->watch.beyond = self->watch.delay;
+    }
+    return finite;
+}
+
+/* A tick whose signals are not the samples. */
 PVID_SELDOM static pvid_reason other_tick(pvid_fourier_f32 *self, const float sample[])
 {
     if (!is_ready(self) || (sample == NULL)) {
         return PVID_NOT_READY;
     }
     const pvid_fourier_model_f32 *model = self->design->model;
-    if (!all_finite(sample, model->samples)) {
+    if (!pvid_fourier_front_fits_f32(&self->front, model->samples, sample) && !are_finite(self, sample)) {
         return reject(self);
-    }
-    if (self->watch.range != NULL) {
-        pvid_fourier_watch_sample_f32(&self->watch, model->samples, sample);
     }
     pvid_fourier_front_derive_f32(&self->front, model, sample);
     return follow(self, sample);
@@ -378,10 +385,9 @@ PVID_SELDOM static pvid_reason other_tick(pvid_fourier_f32 *self, const float sa
 /* A tick with a sample that is not finite or beyond its range. */
 PVID_SELDOM static pvid_reason odd_tick(pvid_fourier_f32 *self, const float sample[])
 {
-    if (!all_finite(sample, self->plain)) {
+    if (!are_finite(self, sample)) {
         return reject(self);
     }
-    self->watch.beyond = self->watch.delay;
     pvid_fourier_front_add_f32(&self->front, self->plain, sample);
     return follow(self, sample);
 }

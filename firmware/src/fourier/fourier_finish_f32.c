@@ -51,6 +51,9 @@ enum {
 #define ENTRIES_PER_STAGE 8u
 #define PRODUCTS_PER_STAGE 30u
 
+/* Non-zeros of C that a stage lists by rows. */
+#define NONZEROS_PER_STAGE 8u
+
 /* Pairs of columns whose noise a stage adds. */
 #define PAIRS_PER_STAGE 1u
 
@@ -127,9 +130,6 @@ void pvid_fourier_finish_begin_f32(pvid_fourier_finish_f32 *self)
     self->expected = 0.0f;
     self->free = 0.0f;
     self->square = 0.0f;
-    for (size_t i = 0; i < (size_t)PVID_MAX_THETA; i++) {
-        self->work.rows.score[i] = 0.0f;
-    }
     begin_kind(self);
 }
 
@@ -182,13 +182,19 @@ PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
             pvid_fourier_noise_shares_f32(&finish->white, design, finish->white.share);
         }
         design->model->model->jacobian(self->estimator.p, slopes->c);
-        finish->index = (uint16_t)pvid_fourier_noise_next_f32(design, finish->kind, 0);
         finish->phase = 1;
         return true;
     }
     if (finish->phase == 1u) {
-        pvid_fourier_noise_begin_f32(design, finish->theta, kind_of(self)->thetas, slopes);
-        finish->phase = 2;
+        const size_t n_c = design->model->model->n_c;
+        const size_t end = (size_t)finish->index + NONZEROS_PER_STAGE;
+        const size_t last = (end < n_c) ? end : n_c;
+        pvid_fourier_noise_list_f32(design, finish->theta, kind_of(self)->thetas, finish->index, last, slopes);
+        finish->index = (uint16_t)last;
+        if (last == n_c) {
+            finish->index = (uint16_t)pvid_fourier_noise_next_f32(design, finish->kind, 0);
+            finish->phase = 2;
+        }
         return true;
     }
     size_t place = finish->index;
@@ -243,6 +249,16 @@ static void clear_parts(pvid_fourier_finish_f32 *self)
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < parts; i++) {
         self->work.rows.part[i] = 0.0f;
+    }
+}
+
+PVID_SELDOM static void scale_stage(pvid_fourier_f32 *self)
+{
+    pvid_fourier_finish_f32 *finish = &self->finish;
+    pvid_fourier_white_scale_f32(&finish->white, self->harmonics);
+    clear_parts(finish);
+    for (size_t i = 0; (finish->kind == 0u) && (i < (size_t)PVID_MAX_THETA); i++) {
+        finish->work.rows.score[i] = 0.0f;
     }
 }
 
@@ -628,8 +644,7 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         pvid_fourier_white_spectrum_f32(&finish->white, self->design, finish->kind, self->harmonics);
         break;
     case STAGE_SCALE:
-        pvid_fourier_white_scale_f32(&finish->white, self->harmonics);
-        clear_parts(finish);
+        scale_stage(self);
         break;
     case STAGE_NOISE:
         repeat = noise_stage(self);
@@ -742,7 +757,10 @@ static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_
     const uint32_t entries = parts_of(design->n_noise, ENTRIES_PER_STAGE);
     const uint32_t products = (uint32_t)products_per_stage(design);
     const uint32_t pairs = (uint32_t)pvid_fourier_noise_pairs_f32(design, (uint8_t)(kind - design->model->kind));
-    const uint32_t noise = checks_noise(self) ? (2u + parts_of(pairs, PAIRS_PER_STAGE)) : 1u;
+    const uint32_t noise =
+        checks_noise(self)
+            ? (1u + parts_of(design->model->model->n_c, NONZEROS_PER_STAGE) + parts_of(pairs, PAIRS_PER_STAGE))
+            : 1u;
     uint32_t stages = entries + 3u + noise; /* SPECTRUM, SCALE, GATE */
     stages +=
         (uint32_t)pvid_fourier_basis_stages(design) + gather_stages(design, kind) + (reflect_stages(design) * columns);

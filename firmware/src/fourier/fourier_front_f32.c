@@ -76,18 +76,29 @@ void pvid_fourier_front_reset_f32(pvid_fourier_front_f32 *self)
 }
 
 /* The samples before: all equal to the first one since a restart. */
-static void remember(pvid_fourier_front_f32 *self, size_t samples, const float sample[])
+static void begin(pvid_fourier_front_f32 *self, size_t samples, const float sample[])
 {
     for (size_t i = 0; i < samples; i++) {
-        self->before[2][i] = self->seen ? self->before[1][i] : sample[i];
-        self->before[1][i] = self->seen ? self->before[0][i] : sample[i];
+        self->before[2][i] = sample[i];
+        self->before[1][i] = sample[i];
         self->before[0][i] = sample[i];
     }
     self->seen = true;
 }
 
-/* A signal of the tick before, from the next sample and the three before it. */
-static float held_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float next)
+static void remember(pvid_fourier_front_f32 *self, size_t count, const float sample[])
+{
+    const size_t samples = PVID_COUNT(PVID_MAX_SAMPLES, count);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < samples; i++) {
+        self->before[2][i] = self->before[1][i];
+        self->before[1][i] = self->before[0][i];
+        self->before[0][i] = sample[i];
+    }
+}
+
+/* A signal of the tick before, whose sample is x, from the next sample and the two before it. */
+static inline float held_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float next)
 {
     const size_t i = signal->sample;
     const float x = self->before[0][i];
@@ -98,7 +109,7 @@ static float held_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_
 }
 
 /* A signal of this tick. */
-static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float x)
+static inline float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier_signal *signal, float x)
 {
     return (signal->source == (uint8_t)PVID_SIGNAL_JUMP) ? (self->jump_scale * (x - self->before[0][signal->sample]))
                                                          : x;
@@ -107,21 +118,22 @@ static float plain_signal(const pvid_fourier_front_f32 *self, const pvid_fourier
 PVID_SELDOM void pvid_fourier_front_derive_f32(pvid_fourier_front_f32 *self, const pvid_fourier_model_f32 *model,
                                                const float sample[])
 {
-    const bool first = !self->seen;
-    if (first) {
-        remember(self, model->samples, sample);
-    }
-    if (first && (self->needs == PVID_FOURIER_NEEDS_NEXT)) {
-        self->wait++; /* the next sample is missing */
-    } else {
-        for (size_t i = 0; i < model->signals; i++) {
-            const pvid_fourier_signal *signal = &model->signal[i];
-            const float x = sample[signal->sample];
-            float *sums = &self->line[2u * i];
-            sums[0] +=
-                (self->needs == PVID_FOURIER_NEEDS_NEXT) ? held_signal(self, signal, x) : plain_signal(self, signal, x);
-            sums[1] += sums[0];
+    const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, model->signals);
+    const bool next = self->needs == PVID_FOURIER_NEEDS_NEXT;
+    if (!self->seen) {
+        begin(self, model->samples, sample);
+        if (next) {
+            self->wait++; /* the next sample is missing */
+            return;
         }
+    }
+    for (size_t i = 0; i < signals; i++) {
+        const pvid_fourier_signal *signal = &model->signal[i];
+        const float x = sample[signal->sample];
+        float *sums = &self->line[2u * i];
+        const float once = sums[0] + (next ? held_signal(self, signal, x) : plain_signal(self, signal, x));
+        sums[0] = once;
+        sums[1] += once;
     }
     if (self->needs != PVID_FOURIER_NEEDS_NOTHING) {
         remember(self, model->samples, sample);

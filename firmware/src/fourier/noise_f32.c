@@ -69,15 +69,15 @@ size_t pvid_fourier_noise_pairs_f32(const pvid_fourier_design_f32 *design, uint8
     return pairs;
 }
 
-void pvid_fourier_noise_begin_f32(const pvid_fourier_design_f32 *design, size_t first, size_t thetas,
-                                  pvid_fourier_slopes_f32 *slopes)
+void pvid_fourier_noise_list_f32(const pvid_fourier_design_f32 *design, size_t first, size_t thetas, size_t from,
+                                 size_t to, pvid_fourier_slopes_f32 *slopes)
 {
-    const pvid_model_f32 *model = design->model->model;
-    for (size_t row = 0; row < thetas; row++) {
+    const uint8_t *c_row = design->model->model->c_row;
+    for (size_t row = 0; (from == 0u) && (row < thetas); row++) {
         slopes->count[row] = 0;
     }
-    for (size_t k = 0; k < model->n_c; k++) {
-        const size_t row = (size_t)model->c_row[k] - first; /* beyond `thetas` also for a row before the kind's */
+    for (size_t k = from; k < to; k++) {
+        const size_t row = (size_t)c_row[k] - first; /* beyond `thetas` also for a row before the kind's */
         if ((row < thetas) && (slopes->count[row] < (uint8_t)PVID_MAX_P)) {
             slopes->place[row][slopes->count[row]] = (uint8_t)k;
             slopes->count[row]++;

@@ -15,9 +15,9 @@ void pvid_fourier_noise_shares_f32(const pvid_fourier_white_f32 *white, const pv
  */
 size_t pvid_fourier_noise_next_f32(const pvid_fourier_design_f32 *design, uint8_t kind, size_t place);
 
-/* The non-zeros of each row of the kind, whose `thetas` rows of C begin at `first`. */
-void pvid_fourier_noise_begin_f32(const pvid_fourier_design_f32 *design, size_t first, size_t thetas,
-                                  pvid_fourier_slopes_f32 *slopes);
+/* Lists the non-zeros from..to-1 of C by rows of the kind, whose `thetas` rows begin at `first`; from 0 on in order. */
+void pvid_fourier_noise_list_f32(const pvid_fourier_design_f32 *design, size_t first, size_t thetas, size_t from,
+                                 size_t to, pvid_fourier_slopes_f32 *slopes);
 
 /* Adds what this entry and those behind it of the same two columns add to C^T M C for each unit of the rows' weight: to
  * the upper triangle of s. rows: weight of a window. Returns the place behind them. */

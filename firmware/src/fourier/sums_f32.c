@@ -102,7 +102,7 @@ void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_d
     float (*sum)[2] = self->sum[self->target][h];
     const float (*last)[2] = (self->start == 0u) ? nothing : (const float (*)[2])sum;
     const float *x = self->block[self->filling ^ 1u][0];
-    PVID_UNROLL_BY_FOUR
+    PVID_UNROLL_BY_TWO
     for (size_t c = 0; c < channels; c++) {
         float even = x[CENTRE * PVID_MAX_CHANNELS];
         float odd = 0.0f;

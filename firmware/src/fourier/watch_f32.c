@@ -1,7 +1,7 @@
 #include "number/uncontracted.h"
 
-/* Every tick compares each sample with its range. A sample beyond it counts for the present step and for all later ones
- * that contain it.
+/* Every tick compares each sample with its range (fourier_front_f32.h). A sample beyond it counts for the present step
+ * and for all later ones that contain it.
  *
  * At every step each sample x adds x - r and (x - r)^2 to its half, r the half's first sample. With d = r_B - r_A the
  * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps
@@ -23,16 +23,6 @@ void pvid_fourier_watch_reset_f32(pvid_fourier_watch_f32 *self)
     self->beyond = 0;
     self->out[0] = false;
     self->out[1] = false;
-}
-
-void pvid_fourier_watch_sample_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[])
-{
-    for (size_t i = 0; i < samples; i++) {
-        const float limit = self->range[i];
-        if ((sample[i] > limit) || (sample[i] < -limit)) {
-            self->beyond = self->delay;
-        }
-    }
 }
 
 void pvid_fourier_watch_step_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[], size_t half,

@@ -13,9 +13,6 @@ void pvid_fourier_watch_init_f32(pvid_fourier_watch_f32 *self, const pvid_fourie
 /* Forgets samples beyond their ranges. */
 void pvid_fourier_watch_reset_f32(pvid_fourier_watch_f32 *self);
 
-/* Takes the samples of a tick; only if there are ranges. */
-void pvid_fourier_watch_sample_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[]);
-
 /* Takes a step of a half, at a tick with these samples. first: it is the half's first step. */
 void pvid_fourier_watch_step_f32(pvid_fourier_watch_f32 *self, size_t samples, const float sample[], size_t half,
                                  bool first);

@@ -204,12 +204,13 @@ static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estim
     }
 }
 
-/* Sets the alarm and renews the sums if they are stale. `settled`: the last step was small. */
+/* Sets the alarm and renews the sums if they are stale. `settled`: the last step was small; error: the largest relative
+ * standard error. */
 static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled, float variance_ratio,
-                        const pvid_estimate_f32 *candidate)
+                        float error, const pvid_estimate_f32 *candidate)
 {
     const bool agrees = all_rows_agree(self, estimator, candidate);
-    const bool errors_small = pvid_trust_largest_error_f32(estimator, candidate) <= SMALL_ERROR;
+    const bool errors_small = error <= SMALL_ERROR;
     const bool renewing = self->groups_to_fade > 0u;
     self->errors_small = errors_small;
     bool short_exceeds = false;
@@ -226,8 +227,8 @@ static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimato
     }
 }
 
-static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
-                           float size, bool above_noise, const pvid_estimate_f32 *candidate)
+static pvid_reason verdict(const pvid_trust_f32 *self, pvid_reason reason, float size, bool above_noise, float error,
+                           const pvid_estimate_f32 *candidate)
 {
     if (reason != PVID_UPDATED) {
         return reason;
@@ -236,7 +237,6 @@ static pvid_reason verdict(const pvid_trust_f32 *self, const pvid_estimator_f32 
         !(candidate->least_pivot >= self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    const float error = pvid_trust_largest_error_f32(estimator, candidate);
     const float small_enough = ARRIVED * error;
     const bool arrived = size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
     if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !arrived) {
@@ -253,8 +253,10 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
         return reason;
     }
     pvid_trust_count_uninformative(&self->uninformative, reason, pvid_trust_fallback_f32(self) != NULL);
-    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, candidate);
-    const pvid_reason judged = verdict(self, estimator, reason, size, above_noise, candidate);
+    const float error = pvid_trust_largest_error_f32(estimator, candidate);
+    const bool settled = (reason == PVID_UPDATED) && (size <= SETTLED_STEP);
+    raise_alarm(self, estimator, settled, variance_ratio, error, candidate);
+    const pvid_reason judged = verdict(self, reason, size, above_noise, error, candidate);
     if (judged == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);

@@ -91,31 +91,29 @@ static inline int32_t pvid_narrowed_q31(int64_t x, int32_t s)
     return pvid_shifted_down_q31(&down, x);
 }
 
-/* *out = x 2^-s rounded half up; returns whether that is within -2^bits..2^bits - 1, else *out is 0. |x| <= 2^62, s
+/* *out = x 2^-s rounded half up; returns whether that is within -2^bits..2^bits - 1, else *out is left. |x| <= 2^62, s
  * up to 62, bits 29 or 30. */
 static inline bool pvid_narrows_q31(int64_t x, uint32_t s, uint32_t bits, int32_t *out)
 {
-    if (s > PVID_SHIFT_DOWN_MOST) {
-        const int32_t high = (int32_t)pvid_floor_shift_q31(x + ((int64_t)1 << (s - 1u)), 32);
-        const int32_t y = pvid_floor_shift_32_q31(high, s - 32u);
-        const int32_t limit = (int32_t)((uint32_t)1 << bits);
-        const bool fits = (y >= -limit) && (y < limit);
-        *out = fits ? y : 0;
-        return fits;
+    if ((s > PVID_SHIFT_DOWN_LEAST) && (s <= PVID_SHIFT_DOWN_MOST)) {
+        const pvid_shift_down_q31 down = pvid_shift_down_by_q31(s);
+        const int32_t high = (int32_t)pvid_floor_shift_q31(x + down.half, 32);
+        const int32_t limit = (int32_t)((uint32_t)1 << ((s + bits) - 32u));
+        if ((high >= limit) || (high < -limit)) {
+            return false;
+        }
+        *out = pvid_shifted_down_q31(&down, x);
+        return true;
     }
-    if (s <= PVID_SHIFT_DOWN_LEAST) {
-        const int64_t y = pvid_round_shift_q31(x, s);
-        const int64_t limit = (int64_t)1 << bits;
-        const bool fits = (y >= -limit) && (y < limit);
-        *out = fits ? (int32_t)y : 0;
-        return fits;
+    const int64_t y = (s > PVID_SHIFT_DOWN_MOST)
+                          ? pvid_floor_shift_q31(pvid_floor_shift_q31(x + ((int64_t)1 << (s - 1u)), 32), s - 32u)
+                          : pvid_round_shift_q31(x, s);
+    const int64_t limit = (int64_t)1 << bits;
+    if ((y >= limit) || (y < -limit)) {
+        return false;
     }
-    const pvid_shift_down_q31 down = pvid_shift_down_by_q31(s);
-    const int32_t high = (int32_t)pvid_floor_shift_q31(x + down.half, 32);
-    const int32_t limit = (int32_t)((uint32_t)1 << ((s + bits) - 32u));
-    const bool fits = (high >= -limit) && (high < limit);
-    *out = fits ? pvid_shifted_down_q31(&down, x) : 0;
-    return fits;
+    *out = (int32_t)y;
+    return true;
 }
 
 /* x held within +-limit. */

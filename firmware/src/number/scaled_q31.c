@@ -5,7 +5,8 @@
 pvid_scaled_q31 pvid_scaled_of_q31(int64_t x, int32_t exponent)
 {
     const int32_t shift = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(x)) - DIGITS;
-    const pvid_scaled_q31 result = {pvid_narrowed_q31(x, shift), exponent + shift};
+    const int64_t m = (shift >= 0) ? pvid_round_shift_q31(x, (uint32_t)shift) : pvid_scale_q31(x, shift);
+    const pvid_scaled_q31 result = {(int32_t)m, exponent + shift};
     return result;
 }
 

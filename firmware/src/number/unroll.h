@@ -6,9 +6,11 @@
  * operations inside. */
 #if defined(__GNUC__) && (__GNUC__ >= 8) && !defined(__clang__)
 #define PVID_UNROLL _Pragma("GCC unroll 16")
+#define PVID_UNROLL_BY_TWO _Pragma("GCC unroll 2")
 #define PVID_UNROLL_BY_FOUR _Pragma("GCC unroll 4")
 #else
 #define PVID_UNROLL
+#define PVID_UNROLL_BY_TWO
 #define PVID_UNROLL_BY_FOUR
 #endif
 

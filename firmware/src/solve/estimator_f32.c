@@ -35,7 +35,8 @@ static bool model_is_valid(const pvid_model_f32 *model)
 {
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
-           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && ((PVID_EXACT == 0) || (model->n_p == PVID_MAX_P)) &&
+           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) &&
+           ((PVID_EXACT == 0) || ((model->n_p == PVID_MAX_P) && (model->project == NULL))) &&
            (model->n_p <= model->n_theta) && (model->n_gated <= model->n_p) && (model->n_c >= 1u) &&
            (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) && (model->n_moments >= 1u) &&
            (model->n_moments <= PVID_MAX_MOMENTS) && ((model->accumulate == NULL) == (model->project == NULL)) &&
@@ -138,8 +139,7 @@ pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], fl
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    return (self->settings.engine == PVID_ENGINE_DIRECT) ? take_row(self, n, y, false)
-                                                         : pvid_staged_add_f32(self, 0, n, y);
+    return pvid_is_direct_f32(self) ? take_row(self, n, y, false) : pvid_staged_add_f32(self, 0, n, y);
 }
 
 pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y)
@@ -152,8 +152,7 @@ pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, 
     if (!exists) {
         return PVID_NOT_READY;
     }
-    return (self->settings.engine == PVID_ENGINE_DIRECT) ? take_row(self, n, y, false)
-                                                         : pvid_staged_add_f32(self, kind, n, y);
+    return pvid_is_direct_f32(self) ? take_row(self, n, y, false) : pvid_staged_add_f32(self, kind, n, y);
 }
 
 pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[])
@@ -217,7 +216,7 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    if (self->settings.engine == PVID_ENGINE_DIRECT) {
+    if (pvid_is_direct_f32(self)) {
         return take_row(self, n, y, true);
     }
     const pvid_reason added = pvid_staged_add_f32(self, 0, n, y);
@@ -243,7 +242,7 @@ void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32
         memset(estimate, 0, sizeof *estimate);
         return;
     }
-    if (self->settings.engine == PVID_ENGINE_DIRECT) {
+    if (pvid_is_direct_f32(self)) {
         pvid_direct_assess_f32(self, estimate);
     } else {
         assess_in_stages(self, estimate);

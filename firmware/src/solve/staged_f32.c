@@ -316,7 +316,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
 {
     reset_solve(self, solve);
     solve->ends_group = ends_group;
-    if (self->settings.engine == PVID_ENGINE_DIRECT) {
+    if (pvid_is_direct_f32(self)) {
         solve->stage = STAGE_DIRECT;
     } else if (ends_group) {
         solve->group_rss = self->group_rss;
@@ -424,7 +424,9 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
         pvid_information_end_group_f32(&self->information);
         break;
     case STAGE_DIRECT:
-        solve->reason = pvid_direct_solve_f32(self, solve->ends_group);
+        if (pvid_is_direct_f32(self)) {
+            solve->reason = pvid_direct_solve_f32(self, solve->ends_group);
+        }
         break;
     default:
         return true;
@@ -484,7 +486,7 @@ static size_t projection_stages(const pvid_model_f32 *model)
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
 {
     const pvid_model_f32 *model = self->model;
-    if (self->settings.engine == PVID_ENGINE_DIRECT) {
+    if (pvid_is_direct_f32(self)) {
         return 1;
     }
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;

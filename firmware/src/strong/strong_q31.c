@@ -126,13 +126,19 @@ static pvid_reason refuse(pvid_strong_q31 *self)
     return PVID_REJECTED_SATURATED;
 }
 
+/* *out = x 2^-shift; whether that is within `bits`. */
+static inline bool acceleration(int64_t x, uint32_t shift, uint32_t bits, int32_t *out)
+{
+    return pvid_narrows_q31(x, shift, bits, out);
+}
+
 /* u[k] = y_A^(k+2)/l1; false where one is beyond the expected range. */
 static bool accelerations(const pvid_strong_q31 *self, const int32_t d_y[], int32_t u[])
 {
     bool within = true;
     for (size_t k = 0; within && (k < PVID_Y_ORDERS_Q31); k++) {
-        within = pvid_narrows_q31(pvid_product_q31(d_y[k], self->u_multiplier[k]), self->u_shift[k],
-                                  (k == 0u) ? RATE_LIMIT_BITS : DERIVATIVE_LIMIT_BITS, &u[k]);
+        within = acceleration(pvid_product_q31(d_y[k], self->u_multiplier[k]), self->u_shift[k],
+                              (k == 0u) ? RATE_LIMIT_BITS : DERIVATIVE_LIMIT_BITS, &u[k]);
     }
     return within;
 }

@@ -31,7 +31,7 @@ from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, samples_of
+from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, config_to_identify, samples_of
 from pvid.run.mechanism import model_of
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
@@ -69,8 +69,12 @@ class MechanismBoard:
     recording: npt.NDArray[np.float32]
 
     @classmethod
-    def of_recording(cls, rig: MechanismRig, recording: Recording) -> MechanismBoard:
+    def of_recording(cls, rig: MechanismRig, recording: Recording, to_identify: bool = False) -> MechanismBoard:
         """With the design and the tables that a recording of the rig asks for; the board's sensors read it.
+
+        Parameters
+        ----------
+        to_identify : as `identify` does: what is published is judged on this machine
 
         Raises
         ------
@@ -80,7 +84,7 @@ class MechanismBoard:
         compiled = model_of(rig)
         recording.refuse_damaged()
         whole = recording.whole()
-        config = config_for_recording(compiled, whole)
+        config = (config_to_identify if to_identify else config_for_recording)(compiled, whole)
         return cls(rig, compiled, config, samples_of(config, whole.signals))
 
     @classmethod
@@ -123,6 +127,14 @@ class MechanismBoard:
         return self.config.sample_rate
 
     @property
+    def _shared(self) -> FourierConfig:
+        """The settings of an image: neutral values for what a Configure frame brings."""
+        ones = np.ones(len(self.compiled.unknowns), np.float32)
+        neutral: dict[str, Any] = {**dict.fromkeys(_PER_PARAMETER, ones), "row_sd": 1.0, "forgetting_s": 0.0}
+        own = replace(self.config.estimator, feedback_hz=0.0, divider=1, law=Law.STATIONARY, **neutral)
+        return replace(self.config, estimator=own)
+
+    @property
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         model, design = self.config.design.model, self.config.design
@@ -132,7 +144,7 @@ class MechanismBoard:
             f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), _COMMAND),
             f"{made.name}_weak_f32.c": files_fourier.source(made, model, _COMMAND),
             "stream_tables.h": files_design.header(
-                self.config, sizes_of_design(design), _COMMAND, self.compiled.title, listed
+                self._shared, sizes_of_design(design), _COMMAND, self.compiled.title, listed
             ),
         }
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))

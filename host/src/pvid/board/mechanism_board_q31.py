@@ -32,6 +32,7 @@ from pvid.run.engine_design_q31 import (
     engine_for_recording,
     engine_for_simulated_rig,
     engine_of_parts,
+    engine_to_identify,
 )
 from pvid.run.mechanism import model_of
 from pvid.settings.fourier_q31 import (
@@ -72,11 +73,11 @@ class MechanismBoardQ31:
     recording: npt.NDArray[np.int32]
 
     @classmethod
-    def of_recording(cls, rig: MechanismRig, recording: Recording) -> MechanismBoardQ31:
+    def of_recording(cls, rig: MechanismRig, recording: Recording, to_identify: bool = False) -> MechanismBoardQ31:
         """As MechanismBoard.of_recording."""
         recording.refuse_damaged()
         whole = recording.whole()
-        engine = engine_for_recording(model_of(rig), whole)
+        engine = (engine_to_identify if to_identify else engine_for_recording)(model_of(rig), whole)
         return cls(rig, engine, engine.counts_of(whole.signals))
 
     @classmethod

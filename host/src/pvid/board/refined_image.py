@@ -55,20 +55,19 @@ def refined_run(name: str, ticks: int, **changes: object) -> RefinedRun:
 def settings_text(settings: RefineConfig, name: str) -> str:
     """The configuration in C: static const `name` and its tables."""
     signals = [
-        f"    {{{one.sample}u, {one.order}u, {int(one.source)}u, {float_literal(np.float32(one.scale))}, "
-        f"{float_literal(np.float32(one.range))}}},"
+        f"    {{{one.sample}u, {one.order}u, {int(one.source)}u, {_literal(one.scale)}, {_literal(one.range)}}},"
         for one in settings.signal
     ]
     second = [] if settings.second is None else [f"static const float {name}_second[] = {_row(settings.second)};"]
     fields = [
-        ("sample_rate_hz", float_literal(np.float32(settings.sample_rate))),
+        ("sample_rate_hz", _literal(settings.sample_rate)),
         ("ratio", str(settings.ratio)),
         ("second", f"{name}_second" if second else "NULL"),
         ("signal", f"{name}_signal"),
         *((one, str(getattr(settings, one))) for one in ("block", "first_block", "passes", "most_passes")),
         *((one, _row(getattr(settings, one))) for one in ("sd", "prior_sd", "gain_sd", "state_limit")),
         *(
-            (one, float_literal(getattr(settings, one)))
+            (one, _literal(getattr(settings, one)))
             for one in (
                 *("forgetting_s", "gate", "chi_max", "clash_max", "step_max", "step_limit"),
                 *("se_max", "distance"),
@@ -88,8 +87,12 @@ def settings_text(settings: RefineConfig, name: str) -> str:
     )
 
 
+def _literal(value: float) -> str:
+    return float_literal(np.float32(value))
+
+
 def _row(values: npt.ArrayLike | Sequence[float]) -> str:
-    return "{" + ", ".join(float_literal(np.float32(one)) for one in np.asarray(values)) + "}"
+    return "{" + ", ".join(_literal(float(one)) for one in np.asarray(values)) + "}"
 
 
 def header(run: RefinedRun, text: str) -> str:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.console import DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
@@ -27,7 +27,7 @@ from pvid.rig.run import Recording, is_run, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
-from pvid.settings.enums import Law
+from pvid.settings.enums import Core, Law
 
 if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
@@ -83,6 +83,7 @@ def identify_run(
     figure: Path | None,
     weights: Weights = "residuals",
     refine: bool = False,
+    on: str | None = None,
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
@@ -91,6 +92,7 @@ def identify_run(
     ----------
     weights : of the rows, as in pvid.oracle.fourier.identify
     refine : the equations are fitted to the whole run, from the answer on
+    on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = _model_of(rig).name
@@ -110,6 +112,8 @@ def identify_run(
     if refine and in_c:
         raise PvidError(f"--refine is in float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
+    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
+        return DIFFERENT
     answer = identify_mechanism(recording, model, weights)
     if refine:
         return _refined(answer, as_json=as_json, figure=figure)
@@ -120,7 +124,7 @@ def identify_run(
         core = identify_in_c(answer, in_c.name)
     shown = core or answer
     if as_json:
-        click.echo(json.dumps(shown.as_json()))
+        click.echo(json.dumps(shown.as_json() | ({} if on is None else {"on": on})))
     elif core is not None:
         _print_core(core)
     else:
@@ -178,6 +182,19 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
     return core
 
 
+def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core) -> bool:
+    """Streams a recording to a target and prints the account; whether every hash is that of this machine."""
+    from pvid.board.engine_board import verify_recording
+
+    own = described(rig) if isinstance(rig, RigFile) else rig
+    with progress_bar(f"streaming to {target}", len(recording)) as advance:
+        verdict = verify_recording(target, own, recording, core, advance)
+    write_stderr(f"{target}: {verdict.playback.account}")
+    if not verdict.equal:
+        write_stderr(f"pvid: {target}: {verdict.text}")
+    return verdict.equal
+
+
 def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> int:
     """Refines an answer and prints it."""
     from pvid.cli.result import write_refined_figure
@@ -200,26 +217,31 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
 
 
 def compare_recording(
-    path: Path, rig: MechanismRig | RigFile, columns: str | None, targets: Sequence[str] = (), **given: str | None
+    path: Path,
+    rig: MechanismRig | RigFile,
+    columns: str | None,
+    targets: Sequence[str] = (),
+    **given: str | None,
 ) -> list[Outcome]:
-    """The C core against its twin on a recording of a described mechanism, in float32 by default.
+    """The C core against its twin on a recording of a described mechanism, in float32 by default; then targets against
+    the C core.
 
     Parameters
     ----------
-    targets : emulated boards, for the strong form
+    targets : the recording is streamed to them; of the strong form emulated boards, which replay it
     given : options, by name; a value that the form does not have is refused
     """
+    from pvid.board.engine_board import verify_recording
     from pvid.run.mechanism_compare import compare_recording as compared
 
     if given.get("form") == _STRONG:
         return _compared_strong(path, rig, columns, targets, given)
+    own = described(rig) if isinstance(rig, RigFile) else rig
     name = _model_of(rig).name
-    given["on"] = targets[0] if targets else None
     for option, value in given.items():
         if value is not None and (option, value) not in _COMPARED:
             raise PvidError(
-                f"--{option} {value}: {name} is compared in float32 or fixed point by the weak form on this computer; "
-                f"omit --{option}"
+                f"--{option} {value}: {name} is compared in float32 or fixed point by the weak form; omit --{option}"
             )
     recording, model = recording_of(path, rig, columns)
     outcomes = []
@@ -229,6 +251,11 @@ def compare_recording(
             found = compared(model, recording, core, advance)
         verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
         outcomes.append(Outcome("host", core, "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict))
+        for target in targets:
+            with progress_bar(f"{core} on {target}", len(recording)) as advance:
+                there = verify_recording(target, own, recording, core, advance)
+            ticks, last = there.playback.done, there.playback.hash
+            outcomes.append(Outcome(target, core, "weak", "stationary", ticks, last, there.equal, there.text))
     return outcomes
 
 

@@ -40,7 +40,7 @@ def sources_of(core: str) -> list[Path]:
 def left_out(form: str, core: str, *also: str) -> str:
     """PVID_LEAVE_OUT of an image with a form's identifier: a regular expression of what it does not link.
 
-    `also` are rooms that it links besides.
+    `also`: further rooms that it links.
     """
     rooms = "|".join(room for room in _FORMS if room not in (form, *also))
     cores = "|".join(other for other in _CORES if other != f"_{core}")

@@ -3,8 +3,8 @@
 All orders come out in one format in one time unit tau = 2^tau_bits points: one unit of order k is
 2^-bits / denominator counts per tau^k. Products of derivatives whose orders add up to the same then need no alignment.
 
-With a block of samples each point is their sum, which is exact and up to `block` times full scale; the denominator makes
-it the mean that the design in float64 means.
+With a block of samples each point is their sum, which is exact and up to `block` times full scale; the denominator
+makes it the mean that the design in float64 means.
 """
 
 from __future__ import annotations

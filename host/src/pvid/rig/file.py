@@ -124,7 +124,7 @@ class Identifier:
     differentiator : filters of the strong form
     degree : strong form: degree of the Savitzky-Golay polynomial
     stride : strong form: samples between the points of the differentiator; with a block at least its length
-    block : strong form, float32, Savitzky-Golay: odd number of samples whose mean is a point; a window of window_s then
+    block : strong form, Savitzky-Golay: odd number of samples whose mean is a point; a window of window_s then
         takes the time of window_s / block points, with 2 % (phi) to 14 % (its fourth derivative) more noise
     test_functions : weak form: modulating functions per window, at least 4; 0: 8 to 16, up to 1.5 times the nominal
         fast mode

@@ -67,10 +67,6 @@ def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
 
 def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
     """The strong form's formats of a rig file."""
-    if rig.identifier.block > 1:
-        raise PvidError(
-            "[identifier] block: the fixed-point core takes every sample as a point; omit it, or raise stride"
-        )
     sensor = _counting(rig)
     w, d1, d2 = nominal_start(rig)
     mode = math.sqrt(w * (d1 + math.sqrt(max(d1**2 - 4 * d2, 0.0))) / 2)  # the faster one of the nominal mechanism

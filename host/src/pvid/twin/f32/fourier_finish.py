@@ -24,7 +24,7 @@ Stages = Iterator[Reasons | None]
 
 _F = np.float32
 _ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 30, 4
-_PAIRS_PER_STAGE, _BOTH_FAMILIES = 1, 16
+_NONZEROS_PER_STAGE, _PAIRS_PER_STAGE, _BOTH_FAMILIES = 8, 1, 16
 _GATE_MEMORY = _F(4)
 _VARIANCE_MAX = _F(1e36)
 
@@ -70,7 +70,9 @@ class Finish:
         residual = _parts(self.design.functions, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
         squares = _parts(own.thetas, self._products)
         basis = 2 * self.design.power + self._stages_of_share
-        noise = 2 + _parts(len(pairs_of(self.design, kind)), _PAIRS_PER_STAGE) if self._checks_noise else 1
+        listed = _parts(len(self.estimator.model.c_row), _NONZEROS_PER_STAGE)
+        pairs = _parts(len(pairs_of(self.design, kind)), _PAIRS_PER_STAGE)
+        noise = 1 + listed + pairs if self._checks_noise else 1
         reflect = 1 if self.design.functions <= _BOTH_FAMILIES else 2
         terms = [one.column for one in self.design.model.terms_of(kind)]
         gather = sum(max(1, terms.count(column)) for column in range(own.columns))

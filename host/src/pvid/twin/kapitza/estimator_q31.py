@@ -100,18 +100,20 @@ class _System:
         near = bit_length(np.abs(beyond)) <= DELTA_BITS
         self.time = np.zeros_like(beyond)
         self._scale(sums, lengths)
-        m = self._shifted(self._mantissas(sums), np.where(near, beyond, 0) << (30 - W_BITS))
+        d = np.where(near, beyond, 0) << (30 - W_BITS)
+        m = self._shifted(self._mantissas(sums), d)
         far = ~near | (m["k22"][2] < _FEW) | (m["k00"][2] < _FEW)
         if far.any():
             before = self.time, self.scale_x, self.scale_z, self.scale_a, self.of_x, self.of_z
-            own = self._shifted_far(sums, beyond, lengths)
+            own, d_far = self._shifted_far(sums, beyond, lengths)
+            d = np.where(far, d_far, d)
             m = {name: np.where(far, own[name], values) for name, values in m.items()}
             now = self.time, self.scale_x, self.scale_z, self.scale_a, self.of_x, self.of_z
             chosen = (np.where(far, b, a) for a, b in zip(before, now, strict=True))
             self.time, self.scale_x, self.scale_z, self.scale_a, self.of_x, self.of_z = chosen
         d1 = np.minimum(_moved(p[D1], self.of_x - bits[0] + 30), ONE // 6)
         d2 = np.minimum(_moved(p[D2], self.of_z - bits[1] + 30), ONE // 8)
-        self._combine(m, round_shift(beyond << (30 - W_BITS), self.time), d1, d2)
+        self._combine(m, d, d1, d2)
 
     def _scale(self, sums: Int, lengths: tuple[Int, Int]) -> None:
         self.scale_x = np.maximum(_half_beyond(sums[_XX + 6]), _half_beyond(sums[_XX]))
@@ -126,8 +128,8 @@ class _System:
         self.of_x = self.scale_x + t - self.scale_a
         self.of_z = self.scale_z + 2 * t - self.scale_a
 
-    def _shifted_far(self, sums: Int, beyond: Int, lengths: tuple[Int, Int]) -> dict[str, Int]:
-        """The shift in 64 bits, and its scales."""
+    def _shifted_far(self, sums: Int, beyond: Int, lengths: tuple[Int, Int]) -> tuple[dict[str, Int], Int]:
+        """The shift in 64 bits, its scales, and d in their time unit."""
         t = np.maximum(bit_length(np.abs(beyond)) - W_BITS, 0)
         d = clamp(round_shift(beyond << (31 - W_BITS), t), 2**31 - 1)
 
@@ -157,7 +159,8 @@ class _System:
         alone = dict(zip(("aa", "ae", "ee", "ya", "ye"), out[:5], strict=True))
         pairs = {f"{one}2": out[[_AX + 4 * k + 1, _AX + 4 * k]] for k, one in enumerate("aey")}
         pairs |= {f"{one}0": out[[_AZ + 5 * k + 1, _AZ + 5 * k]] for k, one in enumerate("aey")}
-        return alone | pairs | {name: out[[at + 2, at + 1, at]] for name, at in _TRIPLES.items()}
+        triples = {name: out[[at + 2, at + 1, at]] for name, at in _TRIPLES.items()}
+        return alone | pairs | triples, round_shift(d, far + 1)
 
     @staticmethod
     def _shift_64(m: Int, at: int, count: int, d: Int) -> None:
@@ -265,12 +268,12 @@ class _Factor:
         self._invert(D2, diagonal(s22, D2))
         self.l02, self.l12 = self._entry(D2, q02), self._entry(D2, q12)
         p1 = q11 - _by_l(self.l12, q12)
-        self.ok = positive & (p1 >= q11 >> PIVOT_SHIFT)
+        self.ok = positive & (p1 > q11 >> PIVOT_SHIFT)
         self._invert(D1, np.where(self.ok, p1, ONE))
         c01 = clamp(q01 - _by_l(self.l02, q12), ONE)
         self.l01 = self._entry(D1, c01)
-        self.p0 = self.s00 - _by_l(self.l02, q02) - _by_l(self.l01, c01)
-        self.ok = self.ok & (self.p0 >= self.s00 >> PIVOT_SHIFT)
+        self.p0 = np.minimum(self.s00 - _by_l(self.l02, q02) - _by_l(self.l01, c01), ONE)
+        self.ok = self.ok & (self.p0 > self.s00 >> PIVOT_SHIFT)
         self._invert(W, np.where(self.ok, self.p0, ONE))
 
     def _invert(self, a: int, pivot: Int) -> None:
@@ -285,7 +288,7 @@ class _Factor:
         return _by_l(x, self.inverse[a])
 
     def _entry(self, a: int, x: Int) -> Int:
-        most = np.int64(ONE) >> self.up[a]
+        most = np.int64(ONE - 1) >> self.up[a]
         limited = np.minimum(np.maximum(self._over(a, x), -most), most)
         return np.asarray(limited << self.up[a])
 
@@ -496,7 +499,7 @@ class KapitzaEstimatorQ31:
                 moment = self.sums[place[frozenset((i, j))]]
                 known = known + times_q31(round_shift(moment, _GUARD_BITS), theta[j])
             of_y = round_shift(self.sums[place[frozenset((Y, i))]], exponent + _GUARD_BITS)
-            residual = residual + times_q31(clamp(known - 2 * of_y, WIDE), theta[i])
+            residual = residual + times_q31(clamp(known - 2 * of_y, WIDE // 8), theta[i])
         return np.maximum(scale(clamp(residual, WIDE), -(2 * exponent + _GUARD_BITS)), 0)
 
     def _variance(self) -> Scaled:
