@@ -24,6 +24,7 @@ from pvid.run.mechanism_core import CoreAnswer, identify_in_c
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Reason
 
+_EXPLAINED = 0.97  # R^2 of each row kind: below, the equations do not fit the run
 _FARTHEST = 20.0  # times the guess: what lies beyond is no start
 
 
@@ -158,7 +159,7 @@ def _identification(run: Run, rig: RigFile, answer: MechanismAnswer, core: _Core
     parts = parts_of(noise, p, rig) if core.published else {}
     status = core.reason.text
     if not core.published:
-        status = _why_not(run, rig, core.reason)
+        status = _why_not(run, rig, core.reason, min(found.r2.values()))
     end = core.publications.t if len(core.publications.t) else core.t
     n_mapped = slice(0, n)
     published = core.publications
@@ -170,7 +171,7 @@ def _identification(run: Run, rig: RigFile, answer: MechanismAnswer, core: _Core
         kappa=_own_share(found.covariance),
         trusted_s=float(end[-1]) if core.published else None,
         first_publication_s=float(end[0]) if core.published else None,
-        chi2=core.chi2,
+        chi2=core.chi2 if core.published else None,
         alarm=False,
         doubts=core.doubts if core.published else (),
         remarks=core.remarks,
@@ -200,11 +201,11 @@ def _start(rig: RigFile, answer: MechanismAnswer) -> Float:
     return found if near and model.is_plausible(found) else guess
 
 
-def _why_not(run: Run, rig: RigFile, reason: Reason) -> str:
+def _why_not(run: Run, rig: RigFile, reason: Reason, r2: float) -> str:
     """The status of a run that is not identified."""
     if reason in (Reason.UPDATED, Reason.MISFIT):  # the analysis refused it
         reason = Reason.HELD_UNCERTAIN
-    if reason == Reason.HELD_NOT_EXCITED:
+    if reason == Reason.HELD_NOT_EXCITED or not r2 > _EXPLAINED:
         try:
             if not excitation_of(run, rig).weak:
                 return UNEXPLAINED
