@@ -240,7 +240,7 @@ PROOFS = (
     ),
     Proof(
         "kapitza_project_q31",
-        "the strong form's normal equations: any sums within 2^61, any p and formats, near the reference and far",
+        "the strong form's normal equations: any sums within 2^61, any p and formats, near the reference and far off",
         ("src/number/integer_q31.c",),
         ("-eva-min-loop-unroll", "60", "-eva-slevel-function", "pvid_kapitza_project_q31:20,main:20"),
         taken=("pvid_scale_q31", "pvid_bit_length_q31", "take_mantissas", "take_64", "as_part"),
@@ -288,8 +288,8 @@ PROOFS = (
             r"function pvid_cholesky_eliminate_q31: precondition self->positive",
             r"function pvid_cholesky_least_pivot_q31: precondition",
         ),
-        why="that a factor which is positive so far has its rows and pivots: joined paths forget which of both holds. "
-        "`estimator_assess_q31` keeps them apart in the same functions",
+        why="that a factor which is positive so far has its rows and pivots: joined paths forget which of the two "
+        "holds. `estimator_assess_q31` keeps them apart in the same functions",
     ),
     Proof(
         "kapitza_physical_q31",

@@ -11,7 +11,7 @@ from campaign_rigs import RIG
 
 from bench.campaign import judge as judging
 from bench.campaign import table
-from bench.campaign.judge import COLUMNS, Judgement, Record, identify_by_engine, identify_rig, judge
+from bench.campaign.judge import COLUMNS, Judgement, Record, identify_rig, judge
 from bench.campaign.population import shipped
 from bench.campaign.truth import SimulatedRig, rig_file, simulate_rig
 from pvid.base.errors import PvidError
@@ -128,67 +128,63 @@ def test_publications_are_counted_over_the_whole_run() -> None:
     assert (record["publications_right"], record["publications_right_alarmed"]) == (3, 1)
 
 
-def test_publications_of_a_run_end_in_its_answer(native: Native) -> None:
+def test_publications_of_a_run_end_in_the_answer_of_the_weak_form(native: Native) -> None:
     from pvid.sim.pendulum import simulate
 
-    run = simulate(duration=15.0, seed=2).run
-    rig = replace(simulated(), run=run)
+    rig = replace(simulated(), run=simulate(duration=15.0, truth="full", seed=2).run)
     cores: tuple[Core, ...] = ("f32", "q31")
     for core in cores:
-        record, result = identify_rig(native, rig, core)
+        record, result = identify_rig(native, rig, core, refine=False)
         assert result is not None and result.identified
         publications = result.publications
-        assert len(publications.t) == record["publications"]
-        assert len(publications.t) > 10
-        assert publications.t[-1] == result.trusted_s
+        assert len(publications.t) == record["publications"] and len(publications.t) > 5
+        assert record["publications_wrong"] == 0 and not record["warned"]
+        assert publications.t[-1] == result.trusted_s <= rig.run.t[-1]
         for at, name in enumerate(NAMES):
             assert publications.p[-1, at] == result.value[name]
-            # the verdict over the whole run (pvid.run.verdict) can only widen the standard errors
-            assert publications.se[-1, at] <= result.se[name] * (1 + 1e-5)
 
 
-def test_the_weak_engine_answers_a_rig_and_is_judged_like_the_own_form() -> None:
-    """The standard rig with full equations: small angles bias it by less than the standard errors contain."""
+def test_the_weak_form_answers_the_standard_rig_and_the_refinement_sharpens_it(native: Native) -> None:
+    """Full equations: small angles bias the weak form by less than its standard errors contain."""
     from pvid.sim.pendulum import simulate
 
-    rig = replace(simulated(), run=simulate(duration=15.0, seed=2).run)
-    record, result = identify_by_engine(rig)
-    assert result is not None and result.publications.t[-1] <= rig.run.t[-1]
-    assert flags(record) >= {"published", "answered", "within_5"} and not record["warned"]
-    assert len(result.publications.t) == record["publications"]
+    rig = replace(simulated(), run=simulate(duration=15.0, truth="full", seed=2).run)
+    weak, _ = identify_rig(native, rig, refine=False)
+    record, result = identify_rig(native, rig)
+    assert flags(weak) >= {"published", "answered", "within_5"} and not weak["warned"]
+    assert result is not None and result.refinement.adopted
+    assert flags(record) >= {"published", "answered", "within_1", "right"} and not record["warned"]
     for name in NAMES:
-        assert record[name] == result.values[name].value
-    assert record["publications_wrong"] == 0
+        assert 0 < float(str(record[f"{name}_se"])) < float(str(weak[f"{name}_se"]))
 
 
-def test_a_rig_at_200_hz_and_one_of_5_seconds_are_answered_by_the_engine(native: Native) -> None:
+def test_a_rig_at_200_hz_and_one_of_5_seconds_are_answered(native: Native) -> None:
     """The first was 1.5 % off behind filters that blurred its pivot, the second lost its way from its guess."""
-    slow, _ = identify_by_engine(simulate_rig(native, shipped(), 1, 8))
+    slow, _ = identify_rig(native, simulate_rig(native, shipped(), 1, 8), refine=False)
     assert slow["answered"] and slow["within_1"] and not slow["silently_wrong"]
-    short, _ = identify_by_engine(simulate_rig(native, shipped(), 1, 45))
+    short, _ = identify_rig(native, simulate_rig(native, shipped(), 1, 45), refine=False)
     assert short["answered"] and not short["silently_wrong"]
 
 
-def test_a_run_that_the_engine_does_not_answer_is_a_record() -> None:
-    still = simulated()
-    record, result = identify_by_engine(still)
+def test_a_run_that_is_refused_is_a_record(native: Native) -> None:
+    record, result = identify_rig(native, simulated())
     assert result is None and "same value in all 100 samples" in str(record["reason"])
 
 
 def test_a_refusal_is_a_record_with_its_sentence(native: Native, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
+    def refuse(*_: object, **__: object) -> None:
         raise PvidError("the run has 100 samples")
 
-    monkeypatch.setattr(judging, "identify", refuse)
+    monkeypatch.setattr(judging, "answered", refuse)
     record, result = identify_rig(native, simulated())
     assert result is None and record["reason"] == "the run has 100 samples" and not record["crashed"]
 
 
 def test_a_crash_is_recorded_as_one(native: Native, monkeypatch: pytest.MonkeyPatch) -> None:
-    def crash(*_: object) -> None:
+    def crash(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by the way")
 
-    monkeypatch.setattr(judging, "identify", crash)
+    monkeypatch.setattr(judging, "answered", crash)
     record, _ = identify_rig(native, simulated())
     assert record["crashed"] and record["reason"] == "ZeroDivisionError: by the way"
     assert "CRASHED 1" in table.summary([record])
@@ -251,20 +247,11 @@ def test_reasons_that_differ_in_numbers_are_one() -> None:
     ]
 
 
-def test_refusals_of_tune_are_recorded(native: Native, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
-        raise PvidError("nothing can be tuned")
-
-    monkeypatch.setattr("pvid.run.tune.tune", refuse)
-    record, _ = identify_rig(native, simulated(), tuned=True)
-    assert record["reason"] == "nothing can be tuned"
-
-
 def test_a_rig_with_viscous_friction_is_answered_by_the_refinement() -> None:
     """The campaign in its short form: a rig of the shipped population that the weak form alone does not answer."""
     native = Native()
     rig = simulate_rig(native, shipped(), 33, 30)
-    record, result = identify_rig(native, rig, refine=True)
+    record, result = identify_rig(native, rig)
     assert rig.rig.condition == "damp" and record["suffices"]
     assert result is not None and result.refinement.adopted
     assert record["published"] and record["answered"] and not record["silently_wrong"]

@@ -130,7 +130,7 @@ def test_records_of_other_settings_are_left_out(tmp_path: Path) -> None:
     others = [
         Campaign(population, 3, seed=2),
         Campaign(population, 3, core="q31"),
-        Campaign(population, 3, tuned=True),
+        Campaign(population, 3, refine=False),
         Campaign(parse(SMALL + "share = 2\n"), 3),
     ]
     keys = {campaign.key for campaign in (first, *others)}

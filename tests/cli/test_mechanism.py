@@ -98,7 +98,7 @@ def test_settings_reach_the_model(motor: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("--on", "cortex-m4f"), "--on cortex-m4f: dc_motor is identified in float64"),
+        (("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is identified in float64"),
         (("--model", "dc_moter"), "dc_moter: no such model; give a .py file or one of battery_2rc"),
     ],
 )

@@ -17,6 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.cli.mechanism import recording_of
 from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.engine_design import config_to_identify
 from pvid.run.mechanism import identify_mechanism
@@ -129,7 +130,6 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     [
         ("identify", ("--law", "stationary"), "--law stationary: dc_motor is identified in float64, or in C by"),
         ("identify", ("--core", "f32", "--form", "strong"), "--form strong: dc_motor is identified in float64"),
-        ("compare", ("--on", "stream-host"), "--on stream-host: dc_motor is compared in float32"),
         ("compare", ("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is compared in float32"),
     ],
 )
@@ -150,21 +150,44 @@ def test_without_a_compiler_there_is_one_sentence(
         pvid("identify", recorded["rigid_body"], "--core", "f32")
 
 
-def test_the_pendulum_s_own_rig_file_goes_through_the_engine(tmp_path: Path) -> None:
-    """--form fourier: columns, resolution, guess and gains come from the rig file, and the keys stay."""
+def test_the_pendulum_s_own_rig_file_goes_through_the_engine_and_the_refinement(tmp_path: Path) -> None:
+    """Columns, resolution, guess and gains come from the rig file."""
     run = tmp_path / "run.csv"
     assert pvid("simulate", run, "--duration", "15", "--seed", "2").return_value == DONE
-    engine = json.loads(pvid("identify", run, "--form", "fourier", "--json").stdout)
+    weak = json.loads(pvid("identify", run, "--no-refine", "--json").stdout)
     own = json.loads(pvid("identify", run, "--json").stdout)
-    assert engine["identified"] and engine["core"] == "f32" and engine["samples"] == own["ticks"] == 15_000
-    assert list(engine["parameters"]) == list(own["parameters"]) == ["g", "l2", "rho2", "w", "d1", "d2", "c"]
-    for name, one in engine["parameters"].items():
-        assert engine[name] == one and one["unit"] == own[name]["unit"]
+    assert weak["identified"] and weak["core"] == "f32" and weak["ticks"] == own["ticks"] == 15_000
+    assert weak["hash"] == own["hash"] and "refinement" not in weak and own["refinement"]["adopted"]
+    assert list(weak["parameters"]) == list(own["parameters"]) == ["g", "l2", "rho2", "w", "d1", "d2", "c"]
+    for name, one in weak["parameters"].items():
+        assert weak[name] == one and one["unit"] == own[name]["unit"]
         apart = abs(one["value"] - own[name]["value"])
         assert apart < 3 * np.hypot(one["se"], own[name]["se"]), name
     # Small angles are neglected: the largest is about 0.1 rad.
-    assert 0.003 < engine["w"]["se"] / engine["w"]["value"] < 0.02
-    assert pvid("compare", run, "--form", "fourier").return_value == DONE
+    assert 0.003 < weak["w"]["se"] / weak["w"]["value"] < 0.02
+    assert own["w"]["se"] < 0.1 * weak["w"]["se"]
+    assert pvid("compare", run).return_value == DONE
+    assert "window s" in pvid("tune", run).stdout
+    design = json.loads(pvid("design", "--run", run, "--json").stdout)
+    assert design["identified"] and set(design["parameters"]) == {"w", "d1", "d2", "c"}
+
+
+def test_design_predicts_the_errors_of_a_rig_file_s_pendulum_for_a_drive(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    RigFile.standard().write(rig)
+
+    def errors(*arguments: str) -> dict[str, float]:
+        found = json.loads(pvid("design", "--rig", rig, "--json", *arguments).stdout)
+        return {name: one["se"] / one["value"] for name, one in found["parameters"].items() if name != "c"}
+
+    short, long = errors("--duration", "10"), errors("--duration", "40")
+    assert all(0 < long[name] < short[name] < 0.5 for name in long)
+    with pytest.raises(PvidError, match="positive number of seconds, not -1"):
+        pvid("design", "--rig", rig, "--duration", "-1")
+    with pytest.raises(PvidError, match="--run contains the drive"):
+        pvid("design", "--rig", rig, "--run", "x.csv", "--tone", "0.005,2,0")
+    with pytest.raises(PvidError, match="phi_lsb is 0"):
+        pvid("design", "--rig", rig, "--set", "sensor.phi_lsb=0.0")
 
 
 def test_design_and_tune_show_the_engine_s_design_for_a_recording(recorded: dict[str, Path]) -> None:
@@ -194,7 +217,6 @@ def test_design_of_a_shipped_rig_needs_no_run() -> None:
             ("design", "--model", "rigid_body", "--duration", "5"),
             "--tone, --release and --duration are for the pendulum",
         ),
-        (("tune", "{run}", "-o", "x.toml"), "-o: nothing is written for a described mechanism"),
     ],
 )
 def test_options_of_the_pendulum_s_design_are_refused(

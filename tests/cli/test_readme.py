@@ -123,7 +123,8 @@ def test_commands_and_options_exist() -> None:
             found = command.get_command(context, words[0])
             assert found is not None, f"{page}: {' '.join(words)}"
             command, words = found, words[1:]
-        known = {option for parameter in command.params for option in parameter.opts} | {"--help"}
+        names = [[*parameter.opts, *parameter.secondary_opts] for parameter in command.params]
+        known = {option for some in names for option in some} | {"--help"}
         asked = {word.split("=")[0] for word in words if word.startswith("--")}
         assert asked <= known, f"{page}: {' '.join(words)}"
 

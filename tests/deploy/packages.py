@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
+
+from pvid.core.host_compiler import compiled_once
 
 STUBS = Path(__file__).with_name("stubs")
 
 
-def run(*command: str | Path, cwd: Path | None = None) -> str:
+def run(*command: str | Path, cwd: Path | None = None, env: Mapping[str, str] | None = None) -> str:
     """Standard output of a command that must succeed."""
-    done = subprocess.run([str(one) for one in command], cwd=cwd, capture_output=True, text=True, check=False)
+    done = subprocess.run([str(one) for one in command], cwd=cwd, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
     return done.stdout
 
 
 def built(source: Path, tree: Path, *options: str) -> Path:
-    """Configures and builds a CMake project."""
-    run("cmake", "-S", source, "-B", tree, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug", *options)
-    run("ninja", "-C", tree)
+    """Configures and builds a CMake project; `source` and `tree` are in one folder, and objects are compiled once for
+    all such folders."""
+    launcher = ["-DCMAKE_C_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
+    run("cmake", "-S", source, "-B", tree, "-G", "Ninja", *launcher, *options)
+    run("ninja", "-C", tree, env={**compiled_once(), "CCACHE_BASEDIR": str(tree.parent)})
     return tree

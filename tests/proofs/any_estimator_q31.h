@@ -158,6 +158,10 @@ static inline void any_state(const pvid_model_q31 *model, pvid_estimator_q31 *se
         self->noise[i].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
         self->noise[i].e = any_i32(-2000, 2000);
     }
+    self->noise_rows = (uint16_t)any_u32(0, UINT16_MAX);
+    for (size_t i = 0; i < sizeof self->noise_table / sizeof self->noise_table[0]; i++) {
+        self->noise_table[i] = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30 + 2047);
+    }
     self->group_rss = any_i64(0, PVID_WIDE);
     self->group_weight = any_i64(0, PVID_WIDE);
     self->expected.m = any_i32(0, PVID_ONE_Q30);

@@ -60,3 +60,11 @@ def test_they_belong_to_the_folder_of_a_model(files: dict[str, str]) -> None:
     target = re.search(r"add_library\(rigid_body STATIC (.*)\)", whole["CMakeLists.txt"])
     assert target is not None and "weak" not in target[1]  # an option: its library needs larger arrays
     assert "target_sources(rigid_body PRIVATE rigid_body_weak_q31.c)" in whole["CMakeLists.txt"]
+
+
+def test_a_measured_drive_has_a_least_deviation_in_counts() -> None:
+    """That of float32, of the pendulum's pivot alone: its angle may stand still."""
+    config = engine_for_simulated_rig(compiled_of("kapitza")).config
+    assert config.drive_min is not None
+    y, phi = config.drive_min
+    assert y > 0 and phi == 0

@@ -21,7 +21,7 @@ from pvid.log.values import Values
 from pvid.models.kapitza.modes import modes_hz
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run, write_run
-from pvid.run.identify import identify
+from pvid.run.advised import answered
 from pvid.run.residuals import Residuals, residuals_of
 from pvid.show import report
 from pvid.show.report import recording_of, write_report
@@ -223,7 +223,7 @@ def test_a_report_and_identify_give_the_same_estimate(native: Native, tmp_path: 
     write_run(tmp_path / "run.csv", run)
     recording, result = (
         recording_of(tmp_path / "run.csv", RigFile.standard()),
-        identify(run, RigFile.standard(), native),
+        answered(run, RigFile.standard(), native),
     )
     assert recording.estimate == {name: (result.value[name], result.se[name]) for name in result.value}
 

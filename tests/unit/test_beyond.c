@@ -86,15 +86,16 @@ static bool row_fits(const pvid_strong_row_q31 *format, const int32_t given[4], 
     return pvid_kapitza_strong_row_q31(format, phi, u, row);
 }
 
-/* That this is the largest of one of them, the others 0, with which a row fits. */
+/* That a row fits below this size of one of them, the others 0, and not above it: entries are within -2^28..2^28 - 1.
+ */
 static void assert_largest(const pvid_strong_row_q31 *format, size_t which, int32_t largest, int32_t u0, int32_t u1,
                            int32_t u2)
 {
     for (int32_t sign = -1; sign <= 1; sign += 2) {
         int32_t given[4] = {0};
-        given[which] = sign * largest;
+        given[which] = sign * (largest - 1);
         assert_true(row_fits(format, given, u0, u1, u2));
-        given[which] += sign;
+        given[which] += 2 * sign;
         assert_false(row_fits(format, given, u0, u1, u2));
     }
 }
@@ -132,7 +133,7 @@ static void each_part_of_a_row_may_be_too_large(void **state)
     const int32_t bracket[4] = {0, (1 << 25) + 1, 0, 1 << 25};
     assert_false(row_fits(&coarse, bracket, 32, 0, 64)); /* 2^31 + 64 - 2^30; without u phi4 it is 64 */
     coarse.phi_shift[3] = -31;
-    const int32_t phi3[4] = {0, 0, 1 << 30, 0};
+    const int32_t phi3[4] = {0, 0, (1 << 30) - 1, 0};
     assert_true(row_fits(&coarse, phi3, 0, 0, 0));
     coarse.phi3 = 1518500250; /* 2^30.5 */
     assert_false(row_fits(&coarse, phi3, 0, 0, 0));
@@ -149,9 +150,12 @@ static void a_shifted_derivative_may_be_too_large(void **state)
         format.phi_shift[order[which]] = 4;
         assert_largest(&format, which, limit / 16, 0, 0, 0);
         format.phi_shift[order[which]] = 31;
-        assert_largest(&format, which, 0, 0, 0, 0);
+        int32_t one[4] = {0};
+        assert_true(row_fits(&format, one, 0, 0, 0));
+        one[which] = 1;
+        assert_false(row_fits(&format, one, 0, 0, 0));
         format.phi_shift[order[which]] = -1;
-        const int32_t largest = (which == PHI2) ? (limit - 1) : (2 * limit);
+        const int32_t largest = (which == PHI2) ? (limit - 1) : ((2 * limit) - 2);
         format.finer[0] = (which == PHI2) ? 1 : 0; /* as fine as before */
         int32_t given[4] = {0};
         given[which] = largest;

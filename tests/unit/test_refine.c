@@ -237,7 +237,8 @@ static void test_sine_and_cosine(void **state)
 /* ---- init ---- */
 
 static const float second[PVID_REFINE_HALF + 1] = {-2.0f, 1.0f};
-static const pvid_refine_signal_f32 signals[2] = {{1, 2, 3.3f, 100.0f}, {0, 0, 1.0f, 1.0f}};
+static const pvid_refine_signal_f32 signals[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 3.3f, 100.0f},
+                                                  {0, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
 
 static pvid_refine_config_f32 good(void)
 {
@@ -285,8 +286,10 @@ static void test_init_refuses(void **state)
 {
     (void)state;
     const float nan = pvid_from_bits_f32(0x7FC00000u);
-    static const pvid_refine_signal_f32 derived_output[2] = {{1, 2, 3.3f, 100.0f}, {0, 2, 1.0f, 1.0f}};
-    static const pvid_refine_signal_f32 no_range[2] = {{1, 2, 3.3f, 0.0f}, {0, 0, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 derived_output[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 3.3f, 100.0f},
+                                                             {0, 2, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 no_range[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 3.3f, 0.0f},
+                                                       {0, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
     REFUSES(sample_rate_hz, nan, PVID_BAD_SAMPLE_RATE);
     REFUSES(ratio, 0, PVID_BAD_DECIMATION);
     REFUSES(second, NULL, PVID_BAD_DESIGN);

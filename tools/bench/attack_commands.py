@@ -56,7 +56,7 @@ _COMMANDS: dict[str, tuple[int, tuple[str, ...], dict[str, tuple[str, ...]]]] = 
         {**_READ, "--law": _CHOICES, "--form": _CHOICES, "--core": _CHOICES, "--json": _FLAG, "--figure": _NAME},
     ),
     "compare": (1, _NAME, {**_READ, "--law": _CHOICES, "--form": _CHOICES, "--core": _CHOICES, "--on": _PORTS}),
-    "tune": (1, _NAME, {**_READ, "--out": _NAME}),
+    "tune": (1, _NAME, _READ),
     "design": (
         0,
         (),

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.page_table import UPDATE, markdown, put_table
@@ -73,7 +72,6 @@ TABLES = (
     ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
     ("pendulum", "pendulum", "The pendulum through the weak engine, beside its own weak form: errors over 80 seeds."),
     ("refine", "refine", "The refinement behind the weak form: errors beside the Cramer-Rao bound, 80 seeds."),
-    ("tune", "tuning", "Errors against the truth with the default settings and with those that `tune` picks."),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
 )
 
@@ -152,6 +150,25 @@ def bench_fixed_cost(mechanism: str, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="float-cost")
+@click.option("--mechanism", default="kapitza", show_default=True, help="Of the shipped ones.")
+@UPDATE
+def bench_float_cost(mechanism: str, update: Path | None) -> int:
+    """Where instructions and bytes of the engine in float32 go on a Cortex-M4F, and those of all mechanisms (needs
+    QEMU)."""
+    from bench import float_cost
+    from pvid.models.mechanisms import names
+
+    put_table(update, "float-tick", markdown(float_cost.TICK_HEADER, float_cost.tick_rows(mechanism)))
+    put_table(update, "float-state", markdown(float_cost.STATE_HEADER, float_cost.state_rows(mechanism)))
+    put_table(update, "float-text", markdown(float_cost.TEXT_HEADER, float_cost.text_rows(mechanism)))
+    with progress_bar("mechanisms", len(names())) as advance:
+        done = iter(range(1, len(names()) + 1))
+        rows = list(float_cost.mechanism_rows(lambda: advance(next(done))))
+    put_table(update, "float-mechanisms", markdown(float_cost.MECHANISMS_HEADER, rows))
+    return DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:
@@ -162,23 +179,6 @@ def bench_cost(update: Path | None) -> int:
         costs = {level: cost.stage_costs(cost.build(Path(folder), level=level)) for level in ("-O2", "-O3")}
         state_bytes = cost.state_bytes(Path(folder))
     put_table(update, "cost", cost.as_markdown(costs, state_bytes))
-    return DONE
-
-
-@bench.command(name="design-cost")
-@click.option("--update", is_flag=True, help="Write the coefficients that `pvid design` computes with.")
-def bench_design_cost(update: bool) -> int:
-    """Instructions of the weak form over a grid of designs beside the formula of `pvid design` (needs valgrind)."""
-    from bench import design_cost
-    from pvid.design import weak_cost
-
-    with progress_bar("designs", len(design_cost.GRID)) as advance:
-        spreads = design_cost.measured_grid(advance)
-    mean, longest = design_cost.fit(spreads) if update else weak_cost.coefficients()
-    if update:
-        write_whole(weak_cost.COEFFICIENTS_FILE, design_cost.as_toml(mean, longest))
-        write_stderr(f"{weak_cost.COEFFICIENTS_FILE.name} written")
-    click.echo(markdown(design_cost.HEADER, design_cost.rows(spreads, mean, longest)))
     return DONE
 
 
@@ -206,6 +206,29 @@ def bench_tick_methods(update: Path | None) -> int:
     with progress_bar("methods", tick_methods.STEPS) as advance:
         rows = list(tick_methods.rows_of(Native(), progress=advance))
     put_table(update, "tick-methods", markdown(tick_methods.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="strong-bytes")
+@UPDATE
+def bench_strong_bytes(update: Path | None) -> int:
+    """Where the bytes of code and state of the strong form in float32 go on a Cortex-M4F."""
+    from bench import strong_bytes
+
+    put_table(update, "strong-text", markdown(strong_bytes.TEXT_HEADER, strong_bytes.text_rows()))
+    put_table(update, "strong-state", markdown(strong_bytes.STATE_HEADER, strong_bytes.state_rows()))
+    return DONE
+
+
+@bench.command(name="strong-schedules")
+@UPDATE
+def bench_strong_schedules(update: Path | None) -> int:
+    """Final p of the strong form's schedules against that of all sums at every row, 40 seeds."""
+    from bench import strong_schedules
+
+    with progress_bar("samplings", len(strong_schedules.SAMPLINGS)) as advance:
+        rows = list(strong_schedules.schedule_rows(Native(), progress=advance))
+    put_table(update, "strong-schedules", markdown(strong_schedules.HEADER, rows))
     return DONE
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import tempfile
 from collections import defaultdict
-from pathlib import Path
+from collections.abc import Sequence
 
-from pvid.base.errors import PvidError
+from bench.struct_sizes import state_table
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.profile import profile
-from pvid.core.sources import INCLUDES
+from pvid.settings.enums import Core
+
+Parts = Sequence[tuple[str, str]]
 
 BOARD_NAMES = ("mps2-an386", "microbit")
 HEADER = ("part of a tick", *(f"{BOARDS[name].core}" for name in BOARD_NAMES))
@@ -53,26 +53,32 @@ _STRUCTS = (
     ("trust", "sizeof(pvid_trust_q31) - 2 * sizeof(pvid_estimate_q31)"),
     ("drive", "sizeof(pvid_fourier_drive_q31)"),
 )
-_ALL = ("all", "sizeof(pvid_fourier_q31)")
+_ALL = "sizeof(pvid_fourier_q31)"
 
 
 def tick_rows(model: str) -> list[tuple[str, ...]]:
     """Instructions of a tick by part, on each board, as in HEADER."""
+    return tick_parts(model, "q31", BOARD_NAMES, _PARTS)
+
+
+def tick_parts(model: str, core: Core, boards: Sequence[str], named: Parts) -> list[tuple[str, ...]]:
+    """The same of either arithmetic: titles, each with the sources of its part."""
     of_boards = []
-    for name in BOARD_NAMES:
-        counted = profile(BOARDS[name], "weak", "q31", model)
-        parts: dict[str, float] = defaultdict(float)
+    for name in boards:
+        counted = profile(BOARDS[name], "weak", core, model)
+        parts: defaultdict[str, float] = defaultdict(float)
         for (_, file), n in counted.functions.items():
-            parts[_part_of(file)] += n
+            parts[part_of(file, named)] += n
         parts[_OTHERS] += counted.measured - counted.total
         of_boards.append((parts, counted.measured))
-    titles = [title for title, _ in _PARTS] + [_OTHERS]
+    titles = [title for title, _ in named] + [_OTHERS]
     rows = [(title, *(f"{parts[title]:.0f}" for parts, _ in of_boards)) for title in titles]
     return [*rows, ("**all**", *(f"{mean:.0f}" for _, mean in of_boards))]
 
 
-def _part_of(file: str) -> str:
-    for title, sources in _PARTS:
+def part_of(file: str, named: Parts) -> str:
+    """The title whose sources contain a file."""
+    for title, sources in named:
         if re.fullmatch(rf"\w*({sources})\.[ch]", file):
             return title
     return _OTHERS
@@ -81,17 +87,4 @@ def _part_of(file: str) -> str:
 def state_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the state by part on a Cortex-M, with the arrays of the sizes that the mechanism needs."""
     sizes = fixed_run(model).sizes
-    lines = [f"char size_{k}[{size}];" for k, (_, size) in enumerate((*_STRUCTS, _ALL))]
-    prefix = BOARDS[BOARD_NAMES[0]].tool_prefix
-    with tempfile.TemporaryDirectory() as folder:
-        source, made = Path(folder) / "a.c", Path(folder) / "a.o"
-        source.write_text("\n".join(['#include "pvid/fourier_q31.h"', *lines, ""]), encoding="ascii")
-        macros = [f"-D{name}={value}" for name, value in sizes.items()]
-        command = [f"{prefix}gcc", "-mcpu=cortex-m4", "-mthumb", "-c", *macros, *INCLUDES, str(source), "-o", str(made)]
-        if subprocess.run(command, check=False).returncode != 0:
-            raise PvidError("the sizes of the state did not compile")
-        listed = subprocess.run([f"{prefix}nm", "-S", str(made)], capture_output=True, text=True, check=True).stdout
-    found = {int(k): int(size, 16) for size, k in re.findall(r"^\w+ (\w+) \w size_(\d+)$", listed, re.MULTILINE)}
-    rows = [(title, str(found[k])) for k, (title, _) in enumerate(_STRUCTS)]
-    named, whole = sum(int(n) for _, n in rows), found[len(_STRUCTS)]
-    return [*rows, ("schedule, pointers, padding", str(whole - named)), ("**all**", str(whole))]
+    return state_table("pvid/fourier_q31.h", _STRUCTS, _ALL, "schedule, pointers, padding", sizes)

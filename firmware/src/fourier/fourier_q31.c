@@ -114,9 +114,11 @@ static void watch_drive(pvid_fourier_q31 *self, size_t half, bool begins, const 
 {
     pvid_fourier_drive_q31 *drive = &self->drive;
     for (size_t i = 0; i < self->design->model->samples; i++) {
-        const int32_t x = pvid_fourier_count_q31(reading[i], self->collect.front.offset[i]);
-        drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
-        drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_square_q31(x);
+        if (self->drive_min[i] > 0) {
+            const int32_t x = pvid_fourier_count_q31(reading[i], self->collect.front.offset[i]);
+            drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
+            drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_square_q31(x);
+        }
     }
 }
 

@@ -41,7 +41,7 @@ static inline int32_t pvid_scaled_packed_q31(pvid_scaled_q31 a)
 static inline pvid_scaled_q31 pvid_scaled_unpacked_q31(int32_t word)
 {
     const int32_t m = pvid_floor_shift_32_q31(word, 11);
-    const pvid_scaled_q31 result = {m * 2048, (word - (m * 2048)) - 1024};
+    const pvid_scaled_q31 result = {m * 2048, (int32_t)((uint32_t)word & 2047u) - 1024};
     return result;
 }
 

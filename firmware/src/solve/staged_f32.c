@@ -270,7 +270,9 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     low[n] -= solve->fall;
     const float lost = self->information.rounding + (ROUNDING * solve->scale);
     self->information.rounding = (lost <= PVID_RESIDUAL_MAX) ? lost : PVID_RESIDUAL_MAX;
-    memcpy(self->p, solve->p, sizeof self->p);
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        self->p[a] = solve->p[a];
+    }
     solve->system.rss = self->information.high[self->model->n_moments + n] + low[n];
     solve->system.rounding = self->information.rounding;
     if (steps) {

@@ -6,6 +6,9 @@
 /* Entries of M after which a call of pvid_system_scale_rows_q31 stops at the end of a row. */
 #define ENTRIES_PER_STAGE 18u
 
+/* Far beyond the exponents of the information of noise. */
+#define EXPONENT_MAX 5000
+
 void pvid_system_exponents_q31(const pvid_information_q31 *information, const pvid_model_q31 *model, int16_t h[])
 {
     const int64_t *diagonal = information->sums;
@@ -232,8 +235,9 @@ void pvid_system_without_table_q31(const pvid_estimator_q31 *self, const pvid_es
     const pvid_scaled_q31 tables =
         pvid_scaled_over_q31(pvid_scaled_of_q31(weight, -16), pvid_scaled_of_q31((int64_t)self->noise_rows, 0));
     const pvid_scaled_q31 margin = pvid_scaled_of_q31((int64_t)self->settings.noise_margin, -16);
-    const pvid_scaled_q31 much =
+    pvid_scaled_q31 much =
         pvid_scaled_times_q31(pvid_scaled_times_q31(margin, tables), pvid_scaled_over_q31(solve->variance, row));
+    much.e = (int32_t)pvid_clamp_q31(much.e, EXPONENT_MAX);
     size_t at = 0;
     for (size_t a = 0; a < self->model->n_p; a++) {
         for (size_t b = a; b < self->model->n_p; b++) {

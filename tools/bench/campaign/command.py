@@ -20,9 +20,7 @@ _WIDTH = 220  # of tables that go into a file
 @click.option("--rigs", default=190, show_default=True, type=click.IntRange(min=1), help="How many.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of the rigs.")
 @click.option("--core", default="f32", show_default=True, type=click.Choice(["f32", "q31", "f64"]), help="Identifier.")
-@click.option("--tune", "tuned", is_flag=True, help="Each run is tuned before it is identified.")
-@click.option("--refine", is_flag=True, help="Each answer is refined, as `identify --refine` does.")
-@click.option("--engine", is_flag=True, help="By the weak engine, from the description of the mechanism.")
+@click.option("--refine/--no-refine", default=True, show_default=True, help="As for identify.")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a running dask.distributed, as tcp://host:8786.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine.  [default: its processors]")
 @click.option("--cache", type=click.Path(path_type=Path), help="Folder that keeps the simulated runs.")
@@ -33,9 +31,7 @@ def campaign(
     rigs: int,
     seed: int,
     core: str,
-    tuned: bool,
     refine: bool,
-    engine: bool,
     scheduler: str | None,
     workers: int | None,
     cache: Path | None,
@@ -58,11 +54,9 @@ def campaign(
     for name in properties:
         if name not in table.PROPERTIES:
             raise PvidError(f"--by {name}: not a property; there are {', '.join(table.PROPERTIES)}")
-    if engine and (core != "f32" or tuned or refine):
-        raise PvidError("--engine identifies in float32 and chooses its own settings: omit --core, --tune and --refine")
     population = shipped() if population_path is None else load(population_path)
     kept = None if cache is None else cache.resolve()
-    task = Campaign(population, rigs, seed, cast(Core, core), tuned, refine, engine, kept)
+    task = Campaign(population, rigs, seed, cast(Core, core), refine, kept)
     store = Store(out, task.key)
     begun = sum(rig < rigs for rig in store.records)
     if begun:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +12,9 @@ from bench.campaign.truth import SimulatedRig
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.models.kapitza import MODEL
-from pvid.rig.described import described
-from pvid.rig.file import Core, RigFile
-from pvid.rig.run import Recording
-from pvid.run.identify import Identification, Publications, identify
-from pvid.run.mechanism import identify_mechanism, model_of
-from pvid.run.mechanism_core import CoreAnswer, identify_in_c
-from pvid.run.refined_identify import refined_identification
+from pvid.rig.file import Core
+from pvid.run.advised import answered
+from pvid.run.identify import Identification, Publications
 
 Float = npt.NDArray[np.float64]
 
@@ -29,8 +23,6 @@ WRONG_SE, WRONG_RELATIVE = 3.0, 0.01
 RIGHT_SE, RIGHT_RELATIVE = 2.0, 0.003
 # The data of a run suffice when its bound of w and d1 is below this, relative.
 SUFFICES = 0.01
-
-Result = TypeVar("Result", Identification, CoreAnswer)
 
 Value = float | int | bool | str | None
 Record = dict[str, Value]
@@ -83,71 +75,17 @@ class Judgement:
         return np.asarray(((self.relative <= WRONG_RELATIVE) | (self.z <= WRONG_SE)).all(axis=-1))
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What is judged of an answer.
-
-    Attributes
-    ----------
-    published : it has values
-    value, se : by name
-    warning, status, reason : in words; reason: why there are no values
-    chi2 : None: not judged
-    publications : during the run
-    """
-
-    published: bool
-    value: Mapping[str, float]
-    se: Mapping[str, float]
-    warning: str | None
-    chi2: float | None
-    status: str
-    reason: str
-    publications: Publications
-
-    @classmethod
-    def of(cls, one: Identification | CoreAnswer) -> Answer:
-        """Of the pendulum's own form, or of the weak engine and its analysis in float64."""
-        return cls._of_engine(one) if isinstance(one, CoreAnswer) else cls._of_own_form(one)
-
-    @classmethod
-    def _of_own_form(cls, one: Identification) -> Answer:
-        return cls(one.identified, one.value, one.se, one.warning, one.chi2, one.status, one.verdict, one.publications)
-
-    @classmethod
-    def _of_engine(cls, one: CoreAnswer) -> Answer:
-        value = {name: found.value for name, found in one.values.items() if found.value is not None}
-        se = {name: found.se for name, found in one.values.items() if found.se is not None}
-        reason = one.reason.text if one.oracle.identified else "not identified by the analysis"
-        misfit, known = one.misfit, one.identified
-        return cls(known, value, se, one.verdict.warning, misfit, one.reason.text, reason, one.publications)
-
-
 def identify_rig(
-    native: Native, simulated: SimulatedRig, core: Core = "f32", *, tuned: bool = False, refine: bool = False
+    native: Native, simulated: SimulatedRig, core: Core = "f32", *, refine: bool = True
 ) -> tuple[Record, Identification | None]:
-    """Identifies a rig as `pvid identify` does, with `pvid tune` before it and --refine where they are asked for; the
-    record of `judge`, and the answer."""
+    """Identifies a rig as `pvid identify` does; the record of `judge`, and the answer.
+
+    A crash is no refusal: it is recorded as one, with its exception as the reason.
+    """
     file = replace(simulated.file, identifier=replace(simulated.file.identifier, core=core))
-
-    def identified() -> Identification:
-        used = _tuned(native, simulated, file) if tuned else file
-        result = identify(simulated.run, used, native)
-        return refined_identification(simulated.run, used, result) if refine else result
-
-    return _judged(simulated, identified)
-
-
-def identify_by_engine(simulated: SimulatedRig) -> tuple[Record, CoreAnswer | None]:
-    """The same with the weak engine in float32, from the description of the mechanism."""
-    return _judged(simulated, lambda: _by_engine(simulated))
-
-
-def _judged(simulated: SimulatedRig, identified: Callable[[], Result]) -> tuple[Record, Result | None]:
-    """A crash is no refusal: it is recorded as one, with its exception as the reason."""
     began = time.perf_counter()
     try:
-        result = identified()
+        result = answered(simulated.run, file, native, refine=refine)
     except PvidError as error:
         return judge(simulated, None, refusal=str(error), seconds=time.perf_counter() - began), None
     except Exception as error:  # one rig must not end the campaign, nor be taken for a refusal
@@ -156,26 +94,11 @@ def _judged(simulated: SimulatedRig, identified: Callable[[], Result]) -> tuple[
     return judge(simulated, result, refusal=None, seconds=time.perf_counter() - began), result
 
 
-def _by_engine(simulated: SimulatedRig) -> CoreAnswer:
-    run = simulated.run
-    recording = Recording(run.t, {"phi": run.phi, "y": run.y}, run.sample_rate)
-    return identify_in_c(identify_mechanism(recording, model_of(described(simulated.file))))
-
-
-def _tuned(native: Native, simulated: SimulatedRig, file: RigFile) -> RigFile:
-    from pvid.run.tune import tune
-
-    return tune(simulated.run, file, native).rig
-
-
-def judge(
-    simulated: SimulatedRig, found: Identification | CoreAnswer | None, *, refusal: str | None, seconds: float
-) -> Record:
+def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: str | None, seconds: float) -> Record:
     """One record: the rig, its bound, the answer, and what the answer is worth; None where there is none."""
-    result = None if found is None else Answer.of(found)
     suffices = bool((simulated.bound[:2] < SUFFICES).all())
     record: Record = {**_of_rig(simulated), "suffices": suffices, "seconds": round(seconds, 3)}
-    published = result is not None and result.published
+    published = result is not None and result.identified
     record["published"] = published
     record["missed"] = suffices and not published
     for name in ("warned", "within_1", "within_5", "silently_wrong", "right", "answered", "crashed"):
@@ -191,7 +114,7 @@ def judge(
     record.update(status=result.status, misfit=_finite(result.chi2))
     record.update(_of_publications(result.publications, simulated))
     if not published:
-        record["reason"] = result.reason
+        record["reason"] = result.verdict
         return record
     value = np.array([result.value[name] for name in MODEL.mapped_names])
     se = np.array([result.se[name] for name in MODEL.mapped_names])

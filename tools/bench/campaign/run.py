@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from bench.campaign.judge import Record, identify_by_engine, identify_rig
+from bench.campaign.judge import Record, identify_rig
 from bench.campaign.population import Population
 from bench.campaign.store import Store, code_version, core_version
 from bench.campaign.truth import GENERATOR, kept_rig, simulate_rig
@@ -23,9 +23,7 @@ _WORKERS_S = 30  # until a running scheduler must have a worker
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is run: rigs 0 to `rigs` - 1 of a seed, identified by a core, tuned before or not, refined or not.
-
-    `engine`: from the description of the mechanism, by the weak engine.
+    """What is run: rigs 0 to `rigs` - 1 of a seed, identified by a core, refined or not.
 
     `cache`: a folder that keeps the simulated runs; None: they are simulated anew.
     """
@@ -34,9 +32,7 @@ class Campaign:
     rigs: int
     seed: int = 1
     core: Core = "f32"
-    tuned: bool = False
-    refine: bool = False
-    engine: bool = False
+    refine: bool = True
     cache: Path | None = None
 
     @property
@@ -47,9 +43,7 @@ class Campaign:
             GENERATOR,
             self.seed,
             self.core,
-            self.tuned,
             self.refine,
-            self.engine,
             code_version(),
             core_version(),
         )
@@ -98,9 +92,7 @@ def _work(rig: int, *, campaign: Campaign, code: str) -> Record:
         simulated = simulate_rig(native, campaign.population, campaign.seed, rig)
     else:
         simulated = kept_rig(native, campaign.population, campaign.seed, rig, campaign.cache)
-    if campaign.engine:
-        return identify_by_engine(simulated)[0]
-    return identify_rig(native, simulated, campaign.core, tuned=campaign.tuned, refine=campaign.refine)[0]
+    return identify_rig(native, simulated, campaign.core, refine=campaign.refine)[0]
 
 
 @lru_cache(maxsize=1)

@@ -98,10 +98,10 @@ def _bytes_of(map_text: str, name: str, source: str) -> int:
     return sum(size for section, size, file in sections(map_text) if wanted.match(section) and origin.search(file))
 
 
-_CORE = r"libpvid\.a\("
+CORE = r"libpvid\.a\("  # in the linker's map: objects of the core
 _MODEL = r"_weak_(f32|q31)\.c"  # what is generated of a mechanism
 _ARITHMETIC = r"libgcc\.a\(|libm\.a\(|libc\.a\(|freestanding/"
-_CODE = r"\.text|\.s?rodata"
+CODE = r"\.text|\.s?rodata"  # sections
 
 
 def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
@@ -132,7 +132,7 @@ class _Built:
 def _strong(configuration: Configuration) -> _Built:
     run = standard_run("strong", TICKS, configuration.core)
     tables = r"\.(s?rodata|progmem\.data)\.replay_(config_)?weights$"
-    return _Built(*build_image(configuration.board, run), ((_CODE, _CORE),), ((tables, "replay"),))
+    return _Built(*build_image(configuration.board, run), ((CODE, CORE),), ((tables, "replay"),))
 
 
 def _weak(configuration: Configuration) -> _Built:
@@ -142,7 +142,7 @@ def _weak(configuration: Configuration) -> _Built:
     return _Built(
         made.image,
         made.tree,
-        ((_CODE, _CORE), (r"\.text", _MODEL)),
+        ((CODE, CORE), (r"\.text", _MODEL)),
         ((r"\.s?rodata", _MODEL), (tables, "replay")),
     )
 
@@ -156,10 +156,10 @@ def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, R
     report = play(board, built.image, TIMEOUT_S)
     footprint = Footprint(
         text=sum(_bytes_of(map_text, *one) for one in built.code),
-        arithmetic=_bytes_of(map_text, _CODE, _ARITHMETIC),
+        arithmetic=_bytes_of(map_text, CODE, _ARITHMETIC),
         tables=sum(_bytes_of(map_text, *one) for one in built.tables),
-        data=_bytes_of(map_text, r"\.s?data", _CORE),
-        bss=_bytes_of(map_text, r"\.s?bss|COMMON", _CORE) + report.state_bytes,
+        data=_bytes_of(map_text, r"\.s?data", CORE),
+        bss=_bytes_of(map_text, r"\.s?bss|COMMON", CORE) + report.state_bytes,
         stack_bound=stack_bound(board.tool_prefix, built.image, built.tree, board.entry),
         stack_seen=report.stack_used,
         mean=round(report.instructions_mean),

@@ -62,14 +62,16 @@ def command(
     from pvid.board.target import targets_of
 
     described: MechanismRig | RigFile | None = mechanism_rig(run_path, rig_path, settings, model)
-    if described is None and form == "fourier":
-        described = rig_for(run_path, rig_path, settings)
+    if described is None:
+        rig = with_overrides(rig_for(run_path, rig_path, settings), form=form)
+        if rig.identifier.form_traits.publishes:
+            described, core = rig, core or rig.identifier.core_traits.in_c
+            law = None if law == "stationary" else law
     if described is not None:
         from pvid.cli.mechanism import compare_recording  # loads SymPy
 
         given = {"core": core, "form": form, "law": law}
         return _shown(compare_recording(run_path, described, columns, targets_of(targets), **given))
-    rig = with_overrides(rig_for(run_path, rig_path, settings), form=form)
     run = read_input(run_path, rig, columns)
     rig = fitted(rig, run)
     native = Native()

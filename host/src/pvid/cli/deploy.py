@@ -11,11 +11,13 @@ from pvid.base.console import DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option
 from pvid.cli.rig_design import model_of_rig, recorded
+from pvid.settings.engine_cores import ENGINE_CORES, FIXED, FLOAT
 
 if TYPE_CHECKING:
     from pvid.deploy.deployment import Deployment
     from pvid.settings.enums import Core
 
+_DEFAULT = FLOAT.name
 _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "amalgamation")
 
 
@@ -26,7 +28,7 @@ _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "am
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file, whose values are the model's.")
 @click.option("--run", "run_path", type=click.Path(path_type=Path), help="A recording of the rig, for its design.")
 @columns_option
-@click.option("--core", type=click.Choice(["f32", "q31"]), default="f32", show_default=True, help="Arithmetic.")
+@click.option("--core", type=click.Choice(list(ENGINE_CORES)), default=_DEFAULT, show_default=True, help="Arithmetic.")
 @click.option("--functions", type=click.IntRange(4, 64), help="Test functions of the design.  [default: chosen]")
 def command(
     model: str,
@@ -51,10 +53,11 @@ def command(
         raise PvidError("--columns needs --run")
     given = [f"--rig {rig_path.name}"] if rig_path is not None else []
     given += [f"--run {run_path.name}"] if run_path is not None else []
-    given += [f"--core {core}"] if core != "f32" else []
+    given += [f"--core {core}"] if core != _DEFAULT else []
     given += [f"--functions {functions}"] if functions is not None else []
     title = " ".join(["pvid deploy", Path(model).name, f"--for {target}", *given])
-    made = _deployment(model, rig_path, run_path, columns, core, functions, title)
+    is_integer = ENGINE_CORES[core] is FIXED
+    made = _deployment(model, rig_path, run_path, columns, is_integer, functions, title)
     paths = write_package(made, target, out)
     write_stderr(f"{out}: {len(paths)} files; start with {out / 'README.md'}")
     return DONE
@@ -65,7 +68,7 @@ def _deployment(
     rig_path: Path | None,
     run_path: Path | None,
     columns: str | None,
-    core: Core,
+    is_integer: bool,
     functions: int | None,
     title: str,
 ) -> Deployment:
@@ -77,13 +80,12 @@ def _deployment(
     compiled, rig = model_of_rig(model, rig_path, run_path)
     if run_path is not None:
         recording = recorded(compiled, rig, run_path, columns)
-        if core == "f32":
-            config = config_for_recording(compiled, recording, functions)
-            return deployment_f32(compiled, config, recording.signals, title)
-        return deployment_q31(engine_for_recording(compiled, recording, functions), recording.signals, title)
+        if is_integer:
+            return deployment_q31(engine_for_recording(compiled, recording, functions), recording.signals, title)
+        return deployment_f32(compiled, config_for_recording(compiled, recording, functions), recording.signals, title)
     if model not in names_of_shipped():
         raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
     run = simulated_run_of(compiled)[0]
-    if core == "f32":
-        return deployment_f32(compiled, config_for_simulated_rig(compiled, functions), run, title)
-    return deployment_q31(engine_for_simulated_rig(compiled, functions), run, title)
+    if is_integer:
+        return deployment_q31(engine_for_simulated_rig(compiled, functions), run, title)
+    return deployment_f32(compiled, config_for_simulated_rig(compiled, functions), run, title)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
-from pvid.base.console import DONE
 from pvid.base.errors import PvidError
-from pvid.base.rounding import with_error
-from pvid.cli.input import columns_option, read_input, rig_options
+from pvid.cli.input import columns_option, rig_options
 from pvid.cli.simulate import tone
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
+from pvid.rig.described import described as of_pendulum
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_RELEASE
+from pvid.sim.rig_run import simulated_run
 
 
 @click.command(name="design")
@@ -33,7 +29,7 @@ from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_RELEASE
     help="Predict for this drive [m,Hz,rad]; repeatable.  [default: the standard rig's]",
 )
 @click.option("--release", nargs=2, type=float, help="Initial phi1, phi1+phi of a predicted run [rad], at rest.")
-@click.option("--duration", type=float, help="Length of the predicted run [s].  [default: the run's, else 40]")
+@click.option("--duration", type=float, help="Length of the predicted run [s].  [default: 40]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(
     model: str | None,
@@ -46,51 +42,36 @@ def command(
     duration: float | None,
     as_json: bool,
 ) -> int:
-    """Predicts standard errors, kappa, delay, memory and instructions of the weak form for a rig.
+    """Predicts the standard errors of the weak form for a rig, and shows its design.
 
-    The drive comes from a recorded run or from tones, not from the rig file. The tables themselves are printed by
-    tables.
+    The drive comes from a recorded run, or from tones for the pendulum of the rig file, not from the rig file. C tables
+    of the design are printed by model build, what it costs on a board by sizes.
 
-    With --model, or a rig file with [model], the design is that of the weak engine for that mechanism: for a recorded
-    run, or for its simulated rig.
+    With --model, or a rig file with [model], the design is that for this mechanism: for a recorded run, or for its
+    simulated rig.
     """
-    described = mechanism_rig(run_path, rig_path, settings, model)
-    if described is not None:
-        from pvid.cli.mechanism import recording_of  # loads SymPy
-        from pvid.cli.mechanism_design import print_design
-        from pvid.run.mechanism import model_of
+    from pvid.cli.mechanism import recording_of  # loads SymPy
+    from pvid.cli.mechanism_design import print_design
+    from pvid.run.mechanism import model_of
 
+    described = mechanism_rig(run_path, rig_path, settings, model)
+    if run_path is None and columns is not None:
+        raise PvidError("--columns needs --run")
+    if run_path is not None and (tones or release or duration is not None):
+        raise PvidError("--run contains the drive: omit --tone, --release and --duration")
+    if described is not None:
         if tones or release or duration is not None:
             raise PvidError("--tone, --release and --duration are for the pendulum: give a recorded run, --run RUN")
-        recording, compiled = (
-            (None, model_of(described)) if run_path is None else recording_of(run_path, described, columns)
-        )
+        if run_path is None:
+            return print_design(model_of(described), None, as_json=as_json)
+        recording, compiled = recording_of(run_path, described, columns)
         return print_design(compiled, recording, as_json=as_json)
-    from pvid.run.design_report import report_for_run, report_for_tones
-
     rig = rig_for(run_path, rig_path, settings)
+    if run_path is not None:
+        recording, compiled = recording_of(run_path, rig, columns)
+        return print_design(compiled, recording, as_json=as_json)
     if duration is not None and not 0 < duration < float("inf"):
         raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
-    if run_path is None:
-        if columns is not None:
-            raise PvidError("--columns needs --run")
-        drive = tuple(tone(text) for text in tones) or STANDARD_DRIVE
-        report = report_for_tones(rig, drive, release or STANDARD_RELEASE, duration or 40.0)
-    elif tones or release:
-        raise PvidError("--run contains the drive: omit --tone and --release")
-    else:
-        report = report_for_run(rig, read_input(run_path, rig, columns, whole=True), duration)
-    if as_json:
-        click.echo(json.dumps(report.as_json()))
-        return DONE
-    table = Table("parameter", "predicted at", "standard error", "%", title=f"a run of {report.duration:g} s")
-    own = rig.mechanism.model
-    for name, value in report.value.items():
-        share = f"{100 * report.se[name] / abs(value):.2g}" if name != own.offset_name else ""
-        label = escape(own.answer(name).name_and_unit)
-        table.add_row(label, *with_error(value, report.se[name]), share)
-    Console().print(table)
-    click.echo(f"kappa {report.kappa:.2g}; noise of a row {report.row_sd:.2g} rad")
-    for name, text in report.cost_rows():
-        click.echo(f"{name}: {text}")
-    return DONE
+    drive = tuple(tone(text) for text in tones) or STANDARD_DRIVE
+    simulated = simulated_run(rig, drive, release or STANDARD_RELEASE, duration or 40.0)
+    return print_design(model_of(of_pendulum(rig)), simulated.recording, as_json=as_json)

@@ -16,8 +16,6 @@ from pvid.cli.result import print_result, print_warning, write_figure, write_ref
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
-from pvid.rig.file import RigFile
-from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.advised import identified
@@ -36,9 +34,10 @@ from pvid.run.survey import fitted
     "noise of the sensors; or that noise alone.  [default: residuals]",
 )
 @click.option(
-    "--refine",
-    is_flag=True,
-    help="Fit the full equations to the whole run, from this answer on, in float64: any angle, friction, skew.",
+    "--refine/--no-refine",
+    default=None,
+    help="Fit the full equations to the whole run, from this answer on, in float64: any angle, friction, skew.  "
+    "[default: of the pendulum's weak form]",
 )
 @click.option(
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
@@ -55,7 +54,7 @@ def command(
     form: str | None,
     core: str | None,
     weights: Literal["residuals", "sensors"] | None,
-    refine: bool,
+    refine: bool | None,
     target: str | None,
     as_json: bool,
     figure: Path | None,
@@ -68,15 +67,16 @@ def command(
     With --model, or a rig file with [model], the run is one of another mechanism (host/docs/models.md): its columns are
     t and the signals of the model. It is identified in float64; with --core f32 also by the C core, compiled for it.
 
-    --refine fits the full equations to the whole run; --figure then shows the measured signals against the simulated.
+    The refinement fits the full equations to the whole run. Its answer replaces that of the weak form where its
+    residuals are those of the sensors' noise; the last line says which it is and why. --figure shows the measured
+    signals against the simulated.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
-    reported tick and at the end.
+    reported tick and at the end. It is then the answer of the image's own form, without the refinement.
     """
-    described: MechanismRig | RigFile | None = mechanism_rig(run_path, rig_path, settings, model)
-    if described is None and form == "fourier":
-        described = rig_for(run_path, rig_path, settings)
-        core = core or "f32"
+    if refine and target is not None:
+        raise PvidError("--refine is in float64 on this computer: omit --on")
+    described = mechanism_rig(run_path, rig_path, settings, model)
     if described is not None:
         from pvid.cli.mechanism import identify_run  # loads SymPy
 
@@ -88,7 +88,7 @@ def command(
             as_json=as_json,
             figure=figure,
             weights=weights or "residuals",
-            refine=refine,
+            refine=bool(refine),
             **options,
         )
     if weights is not None:
@@ -99,11 +99,8 @@ def command(
     notes = resolution_note(given, rig)
     print_notes(notes)
     native = Native()
-    result = identified(replace(run, notes=(*run.notes, *notes)), rig, native)
-    if refine:
-        from pvid.run.refined_identify import refined_identification  # loads SymPy
-
-        result = refined_identification(run, rig, result)
+    noted = replace(run, notes=(*run.notes, *notes))
+    result = identified(noted, rig, native, refine=refine, of_image=target is not None)
     if target is not None:
         from pvid.board.stream_rig import played_samples, stream_rig
         from pvid.board.target import verify
@@ -126,6 +123,8 @@ def command(
             write_refined_figure(outcome, figure)
         else:
             write_figure(result, figure, None)
+    for sentence in result.remarks:
+        write_stderr(f"pvid: note: {sentence}")
     print_warning(result)
     if not result.identified:
         write_stderr(f"pvid: nothing identified: {result.verdict}")

@@ -55,9 +55,8 @@ def form_options(function: Command) -> Command:
     for option in (
         click.option(
             "--form",
-            type=click.Choice(["weak", "strong", "fourier"]),
-            help="Form of the identifier; overrides the rig file. fourier: the weak engine of any mechanism, from the "
-            "pendulum's description.",
+            type=click.Choice(["weak", "strong"]),
+            help="Form of the identifier; overrides the rig file.",
         ),
         click.option(
             "--law",

@@ -25,7 +25,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "demo": "Identify a simulated rig in the firmware on an emulated board.",
         "simulate": "Simulate a rig and write its run and rig file.",
         "identify": "Identify the parameters from a recorded or simulated run.",
-        "tune": "Choose the settings of the weak form for a recorded run.",
+        "tune": "Show the designs of the weak form for a recorded run.",
         "plot": "Draw a report of a log or a run.",
         "batch": "Identify many runs and logs in parallel; one row each, and a page of drifts.",
     },
@@ -37,7 +37,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "sizes": "Measure flash, RAM, stack and instructions on every emulated board.",
     },
     "Design": {
-        "design": "Predict standard errors, memory and instructions for a rig.",
+        "design": "Predict standard errors for a rig.",
         "tables": "Print the constant tables of the C core.",
         "schema": "Print the C header of the serial link's frames.",
     },

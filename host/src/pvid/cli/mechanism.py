@@ -33,11 +33,10 @@ if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
     from pvid.run.mechanism_core import CoreAnswer
 
-ENGINE = "fourier"  # as --form: the weak engine, for a mechanism that has a weak form of its own too
-_FORMS = (("form", "weak"), ("form", ENGINE))
+_FORM = ("form", "weak")
 _IN_C = tuple(("core", name) for name in ENGINE_CORES)
-_POSSIBLE = (("core", "f64"), *_IN_C, *_FORMS)
-_COMPARED = (("core", "all"), *_IN_C, *_FORMS)
+_POSSIBLE = (("core", "f64"), *_IN_C, _FORM)
+_COMPARED = (("core", "all"), *_IN_C, _FORM)
 _STRONG = "strong"  # as --form
 _LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
@@ -100,7 +99,7 @@ def identify_run(
     if only_in_c.get("form") == _STRONG:
         if figure is not None or refine or weights != "residuals":
             raise PvidError("--figure, --refine and --weights are for the weak form; omit --form strong")
-        return _identified_by_strong_form(path, rig, columns, as_json=as_json, **only_in_c)
+        return _identified_by_strong_form(path, rig, columns, as_json=as_json, on=on, **only_in_c)
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
@@ -113,6 +112,8 @@ def identify_run(
     if refine and in_c:
         raise PvidError(f"--refine is in float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
+    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
+        return DIFFERENT
     answer = identify_mechanism(recording, model, weights)
     if refine:
         return _refined(answer, as_json=as_json, figure=figure)
@@ -122,8 +123,6 @@ def identify_run(
 
         core = identify_in_c(answer, in_c.name)
     shown = core or answer
-    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
-        return DIFFERENT
     if as_json:
         click.echo(json.dumps(shown.as_json() | ({} if on is None else {"on": on})))
     elif core is not None:

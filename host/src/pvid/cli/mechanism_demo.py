@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -12,10 +12,7 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
-from pvid.board.mechanism_board import MechanismBoard
-from pvid.board.mechanism_board_q31 import MechanismBoardQ31
-from pvid.board.target import verify
-from pvid.core.native import Native
+from pvid.board.engine_board import verify_recording
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import simulated_rig
@@ -25,14 +22,8 @@ from pvid.run.mechanism import identify_mechanism
 from pvid.run.mechanism_compare import compare_recording
 from pvid.run.mechanism_core import CoreAnswer, identify_in_c
 from pvid.settings.engine_cores import ENGINE_CORES, FIXED, FLOAT
-from pvid.settings.enums import Core
 from pvid.show.mechanism_figure import convergence
 from pvid.sim.simulated_run import RigSimulation
-
-_BOARDS: Mapping[Core, Callable[[MechanismRig, Recording], MechanismBoard | MechanismBoardQ31]] = {
-    FLOAT.name: MechanismBoard.of_recording,
-    FIXED.name: MechanismBoardQ31.of_recording,
-}
 
 
 def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
@@ -57,25 +48,19 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
     recording = Recording(t, {one.name: run[one.name] for one in compiled.signals}, rig.sample_rate)
     truth = dict(zip(compiled.p_names, simulation.truth.tolist(), strict=True))
     write_stderr(f"{compiled.title}: {t[-1]:.0f} s at {rig.sample_rate:g} Hz; the guesses of the model start it")
+    own = MechanismRig(model, rig.sample_rate, known=rig.knowns)
     answer = identify_mechanism(recording, compiled)
     equal = True
-    for core, board_of in _BOARDS.items():
+    for core in (FLOAT.name, FIXED.name):
         try:
-            board = board_of(MechanismRig(model, rig.sample_rate, known=rig.knowns), recording)
+            found = identify_in_c(answer, core)
         except PvidError as error:
             write_stderr(f"pvid: {ENGINE_CORES[core].words}: {error}")
             continue
-        found = identify_in_c(answer, core)
         _print(found, truth)
         with progress_bar(f"{core}: comparing with the twin, streaming to {target}", 2 * len(t)) as advance:
             compared = compare_recording(compiled, recording, core, advance)
-            verdict = verify(
-                target,
-                board.without_recording,
-                Native(),
-                *board.recording.T,
-                progress=lambda done: advance(len(t) + done),
-            )
+            verdict = verify_recording(target, own, recording, core, lambda done: advance(len(t) + done))
         twin = (
             f"equal in every bit, hash {compared.twin_hash:08x}"
             if compared.equal

@@ -8,23 +8,22 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.core.sources import FIRMWARE, SRC
+from pvid.deploy.arithmetic import Arithmetic
 from pvid.deploy.deployment import Deployment, Files
-from pvid.settings.enums import Core
 
 _ROOMS = ("number", "solve", "judge", "fourier", "keep")
 _INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
-_OTHER: dict[Core, str] = {"f32": "_q31", "q31": "_f32"}
 _OWN_CONFIG = "#ifdef PVID_CONFIG_HEADER\n#include PVID_CONFIG_HEADER\n#endif\n"
 SIZES = "pvid/rig_sizes.h"
 
 
 @cache
-def _files(core: Core) -> dict[str, Path]:
+def _files(arithmetic: Arithmetic) -> dict[str, Path]:
     """Name below the include path -> file: sources of the rooms that need no mechanism's own headers, and headers."""
     found: dict[str, Path] = {}
     for room in _ROOMS:
         for path in sorted((SRC / room).glob("*.c")):
-            headers = None if path.stem.endswith(_OTHER[core]) else _headers_of(path)
+            headers = None if path.stem.endswith(arithmetic.without) else _headers_of(path)
             if headers is not None:
                 found |= {_name(one): one for one in (path, *headers)}
     return dict(sorted(found.items()))
@@ -62,7 +61,7 @@ def core_files(deployment: Deployment) -> Files:
     PvidError
         When pvid/config.h has no place for them.
     """
-    files = {name: path.read_text(encoding="utf-8") for name, path in _files(deployment.core).items()}
+    files = {name: path.read_text(encoding="utf-8") for name, path in _files(deployment.arithmetic).items()}
     config = files["pvid/config.h"]
     if _OWN_CONFIG not in config:
         raise PvidError("pvid/config.h does not include PVID_CONFIG_HEADER: a rig's sizes have no place in it")
@@ -73,7 +72,7 @@ def core_files(deployment: Deployment) -> Files:
 
 def _sizes(deployment: Deployment) -> str:
     tables = []
-    if deployment.core == "q31":
+    if deployment.arithmetic.is_integer:
         tables = [
             "",
             "/* Tables stay in the flash of an AVR; C++ has no word for it, and includes no table. */",

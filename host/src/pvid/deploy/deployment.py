@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from pvid.settings.enums import Core
+from pvid.deploy.arithmetic import Arithmetic
 
 Files = dict[str, str]
 
@@ -55,7 +55,7 @@ class Deployment:
     ----------
     name : of the mechanism, in C
     title : in words
-    core : arithmetic
+    arithmetic : float32 or fixed point
     sample_rate : [Hz]
     samples : the argument of a step
     parameters : what is identified
@@ -67,7 +67,7 @@ class Deployment:
 
     name: str
     title: str
-    core: Core
+    arithmetic: Arithmetic
     sample_rate: float
     samples: tuple[Quantity, ...]
     parameters: tuple[Quantity, ...]
@@ -76,6 +76,11 @@ class Deployment:
     command: str
     first_s: float
     playback: Playback = field(repr=False)
+
+    @property
+    def core(self) -> str:
+        """As in the names of functions in C."""
+        return self.arithmetic.core
 
     @property
     def upper(self) -> str:
@@ -90,7 +95,7 @@ class Deployment:
     @property
     def sample_type(self) -> str:
         """In C."""
-        return "float" if self.core == "f32" else "int32_t"
+        return self.arithmetic.sample_type
 
     @property
     def banner(self) -> str:

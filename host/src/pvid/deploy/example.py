@@ -127,7 +127,7 @@ def _source(d: Deployment) -> str:
     table = "PVID_EXAMPLE_TABLE "
     flat = counts.ravel().tolist()
     rows = ["    " + ", ".join(map(str, flat[k : k + _ROW])) + "," for k in range(0, len(flat), _ROW)]
-    if d.core == "f32":
+    if not d.arithmetic.is_integer:
         lsb = ", ".join(float_literal(np.float32(one)) for one in d.playback.lsb)
         scale = ["", f"static const float count[{d.upper}_SAMPLES] = {{{lsb}}}; /* units */"]
         value = f"(float)counts[(tick * {len(d.samples)}u) + (uint32_t)k] * count[k]"

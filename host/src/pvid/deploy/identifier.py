@@ -7,9 +7,6 @@ import numpy as np
 from pvid.codegen import describe
 from pvid.deploy.deployment import Deployment, Files, Quantity
 from pvid.design.c_tables import float_literal
-from pvid.settings.enums import Core
-
-_SNAPSHOT: dict[Core, str] = {"f32": "snapshot_fourier.h", "q31": "snapshot_fourier_q31.h"}
 
 
 def identifier_files(deployment: Deployment) -> Files:
@@ -21,7 +18,7 @@ def identifier_files(deployment: Deployment) -> Files:
 
 
 def _header(d: Deployment) -> str:
-    counts = " in counts of the sensor" if d.core == "q31" else ""
+    counts = " in counts of the sensor" if d.arithmetic.is_integer else ""
     lines = [
         f"/* {d.name}_identifier.h - {d.title}: identifies the parameters of a rig.",
         " *",
@@ -105,7 +102,7 @@ def _source(d: Deployment) -> str:
     core, upper = d.core, d.upper
     values = ("estimate.p[k]", "estimate.se[k]")
     scale: list[str] = []
-    if core == "q31":
+    if d.arithmetic.is_integer:
         units = ", ".join(float_literal(np.float32(one.scale)) for one in d.parameters)
         table = f"static const float scale[{upper}_PARAMETERS] = {{{units}}};"
         scale = ["", "/* Value of one unit of each integer. */", table]
@@ -115,7 +112,7 @@ def _source(d: Deployment) -> str:
         f'#include "{d.name}_identifier.h"',
         "",
         f'#include "{d.name}_design_{core}.h"',
-        f'#include "pvid/{_SNAPSHOT[core]}"',
+        f'#include "{d.arithmetic.snapshot_header}"',
         "",
         f"static pvid_fourier_{core} identifier;",
         *scale,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import tempfile
+from functools import cache
 from pathlib import Path
 
 from pvid.base.errors import PvidError
@@ -16,11 +17,11 @@ _UNO, _MEGA = 2048, 8192
 _REST = 1024  # for the stack and Arduino itself
 
 
+@cache
 def state_bytes(d: Deployment) -> int | None:
     """Size of the identifier [bytes] on this computer, whose pointers are longer than those of a microcontroller; None
     where there is no compiler."""
-    header = "pvid/fourier.h" if d.core == "f32" else "pvid/fourier_q31.h"
-    program = f'#include "{header}"\nchar pvid_state[sizeof(pvid_fourier_{d.core})];\n'
+    program = f'#include "{d.arithmetic.header}"\nchar pvid_state[sizeof(pvid_fourier_{d.core})];\n'
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         for name, text in core_files(d).items():
@@ -46,7 +47,7 @@ def note(d: Deployment) -> str:
 def avr_note(d: Deployment) -> str:
     """What an AVR needs to know."""
     where = "On an AVR the tables are in RAM as well: take `--core q31`, whose tables stay in flash."
-    if d.core == "q31":
+    if d.arithmetic.is_integer:
         where = "On an AVR the tables stay in flash."
     size = state_bytes(d)
     if size is None:

@@ -12,6 +12,7 @@ from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
 from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.core.sizes import smallest
+from pvid.deploy.arithmetic import FIXED, FLOAT
 from pvid.deploy.deployment import Deployment, Playback, Quantity
 from pvid.model.compiled import CompiledModel
 from pvid.run.engine_design import Run, samples_of
@@ -64,7 +65,7 @@ def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, com
     return Deployment(
         name=name,
         title=compiled.title,
-        core="f32",
+        arithmetic=FLOAT,
         sample_rate=config.sample_rate,
         samples=tuple(Quantity(one, units[one], note=_note(made, k)) for k, one in enumerate(model.sample_names)),
         parameters=tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
@@ -96,7 +97,7 @@ def deployment_q31(engine: FixedEngine, run: Run, command: str) -> Deployment:
     return Deployment(
         name=engine.name,
         title=compiled.title,
-        core="q31",
+        arithmetic=FIXED,
         sample_rate=engine.sample_rate,
         samples=tuple(
             Quantity(one, units[one], lsb, note)

@@ -21,14 +21,13 @@ def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequ
     d = deployment
     names = _named([one.name for one in d.parameters])
     period = f"{1e6 / d.sample_rate:g} us"
-    kind = "float32" if d.core == "f32" else "integers only, samples in counts of the sensors"
     return (
         "\n".join(
             [
                 f"# pvid: {d.title}, {where}",
                 "",
                 f"Identifies {names} of this rig while it runs, each with a standard error:",
-                f"{kind}, {d.sample_rate:g} samples a second, static memory. Made by `{d.command}`.",
+                f"{d.arithmetic.samples}, {d.sample_rate:g} samples a second, static memory. Made by `{d.command}`.",
                 "",
                 "| | sample | unit | |",
                 "|---|---|---|---|",
@@ -47,10 +46,10 @@ def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequ
                 "",
                 "## Your sensors",
                 "",
-                f"Call `{d.name}_begin()` once and `{d.name}_step(sample)` every {period}, from a timer:",
-                f"irregular times are errors. The first estimate needs at least {d.first_s:.3g} s of motion.",
-                f"`{d.name}_read(value, error)` may be called from any context; `pvid_reason_text(reason)` is the reason",
-                f"for no estimate yet; `{d.name}_gap()` is for missing samples.",
+                f"Call `{d.name}_begin()` once and `{d.name}_step(sample)` every {period}, from a timer;",
+                f"samples at irregular times are wrong. The first estimate needs {d.first_s:.3g} s of motion at least.",
+                f"`{d.name}_read(value, error)` may be called from any context; `pvid_reason_text(reason)` is why",
+                f"there is no estimate yet; `{d.name}_gap()` is for missing samples.",
                 f"Delete `{d.name}_example.c` and `.h` then.",
                 "",
                 *(f"- {one}" for one in (memory.note(d), *notes) if one),

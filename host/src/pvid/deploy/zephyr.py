@@ -91,7 +91,6 @@ def package(d: Deployment) -> Files:
     symbol = d.library.upper()
     sample = f"samples/{d.name}"
     parameters = ", ".join(one.name for one in d.parameters)
-    fpu = "CONFIG_FPU=y\n" if d.core == "f32" else ""
     steps = [
         f"`west build -b BOARD {sample} -t run` (or `-t flash`); the sample adds this module itself.",
         f"In your own project: this folder in `ZEPHYR_EXTRA_MODULES` or west.yml, and `CONFIG_{symbol}=y` in prj.conf.",
@@ -103,7 +102,7 @@ def package(d: Deployment) -> Files:
             upper=symbol, library=d.library, sources=indented(sources(library), 4), options=COMPILE_OPTIONS
         ),
         f"{sample}/CMakeLists.txt": _APPLICATION.format(name=d.name),
-        f"{sample}/prj.conf": f"CONFIG_{symbol}=y\n{fpu}CONFIG_MAIN_STACK_SIZE=4096\n",
+        f"{sample}/prj.conf": f"CONFIG_{symbol}=y\n{d.arithmetic.zephyr}CONFIG_MAIN_STACK_SIZE=4096\n",
         f"{sample}/sample.yaml": _SAMPLE.format(title=d.title, library=d.library, first=d.parameters[0].name),
         "README.md": readme(
             d, "for Zephyr", steps, ["A processor without an FPU refuses CONFIG_FPU: delete the line."]

@@ -8,7 +8,7 @@ Neither fast nor bit-exact: the reference for twin and C core, and the place to 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.design.weak import WeakDesign
 from pvid.oracle.strong import Estimate, kappa_of
-from pvid.sim.pendulum import Drive, Pendulum, Sensors, simulate
+from pvid.sim.pendulum import Sensors
 
 Float = npt.NDArray[np.float64]
 
@@ -667,37 +667,7 @@ def identify_weak(
     )
 
 
-# ---- prediction
-
-# Without a drive kappa is 1e-16 and S cannot be inverted; the weakest useful drives leave 1e-5 (theory.md 4).
-_UNDRIVEN_KAPPA = 1e-10
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Expected result of a design on a run.
-
-    Attributes
-    ----------
-    p : what it is predicted at
-    se : standard errors of p at the end of the run [units of p]
-    covariance : of p [n_p, n_p]
-    kappa : part of w's information that the other parameters cannot imitate
-    row_sd : standard deviation of a row's residual [rad], from both sensors
-    windows : in the run
-    """
-
-    p: Float
-    se: Float
-    covariance: Float
-    kappa: float
-    row_sd: float
-    windows: int
-
-    @property
-    def relative(self) -> Float:
-        """Relative standard errors of w, d1, d2."""
-        return self.se[:3] / self.p[:3]
+# ---- noise
 
 
 def sample_sd(lsb: float, noise_lsb: float) -> float:
@@ -713,86 +683,6 @@ def row_sd(design: WeakDesign, sensors: Sensors) -> float:
     """
     energy = _energy(residual_filters(design, design.nominal), _taps(design.smooth, 1.0), design.decimation)
     return sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb) * math.sqrt(energy / design.functions)
-
-
-def predict(
-    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors, forgetting_s: float = 0.0
-) -> Prediction:
-    """Standard errors at p that this run gives with these sensors; phi, y [samples], recorded or simulated.
-
-    The rows are taken as exact; noise is white on both sensors and passes the front end. p has 3 entries, or
-    4 when the encoder's zero is unknown. Shared noise of neighbouring windows is counted (not bounded).
-    forgetting_s is the time constant of forgetting [s], 0: none.
-
-    Raises
-    ------
-    PvidError
-        When the run does not fill a window, or does not excite w, or its numbers are beyond those of float64.
-    """
-    beyond = "nothing can be predicted: lengths, drive or resolutions are too far apart for numbers of 64 bits"
-    try:
-        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # the result is checked
-            found = _predicted(phi, y, design, p, sensors, forgetting_s)
-    except np.linalg.LinAlgError as error:
-        raise PvidError(beyond) from error
-    if not (np.isfinite(found.covariance).all() and (found.se > 0).all() and 0 < found.row_sd < math.inf):
-        raise PvidError(beyond)
-    return found
-
-
-def _predicted(
-    phi: npt.ArrayLike, y: npt.ArrayLike, design: WeakDesign, p: Float, sensors: Sensors, forgetting_s: float
-) -> Prediction:
-    smooth, u = front_end(phi, y, design)
-    phi_frames, u_frames = frames(smooth, design), frames(u, design)
-    oracle = WeakOracle(design, WeakSettings(np.asarray(p, np.float64), row_sd=1.0, forgetting_s=forgetting_s))
-    # a row with weight v has noise with weight v^2: forgotten twice as fast
-    noise = WeakOracle(design, replace(oracle.settings, forgetting_s=forgetting_s / 2))
-    height_sd = sample_sd(sensors.y_lsb, sensors.y_noise_lsb) * design.sample_rate**2 / design.l1
-    angle_sd = sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb)
-    smoother, differentiator = _taps(design.smooth, 1.0), _taps(design.second, 0.0)
-    variance = 0.0
-    for k, window_columns in enumerate(columns(phi_frames, u_frames, design)):
-        x, inverse_factor = oracle.rows(window_columns, phi_frames[k], u_frames[k])
-        oracle.add(x, inverse_factor)
-        noise.add(x, inverse_factor)
-        ends = boundary(oracle.p, window_columns, np.zeros(design.functions))
-        motion, _ = internal_motion(oracle.p, ends, phi_frames[k], u_frames[k], design)
-        of_angle = residual_filters(design, oracle.p) @ inverse_factor.T
-        # phi'' = (w + u) q: an error of u is multiplied by q
-        of_drive = motion[:, None] * (design.chi[:, 1] @ inverse_factor.T)
-        variance += angle_sd**2 * _energy(of_angle, smoother, design.decimation)
-        variance += height_sd**2 * _energy(of_drive, differentiator, design.decimation)
-    windows = len(phi_frames)
-    variance /= windows * design.functions
-    c = oracle.jacobian()
-    s = oracle.information()
-    kappa = kappa_of(s)
-    if not kappa > _UNDRIVEN_KAPPA:
-        raise PvidError("this drive does not identify w: the pivot rests or hardly moves")
-    inverse = _inverse(s)
-    alone = inverse @ noise.information() @ inverse
-    shared = inverse @ c.T @ noise.q @ c @ inverse
-    # As in `WeakOracle.sandwich`: limit the information of overlapping windows to twice as much.
-    share = min(1.0, float(np.min(0.75 * np.diag(alone) / np.maximum(-np.diag(shared), 1e-300))))
-    covariance = variance * (alone + share * shared)
-    return Prediction(oracle.p, np.sqrt(np.diag(covariance)), covariance, kappa, math.sqrt(variance), windows)
-
-
-def predict_rig(
-    design: WeakDesign,
-    pendulum: Pendulum,
-    drive: Drive,
-    sensors: Sensors,
-    duration: float = 40.0,
-    release: tuple[float, float] = (0.06, 0.14),
-    zero_unknown: bool = True,
-    forgetting_s: float = 0.0,
-) -> Prediction:
-    """`predict` for a simulated run of the linear pendulum with these parameters."""
-    run = simulate(pendulum, drive, Sensors(), design.sample_rate, duration, release, "linear").run
-    p = np.append(pendulum.linear, [0.0] * zero_unknown)
-    return predict(run.phi, run.y, design, p, sensors, forgetting_s)
 
 
 def _taps(folded: Float, unity: float) -> Float:

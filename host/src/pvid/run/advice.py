@@ -67,7 +67,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Cure:
-    """A sentence that names a mistake and the option that corrects it, and the case without the mistake."""
+    """A sentence that names a mistake and the option that corrects it, and the case without the mistake; "": there is
+    nothing to correct for a user."""
 
     sentence: str
     case: Case
@@ -139,7 +140,7 @@ def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str
             cure = None if search is _equation_mistake and _is_explained(now) else search(case, now, native)
             if cure is None or cure.sentence in found:
                 break
-            found.append(cure.sentence)
+            found += [cure.sentence] if cure.sentence else []
             case, now = cure.case, _trial(cure.case, native)
     return found, case, now
 
@@ -409,25 +410,13 @@ def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
             "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
             Case(replace(run, y=-run.y), rig),
         )
-    in_float = "" if rig.identifier.core_traits.corrects_angles else " with --core f32"
-    largest = now.largest_angle if now is not None else _swing(run)[1]
+    # The trials' equations; the answer itself is refined by the full ones.
     if not rig.identifier.full_angle:
-        yield Cure(
-            f"angles reach {largest:.2g} rad, where sin phi differs from phi: use --set identifier.full_angle=true"
-            + in_float,
-            with_identifier(full_angle=True),
-        )
+        yield Cure("", with_identifier(full_angle=True))
     elif rig.identifier.corrects_angles:
-        yield Cure(
-            "the run follows the equations of small angles, as a simulation of them does: use "
-            "--set identifier.full_angle=false",
-            with_identifier(full_angle=False),
-        )
+        yield Cure("", with_identifier(full_angle=False))
     if not rig.identifier.damping and rig.identifier.zero:
-        yield Cure(
-            "there is friction in the joints: use --set identifier.damping=true" + in_float,
-            with_identifier(damping=True),
-        )
+        yield Cure("", with_identifier(damping=True))
 
 
 def _first_answered(case: Case, now: Identification | None, native: Native) -> Cure | None:
@@ -524,8 +513,8 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
         yield excitation.weak
     elif result.largest_angle > VALID_ANGLE:
         yield (
-            f"angles reach {result.largest_angle:.2g} rad, and the equations are corrected up to {VALID_ANGLE:g} rad: "
-            f"release the pendulum from a smaller angle, or drive it less near its modes"
+            f"angles reach {result.largest_angle:.2g} rad, too far for the equations of the weak form: release the "
+            f"pendulum from a smaller angle, or drive it less near its modes"
         )
     elif result.identified:
         return
@@ -533,7 +522,6 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
         yield (
             f"the swing decays (to {100 / excitation.fading:.0f} % of its start): friction in the joints "
             f"leaves too little motion: reduce it, or drive the pivot harder"
-            + ("" if case.rig.identifier.damping else ", and use --set identifier.damping=true")
         )
     elif result.status == Reason.HELD_UNCERTAIN.text:
         yield "the standard errors are too large: record longer, drive the pivot harder, or use a finer encoder"

@@ -21,7 +21,7 @@ from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.run import Recording
 from pvid.run.engine_design import Run, design_and_p, engine_tables, simulated_run_of
 from pvid.settings.fourier_q31 import FourierConfigQ31
-from pvid.setup.fourier import with_soft_widths
+from pvid.setup.fourier import drive_min_of, with_soft_widths
 from pvid.setup.fourier_q31 import config_of_q31, row_formats
 
 _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
@@ -134,6 +134,10 @@ def fixed_engine(
         found.p if start_there else None,
         found.tables.overlap,
     )
+    still = drive_min_of(found.tables, found.rows.compiled.model)
+    if still is not None:
+        least = tuple(min(round(float(x) / step), 2**24) for x, step in zip(still, lsb, strict=True))
+        config = replace(config, drive_min=least)
     return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
 
 

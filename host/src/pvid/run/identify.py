@@ -159,6 +159,10 @@ class Identification:
         of the weak form's C cores; their standard errors contain those of the scales
     hash
         None where the core has none (f64)
+    doubts
+        alarms of the weak engine's verdict, a sentence each; None: the answer is of another form
+    remarks
+        what else the verdict says, a sentence each
     refinement
         pvid.run.refined_identify.RefinementVerdict; None where none was asked for
     """
@@ -195,6 +199,8 @@ class Identification:
     beyond_words: str | None = None
     notes: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
+    doubts: tuple[str, ...] | None = None
+    remarks: tuple[str, ...] = ()
     refinement: Any = None
 
     @property
@@ -214,6 +220,8 @@ class Identification:
     @property
     def warning(self) -> str | None:
         """Reasons to doubt the estimate, in words; None if there are none."""
+        if self.doubts:
+            return " ".join(self.doubts)
         words = []
         if self.alarm and self.chi2 is not None:
             words.append(
@@ -248,6 +256,8 @@ class Identification:
     @property
     def is_old(self) -> bool:
         """Whether the run's last windows published nothing: the estimate is that of trusted_s."""
+        if self.doubts is not None:  # the verdict says so
+            return False
         new = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
         return self.trusted_s is not None and self.status not in new
 
@@ -358,7 +368,7 @@ def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, na
         kappa=float(case.kappa_of(last)),
         trusted_s=float(run.t[trusted[-1]]) if any_trusted and case.publishes else None,
         first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
-        reasons=_counted(record.reason),
+        reasons=counted(record.reason),
         beyond=beyond,
         beyond_words=None if beyond is None else beyond.words(rig.sensor),
         chi2=_judged(identifier.misfit) if case.publishes else None,
@@ -575,7 +585,7 @@ def _final_status(reasons: npt.NDArray[np.uint8]) -> str:
     return Reason(int(solved[-1])).text
 
 
-def _counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:
+def counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:
     """Count of each reason."""
     counts = np.bincount(reasons)
     return {Reason(int(one)).text: int(counts[one]) for one in np.flatnonzero(counts)}

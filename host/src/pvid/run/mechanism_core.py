@@ -22,7 +22,7 @@ from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import engine_to_identify
-from pvid.run.identify import Publications
+from pvid.run.identify import Publications, counted
 from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, values_of
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
@@ -51,6 +51,7 @@ class CoreAnswer:
     windows : how many the engine has judged
     hash : running hash of its state after the last tick
     publications : every estimate that was published; their standard errors contain what `values` contains
+    reasons : count of each reason, in ticks
     """
 
     oracle: MechanismAnswer
@@ -66,6 +67,7 @@ class CoreAnswer:
     windows: int
     hash: int
     publications: Publications
+    reasons: Mapping[str, int]
 
     @property
     def identified(self) -> bool:
@@ -237,6 +239,7 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
         windows=int(len(ends)),
         hash=identifier.running_hash,
         publications=_published(answer, run, gains, wider),
+        reasons=counted(record.reason),
     )
 
 

@@ -24,6 +24,7 @@ Inputs = Callable[[float], tuple[Float, Float]]
 PASSES = 40
 _LARGEST = 0.3  # step of a logarithm in one pass
 _HALVINGS = 6
+_DAMPINGS = (1e-3, 1e-2, 0.1, 1.0, 10.0)  # of a step that leads nowhere
 _SETTLED = 0.01  # standard errors: of the last step
 _START_SD = 1e3  # of the outputs' spread: the starts are free
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
@@ -218,8 +219,7 @@ class Problem:
             if relative < _SETTLED:
                 converged = True
                 break
-            size = np.abs(d_r[self.log]).max(initial=0.0)
-            share = min(1.0, _LARGEST / max(size, 1e-12))
+            share = self._share(d_r)
             for _ in range(_HALVINGS):
                 near, begun = self.moved(r, share * d_r), starts + share * d_starts
                 now = self.cost(near, cut, begun, use, prior)
@@ -227,8 +227,11 @@ class Problem:
                     break
                 share /= 2
             else:
-                converged = relative < 0.3  # rounding
-                break
+                damped = self._damped(found.triangle, r, starts, prior, free, cut, use, cost)
+                if damped is None or relative < 0.3:
+                    converged = relative < 0.3  # rounding
+                    break
+                near, begun, now = damped
             gained = cost - now
             r, starts, cost = near, begun, now
             if gained < 1e-9 * cost:
@@ -236,11 +239,37 @@ class Problem:
                 break
         return self._judged(r, prior, cut, starts, use, converged, passes, cost)
 
+    def _share(self, d_r: Float) -> float:
+        """Of a step that a pass takes at most."""
+        return min(1.0, _LARGEST / max(float(np.abs(d_r[self.log]).max(initial=0.0)), 1e-12))
+
+    def _damped(
+        self,
+        triangle: Float,
+        r: Float,
+        starts: Float,
+        prior: Prior,
+        free: npt.NDArray[np.intp],
+        cut: Cut,
+        use: Bool,
+        cost: float,
+    ) -> tuple[Float, Float, float] | None:
+        """Levenberg's step, which turns towards the steepest descent where the undamped one leads nowhere: r, starts
+        and the sum of squares; None where none lowers it."""
+        for damping in _DAMPINGS:
+            d_r, d_starts, _, _ = self._step(triangle, r, prior, free, damping)
+            share = self._share(d_r)
+            near, begun = self.moved(r, share * d_r), starts + share * d_starts
+            now = self.cost(near, cut, begun, use, prior)
+            if now < cost:
+                return near, begun, now
+        return None
+
     def _step(
-        self, triangle: Float, r: Float, prior: Prior, free: npt.NDArray[np.intp]
+        self, triangle: Float, r: Float, prior: Prior, free: npt.NDArray[np.intp], damping: float = 0.0
     ) -> tuple[Float, Float, Float, float]:
         """Steps of r and of the starts, R of r's free entries, and the size of r's step (or the starts') in standard
-        errors."""
+        errors. `damping`: of each unknown, on the square of its column."""
         states, n = self.kernel.states, self.n
         top, corner = triangle[:, :states], triangle[:, states:, states:]
         columns = np.append(free, n)
@@ -252,6 +281,8 @@ class Problem:
                 [corner[:, :, columns].reshape(-1, len(columns)), np.column_stack([np.diag(1 / prior.sd[free]), pull])]
             )
             scale = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
+            if damping > 0:
+                rows = np.concatenate([rows, np.column_stack([np.diag(np.sqrt(damping) * scale), 0 * scale])])
             q = np.asarray(np.linalg.qr(rows / np.append(scale, 1.0), mode="r"))
             whole = q[: len(free), : len(free)] * scale
             d_r[free] = np.linalg.lstsq(q[: len(free), : len(free)], q[: len(free), -1], rcond=1e-13)[0] / scale
@@ -260,7 +291,7 @@ class Problem:
         left = top[:, :, :states]
         size = np.maximum(np.linalg.norm(left, axis=1), 1e-300)
         scaled = left / size[:, None, :]
-        normal = np.swapaxes(scaled, 1, 2) @ scaled + 1e-14 * np.eye(states)
+        normal = np.swapaxes(scaled, 1, 2) @ scaled + max(damping, 1e-14) * np.eye(states)
         d_starts = np.linalg.solve(normal, (np.swapaxes(scaled, 1, 2) @ right[..., None]))[..., 0] / size
         if not len(free):
             relative = float(np.sqrt(np.mean(right**2)))

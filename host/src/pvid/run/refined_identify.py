@@ -127,6 +127,8 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
         first_publication_s=weak.first_publication_s if weak.first_publication_s is not None else float(run.t[-1]),
         chi2=found.slow_chi2,
         alarm=found.slow_chi2 > GOOD,
+        doubts=None if weak.doubts is None else (),
+        remarks=(),
         status=Reason.UPDATED.text,
         unexplained=None,
         parts_disagree=False,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from pvid.models.registry import DEFAULT, MODELS
 from pvid.oracle.weak import sample_sd
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.refined import Inputs, Measured, Prior, Problem, Refined, refined, without_outliers
+from pvid.run.refined import GOOD, Inputs, Measured, Prior, Problem, Refined, refined, without_outliers
 from pvid.run.refined_kernel import kernel_of
 
 Float = npt.NDArray[np.float64]
@@ -34,6 +34,8 @@ _SIGN_COARSE = 8  # steps in a smooth one where dry friction may reverse
 _WIDTH = 0.02  # of the sign of a dry friction: share of the joint's speed, over the steps
 _FIRST = tuple(one.name for one in MODELS[DEFAULT].published)
 _OPTIONS = (("slant",), ("f1", "f2"), ("slant", "f1", "f2"))
+_DRY = ("f1", "f2")
+_DRY_STARTS = 4  # of a search with them
 _OPTION_PASSES = 10
 _SHORTER = (0.5, 0.25)  # of a block: tried where the residuals are larger than the sensors' noise
 _CHEAP = 1.3  # growth of the others' standard errors up to which an extra is free
@@ -157,32 +159,77 @@ def refine_pendulum(
     likeliest = np.array([starts[0][name] for name in model.mapped_names])
     search = _Search(run, rig, likeliest)
     problem = search.problem()
-    outcomes: list[Refined] = []
-    for values in starts:
-        found = _searched(search, problem, values)
-        if found is None:
-            continue
-        outcomes.append(found)
-        best = min(outcomes, key=lambda one: one.chi2)
-        agreeing = sum(bool((np.abs(one.r[:3] / best.r[:3] - 1) < _SAME).all()) for one in outcomes)
-        if best.slow_chi2 < _BOUND and (sure or agreeing > 1):
-            break
+    outcomes = _outcomes(search, problem, starts, sure)
     if not outcomes:
         raise PvidError("the refinement finds no motion that is like the run's")
-    found = min(outcomes, key=lambda one: one.chi2)
+    found = _likeliest(outcomes)
     slow = model.modes_hz(found.r[:3])[0]
     found, prior = _whole(search, problem, found, slow)
     found = without_outliers(problem, prior, found)
     if found.slow_chi2 > _ASKED:
         problem, found = _with_options(search, problem, found)
+    if found.slow_chi2 > GOOD or not found.converged:
+        outcomes.sort(key=lambda one: one.chi2)
+        about = [*map(_values_of(search.problem()), outcomes[:2]), *starts]
+        problem, found = _with_friction(search, (problem, found), about[: 1 if sure else _DRY_STARTS])
+        slow = model.modes_hz(found.r[:3])[0]
     if found.slow_chi2 > _ASKED:
         found = _shorter(problem, search.prior(problem, found.r), found, search.lengths(slow, _SHORTER))
     return RefinedPendulum(problem, found, search.first)
 
 
-def _whole(search: _Search, problem: Problem, found: Refined, slow_hz: float) -> tuple[Refined, Prior]:
+def _outcomes(
+    search: _Search,
+    problem: Problem,
+    starts: Sequence[Mapping[str, float]],
+    sure: bool,
+    more: tuple[str, ...] = (),
+) -> list[Refined]:
+    """Searches from the starts in turn, until one fits that is sure, or two agree. `more`: parameters that are
+    searched besides w, d1, d2 and the zero."""
+    outcomes: list[Refined] = []
+    for values in starts:
+        found = _searched(search, problem, values, more)
+        if found is None:
+            continue
+        outcomes.append(found)
+        best = _likeliest(outcomes)
+        agreeing = sum(bool((np.abs(one.r[:3] / best.r[:3] - 1) < _SAME).all()) for one in outcomes)
+        if best.slow_chi2 < _BOUND and (sure or agreeing > 1):
+            break
+    return outcomes
+
+
+def _likeliest(outcomes: Sequence[Refined]) -> Refined:
+    return min(outcomes, key=lambda one: one.chi2)
+
+
+def _values_of(problem: Problem) -> Callable[[Refined], dict[str, float]]:
+    """Parameters of an outcome by name."""
+    names = [one.name for one in problem.kernel.made.parameters]
+    return lambda found: dict(zip(names, map(float, found.r), strict=False))
+
+
+def _with_friction(
+    search: _Search, before: tuple[Problem, Refined], starts: Sequence[Mapping[str, float]]
+) -> tuple[Problem, Refined]:
+    """Searches in which dry friction is free from the first block on; the one before where they explain no more."""
+    problem = search.problem(_DRY)
+    outcomes = _outcomes(search, problem, starts, True, _DRY)
+    if not outcomes:
+        return before
+    found = _likeliest(outcomes)
+    slow = search.rig.mechanism.model.modes_hz(found.r[:3])[0]
+    found, prior = _whole(search, problem, found, slow, _DRY)
+    found = without_outliers(problem, prior, found)
+    return (problem, found) if found.converged and found.slow_chi2 < before[1].slow_chi2 else before
+
+
+def _whole(
+    search: _Search, problem: Problem, found: Refined, slow_hz: float, more: tuple[str, ...] = ()
+) -> tuple[Refined, Prior]:
     """Blocks of full length; skew and frictions are free where that costs the others little, or explains much."""
-    first = list(_FIRST)
+    first = [*_FIRST, *more]
     prior = search.prior(problem, found.r, first)
     found = refined(problem, prior, search.lengths(slow_hz, (1.0,)), before=found)
     names = [one.name for one in problem.kernel.made.parameters]
@@ -217,14 +264,16 @@ def _largest_error(found: Refined) -> float:
     return float(np.sqrt(np.diag(found.covariance)[:3]).max())
 
 
-def _searched(search: _Search, problem: Problem, values: Mapping[str, float]) -> Refined | None:
-    """w, d1, d2 and the zero from a start by short blocks; None where it leads nowhere."""
+def _searched(
+    search: _Search, problem: Problem, values: Mapping[str, float], more: tuple[str, ...] = ()
+) -> Refined | None:
+    """w, d1, d2, the zero and `more` from a start by short blocks; None where it leads nowhere."""
     model = search.rig.mechanism.model
     p = np.array([values[name] for name in model.mapped_names])
     if not model.is_plausible(p):
         return None
     r = search.r(problem, values)
-    prior = search.prior(problem, r, _FIRST)
+    prior = search.prior(problem, r, (*_FIRST, *more))
     wide = Prior(r, np.maximum(prior.sd, 1.0), prior.free)
     try:
         found = refined(problem, wide, search.lengths(model.modes_hz(p)[0], _SEARCH), most=_SEARCH_PASSES)

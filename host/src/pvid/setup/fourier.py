@@ -176,7 +176,7 @@ def config_of(
             noise_margin=_NOISE_MARGIN,
         ),
         range=None if run is None else _as_float32(_ranges(design.model, parameters.model, run)),
-        drive_min=None if run is None else _drive_min(design, parameters.model),
+        drive_min=None if run is None else drive_min_of(design, parameters.model),
         trust=TrustConfig(),
         gate=replace(_GATE, patience_s=_PATIENCE_WINDOWS * hop_s),
     )
@@ -190,7 +190,7 @@ def _ranges(model: FourierModel, compiled: CompiledModel, run: Mapping[str, npt.
     ]
 
 
-def _drive_min(design: FourierDesign32, compiled: CompiledModel) -> npt.NDArray[np.float32] | None:
+def drive_min_of(design: FourierDesign32, compiled: CompiledModel) -> npt.NDArray[np.float32] | None:
     """Standard deviation in a window below which a measured drive stands still: its derivatives are noise then."""
     model = design.model
     derived = {model.signal[one.signal].sample for one in model.jet if one.order}

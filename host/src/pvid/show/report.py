@@ -20,7 +20,6 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from scipy.signal import savgol_filter, welch
 
-from pvid.base.errors import PvidError
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
 from pvid.core.native import Native
@@ -34,8 +33,7 @@ from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run, is_run, read_run
 from pvid.rig.sensor_steps import resolution_note, resolved
-from pvid.run.advice import advice, advice_on_refusal, behind
-from pvid.run.identify import identify
+from pvid.run.advised import identified
 from pvid.run.residuals import Residuals, residuals_of
 from pvid.run.survey import fitted
 from pvid.settings.enums import Reason
@@ -168,12 +166,9 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     run = replace(run, notes=(*run.notes, *resolution_note(rig, resolved(rig, run))))
     whole = run.whole()  # residuals and spectra have no place for a missing sample
     given = run if rig.identifier.core_traits.takes_gaps else whole
-    try:
-        result = identify(given, rig, native)
-    except PvidError as error:
-        raise behind(advice_on_refusal(given, rig, native), error) from error
+    result = identified(given, rig, native)
     names = [name for name in result.model.p_names if name in result.value]
-    advices = tuple(f"advice: {sentence}" for sentence in advice(given, rig, result, native))
+    advices = tuple(f"advice: {sentence}" for sentence in result.advice)
     return Recording(
         title=f"{path.name}: {result.form} form, {result.law} law, core {result.core}, {run.sample_rate:g} samples per "
         "second",

@@ -7,9 +7,16 @@
 #include <avr/sleep.h>
 #include <stdint.h>
 
-class SerialPort {
+class SerialPort
+{
   public:
-    void begin(long baud) { (void)baud; UCSR0A = _BV(U2X0); UCSR0B = _BV(TXEN0); UBRR0 = 16; }
+    void begin(long baud)
+    {
+        (void)baud;
+        UCSR0A = _BV(U2X0);
+        UCSR0B = _BV(TXEN0);
+        UBRR0 = 16;
+    }
     void print(const char *text)
     {
         while (*text != '\0') {

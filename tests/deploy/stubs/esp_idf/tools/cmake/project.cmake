@@ -2,7 +2,7 @@
 set(idf ${CMAKE_CURRENT_LIST_DIR}/../..)
 macro(project name)
   _project(${name} LANGUAGES C)
-  set(CMAKE_C_FLAGS "${CMAKE_C_FLAGS} -std=gnu17 -Wall -Wextra -Werror=all -Wno-unused-parameter")
+  set(CMAKE_C_FLAGS "${CMAKE_C_FLAGS} -std=gnu17 -Wall -Wextra -Werror")
   add_subdirectory(${CMAKE_CURRENT_SOURCE_DIR}/../.. component)
   add_subdirectory(main)
   get_property(components GLOBAL PROPERTY idf_components)

@@ -1,0 +1,61 @@
+"""Float32 and fixed point: what differs in a package."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pvid.settings.engine_cores import FIXED as FIXED_ENGINE
+from pvid.settings.engine_cores import FLOAT as FLOAT_ENGINE
+from pvid.settings.engine_cores import EngineCore
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """One of the two.
+
+    Attributes
+    ----------
+    engine : its name and words
+    without : end of the names of sources that it does without
+    header, snapshot_header : of the engine
+    sample_type : in C
+    samples : what a sample is, for a README
+    is_integer : samples are counts, and parameters are integers with a scale
+    zephyr : settings of a Zephyr application
+    """
+
+    engine: EngineCore
+    without: str
+    header: str
+    snapshot_header: str
+    sample_type: str
+    samples: str
+    is_integer: bool
+    zephyr: str
+
+    @property
+    def core(self) -> str:
+        """Name, as in the names of functions."""
+        return self.engine.name
+
+
+FLOAT = Arithmetic(
+    engine=FLOAT_ENGINE,
+    without="_q31",
+    header="pvid/fourier.h",
+    snapshot_header="pvid/snapshot_fourier.h",
+    sample_type="float",
+    samples="float32",
+    is_integer=False,
+    zephyr="CONFIG_FPU=y\n",
+)
+FIXED = Arithmetic(
+    engine=FIXED_ENGINE,
+    without="_f32",
+    header="pvid/fourier_q31.h",
+    snapshot_header="pvid/snapshot_fourier_q31.h",
+    sample_type="int32_t",
+    samples="integers only, samples in counts of the sensors",
+    is_integer=True,
+    zephyr="",
+)

@@ -1,0 +1,56 @@
+"""The programs of firmware/examples, built on a deployed package as C and as C++, and run."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+from packages import STUBS, built, run
+
+from pvid.deploy.of_rig import deployment_f32
+from pvid.deploy.targets import write_package
+from pvid.models.mechanisms import compiled_of
+from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
+
+EXAMPLES = ROOT / "firmware" / "examples"
+NAMES = sorted(path.stem for path in EXAMPLES.glob("*.c"))
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
+PRINTED = {
+    "minimal": r"(?s).*: updated\n.*\nR = 1\.(19|20)\d* \+- \S+ ohm\n.*",
+    "timer_and_main_loop": r"estimate 1 at tick \d+: R = 1\.(19|20)\d*\n(?s:.*)",
+    "own_mechanism": r"0\.0(199|200)\d .*\n0\.0(49|50)\d\d .*\n0\.(09|10)\d\d\d .*\n",
+    "snapshot_in_flash": r"(\d+) estimates before the power cut, \1 after it; R = 1\.(19|20)\d*\n",
+    "rtos_task": r"R = 1\.(19|20)\d* \+- \S+ ohm\n",
+}
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the package in p and its build in b."""
+    folder = tmp_path_factory.mktemp("examples")
+    compiled = compiled_of("dc_motor")
+    made = deployment_f32(compiled, config_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
+    write_package(made, "cmake", folder / "p")
+    built(folder / "p", folder / "b")
+    run("gcc", "-std=c99", "-Ip/src", "-c", "p/example/dc_motor_example.c", "-o", "example.o", cwd=folder)
+    run("gcc", "-std=gnu99", "-c", STUBS / "freertos" / "tasks.c", "-o", "tasks.o", cwd=folder)
+    return folder
+
+
+def test_every_example_has_its_output() -> None:
+    assert set(PRINTED) == set(NAMES)
+    text = (EXAMPLES / "README.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `(\w+)\.c` \|", text, re.MULTILINE)) == set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("language", [("gcc", "-std=c99"), ("g++", "-std=c++14", "-x", "c++")], ids=["C", "C++"])
+def test_example(name: str, language: tuple[str, ...], package: Path, tmp_path: Path) -> None:
+    paths = (f"-I{package}/p/src", f"-I{package}/p/example", f"-I{STUBS / 'freertos'}")
+    objects = ("example.o", "tasks.o", "b/libpvid_dc_motor.a")
+    flags = (*language[1:], *WARNINGS, *paths)
+    run(language[0], *flags, "-c", EXAMPLES / f"{name}.c", "-o", tmp_path / "main.o", cwd=package)
+    run(language[0], tmp_path / "main.o", *objects, "-lm", "-pthread", "-o", tmp_path / "it", cwd=package)
+    assert re.fullmatch(PRINTED[name], run(tmp_path / "it"))
