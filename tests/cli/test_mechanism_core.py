@@ -129,7 +129,7 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     ("command", "arguments", "sentence"),
     [
         ("identify", ("--law", "stationary"), "--law stationary: dc_motor is identified in float64, or in C by"),
-        ("identify", ("--core", "f32", "--form", "strong"), "--form strong: dc_motor is identified in float64"),
+        ("identify", ("--core", "q31", "--form", "strong"), "the strong form of dc_motor is in float32 and float64"),
         ("compare", ("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is compared in float32"),
     ],
 )

@@ -196,8 +196,9 @@ class Problem:
         if not self.kernel.possible(r):
             return np.inf
         z = self.simulated(r, cut, starts)
-        error = np.where(use, (cut.rows(self.measured.z) - z) / self.measured.sd, 0.0)
-        total = float(np.sum(error**2))
+        with np.errstate(over="ignore"):  # a motion that runs away
+            error = np.where(use, (cut.rows(self.measured.z) - z) / self.measured.sd, 0.0)
+            total = float(np.sum(error**2))
         return total + self._prior_cost(r, prior) if np.isfinite(total) else np.inf
 
     def _prior_cost(self, r: Float, prior: Prior) -> float:
