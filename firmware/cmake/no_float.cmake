@@ -7,7 +7,7 @@ cmake_minimum_required(VERSION 3.20)
 
 # What libgcc's soft float is called: of ARM, and of the others.
 set(soft_float "__aeabi_([cdf]|u?[il]2[df])[a-z0-9]*|__(add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|fix|float|extend)[a-z]*[sdtx]f[a-z0-9]*")
-set(instruction "\t(v(add|sub|mul|div|ldr|str|mov|cvt|sqrt|cmp)|f(add|sub|mul|div|lw|sw|ld|sd|cvt|mv))")
+set(instruction "\t(v(add|sub|mul|div|ldr|str|mov|cvt|sqrt|cmp)|f(add|sub|mul|div|lw|sw|ld|sd|cvt|mv))[.\t]")
 
 # tool(RESULT COMMAND...): what it prints.
 function(tool result)

@@ -5,6 +5,7 @@
 #include "stream_rig.h"
 
 #define RECORDED_TICKS 1000u
+#define STREAM_PUT pvid_put_f32
 
 extern const float recorded[RECORDED_TICKS][STREAM_SAMPLES];
 

@@ -37,7 +37,7 @@ SOFT_FLOAT = re.compile(
     r"__aeabi_(?:[cdf]|u?[il]2[df])|__(?:add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|fix|float|extend)\w*[sdtx]f"
 )
 FLOAT_INSTRUCTION = re.compile(
-    r"\t(?:v(?:add|sub|mul|div|ldr|str|mov|cvt|sqrt|cmp)|f(?:add|sub|mul|div|lw|sw|ld|sd|cvt|mv))"
+    r"\t(?:v(?:add|sub|mul|div|ldr|str|mov|cvt|sqrt|cmp)|f(?:add|sub|mul|div|lw|sw|ld|sd|cvt|mv))[.\t]"
 )
 
 

@@ -110,6 +110,7 @@ typedef struct {
 /* 2^58 / d for d in [2^29, 2^30): a division of 32 bits and a Newton step. */
 static int32_t inverse_of(int32_t d)
 {
+    PVID_ASSERT(d >= ((int32_t)1 << 29));
     const int32_t r = (int32_t)(((uint32_t)1 << 31) / ((uint32_t)d >> 14)); /* 2^45 / d, 15 bits of it */
     const int64_t rest = ((int64_t)1 << 45) - pvid_product_q31(d, r);
     const int32_t more = (int32_t)pvid_nearest_q31(pvid_product_q31((int32_t)pvid_nearest_q31(rest, 15), r), 17);

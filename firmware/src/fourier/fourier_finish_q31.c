@@ -411,7 +411,8 @@ static void pull_stage(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     if (finish->known.compensates && !finish->saturated) {
-        pvid_scaled_q31 pull[PVID_MAX_THETA_Q31] = {{0, 0}};
+        pvid_scaled_q31 pull[PVID_MAX_THETA_Q31];
+        memset(pull, 0, sizeof pull);
         memcpy(&pull[finish->theta], &finish->known.pull[finish->theta], kind_of(self)->thetas * sizeof pull[0]);
         (void)pvid_estimator_add_to_b_q31(&self->estimator, pull);
     }

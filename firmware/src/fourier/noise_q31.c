@@ -76,7 +76,10 @@ static void add_information(pvid_estimator_q31 *estimator, size_t a, size_t b, p
             if ((model->c_row[l] != b) || (same && (j < i))) {
                 continue;
             }
-            const int32_t twice = (!same && (i == j)) ? 1 : 0;
+            int32_t twice = 0;
+            if (!same && (i == j)) {
+                twice = 1;
+            }
             const pvid_scaled_q31 x = pvid_scaled_times_q31(part, pvid_scaled_of_q31(work->c[l], work->f[j] + twice));
             int32_t *place = &estimator->noise_table[(i < j) ? place_of(model->n_p, i, j) : place_of(model->n_p, j, i)];
             *place = pvid_scaled_packed_q31(pvid_scaled_plus_q31(pvid_scaled_unpacked_q31(*place), x));

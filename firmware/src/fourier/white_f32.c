@@ -80,6 +80,16 @@ static float samples_of(const pvid_fourier_design_f32 *design, size_t harmonic)
     return (harmonic == 0u) ? (2.0f * (float)design->hop) : (float)design->hop;
 }
 
+/* c[0] + c[1] x + c[2] x^2 .. */
+static float polynomial_of(const float c[], size_t powers, float x)
+{
+    float sum = 0.0f;
+    for (size_t j = powers; j > 0u; j--) {
+        sum = (sum * x) + c[j - 1u];
+    }
+    return sum;
+}
+
 void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fourier_design_f32 *design, uint8_t kind,
                                      uint8_t harmonics)
 {
@@ -91,12 +101,7 @@ void pvid_fourier_white_spectrum_f32(pvid_fourier_white_f32 *self, const pvid_fo
     c[design->error_order[kind]] += design->error_variance[kind];
     for (size_t h = 0; h < harmonics; h++) {
         const float rate = (float)h * self->omega;
-        const float square = rate * rate;
-        float sum = 0.0f;
-        for (size_t j = self->powers; j > 0u; j--) {
-            sum = (sum * square) + c[j - 1u];
-        }
-        self->scale[h] = samples_of(design, h) * sum;
+        self->scale[h] = samples_of(design, h) * polynomial_of(c, self->powers, rate * rate);
         mean += self->scale[h];
     }
     const float part = (FLOOR * mean) / (float)harmonics;

@@ -134,8 +134,8 @@ static inline uint64_t pvid_magnitude_q31(int64_t x)
 static inline uint32_t pvid_bit_length_q31(uint64_t x) /* one instruction counts leading zeros */
 {
     const uint32_t high = (uint32_t)(x >> 32);
-    const uint32_t rest = (high != 0u) ? high : (uint32_t)(x & 0xFFFFFFFFu);
-    return (rest == 0u) ? 0u : (((high != 0u) ? 64u : 32u) - (uint32_t)__builtin_clz(rest));
+    const uint32_t word = (high != 0u) ? high : (uint32_t)(x & 0xFFFFFFFFu);
+    return (word == 0u) ? 0u : (((high != 0u) ? 64u : 32u) - (uint32_t)__builtin_clz(word));
 }
 #else
 uint32_t pvid_bit_length_q31(uint64_t x);

@@ -165,7 +165,7 @@ pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pv
 
 void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self)
 {
-    const size_t places = places_of(&self->bank);
+    const size_t places = (size_t)places_of(&self->bank);
     self->head = 0;
     self->at = 0;
     self->missing = (uint16_t)((self->length + (uint32_t)block_of(&self->bank)) - 1u);

@@ -27,7 +27,7 @@ from pvid.sim.simulated_run import RigSimulation
 Run = Mapping[str, npt.ArrayLike]
 
 # A design that costs less is taken if its score is at most this many times the best one's.
-_COST = 1.1
+_COST = 1.2
 _DECIMATIONS = (2, 4, 8, 16, 32)
 _FEWER = (24, 16, 12)
 

@@ -17,8 +17,9 @@ from pvid.oracle.fourier.front import weights_of
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.rows import Compiled
 
-# A frequency belongs to the drive if its power is so many times that of the noise.
-_ABOVE_NOISE = 10.0
+# A frequency belongs to the drive if its power is so many times the median, the noise: noise reaches 40 times at one of
+# 2^40 frequencies. (Ten times are reached at one of a thousand, and a second derivative makes those the largest.)
+_ABOVE_NOISE = 40.0
 
 
 def rates_of_drives(model: Compiled) -> list[Jet]:
