@@ -34,6 +34,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "ports": "List the serial ports of this machine and the emulated boards.",
         "view": "Show a log on the live page.",
         "export": "Convert a log to csv, parquet, mcap or npz.",
+        "layout": "Write the plots of a log as a layout file for PlotJuggler or Foxglove.",
         "sizes": "Measure flash, RAM, stack and instructions on every emulated board.",
     },
     "Design": {
