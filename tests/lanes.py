@@ -63,7 +63,7 @@ def assert_lanes_equal(
             assert first_difference(record, own) is None, native.build
             assert hashes is None or np.array_equal(record.hash[:hashed_ticks], hashes), native.build
             assert core.running_hash == record.hash[-1]
-            assert core.counters == counters
+            assert core.counters == counters, (core.counters, counters)
             assert core.assess().tobytes() == assessed[lane].tobytes()
             if core.publishes:
                 assert core.estimate.tobytes() == twin.trust.estimate[lane].tobytes()

@@ -83,8 +83,8 @@ def test_a_run_goes_through_a_socket(start: Start, native: Native) -> None:
 def test_bytes_during_startup_do_not_block_the_receiver(name: str, native: Native) -> None:
     """A byte in the UART before its interrupt was on: some UARTs then never call again."""
     for _ in range(3):
-        target = open_target(name, standard_rig("weak"))
-        assert play_standard(replace(target, coming_up_s=0.0), "weak", patience_s=60).complete
+        target = open_target(name, standard_rig("strong"))
+        assert play_standard(replace(target, coming_up_s=0.0), "strong", patience_s=60).complete
 
 
 def test_a_port_in_use_is_named() -> None:

@@ -252,7 +252,10 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError
     whitener = plain.whitener.base
     without = unlikely(rows, kind, theta, EquationError())
     for order in range(rows.compiled.channels.rows_top(kind) + 1):
-        q, u = np.linalg.eigh(whitener @ rows.noise.gram(order, order) @ whitener.T)
+        white = whitener @ rows.noise.gram(order, order) @ whitener.T
+        if not np.isfinite(white).all():  # sensors of no size that a number holds
+            continue
+        q, u = np.linalg.eigh(white)
         q = np.maximum(q, 0.0)
         z = np.einsum("ij,ik,kj->j", u, moment, u)
         v, rise = most_likely(q, z)
