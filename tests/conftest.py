@@ -27,6 +27,7 @@ SLOW = (
     *("tools/proofs", "tools/analysis", "tools/loops", "tools/mutate", "tools/core_rooms", "bench/campaign_population"),
     *("codegen/strong_model", "codegen/generated_q31", "codegen/generated_f32", "codegen/build", "codegen/random"),
     "codegen/model_q31",
+    *("tools/notebooks", "fleet/batch"),
     *("board/generated", "board/engine_boards", "twin/fourier_f32", "oracle/fourier_engine"),
 )
 # Of these, the tests that belong to the inner loop all the same.

@@ -7,8 +7,8 @@ reads recorded runs and proves, bit for bit, that the C code and numpy compute t
     result.parameters["g"].value, result.parameters["g"].se, result.identified, result.warning
     result.plot("run.png")
 
-`pvid.Model` describes a mechanism of your own; `pvid.Estimator` estimates the parameters of your own rows on the C
-core.
+`pvid.Model` and `pvid.sgn` describe a mechanism of your own; `pvid.Estimator` estimates the parameters of your own rows
+on the C core.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from pvid.base.version import __version__
 
-__all__ = ["Estimator", "Model", "PvidError", "Result", "__version__", "identify"]
+__all__ = ["Estimator", "Model", "PvidError", "Result", "__version__", "identify", "sgn"]
 
 if TYPE_CHECKING:
     from pvid.api.estimator import Estimator
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pvid.api.result import Result
     from pvid.base.errors import PvidError
     from pvid.model.description import Model
+    from pvid.model.signals import sgn
 
 # Imported when they are first used: SciPy and SymPy take a second.
 _HOMES = {
@@ -34,6 +35,7 @@ _HOMES = {
     "PvidError": "pvid.base.errors",
     "Result": "pvid.api.result",
     "identify": "pvid.api.identify",
+    "sgn": "pvid.model.signals",
 }
 
 

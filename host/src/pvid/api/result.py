@@ -28,6 +28,13 @@ class Parameter:
         return f"{value} ± {error} {self.unit}".rstrip()
 
 
+class Picture(type(Path())):  # type: ignore[misc]
+    """The path of a PNG file, which a notebook shows as a picture."""
+
+    def _repr_png_(self) -> bytes | None:
+        return self.read_bytes() if self.suffix == ".png" else None
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """An identification.
@@ -70,14 +77,15 @@ class Result:
         return f"<table>{rows}</table>{warning}"
 
     def plot(self, path: str | Path) -> Path:
-        """Writes a figure of the estimates over time with their standard errors (png, svg or pdf) and returns its path.
+        """Writes a figure of the estimates over time with their standard errors (png, svg or pdf) and returns its path,
+        which a notebook shows as a picture.
 
         Raises
         ------
         PvidError
             When it cannot be written.
         """
-        out = Path(path)
+        out = Picture(path)
         if isinstance(self._answer, Identification):
             from pvid.show.figures import convergence
 

@@ -1,0 +1,55 @@
+"""The notebooks run, cell by cell, and show what they show; the runner's outputs are those of a kernel."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from conftest import ROOT
+
+NOTEBOOKS = sorted((ROOT / "host" / "notebooks").glob("*.ipynb"))
+
+
+@pytest.fixture(scope="module")
+def runner() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("notebooks", ROOT / "tools" / "notebooks.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def outputs_of(notebook: dict[str, Any]) -> list[list[str]]:
+    """The kinds of the outputs of each cell of code."""
+    return [
+        [kind for one in cell["outputs"] for kind in one.get("data", {"stream": ""})]
+        for cell in notebook["cells"]
+        if cell["cell_type"] == "code"
+    ]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_every_cell_runs_and_shows_what_the_file_shows(
+    path: Path, runner: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ran = runner.run_notebook(path)
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    assert outputs_of(ran) == outputs_of(kept), "run tools/notebooks.py --update"
+    assert "image/png" in str(outputs_of(kept)) and "text/html" in str(outputs_of(kept))
+    assert kept["nbformat"] == 4 and len({cell["id"] for cell in kept["cells"]}) == len(kept["cells"])
+
+
+def test_a_cell_shows_what_it_prints_and_its_last_value(runner: ModuleType) -> None:
+    names: dict[str, Any] = {}
+    assert runner.run_cell("x = 2\nprint(x)\nx + 1", names) == [
+        {"name": "stdout", "output_type": "stream", "text": ["2\n"]},
+        {"data": {"text/plain": ["3"]}, "metadata": {}, "output_type": "display_data"},
+    ]
+    assert runner.run_cell("x", names)[0]["data"] == {"text/plain": ["2"]} and runner.run_cell("y = x", names) == []
+    with pytest.raises(ZeroDivisionError):
+        runner.run_cell("x / 0", names)
