@@ -73,7 +73,7 @@ def run_notebook(path: Path) -> dict[str, Any]:
 
 
 def text_of(notebook: dict[str, Any]) -> str:
-    """As it stands in the file."""
+    """The text of its file."""
     return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import json
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +17,7 @@ import pvid
 from bench.campaign.judge import COLUMNS, Record
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
+from pvid.base.json_lines import append_json_line, read_json_lines
 from pvid.core.headers import default_library
 
 _KEY = "key"
@@ -60,7 +60,7 @@ class Store:
         self._arrow, self._parquet = _arrow()
         self.records: dict[int, Record] = {}
         self.foreign = 0
-        for record in (*self._complete(), *self._begun()):
+        for record in (*self._complete(), *read_json_lines(self.partial)):
             self._take(record)
 
     def _take(self, keyed: dict[str, Any]) -> None:
@@ -81,30 +81,9 @@ class Store:
             raise PvidError(f"{self.out}: exists and is not a campaign's result: choose another name for -o")
         return rows
 
-    def _begun(self) -> list[dict[str, Any]]:
-        """What the partial file holds; a line that was cut off while it was written is none."""
-        if not self.partial.exists():
-            return []
-        records = []
-        for line in self.partial.read_bytes().split(b"\n")[:-1]:
-            try:
-                record = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(record, dict):
-                records.append(record)
-        return records
-
     def add(self, record: Record) -> None:
         """Keeps a record, in the partial file too."""
-        line = json.dumps({_KEY: self.key, **{name: record[name] for name in COLUMNS}})
-        try:
-            with self.partial.open("ab") as file:
-                if file.tell() > 0 and not _ends_a_line(self.partial):
-                    file.write(b"\n")
-                file.write(line.encode() + b"\n")
-        except OSError as error:
-            raise PvidError(f"{self.partial}: cannot be written: {error.strerror}") from error
+        append_json_line(self.partial, {_KEY: self.key, **{name: record[name] for name in COLUMNS}})
         self.records[int(str(record["rig"]))] = record
 
     def chosen(self, rigs: Iterable[int]) -> list[Record]:
@@ -127,12 +106,6 @@ class Store:
         except OSError as error:
             raise PvidError(f"{self.out}: cannot be written: {error.strerror}") from error
         return records
-
-
-def _ends_a_line(path: Path) -> bool:
-    with path.open("rb") as file:
-        file.seek(-1, 2)
-        return file.read(1) == b"\n"
 
 
 def _arrow() -> tuple[Any, Any]:

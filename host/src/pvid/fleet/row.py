@@ -100,8 +100,7 @@ def row_of(path: str, question: Question) -> Row:
         key = question.key(place)
         board, began = _origin(place)
     except (OSError, PvidError) as error:
-        told = reason(error) if isinstance(error, OSError) else str(error)
-        return Row(key, path, str(place.parent), 0.0, failure=told, took=time.monotonic() - start)
+        return Row(key, path, str(place.parent), 0.0, failure=_told(error), took=time.monotonic() - start)
     try:
         result = identify(
             place,
@@ -112,8 +111,7 @@ def row_of(path: str, question: Question) -> Row:
             settings=question.settings,
         )
     except (PvidError, OSError) as error:
-        told = reason(error) if isinstance(error, OSError) else str(error)
-        return Row(key, path, board, began, failure=told, took=time.monotonic() - start)
+        return Row(key, path, board, began, failure=_told(error), took=time.monotonic() - start)
     return Row(
         key,
         path,
@@ -127,6 +125,10 @@ def row_of(path: str, question: Question) -> Row:
         parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
         took=time.monotonic() - start,
     )
+
+
+def _told(error: OSError | PvidError) -> str:
+    return reason(error) if isinstance(error, OSError) else str(error)
 
 
 def _origin(path: Path) -> tuple[str, float]:

@@ -38,7 +38,7 @@ def run(
     if not places:
         raise PvidError("there is no recording to identify: name files, or a pattern in quotes")
     rows: dict[str, Row] = {}
-    for place in places:
+    for place in places if store.rows else ():  # else nothing is kept, and workers read the files anyway
         kept = store.rows.get(_key(place, question))
         if kept is not None:
             rows[place] = kept

@@ -5,7 +5,6 @@ A row counts for a recording with the same key (pvid.fleet.row): of a file that 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
+from pvid.base.json_lines import append_json_line, read_json_lines
 from pvid.fleet.row import Row
 
 _PARAMETERS = "parameters"
@@ -45,15 +45,12 @@ class Store:
             self.rows[row.key] = row
 
     def _begun(self) -> Iterable[Row]:
-        """What the partial file holds; a line that was cut off while it was written is none."""
-        if not self.partial.exists():
-            return
-        for line in self.partial.read_bytes().split(b"\n"):
+        """What the partial file contains."""
+        for found in read_json_lines(self.partial):
             try:
-                found = json.loads(line)
                 found[_PARAMETERS] = {name: tuple(one) for name, one in found[_PARAMETERS].items()}
                 yield Row(**found)
-            except (ValueError, TypeError, KeyError, AttributeError):
+            except (TypeError, KeyError, AttributeError):
                 continue
 
     def add(self, row: Row) -> None:
@@ -66,11 +63,7 @@ class Store:
         """
         if row.key:
             self.rows[row.key] = row
-        try:
-            with self.partial.open("ab") as file:
-                file.write(b"\n" + json.dumps(asdict(row)).encode())
-        except OSError as error:
-            raise PvidError(f"{self.partial}: cannot be written: {error.strerror}") from error
+        append_json_line(self.partial, asdict(row))
 
     def finish(self, rows: Iterable[Row]) -> None:
         """Writes the Parquet file with these rows; the partial file vanishes.
