@@ -48,9 +48,10 @@ void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const flo
     }
 }
 
-void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level)
+void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level, float clash)
 {
     estimate->level = level;
+    estimate->clash = clash;
     for (size_t i = 0; i < N; i++) {
         const float sd = sqrtf(estimate->covariance[i][i]);
         estimate->r[i] = r[i];

@@ -24,6 +24,7 @@ _HOPELESS = _F(30)
 _LOST_MOST = 6
 _RECENT = 200
 _LEVEL_GAIN = _F(0.2)
+_CLASH_GAIN = _F(0.3)
 _ERRORS = _F(5)
 
 
@@ -50,6 +51,7 @@ class RefineEstimate:
     se: Float32
     covariance: Float32
     level: np.float32
+    clash: np.float32
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ class RefineTwin:
         self.phase = Phase.WAIT
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
         self.passed = self.taken = self.refused = self.lost = self.length = self.begin = 0
-        self.level = _F(0)
+        self.level = self.clash = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
         self.weak_se = np.zeros(len(shape.place_of_p), _F)
         self.triangle = np.zeros((n, n), _F)
@@ -147,9 +149,11 @@ class RefineTwin:
         enough = self.work.used * 10 >= self.length * 6 * self.shape.outputs
         return bool(self.solved and enough and np.all(np.abs(self.start) < self.state_limit))
 
-    def _take(self, square: np.float32) -> None:
+    def _take(self, square: np.float32, clash: np.float32) -> None:
         config = self.config
         self.refused = self.lost = 0
+        gain = _CLASH_GAIN if self.taken > 1 else _F(1)
+        self.clash = self.clash + gain * (clash - self.clash) if self.taken > 0 else _F(1)
         self.taken = min(self.taken + 1, 2)
         self.level = square if self.taken == 1 else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
@@ -202,7 +206,7 @@ class RefineTwin:
         )
         self.begin += self.work.step * BIG_STEP
         if taken:
-            self._take(square)
+            self._take(square, clash)
             self.verdict = Reason.UPDATED if self.taken > 1 else Reason.HELD_UNCERTAIN
         else:
             self.verdict = Reason.HELD_BLOCK if self.taken > 0 else Reason.HELD_SEARCHING
@@ -216,7 +220,8 @@ class RefineTwin:
         if self.passed == 0:
             self.covariance = np.multiply.outer(self.gain_sd, self.gain_sd)
         x = inverse_column(self.solve.triangle, self.passed)
-        variance = self.variance * _at_least_one(self.level)
+        level = _at_least_one(self.level)
+        variance = self.variance * (self.clash if self.clash > level else level)
         upto = self.passed + 1
         self.covariance[:upto, :upto] = self.covariance[:upto, :upto] + np.multiply.outer(variance * x[:upto], x[:upto])
         self.passed += 1
@@ -226,7 +231,7 @@ class RefineTwin:
         sd = np.sqrt(np.diag(self.covariance))
         logarithmic = self.steps.logarithmic
         se = np.where(logarithmic, sd * self.r, sd)
-        self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level)
+        self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level, self.clash)
         certain = np.all(np.isfinite(self.r)) and np.all(np.isfinite(se))
         certain = certain and np.all(~logarithmic | (se <= _F(self.config.se_max) * self.r))
         self.verdict = Reason.UPDATED
