@@ -45,7 +45,7 @@ FLOAT_INSTRUCTION = re.compile(
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A run of the standard rig, 10 s, and its rig file."""
     folder = tmp_path_factory.mktemp("q31")
-    run = simulate(sensors=standard_sensors(14), truth="linear", duration=10.0, seed=2).run
+    run = simulate(sensors=standard_sensors(14), truth="full", duration=10.0, seed=2).run
     write_run(folder / "run.csv", run)
     exact = replace(LINEAR_RIG.sensor, y_gain_sd=0.0)  # else the errors are those of the gain and of l1
     replace(LINEAR_RIG, l1_sd=0.0, sensor=exact).write(folder / "rig.toml")
@@ -120,24 +120,13 @@ def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
     assert "DIFFERENT" not in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        ({"sensor": {"phi_lsb": 0.0}}, "phi_lsb is 0"),
-        ({"sensor": {"phi_range": 1e-6}}, "phi_range is 0 counts"),
-        ({"identifier": {"damping": True}}, "core q31 has no damping"),
-    ],
-)
-def test_unsupported_request_is_reported(
-    recorded: tuple[Path, Path], tmp_path: Path, change: dict[str, dict[str, object]], sentence: str
-) -> None:
+def test_an_encoder_without_a_resolution_is_named(recorded: tuple[Path, Path], tmp_path: Path) -> None:
+    """Nothing is identified at an error of zero, and the step that the run shows is told."""
     rig = RigFile.standard()
-    for table, keys in change.items():
-        rig = replace(rig, **{table: replace(getattr(rig, table), **keys)})
-    rig.write(tmp_path / "rig.toml")
+    replace(rig, sensor=replace(rig.sensor, phi_lsb=0.0)).write(tmp_path / "rig.toml")
     command = ["identify", str(recorded[0]), "--rig", str(tmp_path / "rig.toml"), "--core", "q31"]
-    with pytest.raises(PvidError, match=sentence):
-        CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False)
+    done = CliRunner().invoke(commands, command)
+    assert "nothing identified" in done.stderr and "use --set sensor.phi_lsb=0.0003835" in done.stderr
 
 
 PROGRAM = """

@@ -33,15 +33,16 @@ def rig_with(**identifier: Any) -> RigFile:
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    """20 s of the standard rig with an encoder of 14 bits."""
-    return simulate(sensors=standard_sensors(14), truth="linear", duration=20.0, seed=1).run
+    """19.9 s of the standard rig with an encoder of 14 bits: its last tick is not within a solve that is spread over
+    ticks, whose counters would be those of a part of it."""
+    return simulate(sensors=standard_sensors(14), truth="linear", duration=19.9, seed=1).run
 
 
 @pytest.mark.parametrize("law", LAWS)
 @every_case
 def test_the_core_equals_its_twin(case: Case, law: str, native: Native, run: Run) -> None:
     rig = rig_with(form=case.form, dead_zone=1.5, forgetting_s=4.0, **LAWS[law])
-    ticks = 20_000 if case.form == "weak" else 2_000
+    ticks = 19_900 if case.form == "weak" else 2_000
     phi, y = (x[:ticks] for x in case.samples(rig, run))
     (lane,) = assert_lanes_equal([native], case.settings(rig, 1000.0), phi, y)
     assert lane.counters["at_rest"] > 0 or law == "paper"  # whose F does not decay

@@ -158,13 +158,13 @@ def test_an_hour_without_a_drive_changes_no_bit_of_the_estimate(native: Native) 
 
 
 def test_the_command_line_publishes_the_zero(tmp_path: Path) -> None:
-    pvid(tmp_path, "simulate", "run.csv", "--truth", "linear", "--zero", "0.02", "--duration", "20")
+    pvid(tmp_path, "simulate", "run.csv", "--zero", "0.02", "--duration", "20")
     answer = json.loads(pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--json").stdout)
     assert answer["form"] == "weak"
     # the encoder's grid lies within half an LSB of the zero, at random
     assert answer["c"]["value"] == pytest.approx(0.02, abs=LSB_14)
     assert 0 < answer["c"]["se"] < LSB_14
-    assert pvid(tmp_path, "compare", "run.csv", "--rig", "run.toml").stdout.count("equal") == 2
+    assert pvid(tmp_path, "compare", "run.csv", "--rig", "run.toml").stdout.count("equal") == 1
 
 
 @pytest.mark.parametrize("bits", [12, 14, 16])

@@ -215,8 +215,12 @@ def _why_not(run: Run, rig: RigFile, reason: Reason, r2: float) -> str:
 
 
 def _own_share(covariance: Float) -> float:
-    """Share of the information on the first parameter that the others cannot explain."""
-    return float(1.0 / (covariance[0, 0] * np.linalg.pinv(covariance, hermitian=True)[0, 0]))
+    """Share of the information on the first parameter that the others cannot explain; 0 without information."""
+    sd = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(sd, sd)
+    if not np.isfinite(correlation).all():
+        return 0.0
+    return float(min(1.0, 1.0 / np.linalg.pinv(correlation, hermitian=True)[0, 0]))
 
 
 def _trajectory(core: _Core, correlation: npt.NDArray[np.float64], rig: RigFile) -> Trajectory:

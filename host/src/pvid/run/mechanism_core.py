@@ -195,7 +195,7 @@ def _in_fixed_point(answer: MechanismAnswer) -> _Run:
     identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
     record = identifier.run_samples(engine.counts_of(answer.recording.signals), sums=False)
     last, n_p = identifier.estimate, len(answer.found.p)
-    se = engine.values(last["se"][:n_p])
+    se = engine.values(np.maximum(last["se"][:n_p], 1))  # an error below the format's step counts as a step
     correlation = np.asarray(last["correlation"], np.float64)[:n_p, :n_p] * 2.0**-30
     return _Run(
         "q31",
