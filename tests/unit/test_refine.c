@@ -302,7 +302,7 @@ static void test_init_refuses(void **state)
     REFUSES(most_passes, 1, PVID_BAD_ITERATIONS);
     REFUSES(sd[0], 0.0f, PVID_BAD_ROW_SD);
     REFUSES(prior_sd[6], nan, PVID_BAD_START_SD);
-    REFUSES(gain_sd[0], -1.0f, PVID_BAD_START_SD);
+    REFUSES(gain_sd[0], nan, PVID_BAD_START_SD);
     REFUSES(state_limit[3], 0.0f, PVID_BAD_BOUNDS);
     REFUSES(forgetting_s, -1.0f, PVID_BAD_FORGETTING);
     REFUSES(gate, nan, PVID_BAD_GATE_SIGMAS);

@@ -44,6 +44,9 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
 #define LEVEL_GAIN 0.2f
 #define CLASH_GAIN 0.3f
 
+/* Factor on the clash of the first two blocks: they are short, and neighbours err alike. */
+#define FIRST_CLASH 2.0f
+
 static inline bool is_ready(const pvid_refine_f32 *self)
 {
     const bool ready = (self != NULL) && (self->config.signal != NULL);
@@ -132,8 +135,11 @@ static void take(pvid_refine_f32 *self, float square, float clash)
     const pvid_refine_config_f32 *config = &self->config;
     self->refused = 0;
     self->lost = 0;
-    const float gain = (self->taken > 1u) ? CLASH_GAIN : 1.0f; /* the first one to have a past tells it alone */
-    self->clash = (self->taken == 0u) ? 1.0f : (self->clash + (gain * (clash - self->clash)));
+    if (self->taken > 1u) {
+        self->clash += CLASH_GAIN * (clash - self->clash);
+    } else {
+        self->clash = (self->taken == 0u) ? 1.0f : (FIRST_CLASH * clash);
+    }
     self->taken = (uint8_t)((self->taken < 2u) ? (self->taken + 1u) : 2u);
     self->level = (self->taken == 1u) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
     memcpy(self->r, self->linear, sizeof self->r);

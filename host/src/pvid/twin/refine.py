@@ -25,6 +25,7 @@ _LOST_MOST = 6
 _RECENT = 200
 _LEVEL_GAIN = _F(0.2)
 _CLASH_GAIN = _F(0.3)
+_FIRST_CLASH = _F(2)
 _ERRORS = _F(5)
 
 
@@ -152,8 +153,10 @@ class RefineTwin:
     def _take(self, square: np.float32, clash: np.float32) -> None:
         config = self.config
         self.refused = self.lost = 0
-        gain = _CLASH_GAIN if self.taken > 1 else _F(1)
-        self.clash = self.clash + gain * (clash - self.clash) if self.taken > 0 else _F(1)
+        if self.taken > 1:
+            self.clash = self.clash + _CLASH_GAIN * (clash - self.clash)
+        else:
+            self.clash = _FIRST_CLASH * clash if self.taken > 0 else _F(1)
         self.taken = min(self.taken + 1, 2)
         self.level = square if self.taken == 1 else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
@@ -238,15 +241,15 @@ class RefineTwin:
         if not certain:
             self.verdict = Reason.HELD_UNCERTAIN
             return
-        better, distance = True, _F(self.config.distance)
+        ratio, distance = _F(1), _F(self.config.distance)
         for i, place in enumerate(self.shape.place_of_p):
             x, error, weak_se = self.r[place], se[place], self.weak_se[i]
             errors = np.sqrt(error * error + weak_se * weak_se)
             allowed = _ERRORS * errors + (distance * x if logarithmic[place] else distance)
             if not -allowed <= x - self.weak[place] <= allowed:
                 self.verdict = Reason.HELD_DISAGREES
-            better = better and bool(distance > 0 or error <= weak_se)
-        if not better and self.verdict is Reason.UPDATED:
+            ratio = ratio * (error / weak_se)
+        if not (distance > 0 or ratio <= 1) and self.verdict is Reason.UPDATED:
             self.verdict = Reason.HELD_UNCERTAIN
 
     # ---- jobs ----
