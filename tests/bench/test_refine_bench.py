@@ -50,3 +50,12 @@ def test_the_gain_of_the_drive_is_in_the_standard_errors() -> None:
     found = run_fault(Fault(0.3, gain=0.004, duration=12.0), 0)
     np.testing.assert_allclose(found.error[-1], [0.004, -0.004, -0.008], rtol=0.1)
     assert np.all(np.abs(found.error[-1] / found.se[-1]) < 1.3)
+
+
+def test_disturbances_leave_nothing_that_is_not_finite_and_nothing_confidently_wrong() -> None:
+    """Two minutes of outliers, missing and stuck samples, spikes of the drive and jumps of the encoder's zero."""
+    for seed in range(2):
+        found = run_fault(Fault(0.3, disturbed=True, duration=120.0), seed)
+        assert np.isfinite(found.error).all() and np.isfinite(found.se).all() and np.isfinite(found.clash)
+        assert not found.confidently_wrong
+        assert np.abs(found.error[-1]).max() < 2e-3

@@ -50,6 +50,7 @@ class Fault:
     backlash : of the encoder's gear [LSB]
     eccentricity : of its disc [rad]
     gain : relative error of y's scale, which is as large as the rig file expects
+    disturbed : outliers, missing and stuck samples of both sensors and jumps of the encoder's zero, a few a minute
     """
 
     angle: float
@@ -57,6 +58,7 @@ class Fault:
     backlash: float = 0.0
     eccentricity: float = 0.0
     gain: float = 0.0
+    disturbed: bool = False
     duration: float = 40.0
 
     @property
@@ -68,7 +70,8 @@ class Fault:
             ("eccentric by {:g} rad", self.eccentricity),
             ("gain of y off by {:g}", self.gain),
         )
-        return ", ".join(text.format(value) for text, value in parts if value) or "none"
+        said = [text.format(value) for text, value in parts if value]
+        return ", ".join(said + ["disturbed"] * self.disturbed) or "none"
 
 
 FAULTS = tuple(
@@ -80,8 +83,29 @@ FAULTS = tuple(
         *({"backlash": width} for width in (0.5, 2.0, 8.0)),
         *({"eccentricity": width} for width in (1e-4, 1e-3)),
         {"gain": 0.003},
+        {"disturbed": True, "duration": 120.0},
     )
 )
+
+
+def _disturb(phi: Float, y: Float, random: np.random.Generator) -> None:
+    """In place; the last fifth of the run is left alone."""
+    ticks = len(phi)
+    for kind, at in enumerate(random.integers(0, int(0.8 * ticks), max(8, ticks // 5000))):
+        signal, some = (phi, slice(at, at + int(random.integers(1, 600))))
+        match kind % 6:
+            case 0:
+                signal[random.integers(at, at + 5000, 12).clip(max=ticks - 1)] += 0.05
+            case 1:
+                signal[some] = np.nan
+            case 2:
+                signal[some] = signal[at]
+            case 3:
+                signal[at:] += 0.02
+            case 4:
+                y[some] = np.nan
+            case _:
+                y[at] += 1e-3
 
 
 @lru_cache(2)
@@ -128,6 +152,8 @@ def run_fault(fault: Fault, seed: int) -> Published:
     if fault.backlash:
         exact = with_play(exact, fault.backlash * _LSB)
     phi, y = standard_sensors(BITS).measure(exact, (1 + fault.gain) * pivot, seed)
+    if fault.disturbed:
+        _disturb(phi, y, np.random.default_rng([seed, 7]))
     about = refine_rig(RATE_HZ, STANDARD_PENDULUM.l1, TRUTH, sample_sd(BITS), y_gain_sd=fault.gain)
     gain_sd = np.asarray(about.gain_sd, np.float32)
     identifier = engine_of(BITS).identifier(standard_start(seed), gain_sd=gain_sd)

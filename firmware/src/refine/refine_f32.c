@@ -236,14 +236,16 @@ static void pass_job(pvid_refine_f32 *self)
 {
     pvid_refine_signals_f32 signals;
     uint32_t first = 0;
-    if (pvid_refine_pass_needs_f32(&self->work, &first)) {
+    const uint32_t steps = pvid_refine_pass_needs_f32(&self->work, &first);
+    if (steps > 0u) {
         const uint32_t entry = self->begin + first;
-        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < (3 + PVID_REFINE_REACH)) {
+        const uint32_t behind = entry + (steps + PVID_REFINE_REACH);
+        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - behind) < 0) {
             self->waiting = true;
-            self->due = entry + (3u + PVID_REFINE_REACH);
+            self->due = behind;
             return;
         }
-        pvid_refine_front_read_f32(&self->front, entry, &signals);
+        pvid_refine_front_read_f32(&self->front, entry, steps, &signals);
     }
     pvid_refine_pass_job_f32(&self->work, self->linear, self->weight, &signals);
     if (pvid_refine_pass_ends_f32(&self->work, self->length)) {

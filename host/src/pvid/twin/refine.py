@@ -255,14 +255,15 @@ class RefineTwin:
     # ---- jobs ----
 
     def _pass_job(self) -> None:
-        first = self.work.needs()
+        first, steps = self.work.needs()
         signals = None
-        if first is not None:
+        if steps > 0:
             entry = self.begin + first
-            if self.front.end - entry < 3 + self.shape.reach:
-                self.waiting, self.due = True, entry + 3 + self.shape.reach
+            behind = entry + steps + self.shape.reach
+            if self.front.end < behind:
+                self.waiting, self.due = True, behind
                 return
-            signals = self.front.read(entry)
+            signals = self.front.read(entry, steps)
         self.work.do(self.linear, self.weight, signals)
         if self.work.ends(self.length):
             self.solve.begin()
