@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -74,18 +75,15 @@ class Fault:
         return ", ".join(said + ["disturbed"] * self.disturbed) or "none"
 
 
-FAULTS = tuple(
-    Fault(angle, **one)
-    for angle in (0.1, 0.3)
-    for one in (
-        {},
-        *({"dry": dry} for dry in (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)),
-        *({"backlash": width} for width in (0.5, 2.0, 8.0)),
-        *({"eccentricity": width} for width in (1e-4, 1e-3)),
-        {"gain": 0.003},
-        {"disturbed": True, "duration": 120.0},
-    )
+_KINDS: tuple[dict[str, Any], ...] = (
+    {},
+    *({"dry": dry} for dry in (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)),
+    *({"backlash": width} for width in (0.5, 2.0, 8.0)),
+    *({"eccentricity": width} for width in (1e-4, 1e-3)),
+    {"gain": 0.003},
+    {"disturbed": True, "duration": 120.0},
 )
+FAULTS = tuple(Fault(angle, **kind) for angle in (0.1, 0.3) for kind in _KINDS)
 
 
 def _disturb(phi: Float, y: Float, random: np.random.Generator) -> None:
