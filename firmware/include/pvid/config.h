@@ -221,6 +221,15 @@
 #error "PVID_MAX_POWER must lie in 2..12"
 #endif
 
+/* Blocks of steps in the sums: 2, one of which fills while the other is added; 1 where the ticks of one step add and
+ * join a whole block, which `pvid model build` tells. RAM: 32 bytes each for a channel, 16 in the fixed-point core. */
+#ifndef PVID_MAX_BLOCKS
+#define PVID_MAX_BLOCKS 2
+#endif
+#if PVID_MAX_BLOCKS < 1 || PVID_MAX_BLOCKS > 2
+#error "PVID_MAX_BLOCKS must lie in 1..2"
+#endif
+
 /* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid
  * model build` prints with the design, exactly; init refuses others (PVID_BAD_DESIGN). Their loops are of constant
  * length: fewer instructions, more flash, the same bits. */

@@ -176,6 +176,9 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
         self->front.limit[i] = pvid_fourier_front_limit_f32((config->range != NULL) ? config->range[i] : LARGEST);
     }
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
+    if (pvid_fourier_blocks_f32(free_ticks, self->harmonics) > (uint32_t)PVID_MAX_BLOCKS) {
+        return PVID_BAD_DESIGN;
+    }
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
     self->stages_per_tick =
         pvid_fourier_stages_f32(pvid_fourier_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);

@@ -176,7 +176,7 @@ PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
     if ((finish->index == 0u) && (finish->kind == 0u)) {
         memset(finish->candidate.covariance, 0, sizeof finish->candidate.covariance);
     }
-    pvid_fourier_slopes_f32 *slopes = &finish->work.rows.of_kind.before.slopes;
+    pvid_fourier_slopes_f32 *slopes = &finish->work.rows.of_kind.slopes;
     if (finish->phase == 0u) {
         if (!finish->shares) {
             pvid_fourier_noise_shares_f32(&finish->white, design, finish->white.share);
@@ -210,7 +210,7 @@ PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
 PVID_SELDOM static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_fourier_white_basis_f32(&finish->white, finish->index, &finish->work.rows.of_kind.before.basis);
+    pvid_fourier_white_basis_f32(&finish->white, finish->index, &finish->work.rows.of_kind.basis);
     finish->index++;
     return finish->index < pvid_fourier_basis_stages(self->design);
 }
@@ -221,7 +221,7 @@ PVID_SELDOM static bool share_stage(pvid_fourier_f32 *self)
     const size_t parts = pvid_fourier_parts(self->design);
     const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
     const size_t last = (end < parts) ? end : parts;
-    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.of_kind.before.basis.leverage,
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.of_kind.basis.leverage,
                                  finish->index, last);
     finish->index = (uint16_t)last;
     return last < parts;

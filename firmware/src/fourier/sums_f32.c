@@ -62,7 +62,7 @@ bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop, size
     self->start = (uint16_t)(self->index - PVID_FOURIER_BLOCK);
     self->target = self->half;
     self->harmonic = 0;
-    self->filling ^= 1u;
+    self->filling = (uint8_t)(PVID_MAX_BLOCKS - 1u - self->filling);
     if (self->index < hop) {
         return false;
     }
@@ -101,7 +101,7 @@ void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_d
     }
     float (*sum)[2] = self->sum[self->target][h];
     const float (*last)[2] = (self->start == 0u) ? nothing : (const float (*)[2])sum;
-    const float *x = self->block[self->filling ^ 1u][0];
+    const float *x = self->block[PVID_MAX_BLOCKS - 1u - self->filling][0];
     PVID_UNROLL_BY_TWO
     for (size_t c = 0; c < channels; c++) {
         float even = x[CENTRE * PVID_MAX_CHANNELS];

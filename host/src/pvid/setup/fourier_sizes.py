@@ -31,7 +31,19 @@ def sizes_of_design(design: FourierDesign32) -> dict[str, int]:
         "PVID_MAX_FUNCTIONS": design.functions,
         "PVID_MAX_POWER": design.power,
         "PVID_MAX_DECIMATION": design.decimation,
+        "PVID_MAX_BLOCKS": _blocks(_used_ticks(design.decimation), 8, design),
     }
+
+
+def _used_ticks(decimation: int) -> int:
+    """Ticks of a step that neither add harmonics nor run stages."""
+    return 0 if decimation == 1 else 2 if decimation >= 4 else 1
+
+
+def _blocks(used: int, steps: int, design: FourierDesign32 | FourierDesignQ31) -> int:
+    """Blocks of so many steps that the sums need: one where the other ticks of a step add and join all harmonics."""
+    free, items = design.decimation - used, 2 * (design.highest + 1)
+    return 1 if free * -(-items // (steps * free)) >= items else 2
 
 
 def sizes_for_one(design: FourierDesign32) -> dict[str, int]:
@@ -66,4 +78,5 @@ def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]
         "PVID_MAX_FUNCTIONS": design.functions,
         "PVID_MAX_POWER": design.power,
         "PVID_MAX_DECIMATION": design.decimation,
+        "PVID_MAX_BLOCKS": _blocks(min(design.decimation - 1, 1), 4, design),
     }
