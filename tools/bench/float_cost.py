@@ -13,8 +13,8 @@ from pvid.board.boards import BOARDS
 from pvid.board.engine_image import engine_image
 from pvid.board.mechanism_image import mechanism_run
 from pvid.board.sizes import Configuration, measure
+from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.models.mechanisms import names
-from pvid.setup.fourier_sizes import sizes_for_one
 
 BOARD = "mps2-an386"
 TICK_HEADER = ("part of a tick", "instructions")
@@ -64,7 +64,7 @@ def tick_rows(model: str) -> list[tuple[str, ...]]:
 
 def state_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the state by part, as in STATE_HEADER."""
-    sizes = sizes_for_one(mechanism_run(model).config.design)
+    sizes = fitted_sizes(mechanism_run(model).config)
     return state_table("pvid/fourier.h", _STRUCTS, "sizeof(pvid_fourier_f32)", "schedule, pointers, padding", sizes)
 
 

@@ -222,12 +222,23 @@
 #endif
 
 /* Blocks of steps in the sums: 2, one of which fills while the other is added; 1 where the ticks of one step add and
- * join a whole block, which `pvid model build` tells. RAM: 32 bytes each for a channel, 16 in the fixed-point core. */
+ * join a whole block, which `pvid model build` tells. RAM: 32 bytes each for a channel, 16 in the fixed-point core.
+ * init refuses a design that needs 2. */
 #ifndef PVID_MAX_BLOCKS
 #define PVID_MAX_BLOCKS 2
 #endif
 #if PVID_MAX_BLOCKS < 1 || PVID_MAX_BLOCKS > 2
 #error "PVID_MAX_BLOCKS must lie in 1..2"
+#endif
+
+/* Windows whose sums have a place of their own: 1, or 0 where all columns of a window are formed before the next half's
+ * first block is added, which `pvid model build` tells: they are then in the place of the older half's. Float only.
+ * RAM: 8 bytes for each channel and harmonic. init refuses a design that needs 1. */
+#ifndef PVID_MAX_WINDOWS
+#define PVID_MAX_WINDOWS 1
+#endif
+#if PVID_MAX_WINDOWS < 0 || PVID_MAX_WINDOWS > 1
+#error "PVID_MAX_WINDOWS must lie in 0..1"
 #endif
 
 /* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid

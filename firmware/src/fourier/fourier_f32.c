@@ -131,6 +131,19 @@ static pvid_status init_refinement(pvid_fourier_f32 *self, const pvid_fourier_re
     return refine->stage->init(refine->storage, refine->config);
 }
 
+/* Returns whether the sums of a window have a place of their own, or are used before the next half's first block. */
+static bool window_has_place(const pvid_fourier_f32 *self, uint32_t free_ticks)
+{
+#if PVID_MAX_WINDOWS > 0
+    (void)self;
+    (void)free_ticks;
+    return true;
+#else
+    const uint32_t adding = ((2u * (uint32_t)self->harmonics) + (self->items_per_tick - 1u)) / self->items_per_tick;
+    return pvid_fourier_finish_columns_f32(self) <= (self->stages_per_tick * (free_ticks - adding));
+#endif
+}
+
 static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
 {
     const pvid_fourier_design_f32 *design = config->design;
@@ -184,6 +197,9 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
         pvid_fourier_stages_f32(pvid_fourier_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
     if (self->stages_per_tick == 0u) {
         return PVID_BAD_ITERATIONS;
+    }
+    if (!window_has_place(self, free_ticks)) {
+        return PVID_BAD_DESIGN;
     }
     restart(self);
     return init_refinement(self, config->refine);
@@ -278,7 +294,7 @@ static pvid_reason add(pvid_fourier_f32 *self)
     pvid_fourier_sums_f32 *sums = &self->sums;
     for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
         if (pvid_fourier_sums_joins_f32(sums)) {
-            pvid_fourier_sums_join_one_f32(sums, self->design, self->channels, self->dt, self->finish.work.rows.window);
+            pvid_fourier_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_fourier_window_f32(self));
             if (sums->joined == self->harmonics) {
                 pvid_fourier_finish_begin_f32(&self->finish);
                 rest(self);

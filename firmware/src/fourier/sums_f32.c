@@ -131,7 +131,7 @@ static float edge_of(const pvid_fourier_sums_f32 *self, const pvid_fourier_chann
 }
 
 void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                                    float dt, float window[][2][PVID_MAX_HARMONICS])
+                                    float dt, float window[][PVID_MAX_CHANNELS][2])
 {
     const float half_time = dt * (float)design->hop;
     const size_t h = self->joined;
@@ -154,7 +154,7 @@ void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_four
         } else {
             /* no integral */
         }
-        window[c][0][h] = ((h % 2u) != 0u) ? (a[c][0] - re) : (a[c][0] + re);
-        window[c][1][h] = ((h % 2u) != 0u) ? (a[c][1] - im) : (a[c][1] + im);
+        window[h][c][0] = ((h % 2u) != 0u) ? (a[c][0] - re) : (a[c][0] + re);
+        window[h][c][1] = ((h % 2u) != 0u) ? (a[c][1] - im) : (a[c][1] + im);
     }
 }

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen import files_design, files_fourier
+from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
 from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_library_q31 import fourier_native_q31
@@ -69,7 +70,7 @@ def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, com
         sample_rate=config.sample_rate,
         samples=tuple(Quantity(one, units[one], note=_note(made, k)) for k, one in enumerate(model.sample_names)),
         parameters=tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
-        sizes=smallest(needed),
+        sizes=fitted_sizes(config),
         generated={
             f"{name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), command),
             f"{name}_weak_f32.c": files_fourier.source(made, model, command),
