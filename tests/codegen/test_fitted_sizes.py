@@ -62,4 +62,4 @@ def test_a_design_without_time_for_one_block_is_refused() -> None:
 def test_the_header_defines_every_size() -> None:
     sizes = fitted_sizes(RUN.config)
     text = config_header("kapitza_config", sizes, "test")
-    assert all(f"#define {macro} {size}\n" in text for macro, size in sizes.items())
+    assert all(f"#ifndef {macro}\n#define {macro} {size}\n" in text for macro, size in sizes.items())

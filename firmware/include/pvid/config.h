@@ -256,6 +256,29 @@
 #define PVID_EXACT_RUNS 0
 #define PVID_EXACT_SIGNS 0
 #define PVID_EXACT_INTEGRANDS 0
+#define PVID_EXACT_CHANNELS 0 /* that are summed */
+#endif
+
+/* Parts that a design or its settings may do without, for less flash; `pvid model build` tells. init refuses settings
+ * that need a part which is left out: a dead zone with PVID_BAD_DEAD_ZONE, a second stage with PVID_BAD_POINTER. */
+#ifndef PVID_DEAD_ZONE /* dead zone of estimator.h */
+#define PVID_DEAD_ZONE 1
+#endif
+#if PVID_DEAD_ZONE != 0 && PVID_DEAD_ZONE != 1
+#error "PVID_DEAD_ZONE must be 0 or 1"
+#endif
+#ifndef PVID_REFINEMENT /* second stage of fourier.h */
+#define PVID_REFINEMENT 1
+#endif
+#if PVID_REFINEMENT != 0 && PVID_REFINEMENT != 1
+#error "PVID_REFINEMENT must be 0 or 1"
+#endif
+#ifndef PVID_CHECK_TABLES /* init checks every number of a float model and design; 0: their counts alone, of tables    \
+                             that are as printed, which pvid has checked */
+#define PVID_CHECK_TABLES 1
+#endif
+#if PVID_CHECK_TABLES != 0 && PVID_CHECK_TABLES != 1
+#error "PVID_CHECK_TABLES must be 0 or 1"
 #endif
 
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your

@@ -92,6 +92,12 @@ static inline bool is_ready(const pvid_fourier_f32 *self)
     return ready;
 }
 
+/* Returns whether there is a second stage. */
+static inline bool refines(const pvid_fourier_f32 *self)
+{
+    return (PVID_REFINEMENT != 0) && (self->refine != NULL);
+}
+
 /* Reason of a tick without anything else to report. */
 static inline pvid_reason idle(const pvid_fourier_f32 *self)
 {
@@ -124,7 +130,7 @@ static pvid_status init_refinement(pvid_fourier_f32 *self, const pvid_fourier_re
     if (refine == NULL) {
         return PVID_OK;
     }
-    if (refine->stage == NULL) {
+    if ((PVID_REFINEMENT == 0) || (refine->stage == NULL)) {
         return PVID_BAD_POINTER;
     }
     self->refine = refine;
@@ -178,6 +184,9 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->design = design;
     self->harmonics = (uint8_t)((design->functions / 2u) + (design->power / 2u) + 1u);
     self->channels = summed_channels(design->model);
+    if ((PVID_EXACT != 0) && (self->channels != PVID_EXACT_CHANNELS)) {
+        return PVID_BAD_DESIGN;
+    }
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_fourier_front_init_f32(&self->front, design, config->sample_rate_hz);
     pvid_fourier_step_init_f32(&self->history,
@@ -215,7 +224,7 @@ void pvid_fourier_gap_f32(pvid_fourier_f32 *self)
 {
     if (is_ready(self)) {
         restart(self);
-        if (self->refine != NULL) {
+        if (refines(self)) {
             self->refine->stage->gap(self->refine->storage);
         }
     }
@@ -225,7 +234,7 @@ void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen)
 {
     if (is_ready(self)) {
         self->frozen = frozen;
-        if (self->refine != NULL) {
+        if (refines(self)) {
             self->refine->stage->freeze(self->refine->storage, frozen);
         }
     }
@@ -437,7 +446,7 @@ PVID_SELDOM static pvid_reason both_ticks(pvid_fourier_f32 *self, const float sa
 
 pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
 {
-    return ((self != NULL) && (self->refine != NULL)) ? both_ticks(self, sample) : weak_tick(self, sample);
+    return ((self != NULL) && refines(self)) ? both_ticks(self, sample) : weak_tick(self, sample);
 }
 
 const pvid_estimate_f32 *pvid_fourier_candidate_f32(const pvid_fourier_f32 *self)

@@ -37,10 +37,12 @@ void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
 }
 
 /* s_j and d_j of the step `place` behind the centre and its partner. */
-static void pair(float (*block)[PVID_MAX_CHANNELS], size_t place, size_t channels)
+static void pair(float (*block)[PVID_MAX_CHANNELS], size_t place, size_t number)
 {
+    const size_t channels = PVID_COUNT(PVID_EXACT_CHANNELS, number);
     float *after = block[place];
     float *before = block[(2u * CENTRE) - place];
+    PVID_UNROLL_BY_FOUR
     for (size_t c = 0; c < channels; c++) {
         const float x = after[c];
         const float y = before[c];
@@ -130,9 +132,10 @@ static float edge_of(const pvid_fourier_sums_f32 *self, const pvid_fourier_chann
     return self->edge[fold - 1u][one->integrand];
 }
 
-void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
+void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t number,
                                     float dt, float window[][PVID_MAX_CHANNELS][2])
 {
+    const size_t channels = PVID_COUNT(PVID_EXACT_CHANNELS, number);
     const float half_time = dt * (float)design->hop;
     const size_t h = self->joined;
     self->joined++;

@@ -133,4 +133,4 @@ def build_refined_image(target: Board, run: RefinedRun) -> tuple[Path, Path]:
     files["pvid/refine_shape.h"] = files_refine.shape(run.made, MADE_BY)
     files["refine_model_f32.h"] = files_refine.header(run.made, MADE_BY)
     name = f"{run.weak.name}-refined-f32-{len(run.weak.counts)}"
-    return build_with(target, name, files, fitted_sizes(run.weak.config), "f32", refined=True)
+    return build_with(target, name, files, fitted_sizes(run.weak.config, refined=True), "f32", refined=True)

@@ -6,22 +6,40 @@ from collections.abc import Mapping
 
 from pvid.codegen.files_f32 import guarded
 from pvid.core.sizes import smallest
-from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier_sizes import sizes_of_design
+from pvid.settings.fourier import NONE, FourierConfig
+from pvid.settings.fourier_q31 import FourierConfigQ31
+from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_q31
 from pvid.twin.fourier import FourierTwin
 
 
-def fitted_sizes(config: FourierConfig) -> dict[str, int]:
-    """None below what the core accepts, and loops of constant length where all are those of the design (PVID_EXACT)."""
-    needed = sizes_of_design(config.design)
+def fitted_sizes(config: FourierConfig, *, refined: bool = False) -> dict[str, int]:
+    """None below what the core accepts, and without parts that the settings do without.
+
+    Where all are those of the design also loops of constant length (PVID_EXACT) and no check of its tables.
+
+    Parameters
+    ----------
+    refined : with the second stage
+    """
+    needed, model = sizes_of_design(config.design), config.design.model
     found = smallest(needed)
-    windows = {"PVID_MAX_WINDOWS": 0 if _shares_place(config) else 1}
+    fitted = found | {
+        "PVID_MAX_WINDOWS": 0 if _shares_place(config) else 1,
+        "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
+        "PVID_REFINEMENT": int(refined),
+    }
     if found != needed:
-        return found | windows
-    model = config.design.model
+        return fitted
     counts = ("signals", "jets", "runs", "signs", "integrands")
     exact = {f"PVID_EXACT_{one.upper()}": int(getattr(model, one)) for one in counts}
-    return found | windows | {"PVID_EXACT": 1} | exact
+    summed = max(k + 1 for k, one in enumerate(model.channel) if one.gain != NONE)
+    return fitted | {"PVID_CHECK_TABLES": 0, "PVID_EXACT": 1, "PVID_EXACT_CHANNELS": summed} | exact
+
+
+def fitted_sizes_q31(config: FourierConfigQ31, n_p: int, n_c: int) -> dict[str, int]:
+    """The same in fixed point, of a model with n_p parameters and n_c non-zeros of d theta / d p."""
+    parts = {"PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0), "PVID_CHECK_TABLES": 0}
+    return smallest(sizes_of_q31(config.design, n_p, n_c)) | parts
 
 
 def _shares_place(config: FourierConfig) -> bool:
@@ -39,6 +57,8 @@ def config_header(name: str, sizes: Mapping[str, int], command: str) -> str:
         "",
         f'For the library and for what uses it: -DPVID_CONFIG_HEADER=\\"{name}.h\\", in CMake',
         f"  set(PVID_CONFIG_HEADER {name}.h)",
-        "and this folder among the include directories.",
+        "and this folder among the include directories. What is defined before stays, as -DPVID_REFINEMENT=1 for the"
+        " second stage.",
     ]
-    return guarded(name, about, [f"#define {macro} {size}" for macro, size in sorted(sizes.items())])
+    body = [f"#ifndef {macro}\n#define {macro} {size}\n#endif" for macro, size in sorted(sizes.items())]
+    return guarded(name, about, body)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pvid.codegen import describe, files_fourier_q31
-from pvid.codegen.fitted_sizes import config_header
-from pvid.core.sizes import smallest
+from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.run.engine_design_q31 import FixedEngine
 from pvid.setup.fourier_sizes import sizes_of_q31
 
@@ -28,7 +27,13 @@ def files_of(engine: FixedEngine, command: str) -> dict[str, str]:
 def config_of(engine: FixedEngine, command: str) -> dict[str, str]:
     """The sizes of the core for this design alone: name -> text; parameters as of `files_of`."""
     name = f"{engine.name}_config_q31"
-    return {f"{name}.h": config_header(name, smallest(_sizes(engine)), command)}
+    return {f"{name}.h": config_header(name, fitted_of(engine), command)}
+
+
+def fitted_of(engine: FixedEngine) -> dict[str, int]:
+    """Sizes of the core for this design alone."""
+    model = engine.parameters.model
+    return fitted_sizes_q31(engine.config, model.n_p, len(model.c_row))
 
 
 def _sizes(engine: FixedEngine) -> dict[str, int]:
