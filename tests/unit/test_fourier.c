@@ -15,6 +15,7 @@
 #include "fourier/columns_f32.h"
 #include "fourier/fourier_finish_f32.h"
 #include "fourier/fourier_front_f32.h"
+#include "fourier/sums_f32.h"
 #include "fourier/white_f32.h"
 #include "pvid/pvid.h"
 #include "solve/products_f32.h"
