@@ -42,7 +42,6 @@ from bench.longevity_signals import (
     Sensing,
     Signals,
 )
-from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import strong_config
@@ -97,8 +96,8 @@ KNOWN_SILENT = {
 OVER = ("perfect", "absent", "constant", "one tone", "switching", "dropped samples")
 
 
-# Sums that remember longer than this run still contain the window in which the motion stopped; the last window of a drive
-# that goes on and off may tell less than it takes.
+# Sums that remember longer than this run still contain the window in which the motion stopped; the last window of a
+# drive that goes on and off may tell less than it takes.
 LINGERING = {(scenario, f"weak, {memory}") for scenario in ("absent", "constant") for memory in ("100 s", "none")}
 HELD = {("switching", "weak q31, 10 s")}
 

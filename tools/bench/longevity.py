@@ -243,7 +243,7 @@ _START = (0.8, 1.2, 0.8, 1.0)  # over the guess
 
 def _start_of(start: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """A start that is up to 20 % off."""
-    return (start * np.array(_START)).astype(start.dtype)
+    return np.asarray(start * np.array(_START), start.dtype)
 
 
 @cache

@@ -1,4 +1,4 @@
-/* The pendulum's weak form in both arithmetics, for programs that have both: the tables of the two designs have the
+/* The weak form of the pendulum in both cores, for programs that have both: the tables of the two designs have the
  * same names. */
 #ifndef PENDULUM_CONFIGURATION_H
 #define PENDULUM_CONFIGURATION_H
