@@ -332,7 +332,7 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
     "--columns",
     "columns",
     multiple=True,
-    help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, engine, peers.",
+    help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, peers.",
 )
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")
