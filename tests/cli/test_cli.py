@@ -163,6 +163,9 @@ def test_a_bad_run_is_one_sentence_and_exit_code_2(case: str, place: Path, tmp_p
         (("simulate", "out.csv", "--tone", "loud"), "loud"),
         (("simulate", "out.csv", "--duration", "-1"), "-1 s"),
         (("nonsense",), "nonsense"),
+        (("identify", "run.csv", "--l1", "0.25"), "l1 is a key of the rig file: use --set l1=VALUE"),
+        (("plot", "run.csv", "--phi-lsb", "0.001"), "use --set sensor.phi_lsb=VALUE"),
+        (("demo", "--l1", "0.25"), "No such option '--l1'"),
     ],
 )
 def test_bad_usage_is_one_sentence_that_names_it(arguments: tuple[str, ...], named: str, place: Path) -> None:
@@ -170,6 +173,12 @@ def test_bad_usage_is_one_sentence_that_names_it(arguments: tuple[str, ...], nam
     assert done.returncode == 2, done.stdout
     assert named in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+
+
+def test_without_a_command_the_help_is_printed_as_text(tmp_path: Path) -> None:
+    done = pvid(tmp_path)
+    assert done.returncode == 0 and done.stderr == ""
+    assert "\nIdentify:\n" in done.stdout and "identify RUN.csv --set l1=0.25" in done.stdout
 
 
 def test_an_unknown_zero_of_the_encoder_is_found(tmp_path: Path) -> None:

@@ -59,7 +59,9 @@ def test_l1_is_all_that_is_needed(run: Run, tmp_path: Path) -> None:
     found = answer(path)
     assert found["g"]["value"] == pytest.approx(STANDARD_PENDULUM.g, rel=0.01)  # the README's promise
     assert found["input"] == []
-    with pytest.raises(PvidError, match=r"no rig file, and l1, .* is all that is needed: use --set l1=0\.25$"):
+    with pytest.raises(
+        PvidError, match=r"no rig file: of the pendulum l1, .* is all that is needed: use --set l1=0\.25 with"
+    ):
         pvid("identify", path)
     with pytest.raises(PvidError, match="does not exist"):
         pvid("identify", tmp_path / "absent.csv")

@@ -381,7 +381,8 @@ def test_a_port_that_is_not_there_and_a_log_that_is(tmp_path: Path, pvid: Logger
     process = pvid()
     out, err = process.communicate(timeout=30)
     assert process.returncode == 2
-    assert err.splitlines()[-1] == "pvid: there is no port board: is the board plugged in?"
+    lists = "`pvid ports` lists the ports and the emulated boards"
+    assert err.splitlines()[-1] == f"pvid: there is no port board: is the board plugged in? {lists}"
     assert not (tmp_path / "out.pvlog").exists()
     (tmp_path / "out.pvlog").write_bytes(b"")
     again = pvid()
@@ -636,7 +637,7 @@ def test_cause_of_a_broken_link_is_reported(tmp_path: Path) -> None:
     watching = Watching()
     account = Logger(PortSource(place), tmp_path / "out.pvlog", [watching], duration_s=60).run()
     sender.join()
-    why = f"there is no port {place}: is the board plugged in?"
+    why = f"there is no port {place}: is the board plugged in? `pvid ports` lists the ports and the emulated boards"
     assert watching.told[1] == f"down: {why}" and f"; waiting for the link ({why})" in watching.told[2]
     assert account.obstacle == "" and account.samples == 20 * field_board.SAMPLES_A_FRAME
 

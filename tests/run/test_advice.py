@@ -18,7 +18,8 @@ from pvid.core.native import Native
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run, write_run
 from pvid.rig.sensor_steps import resolved
-from pvid.run.advice import advice, advice_on_refusal
+from pvid.run.advice import advice, advice_on_refusal, suspected_unit
+from pvid.run.advised import answered
 from pvid.run.excitation import excitation_of
 from pvid.run.identify import Identification, identify
 from pvid.settings.enums import Reason
@@ -425,3 +426,25 @@ def test_missing_ticks_are_no_mistake(native: Native) -> None:
     assert result is not None and result.identified and said == ()
     _, said = advised(replace(run, phi=phi, y=-y), RIG, native)
     assert len(said) == 1 and "y is counted downwards" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "said"),
+    [
+        (lambda run: replace(run, t=1e3 * run.t, sample_rate=run.sample_rate / 1e3), "t looks like milliseconds"),
+        (lambda run: replace(run, phi=np.degrees(run.phi)), "phi looks like degrees"),
+        (lambda run: replace(run, phi=np.rint(run.phi / LSB)), "phi looks like counts"),
+        (lambda run: replace(run, y=1e3 * run.y), "y looks like millimetres"),
+        (lambda run: run, None),
+    ],
+    ids=["ms", "degrees", "counts", "mm", "right"],
+)
+def test_magnitudes_alone_show_a_wrong_unit(spoilt: Callable[[Run], Run], said: str | None) -> None:
+    found = suspected_unit(spoilt(run_of()), RIG)
+    assert found is None if said is None else found is not None and found.startswith(said)
+
+
+def test_a_run_in_degrees_is_neither_refined_nor_answered(native: Native) -> None:
+    result = answered(replace(run_of(), phi=np.degrees(run_of().phi)), without_a_rig_file(run_of()), native)
+    assert result.refinement.text == "not refined: phi looks like degrees"
+    assert not result.identified and result.status.startswith("held") and not result.parts

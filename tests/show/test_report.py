@@ -173,7 +173,9 @@ def test_plot_of_a_run_identifies_it_first(tmp_path: Path) -> None:
     assert CliRunner().invoke(commands, arguments[:2], standalone_mode=False).return_value == 0  # run.toml is there
     assert (tmp_path / "run.png").is_file()
     (tmp_path / "run.toml").unlink()
-    with pytest.raises(PvidError, match="no rig file, and l1, .* is all that is needed: use --set l1=0.25"):
+    with pytest.raises(
+        PvidError, match="no rig file: of the pendulum l1, .* is all that is needed: use --set l1=0.25 with"
+    ):
         CliRunner().invoke(commands, arguments[:2], standalone_mode=False, catch_exceptions=False)
 
 

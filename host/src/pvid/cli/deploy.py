@@ -53,6 +53,7 @@ def command(
         raise PvidError("--columns needs --run")
     given = [f"--rig {rig_path.name}"] if rig_path is not None else []
     given += [f"--run {run_path.name}"] if run_path is not None else []
+    given += [f"--columns {columns}"] if columns is not None else []
     given += [f"--core {core}"] if core != _DEFAULT else []
     given += [f"--functions {functions}"] if functions is not None else []
     title = " ".join(["pvid deploy", Path(model).name, f"--for {target}", *given])

@@ -81,13 +81,19 @@ def main() -> None:
     try:
         code = commands.main(prog_name="pvid", standalone_mode=False)
         sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        code = DONE
+    except click.NoSuchOption as error:
+        from pvid.cli.rig_keys import setting_for  # the rig file's keys, which only this needs
+
+        write_stderr(f"pvid: {setting_for(error) or _usage(error)}")
+        code = BAD_INPUT
     except click.exceptions.Abort:
         write_stderr("pvid: interrupted")
         code = INTERRUPTED
     except click.ClickException as error:
-        context = getattr(error, "ctx", None)
-        help_hint = f" (see {context.command_path} --help)" if context is not None else ""
-        write_stderr(f"pvid: {error.format_message()}{help_hint}")
+        write_stderr(f"pvid: {_usage(error)}")
         code = BAD_INPUT
     except PvidError as error:
         write_stderr(f"pvid: {error}")
@@ -106,6 +112,12 @@ def main() -> None:
         write_stderr(f"pvid: not enough memory{detail}: is a length, a rate or a count too large?")
         code = BAD_INPUT
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _usage(error: click.ClickException) -> str:
+    """The sentence of a wrong command line, and where its help is."""
+    context = getattr(error, "ctx", None)
+    return error.format_message() + (f" (see {context.command_path} --help)" if context is not None else "")
 
 
 class Commands(click.Group):
@@ -134,4 +146,10 @@ class Commands(click.Group):
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="pvid", message="%(prog)s %(version)s")
 def commands() -> None:
-    """Identifies the parameters of a mechanism from its motion, on a PC and on microcontrollers, with equal bits."""
+    """Identifies the parameters of a mechanism from its motion, on a PC and on microcontrollers, with equal bits.
+
+    \b
+    pvid demo                                     see it work
+    pvid identify RUN.csv --set l1=0.25           your recording of a pendulum
+    pvid identify RUN.csv --model MODEL           of another mechanism
+    """

@@ -61,7 +61,8 @@ def opening_failure(name: str, error: Exception) -> str:
     """One sentence on a port that did not open."""
     cause = error.__context__ if getattr(error, "errno", None) is None and error.__context__ is not None else error
     words = {
-        errno.ENOENT: f"there is no port {name}: is the board plugged in?",
+        errno.ENOENT: f"there is no port {name}: is the board plugged in? `pvid ports` lists the ports and the "
+        "emulated boards",
         errno.EACCES: f"no permission to open the port {name}: its group (dialout) has it",
         errno.EAGAIN: f"the port {name} is in use by another program",
         errno.EBUSY: f"the port {name} is in use by another program",

@@ -47,7 +47,10 @@ def rig_for(run_path: Path | None, rig_path: Path | None, settings: Iterable[str
     if missing:
         wanted = " and ".join(f"{one.name}, the {one.meaning} [{one.unit}]," for one in missing)
         typed = " ".join(f"--set {one.name}={one.example}" for one in missing)
-        raise PvidError(f"no rig file, and {wanted} is all that is needed: use {typed}")
+        raise PvidError(
+            f"no rig file: of the pendulum {wanted} is all that is needed: use {typed} with the value of your rig; "
+            f"another mechanism is named by --model"
+        )
     return RigFile.parse("", given)
 
 

@@ -115,6 +115,16 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
     return tuple(found)
 
 
+def suspected_unit(run: Run, rig: RigFile) -> str | None:
+    """The mistake of a unit that magnitudes alone show, without a trial; None: there is none."""
+    case = Case(_shortened(run), rig)
+    far = _swing(case.run)[1] >= _FULL_TURN or _steps_in_degrees(case)
+    for cures in (_time_unit(case), _angle_in_counts(case), _rod_units(case), _height_units(case)):
+        if cures:
+            return cures[0].sentence.partition(": use ")[0]
+    return "phi looks like degrees" if far else None
+
+
 def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]:
     """Sentences for a run whose settings were refused."""
     return tuple(_put_right(Case(_shortened(run), rig), native)[0])
@@ -262,8 +272,7 @@ def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
     """Detected by the swing, if it is a whole turn or a trial in degrees is better; or by the encoder's step."""
     run = case.run
     _, swing = _swing(run)
-    step = resolution_of(run.phi)
-    by_step = step is not None and _is_step_in_degrees(step, case.rig.sensor.phi_lsb)
+    by_step = _steps_in_degrees(case)
     if swing < _WIDE_SWING and not by_step:
         return []
     in_degrees = Case(replace(run, phi=joined(np.radians(run.phi))[0]), case.rig)
@@ -275,6 +284,11 @@ def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
             in_degrees,
         )
     ]
+
+
+def _steps_in_degrees(case: Case) -> bool:
+    step = resolution_of(case.run.phi)
+    return step is not None and _is_step_in_degrees(step, case.rig.sensor.phi_lsb)
 
 
 def _is_step_in_degrees(step: float, lsb: float) -> bool:

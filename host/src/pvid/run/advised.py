@@ -23,12 +23,25 @@ def answered(
     """
     if of_image:
         return identify(run, rig, native)
-    from pvid.run.engine_identify import identify_by_engine  # loads SymPy
-    from pvid.run.refined_identify import refined_identification
+    from pvid.run.engine_identify import held_if_wide, identify_by_engine  # loads SymPy
+    from pvid.run.refined_identify import RefinementVerdict, refined_identification
 
-    weak = rig.identifier.form_traits.publishes
-    found = identify_by_engine(run, rig) if weak else identify(run, rig, native)
-    return refined_identification(run, rig, found) if (weak if refine is None else refine) else found
+    if not rig.identifier.form_traits.publishes:
+        found = identify(run, rig, native)
+        return refined_identification(run, rig, found) if refine else found
+    found = identify_by_engine(run, rig)
+    if refine is None and (unit := _wrong_unit(run, rig, held_if_wide(found))) is not None:
+        found = replace(found, refinement=RefinementVerdict(False, f"not refined: {unit}"))
+    elif refine is not False:
+        found = refined_identification(run, rig, found)
+    return held_if_wide(found)
+
+
+def _wrong_unit(run: Run, rig: RigFile, found: Identification) -> str | None:
+    """A mistake of a unit, by which a refinement would simulate another motion for minutes and find nothing."""
+    from pvid.run.advice import suspected_unit
+
+    return None if found.identified and found.warning is None else suspected_unit(run, rig)
 
 
 def identified(

@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.verdict import UNKNOWN
+from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.described import described
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -68,6 +70,18 @@ def identify_by_engine(run: Run, rig: RigFile) -> Identification:
     _refuse_slow(run, rig)
     answer = identify_mechanism(run.recording, model_of(described(rig)))
     return _identification(run, *_computed(run, rig, answer))
+
+
+def held_if_wide(found: Identification) -> Identification:
+    """Without the estimate if its error, with what the linearised equations neglect, exceeds the engine's limit."""
+    names = found.model.mapped_names
+    if not found.identified or all(found.se[name] <= UNKNOWN * abs(found.value[name]) for name in names):
+        return found
+    far = found.largest_angle > VALID_ANGLE
+    reason = Reason.HELD_OUT_OF_RANGE if far else Reason.HELD_UNCERTAIN
+    return replace(
+        found, trusted_s=None, first_publication_s=None, chi2=None, parts={}, doubts=(), status=reason.text, alarm=False
+    )
 
 
 def _refuse_slow(run: Run, rig: RigFile) -> None:
