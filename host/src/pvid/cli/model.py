@@ -347,7 +347,7 @@ def _fixed_weak(
 ) -> tuple[dict[str, str], str | None]:
     """Files of the fixed-point weak form, or why there are none."""
     from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
-    from pvid.run.engine_files_q31 import files_of
+    from pvid.run.engine_files_q31 import config_of, files_of
 
     try:
         if run_path is None:
@@ -356,7 +356,7 @@ def _fixed_weak(
             engine = engine_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions, soft_signs)
     except PvidError as error:
         return {}, str(error)
-    return files_of(engine, title), None
+    return files_of(engine, title) | config_of(engine, title), None
 
 
 def _numbers(given: tuple[str, ...], option: str, example: str = "--reach phi_1=40") -> dict[str, float]:
