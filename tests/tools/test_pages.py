@@ -140,11 +140,12 @@ def test_a_reason_and_a_short_form_are_each_used() -> None:
 
 def test_the_parser_finds_what_a_page_may_contain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pages, "ROOT", tmp_path)
-    (tmp_path / "a.md").write_text(
-        "text\n\n    ./tools/pvid ports  # a comment\n\n    cd x && cmake --preset y\n\n```text\nshown\n```\n- a\n\n    mystery\n",
+    (tmp_path / "index.md").write_text(
+        "text\n\n    ./tools/pvid ports  # a comment\n\n    cd x && cmake --preset y\n\n```text\nshown\n```\n"
+        "- a\n\n    mystery\n",
         encoding="utf-8",
     )
-    found = pages.blocks_of(Path("a.md"))
+    found = pages.blocks_of(Path("index.md"))
     assert [block.kind for block in found] == ["commands", "output", "unknown"]
     assert pages.commands_of(found[0]) == ["./tools/pvid ports", "cd x", "cmake --preset y"]
 
