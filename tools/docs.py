@@ -104,7 +104,13 @@ def rig_file_tables() -> str:
         for key in fields(owner):
             if not key.metadata and key.type != "bool":
                 continue  # one of the tables
-            cells = (f"`{key.name}`", key.metadata.get("unit", ""), shown_range(key), shown_default(key), good_for_most(key))
+            cells = (
+                f"`{key.name}`",
+                key.metadata.get("unit", ""),
+                shown_range(key),
+                shown_default(key),
+                good_for_most(key),
+            )
             lines.append(f"| {' | '.join(cells)} | {meaning[key.name].replace('|', '&#124;')} |")
     return "\n".join(lines[1:])
 
@@ -125,6 +131,8 @@ def documented(thing: object) -> str:
         if at + 1 < len(lines) and lines[at + 1] and set(lines[at + 1]) == {"-"}:
             section = line
             out += [f"*{line}*", ""]
+        elif section == "Examples" and line:
+            out.append(f"    {line.removesuffix('  # doctest: +SKIP')}")
         elif section and line and not line.startswith(" "):
             name, colon, rest = line.partition(" : ")
             out.append(f"- `{name}`{': ' if colon else ''}{rest}")
@@ -135,7 +143,9 @@ def documented(thing: object) -> str:
 
 def signature_of(name: str, thing: Callable[..., object]) -> str:
     """A call with its arguments, one a line if there are many; without the annotations' quotes."""
-    parameters = [str(one).replace("'", "") for one in inspect.signature(thing).parameters.values() if one.name != "self"]
+    parameters = [
+        str(one).replace("'", "") for one in inspect.signature(thing).parameters.values() if one.name != "self"
+    ]
     inner = ", ".join(parameters)
     return f"{name}({inner})" if len(inner) < 80 else f"{name}(\n    " + ",\n    ".join(parameters) + ",\n)"
 

@@ -4,9 +4,9 @@
     build/venv/bin/python tools/pages.py             lists the blocks that are not executed, with the reason of each
     build/venv/bin/python tools/pages.py --update    writes what commands print into the pages that show it
 
-A block is a fence, or lines indented by four spaces behind an empty line. A block of commands is executed line by line in a
-folder with recordings, rig files and a model (`prepared`). A fence `text` behind commands shows what they print. tests/tools/
-test_pages.py executes all of it.
+A block is a fence, or lines indented by four spaces behind an empty line. A block of commands is executed line by
+line in a folder with recordings, rig files and a model (`prepared`). A fence `text` behind commands shows what they
+print. tests/tools/test_pages.py executes all of it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ NOT_EXECUTED = (
     (r"^\./tools/(test|release)\b", "executes the tests themselves; tests/tools/test_release.py executes parts of it"),
     (r"^build/venv/bin/python tools/prove\.py", "takes minutes; tests/tools/test_proofs.py executes parts of it"),
     (r"^python3 -m venv|pip install", "tests/tools/test_wheel.py installs the package into a bare environment"),
-    (r"^cd firmware|cmake --preset", "tests/board builds the images"),
+    (r"^cd firmware|--preset", "tests/board builds the images"),
     (r"^cc ", "tests/deploy/test_examples.py builds and executes every example"),
     (r"MODEL|FOLDER", "a form to fill in, which is not parsed either"),
 )
@@ -57,7 +57,7 @@ SHORT = (
     (r"(model simulate \S+ \S+)", r"\1 --duration 5", "a shorter run"),
     (r"(pvid log .*)", r"\1 --paced --samples 3000 --quiet", "a shorter log"),
 )
-# ---- blocks that are neither commands nor programs: page, pattern of the first line, what they are and what checks them
+# ---- blocks that are neither commands nor programs: page, pattern of the first line, what they are and their test
 SHOWN = (
     ("theory.md", "", "equations; tests/oracle"),
     ("compiler.md", r"sum_j", "an equation"),
@@ -209,9 +209,15 @@ def prepared(folder: Path) -> None:
             done = pvid(words.split())
             assert done.code == 0, f"{words}: {done.text}"
         shutil.copy("run.toml", "rig.toml")
+        Path("tests").symlink_to(ROOT / "tests")  # with recordings that others made
         model = next(one for one in blocks_of(Path("host/docs/models.md")) if one.kind == "python")
         Path("motor.py").write_text(model.text, encoding="utf-8")
-        scales = {"time_ms": ("t", 1e3), "ms": ("t", 1e3), "angle_deg": ("phi", 180 / np.pi), "deg": ("phi", 180 / np.pi)}
+        scales = {
+            "time_ms": ("t", 1e3),
+            "ms": ("t", 1e3),
+            "angle_deg": ("phi", 180 / np.pi),
+            "deg": ("phi", 180 / np.pi),
+        }
         with_columns(Path("run.csv"), Path("run.csv"), {**scales, "h": ("y", 1e3)})
         others = {"time": ("t", 1e3), "current_mA": ("i", 1e3), "angle": ("phi", 180 / np.pi), "u": ("V", 1.0)}
         with_columns(Path("motor.csv"), Path("recorded.csv"), others)
@@ -262,7 +268,9 @@ def differences(shown: str, printed: str) -> Iterator[str]:
     """
     lines = iter(shown_lines(printed))
     for line in shown_lines(shown):
-        if line.strip() != "..." and not any(alike(line.removesuffix(" ..."), one, line.endswith(" ...")) for one in lines):
+        if line.strip() != "..." and not any(
+            alike(line.removesuffix(" ..."), one, line.endswith(" ...")) for one in lines
+        ):
             yield line
 
 

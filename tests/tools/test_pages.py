@@ -1,4 +1,4 @@
-"""Every block of README.md and of the site is executed, or listed with a reason and parsed; what pages show is printed."""
+"""Every block of README.md and of the site is executed, or listed with a reason and parsed."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ from pvid.rig.mechanism_file import MechanismRig  # noqa: E402
 # What the C of a page uses beside its headers: page, declarations.
 SURROUNDINGS = {
     "models.md": "#include <stdbool.h>\n#include <pvid/pvid.h>\nvoid use(const float *, const float *);\n",
-    "compiler.md": '#include "pvid/pvid.h"\n#include "pvid/refine.h"\nextern const pvid_refine_config_f32 refine_config;\n',
-    "tutorial.md": "#include <pvid/pvid.h>\nfloat force(void);\nfloat place(void);\nvoid show(const float *, const float *);\n",
+    "compiler.md": '#include "pvid/pvid.h"\n#include "pvid/refine.h"\n'
+    "extern const pvid_refine_config_f32 refine_config;\n",
+    "tutorial.md": "#include <pvid/pvid.h>\nfloat force(void);\nfloat place(void);\n"
+    "void show(const float *, const float *);\n",
     "firmware.md": '#include "pvid/pvid.h"\nfloat read_encoder(void);\nfloat read_pivot(void);\n'
     "void show(const pvid_estimate_f32 *);\n",
 }
@@ -67,7 +69,15 @@ def compile_c(block: pages.Block, folder: Path) -> None:
     for path in folder.rglob("*_design_f32.h"):
         for macro, size in re.findall(r"-D(PVID_MAX_\w+)=(\d+)", path.read_text(encoding="utf-8")):
             sizes[macro] = max(int(size), sizes.get(macro, 0))
-    command = ["gcc", "-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", *(f"-D{macro}={size}" for macro, size in sizes.items())]
+    command = [
+        "gcc",
+        "-std=c99",
+        "-fsyntax-only",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        *(f"-D{macro}={size}" for macro, size in sizes.items()),
+    ]
     done = subprocess.run(
         [*command, *PUBLIC_INCLUDES, *(f"-I{path}" for path in generated), "page.c"],
         cwd=folder,
@@ -90,7 +100,7 @@ def test_every_block_of_a_page_is_executed(
     assert [str(block) for block in blocks if block.kind == "unknown"] == []
     folder = tmp_path / "page"
     if any(block.kind in ("commands", "python", "c") for block in blocks):
-        shutil.copytree(files, folder)
+        shutil.copytree(files, folder, symlinks=True)
     names: dict[str, object] = {}
     printed = ""
     for place, block in enumerate(blocks):
@@ -109,7 +119,7 @@ def test_every_block_of_a_page_is_executed(
                 assert block.text == path_of(page.stem)[1].read_text(encoding="utf-8").rstrip()
             case "python":
                 printed = pages.executed_python(block, folder, names).text
-            case "c":
+            case "c" if page.name != "README.md":  # tests/cli/test_readme.py builds and executes that program
                 compile_c(block, folder)
             case "toml":
                 parse_toml(block)
@@ -130,16 +140,19 @@ def test_a_reason_and_a_short_form_are_each_used() -> None:
 
 def test_the_parser_finds_what_a_page_may_contain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pages, "ROOT", tmp_path)
-    (tmp_path / "a.md").write_text(
-        "text\n\n    ./tools/pvid ports  # a comment\n\n    cd x && cmake --preset y\n\n```text\nshown\n```\n- a\n\n    mystery\n",
+    (tmp_path / "index.md").write_text(
+        "text\n\n    ./tools/pvid ports  # a comment\n\n    cd x && cmake --preset y\n\n```text\nshown\n```\n"
+        "- a\n\n    mystery\n",
         encoding="utf-8",
     )
-    found = pages.blocks_of(Path("a.md"))
+    found = pages.blocks_of(Path("index.md"))
     assert [block.kind for block in found] == ["commands", "output", "unknown"]
     assert pages.commands_of(found[0]) == ["./tools/pvid ports", "cd x", "cmake --preset y"]
 
 
-@pytest.mark.parametrize("line", ["./tools/pvid nothing", "./tools/pvid bench weak --no-such-option", "./tools/pvid log"])
+@pytest.mark.parametrize(
+    "line", ["./tools/pvid nothing", "./tools/pvid bench weak --no-such-option", "./tools/pvid log"]
+)
 def test_a_command_that_is_only_parsed_is_refused_if_it_is_wrong(line: str) -> None:
     with pytest.raises(click.ClickException):
         pages.parse(line)
