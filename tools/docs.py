@@ -11,14 +11,17 @@ which GitHub shows. Nothing is loaded from the network. Needs mkdocs-material an
 from __future__ import annotations
 
 import argparse
+import inspect
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
+from typing import cast
 
+import pvid
 from pvid.cli.page_table import put_table, with_table
 from pvid.link import frames
 from pvid.rig.file import Identifier, ModelTable, Nominal, RigFile, Sensor
@@ -59,6 +62,31 @@ def shown_default(key: Field[object]) -> str:
     return f"`{key.default:.4g}`" if isinstance(key.default, float) else f"`{key.default}`"
 
 
+# Of a key: the value that is good for most rigs, where it is not the default.
+GOOD_FOR_MOST = {
+    "l1": "measure it to 0.1 %",
+    "sample_rate": "leave it out",
+    "l1_sd": "your ruler's error / l1",
+    "phi_lsb": "leave it out for a recording; for a board the encoder's step",
+    "y_lsb": "the sensor's step",
+    "y_gain_sd": "its data sheet's",
+    "phi_zero": "0; 3.14 if the encoder hangs at half a turn",
+    "acceleration_range": "twice the largest",
+    "l2": "within a factor of 2",
+    "rho2": "within a factor of 2",
+    "forgetting_s": "0; 10 or more if the mechanism changes",
+    "core": "`f32`; `q31` without a floating-point unit",
+    "stride": "the default",
+    "outlier_gate": "leave it out",
+    "outlier_patience_s": "leave it out",
+}
+
+
+def good_for_most(key: Field[object]) -> str:
+    """What most rigs need of a key."""
+    return GOOD_FOR_MOST.get(key.name, "the default")
+
+
 def rig_file_tables() -> str:
     """The tables of rig-file.md."""
     lines = []
@@ -71,11 +99,12 @@ def rig_file_tables() -> str:
     )
     for title, owner in tables:
         meaning = meanings(owner)
-        lines += ["", f"## {title}", "", "| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
+        lines += ["", f"## {title}", "", "| key | unit | range | default | good for most | meaning |"]
+        lines.append("|---|---|---|---|---|---|")
         for key in fields(owner):
             if not key.metadata and key.type != "bool":
                 continue  # one of the tables
-            cells = (f"`{key.name}`", key.metadata.get("unit", ""), shown_range(key), shown_default(key))
+            cells = (f"`{key.name}`", key.metadata.get("unit", ""), shown_range(key), shown_default(key), good_for_most(key))
             lines.append(f"| {' | '.join(cells)} | {meaning[key.name].replace('|', '&#124;')} |")
     return "\n".join(lines[1:])
 
@@ -85,8 +114,64 @@ def schema_block() -> str:
     return f"```\n{frames.SCHEMA_TEXT}\n```"
 
 
+def documented(thing: object) -> str:
+    """A docstring of numpydoc as Markdown: sections are headings, descriptions of names are a list."""
+    lines = (inspect.getdoc(thing) or "").splitlines()
+    out: list[str] = []
+    section = ""
+    for at, line in enumerate(lines):
+        if line and set(line) == {"-"}:
+            continue
+        if at + 1 < len(lines) and lines[at + 1] and set(lines[at + 1]) == {"-"}:
+            section = line
+            out += [f"*{line}*", ""]
+        elif section and line and not line.startswith(" "):
+            name, colon, rest = line.partition(" : ")
+            out.append(f"- `{name}`{': ' if colon else ''}{rest}")
+        else:
+            out.append(line)
+    return "\n".join(out).strip()
+
+
+def signature_of(name: str, thing: Callable[..., object]) -> str:
+    """A call with its arguments, one a line if there are many; without the annotations' quotes."""
+    parameters = [str(one).replace("'", "") for one in inspect.signature(thing).parameters.values() if one.name != "self"]
+    inner = ", ".join(parameters)
+    return f"{name}({inner})" if len(inner) < 80 else f"{name}(\n    " + ",\n    ".join(parameters) + ",\n)"
+
+
+def own_members(owner: type) -> Iterator[tuple[str, object]]:
+    """Public methods and properties of a class that have a docstring, in the order of the source."""
+    for name, member in vars(owner).items():
+        if not name.startswith("_") and inspect.getdoc(member) and (callable(member) or isinstance(member, property)):
+            yield name, member
+
+
+def python_reference() -> str:
+    """The reference of `import pvid`, from its docstrings."""
+    lines = []
+    for name in sorted(set(pvid.__all__) - {"__version__"}, key=str.lower):
+        thing = getattr(pvid, name)
+        lines += [f"## pvid.{name}", ""]
+        if not (isinstance(thing, type) and issubclass(thing, Exception)):
+            lines += ["```text", signature_of(f"pvid.{name}", thing), "```", ""]
+        lines += [documented(thing), ""]
+        if not isinstance(thing, type) or issubclass(thing, Exception):
+            continue
+        for member, of_class in own_members(thing):
+            lines += [f"### {name}.{member}", ""]
+            if not isinstance(of_class, property):
+                lines += ["```text", signature_of(member, cast("Callable[..., object]", of_class)), "```", ""]
+            lines += [documented(of_class), ""]
+    return "\n".join(lines).strip()
+
+
 # page, marker, text
-GENERATED = (("rig-file.md", "rig-file", rig_file_tables), ("link-and-log.md", "schema", schema_block))
+GENERATED = (
+    ("rig-file.md", "rig-file", rig_file_tables),
+    ("link-and-log.md", "schema", schema_block),
+    ("api-python.md", "api", python_reference),
+)
 
 
 def generated_parts(update: bool) -> Iterator[str]:

@@ -327,7 +327,7 @@ PROOFS = (
     ),
     Proof(
         "fingerprint_q31",
-        "any configuration of both forms, tables of any extent that fits; `pvid_fnv_estimator_q31`, any state",
+        "any configuration of the strong form, a bank of any extent that fits; `pvid_fnv_estimator_q31`, any state",
         (
             *(
                 "src/keep/fingerprint_q31.c",
@@ -345,42 +345,6 @@ PROOFS = (
         "a group of rows within their limit on top of any sums within 2^60",
         ("src/solve/information_q31.c", "src/solve/kinds.c", "src/number/integer_q31.c"),
         ("-eva-auto-loop-unroll", "1100", "-eva-min-loop-unroll", "13"),
-    ),
-    Proof(
-        "weak_front_q31",
-        "the weights of the tests' design: any samples within full scale, the ring's head in any place",
-        ("src/weak/front_q31.c", "src/number/integer_q31.c"),
-        ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "100"),
-    ),
-    Proof(
-        "weak_window_q31",
-        "the tests' design: any F and U that the front lets through, from a window's start and from a gap on",
-        ("src/weak/window_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
-        ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "70"),
-        taken=("pvid_scaled_of_q31", "pvid_scaled_over_q31"),
-    ),
-    Proof(
-        "weak_finish_q31",
-        "every stage on any state, with 4 and with 16 functions, any Gram tables that init takes, the tests' columns",
-        (
-            "src/solve/cholesky_q31.c",
-            "src/number/scaled_q31.c",
-            "src/number/integer_q31.c",
-            "models/kapitza/kapitza_weak_q31.c",
-        ),
-        (
-            *("-eva-min-loop-unroll", "17", "-eva-auto-loop-unroll", "300", "-eva-split-return", "full"),
-            *("-eva-slevel-function", "factor_diagonal:400,find_length:10", "-eva-subdivide-non-linear", "4"),
-            *("-inline-calls", "pvid_pivot_is_significant_q31", "-eva-domains", "equality"),
-        ),
-        taken=(
-            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
-            *("pvid_to_block_q31", "pvid_half_exponent_q31", *SCALED),
-            *("pvid_estimator_innovation_q31", "pvid_estimator_add_q31", "pvid_estimator_begin_q31"),
-            *("pvid_estimator_advance_q31", "pvid_estimator_begin_assessment_q31", "pvid_estimator_assess_advance_q31"),
-            *("pvid_gate_passes_q31", "pvid_trust_fallback_q31", "pvid_trust_judge_q31"),
-            *("pvid_estimator_set_expected_q31", "pvid_information_fade_q31", "pvid_trust_fade_factor_q31"),
-        ),
     ),
     Proof(
         "fourier_front_q31",
@@ -410,14 +374,13 @@ PROOFS = (
         (
             "src/keep/snapshot_fourier_q31.c",
             "src/keep/snapshot_strong_q31.c",
-            "src/keep/snapshot_weak_q31.c",
             "src/keep/snapshot.c",
             "src/keep/crc32.c",
             "src/keep/fnv.c",
         ),
         ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
         taken=(
-            *("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31", "pvid_fingerprint_fourier_q31"),
+            *("pvid_fingerprint_strong_q31", "pvid_fingerprint_fourier_q31"),
             *("pvid_fingerprint_fourier_model_q31", "pvid_fingerprint_fourier_design_q31"),
         ),
     ),

@@ -88,7 +88,7 @@ def test_an_interrupted_campaign_keeps_its_records_and_goes_on(population: Path,
         command(*arguments), stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts
     ) as process:
         deadline = time.monotonic() + 180
-        while time.monotonic() < deadline and not (partial.exists() and partial.read_bytes().count(b"\n") >= 3):
+        while time.monotonic() < deadline and not (partial.exists() and partial.read_bytes().count(b"\n") >= 1):
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=180)
@@ -96,7 +96,7 @@ def test_an_interrupted_campaign_keeps_its_records_and_goes_on(population: Path,
     assert "the same command goes on" in " ".join(told.split())
     assert not out.exists()
     kept = partial.read_text().splitlines()
-    assert 3 <= len(kept) < 300
+    assert 1 <= len(kept) < 300
     again = called(population, "--rigs", "4", "--workers", "1", "-o", out)
     assert again.returncode == 0 and "of 4 rigs are done already" in again.stderr
     times = {row["rig"]: row["seconds"] for row in pyarrow.parquet.read_table(out).to_pylist()}

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from fourier_rig import assert_equals_the_twin
 from lanes import assert_lanes_equal
 
 from bench import longevity, longevity_tables
 from bench.longevity import (
     COLUMNS,
     ENCODER,
-    ENGINE_LANES,
     FILTER_BIAS,
     FINE,
     STRONG_FORGETTING_S,
@@ -42,16 +42,16 @@ from bench.longevity_signals import (
     Sensing,
     Signals,
 )
-from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.settings.enums import Reason
-from pvid.setup.f32 import strong_config, weak_config
+from pvid.setup.f32 import strong_config
 from pvid.setup.q31 import counts_of_samples
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Sensors, simulate
 
 TICKS = 100_000
 SLOW_TICKS = 50_000  # of the strong form in fixed point
 LANES = (*WEAK_LANES, *STRONG_LANES, *WEAK_Q31_LANES)
+TWIN_SCENARIOS = ("dropped samples", "sensor wrap", "stuck sensor")  # the engine's bits behind the worst of them
 Outcomes = dict[str, dict[str, Outcome]]
 
 
@@ -62,8 +62,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 @pytest.fixture(scope="module")
 def outcomes(native: Native, library: ctypes.CDLL) -> Outcomes:
-    lanes = (*LANES, *ENGINE_LANES)
-    found = {name: longevity.measure(native, library, one, lanes, TICKS) for name, one in SCENARIOS.items()}
+    found = {name: longevity.measure(native, library, one, LANES, TICKS) for name, one in SCENARIOS.items()}
     for name, one in SCENARIOS.items():
         found[name] |= longevity.measure(native, library, one, STRONG_Q31_LANES, SLOW_TICKS)
     return found
@@ -97,10 +96,10 @@ KNOWN_SILENT = {
 OVER = ("perfect", "absent", "constant", "one tone", "switching", "dropped samples")
 
 
-# Two of the tones stop at once, which no filter follows: two windows have 3e4 times the noise. 20 s after the start the
-# gate has seen 22 windows of 1.7 s, remembers the residuals of the start yet and lets them in (of 1.25 s it had seen 31
-# and did not): 0.1 % of error at most, and an alarm that fades only with the sums.
-LET_IN = ("one tone", "weak", 0.12)
+# Sums that remember longer than this run still contain the window in which the motion stopped; the last window of a
+# drive that goes on and off may tell less than it takes.
+LINGERING = {(scenario, f"weak, {memory}") for scenario in ("absent", "constant") for memory in ("100 s", "none")}
+HELD = {("switching", "weak q31, 10 s")}
 
 
 @pytest.mark.parametrize("scenario", OVER)
@@ -108,31 +107,25 @@ def test_expired_alarm_does_not_return(scenario: str, outcomes: Outcomes) -> Non
     for lane in (lane for lane in LANES if lane.gated):
         outcome = outcomes[scenario][lane.label]
         assert outcome.errors <= longevity.BACK, lane.label
-        if (scenario, lane.kind) == LET_IN[:2]:
+        assert abs(outcome.error_after) < (0.03 if lane.kind == "weak" else 0.2), lane.label  # 0.025 as measured
+        if (scenario, lane.label) in LINGERING:
             assert outcome.told == Reason.MISFIT.text, lane.label
-            assert abs(outcome.error_after) < LET_IN[2], lane.label
+        elif (scenario, lane.label) in HELD:
+            assert outcome.told == Reason.HELD_UNCERTAIN.text, lane.label
         else:
             assert outcome.told == Reason.UPDATED.text, lane.label
-            assert abs(outcome.error_after) < (0.03 if lane.kind == "weak" else 0.2), lane.label
-
-
-@pytest.mark.parametrize("scenario", ["perfect", "one tone", "switching", "dropped samples", "sensor wrap"])
-def test_the_engine_of_any_mechanism_is_right_behind_a_disturbance(scenario: str, outcomes: Outcomes) -> None:
-    for lane in (lane for lane in ENGINE_LANES if lane.gated):
-        outcome = outcomes[scenario][lane.label]
-        assert outcome.told == Reason.UPDATED.text and outcome.errors <= longevity.BACK, lane.label
-        assert abs(outcome.error_after) < 0.03, lane.label  # per cent; 0.022 as measured
 
 
 @pytest.mark.parametrize("scenario", ["stuck sensor", "saturated sensor", "sensor wrap", "outliers", "slipping clock"])
 def test_sums_that_never_forget_survive_a_bad_sensor(scenario: str, outcomes: Outcomes) -> None:
-    # 0.18 % with the slipping clock, whose windows differ too little from the usual; alarm
+    # 0.12 % with the slipping clock, whose windows differ too little from the usual; alarm
     for lane in (Lane("weak", 0.0), Lane("strong", 0.0)):
         outcome = outcomes[scenario][lane.label]
         assert outcome.errors <= longevity.BACK
         assert abs(outcome.error_after) < 0.3
         assert outcome.told in (Reason.UPDATED.text, Reason.MISFIT.text)
-        assert {Reason.REJECTED_OUTLIER.text, Reason.MISFIT.text} & outcome.disturbed.keys()
+        noticed = (Reason.REJECTED_OUTLIER, Reason.MISFIT, Reason.HELD_OUT_OF_RANGE)
+        assert {reason.text for reason in noticed} & outcome.disturbed.keys()
 
 
 @pytest.mark.parametrize("scenario", ["step", "drift"])
@@ -175,7 +168,7 @@ def test_signals_held_out_find_nothing_silently_wrong(number: int, native: Nativ
 # ---- equal to the twin ----
 
 
-TWIN_TICKS = {"weak": 15_000, "strong": 1_200, "weak q31": 6_000, "strong q31": 500}
+TWIN_TICKS = {"weak": 15_000, "strong": 1_200, "strong q31": 500}
 
 
 def samples(library: ctypes.CDLL, scenario: str, ticks: int, sensing: Sensing) -> tuple[np.ndarray, np.ndarray]:
@@ -188,16 +181,13 @@ def counts(library: ctypes.CDLL, scenario: str, ticks: int, sensing: Sensing) ->
     return counts_of_samples(phi, sensing.phi_lsb), counts_of_samples(y, sensing.y_lsb)
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
-def test_the_weak_form_equals_its_twin(scenario: str, native: Native, library: ctypes.CDLL) -> None:
+@pytest.mark.parametrize("scenario", TWIN_SCENARIOS)
+def test_the_weak_form_equals_its_twin(scenario: str, library: ctypes.CDLL) -> None:
     phi, y = samples(library, scenario, TWIN_TICKS["weak"], ENCODER)
-    config = weak_config(rig_of(Lane("weak", 0.0)), RATE_HZ)
+    native, config = longevity.weak_of(Lane("weak", 0.0))
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in longevity.WEAK_FORGETTING_S]
-    try:
-        assert_lanes_equal([native], config, phi, y, lanes)
-    except PvidError:  # their gates let different windows in: one by one
-        for alone in lanes:
-            assert_lanes_equal([native], config, phi, y, [alone])
+    for alone in lanes:  # their gates let different windows in
+        assert_equals_the_twin(native, config, np.stack([y, phi], axis=1).astype(np.float32), [alone])
 
 
 @pytest.mark.parametrize(
@@ -208,15 +198,6 @@ def test_the_strong_form_equals_its_twin(scenario: str, ticks: int, native: Nati
     config = strong_config(rig_of(Lane("strong", 0.0)), RATE_HZ)
     lanes = [replace(config.estimator, forgetting_s=tau) for tau in STRONG_FORGETTING_S]
     assert_lanes_equal([native], config, *samples(library, scenario, ticks, ENCODER), lanes)
-
-
-@pytest.mark.parametrize("scenario", SCENARIOS)
-def test_the_weak_form_equals_its_twin_in_fixed_point(scenario: str, native: Native, library: ctypes.CDLL) -> None:
-    phi, y = counts(library, scenario, TWIN_TICKS["weak q31"], ENCODER)
-    configs = [config_q31_of(lane) for lane in WEAK_Q31_LANES]
-    for gate in {config.gate for config in configs}:  # lanes of the twin share the gate
-        alike = [config for config in configs if config.gate == gate]
-        assert_lanes_equal([native], alike[0], phi, y, [config.estimator for config in alike])
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -340,7 +321,6 @@ def test_an_error_is_charged_beyond_the_filter_s_own(
     change: float, drive: Any, native: Native, library: ctypes.CDLL
 ) -> None:
     # 0.022 to 0.111 % of w and of d1, 0.046 to 0.279 % of d2; the allowance is at most 1.5 times the largest
-    assert FILTER_BIAS["weak"] == (0.0, 0.0, 0.0)
     allowed = np.array(FILTER_BIAS["strong"])
     bias = filter_bias(native, library, change, drive)
     assert (bias < allowed).all()
@@ -348,9 +328,9 @@ def test_an_error_is_charged_beyond_the_filter_s_own(
         assert (allowed < 1.6 * bias).all(), "no more than it takes"
 
 
-def test_a_bias_of_the_engine_s_front_end_is_charged_beyond_it(library: ctypes.CDLL) -> None:
+def test_a_bias_of_the_weak_form_s_front_end_is_charged_beyond_it(library: ctypes.CDLL) -> None:
     # seen in 10^7 ticks without forgetting alone, whose standard errors are 0.0007 %
-    assert (longevity.engine_bias(library) < np.array(FILTER_BIAS["engine"])).all()
+    assert (longevity.weak_bias(library) < np.array(FILTER_BIAS["weak"])).all()
 
 
 def test_two_processes_do_what_one_does(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -402,11 +382,10 @@ def test_the_table_of_held_out_signals_counts_what_is_silent(results: Path) -> N
     marker, header, rows = longevity_tables.held_out_table()
     assert marker == "longevity-held-out"
     assert header == ("form", "cells", "right", "alarm", "silently wrong", "not finite", "wrong after")
-    assert rows[0] == ("weak", "8", "8", "0", "0", "0", "")
+    assert rows[0] == ("weak", "10", "10", "0", "0", "0", "")
     assert rows[1] == ("strong", "14", "10", "2", "2", "0", f"{HELD_OUT[0].title}; {HELD_OUT[1].title}")
     assert [row[:2] for row in rows[2:]] == [
         ("weak q31", "0"),
         ("strong q31", "0"),
         ("strong fine", "0"),
-        ("engine", "0"),
     ]

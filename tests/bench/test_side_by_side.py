@@ -166,3 +166,7 @@ def test_output_error_refuses_what_it_cannot_fit() -> None:
     broken[7] = np.nan
     with pytest.raises(PvidError, match="finite"):
         output_error(broken, run.y, RATE_HZ, standard_start(0), STANDARD_PENDULUM.l1)
+
+
+def test_the_bound_is_that_of_math_md() -> None:
+    np.testing.assert_allclose(100 * cramer_rao(14), [0.0082, 0.0086, 0.0168], rtol=0.01)  # its printed digits

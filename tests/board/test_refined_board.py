@@ -11,7 +11,7 @@ TIMEOUT_S = 60.0
 
 
 def test_a_board_refines_a_first_order_model_with_the_bits_of_this_computer() -> None:
-    run = refined_run("rigid_body", 4500)
+    run = refined_run("rigid_body", 4500, distance=0.1)
     expected = run.native().run_both(run.weak.samples)
     image, _ = build_refined_image(BOARDS["mps2-an386"], run)
     report = play(BOARDS["mps2-an386"], image, TIMEOUT_S)

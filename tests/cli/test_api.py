@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from conftest import ROOT
 
 import pvid
 from pvid.cli.main import commands
 from pvid.models.kapitza.physical import linear
-
-PAGE = ROOT / "host" / "docs" / "python.md"
 
 
 @pytest.fixture(scope="module")
@@ -129,21 +124,3 @@ def test_rows_of_another_shape_are_refused_and_bad_ones_have_a_reason() -> None:
     with pytest.raises(pvid.PvidError, match="a row has 1 entries"):
         estimator.step([1.0, 2.0], 0.0)
     assert estimator.step([np.nan], 0.0) == "rejected not finite"
-
-
-def test_the_page_about_python_runs_as_it_is_printed(
-    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    shutil.copy(run, tmp_path)
-    monkeypatch.chdir(tmp_path)
-    arguments = ["model", "simulate", "dc_motor", "motor.csv", "--duration", "10"]
-    CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
-    names: dict[str, object] = {}
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
-    assert len(blocks) == 6
-    for block in blocks:
-        exec(compile(block, str(PAGE), "exec"), names)
-    told = capsys.readouterr().out
-    assert "g = 9." in told and "'chi2'" in told and (tmp_path / "run.png").exists()
-    checked = CliRunner().invoke(commands, ["model", "check", "own.py"], standalone_mode=False, catch_exceptions=False)
-    assert checked.return_value in (0, None)

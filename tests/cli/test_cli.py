@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -169,3 +170,13 @@ def test_bad_usage_is_one_sentence_that_names_it(arguments: tuple[str, ...], nam
     assert done.returncode == 2, done.stdout
     assert named in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+
+
+def test_an_unknown_zero_of_the_encoder_is_found(tmp_path: Path) -> None:
+    lsb = 2 * math.pi / 2**14
+    pvid(tmp_path, "simulate", "run.csv", "--zero", "0.02", "--duration", "20")
+    answer = json.loads(pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--json").stdout)
+    assert answer["form"] == "weak"
+    # the encoder's grid lies within half an LSB of the zero, at random
+    assert answer["c"]["value"] == pytest.approx(0.02, abs=lsb)
+    assert 0 < answer["c"]["se"] < lsb

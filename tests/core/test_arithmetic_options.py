@@ -86,5 +86,5 @@ def test_a_cortex_m4f_image_at_gccs_default_standard_has_the_same_bits(
     run = standard_run("strong", 1000)
     image, _ = build_image(BOARDS["mps2-an386"], run)
     given = (tmp_path / "given").read_text(encoding="utf-8")
-    assert "strong/strong_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given
+    assert "kapitza/strong_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given
     assert play(BOARDS["mps2-an386"], image, TIMEOUT_S).hash == int(native_hashes(run, native)[-1])

@@ -16,13 +16,11 @@ from linear_rig import LINEAR_RIG
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.core.native import Native
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, source
 from pvid.design.weak_q31 import weak_tables_q31
 from pvid.rig.file import RigFile
 from pvid.rig.run import write_run
 from pvid.setup.f32 import weak_design_of
-from pvid.setup.q31 import counts_of, weak_config_q31
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 FIRMWARE = ROOT / "firmware"
@@ -127,57 +125,6 @@ def test_an_encoder_without_a_resolution_is_named(recorded: tuple[Path, Path], t
     command = ["identify", str(recorded[0]), "--rig", str(tmp_path / "rig.toml"), "--core", "q31"]
     done = CliRunner().invoke(commands, command)
     assert "nothing identified" in done.stderr and "use --set sensor.phi_lsb=0.0003835" in done.stderr
-
-
-PROGRAM = """
-#include <stdio.h>
-#include "pvid/pvid.h"
-#include "pvid/pvid_q31.h"
-#include "table.h"
-int main(void)
-{
-    static pvid_weak_q31 identifier;
-    uint32_t hash = PVID_FNV_START;
-    int phi, y;
-    if (pvid_weak_init_q31(&identifier, &standard) != PVID_OK) return 1;
-    while (scanf("%d %d", &phi, &y) == 2) {
-        hash = pvid_fnv_estimator_q31(hash, &identifier.estimator, pvid_weak_step_q31(&identifier, phi, y));
-    }
-    printf("%08x", (unsigned)hash);
-    return 0;
-}
-"""
-
-
-def test_the_header_is_the_configuration(recorded: tuple[Path, Path], tmp_path: Path, native: Native) -> None:
-    """A program made from the generated header and the sources alone computes the bits of the shared library."""
-    _, rig_path = recorded
-    command = ["tables", "--core", "q31", "--rig", str(rig_path), "--name", "standard"]
-    header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
-    (tmp_path / "table.h").write_text(header)
-    (tmp_path / "main.c").write_text(PROGRAM)
-    program = tmp_path / "program"
-    sanitizers = ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
-    # the hash wraps by its definition, and by nothing else
-    (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
-    sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
-    includes = [*INCLUDES, f"-I{tmp_path}"]
-    warnings = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
-    flags = ["-std=c99", "-O1", *warnings, *sanitizers, *includes]
-    tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", program)
-    rig = RigFile.standard()
-    run = simulate(sensors=standard_sensors(14), truth="linear", duration=10.0, seed=2).run
-    phi, y = counts_of(rig, run)
-    random = np.random.default_rng(3)
-    # a hostile tail: full scale in any order, and words beyond it
-    phi = np.concatenate([phi, random.integers(-1304, 1305, 4000), random.integers(-(2**31), 2**31, 2000)])
-    y = np.concatenate([y, y[:4000], random.integers(-(2**31), 2**31, 2000)])
-    lines = "\n".join(f"{a} {b}" for a, b in zip(phi, y, strict=True))
-    done = subprocess.run([program], input=lines, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    core = native.identifier(weak_config_q31(rig, 1000.0))
-    core.run(phi, y)
-    assert done.stdout == f"{core.running_hash:08x}"
 
 
 def test_a_guess_beyond_the_fixed_point_format_is_refused(tmp_path: Path) -> None:

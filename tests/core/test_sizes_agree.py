@@ -38,6 +38,8 @@ OTHER = {
     "PVID_MAX_KINDS": 1,
     "PVID_MAX_COLUMNS": 14,
     "PVID_MAX_POWER": 6,
+    "PVID_MAX_BLOCKS": 1,
+    "PVID_MAX_WINDOWS": 0,
 }
 
 LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}

@@ -200,7 +200,7 @@ static void ud_step(uint32_t i)
     sink = ud.theta[0];
 }
 
-/* Whole periods of WEAK_RIG_PERIOD ticks make a mean. */
+/* Whole periods of 768 ticks, from window to window, make a mean. */
 static void weak(uint32_t i)
 {
     weak_rig_tick(phi_samples[i], y_samples[i]);

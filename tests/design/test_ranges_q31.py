@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from bench.campaign.judge import identify_rig
 from bench.campaign.population import shipped
 from bench.campaign.truth import simulate_rig
-from pvid.cli.main import commands
 from pvid.core.native import Native
 from pvid.rig.file import RigFile, Sensor
-from pvid.rig.run import Run, write_run
+from pvid.rig.run import Run
 from pvid.run.identify import identify
 from pvid.run.survey import fitted
 from pvid.settings.q31 import WeakConfigQ31
@@ -102,23 +98,6 @@ def test_a_run_beyond_a_tenth_of_l1_is_identified(native: Native) -> None:
         assert result.beyond is not None and result.beyond.share == 0
         # some 0.3 % of noise in 15 s
         assert result.value["g"] == pytest.approx(9.5, rel=0.02)
-
-
-def test_samples_beyond_range_are_reported_with_their_share(native: Native, tmp_path: Path) -> None:
-    run = far_run()
-    rig = replace(RIG, sample_rate=None, sensor=replace(RIG.sensor, y_range=0.03))
-    share = np.mean(np.abs(run.y - np.median(run.y)) > 0.03)  # the median has more of them within than the middle
-    write_run(tmp_path / "run.csv", run)
-    rig.write(tmp_path / "run.toml")
-    arguments = ["identify", str(tmp_path / "run.csv"), "--rig", str(tmp_path / "run.toml")]
-    told = CliRunner().invoke(commands, arguments, standalone_mode=False)
-    assert told.return_value == 3
-    assert f"identified: saturated: {100 * share:.0f} % of the samples are beyond y_range = 0.03 m" in told.stderr
-    assert "warning" not in told.stderr
-    answer = json.loads(CliRunner().invoke(commands, [*arguments, "--json"], standalone_mode=False).stdout)
-    assert answer["status"] == "saturated"
-    assert answer["samples_beyond_range"]["y"] == pytest.approx(share * len(run.t), abs=2)
-    assert answer["samples_beyond_range"]["phi"] == 0
 
 
 def test_an_answer_in_spite_of_samples_beyond_range_has_a_warning(native: Native) -> None:

@@ -10,14 +10,15 @@
 #include <stdlib.h>
 
 #include "hostile.h"
+#include "pendulum/configuration.h"
 #include "pendulum/kapitza_design_f32.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
+#include "pvid/snapshot_fourier_q31.h"
 #include "strong_table_q31.h"
-#include "weak_table_q31.h"
 
 #define LAST_REASON PVID_NOT_READY
-#define ROOM ((size_t)PVID_SNAPSHOT_FOURIER_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
+#define ROOM ((size_t)PVID_SNAPSHOT_FOURIER_F32 + (size_t)PVID_SNAPSHOT_FOURIER_Q31)
 #define MOST_TOLD 20u
 
 static struct {
@@ -399,71 +400,106 @@ static void clear_strong(void)
 
 /* ---- weak, integers ---- */
 
+#define PENDULUM_TERMS 13
+#define PENDULUM_NOISE 21
+
 static struct {
-    pvid_weak_q31 self;
-    pvid_weak_config_q31 config;
-    pvid_weak_design_q31 design;
+    pvid_fourier_q31 self;
+    pvid_fourier_config_q31 config;
+    pvid_fourier_design_q31 design;
+    int32_t full_scale[KAPITZA_WEAK_SAMPLES];
+    int32_t offset[KAPITZA_WEAK_SAMPLES];
+    int32_t drive_min[KAPITZA_WEAK_SAMPLES];
+    pvid_scaled_q31 factor[PENDULUM_TERMS];
+    pvid_fourier_noise_q31 noise[PENDULUM_NOISE];
 } weak_q31;
+
+static void spoil_tables_q31(void)
+{
+    const pvid_fourier_design_q31 *sound = pendulum_config_q31->design;
+    if (one_in(5)) {
+        const size_t i = below(PENDULUM_TERMS);
+        memcpy(weak_q31.factor, sound->factor, sizeof weak_q31.factor);
+        weak_q31.factor[i].m = one_in(2) ? any_size_i32() : sound->factor[i].m;
+        weak_q31.factor[i].e = one_in(2) ? any_size_i32() : sound->factor[i].e;
+        weak_q31.design.factor = weak_q31.factor;
+    }
+    if (one_in(5)) {
+        const size_t i = below(PENDULUM_NOISE);
+        memcpy(weak_q31.noise, sound->noise, sizeof weak_q31.noise);
+        weak_q31.noise[i].factor.m = one_in(2) ? any_size_i32() : sound->noise[i].factor.m;
+        weak_q31.noise[i].a = one_in(4) ? (uint8_t)any_word() : sound->noise[i].a;
+        weak_q31.design.noise = weak_q31.noise;
+    }
+    if (one_in(5)) { /* the formats are those of the sound one: a smaller one is within them */
+        for (size_t i = 0; i < KAPITZA_WEAK_SAMPLES; i++) {
+            weak_q31.full_scale[i] = one_in(4) ? -any_i32() / 2 : 1 + (int32_t)below((uint32_t)sound->full_scale[i]);
+            weak_q31.full_scale[i] = (weak_q31.full_scale[i] > sound->full_scale[i]) ? 0 : weak_q31.full_scale[i];
+        }
+        weak_q31.design.full_scale = weak_q31.full_scale;
+    }
+}
 
 static void configure_weak_q31(bool sound)
 {
-    pvid_weak_config_q31 *config = &weak_q31.config;
-    weak_q31.design = weak_unit_design;
-    *config = weak_unit;
+    pvid_fourier_config_q31 *config = &weak_q31.config;
+    *config = *pendulum_config_q31;
+    weak_q31.design = *config->design;
     config->design = &weak_q31.design;
-    config->zero_unknown = !one_in(3);
     config->estimator.forgetting_groups = one_in(3) ? 8u : 0u;
     config->gate.sigmas = one_in(3) ? 0u : config->gate.sigmas;
-    config->drive_min = one_in(3) ? 0 : config->drive_min;
+    config->drive_min = one_in(3) ? NULL : config->drive_min;
+    config->compensation = !one_in(4);
     if (sound) {
         return;
     }
     if (one_in(2)) {
         spoil_estimator_q31(&config->estimator);
     }
-    config->pivot_noise.m = one_in(6) ? any_i32() : config->pivot_noise.m;
-    config->pivot_noise.e = one_in(6) ? any_i32() : config->pivot_noise.e;
-    config->phi_offset = one_in(6) ? any_i32() : config->phi_offset;
-    config->y_offset = one_in(6) ? any_i32() : config->y_offset;
+    for (size_t i = 0; i < KAPITZA_WEAK_SAMPLES; i++) {
+        weak_q31.offset[i] = one_in(3) ? any_i32() : 0;
+        weak_q31.drive_min[i] = one_in(3) ? any_size_i32() : 0;
+    }
+    config->offset = one_in(6) ? weak_q31.offset : config->offset;
+    config->drive_min = one_in(6) ? weak_q31.drive_min : config->drive_min;
     config->iterations = one_in(6) ? (uint8_t)any_word() : config->iterations;
     config->trust.kappa_min = one_in(6) ? any_i32() : config->trust.kappa_min;
     config->trust.se_max = one_in(6) ? any_size_i32() : config->trust.se_max;
     config->trust.misfit_max = one_in(6) ? (uint32_t)any_size_i32() : config->trust.misfit_max;
     config->trust.renewal = one_in(6) ? (uint32_t)any_size_i32() : config->trust.renewal;
-    config->drive_min = one_in(6) ? any_size_i32() : config->drive_min;
-    weak_q31.design.lag = one_in(6) ? (uint8_t)any_word() : weak_q31.design.lag;
-    weak_q31.design.taps = one_in(12) ? (uint16_t)below(weak_q31.design.taps + 1u) : weak_q31.design.taps;
-    weak_q31.design.decimation = one_in(12) ? (uint16_t)any_word() : weak_q31.design.decimation;
-    weak_q31.design.window = one_in(12) ? (uint16_t)below(weak_q31.design.window + 1u) : weak_q31.design.window;
-    weak_q31.design.phi_max = one_in(12) ? any_size_i32() : weak_q31.design.phi_max;
-    weak_q31.design.sum_shift = one_in(12) ? (uint8_t)below(70) : weak_q31.design.sum_shift;
-    weak_q31.design.chi = one_in(20) ? NULL : weak_q31.design.chi;
+    spoil_tables_q31();
+    pvid_fourier_design_q31 *design = &weak_q31.design;
+    design->functions = one_in(8) ? (uint8_t)below(13) : design->functions;
+    design->power = one_in(8) ? (uint8_t)below(9) : design->power;
+    design->decimation = one_in(8) ? (uint8_t)below((uint32_t)design->decimation + 1u) : design->decimation;
+    design->hop = one_in(8) ? (uint16_t)below((uint32_t)design->hop + 1u) : design->hop;
+    design->n_noise = one_in(8) ? (uint16_t)below((uint32_t)design->n_noise + 1u) : design->n_noise;
+    design->circle = one_in(20) ? NULL : design->circle;
     config->design = one_in(20) ? NULL : config->design;
 }
 
 static pvid_status init_weak_q31(void)
 {
-    return pvid_weak_init_q31(&weak_q31.self, &weak_q31.config);
+    return pvid_fourier_init_q31(&weak_q31.self, &weak_q31.config);
 }
 
 static pvid_reason step_weak_q31(uint32_t kind, unsigned long tick)
 {
     static const double lsb[2] = {3.835e-4, 5.0e-6};
-    static const int32_t full_scale[2] = {1304, 6000};
-    int32_t phi;
-    int32_t y;
-    hostile_counts(kind, tick, lsb, full_scale, &phi, &y);
-    return pvid_weak_step_q31(&weak_q31.self, phi, y);
+    static const int32_t full_scale[2] = {782, 6000};
+    int32_t reading[KAPITZA_WEAK_SAMPLES]; /* y, phi */
+    hostile_counts(kind, tick, lsb, full_scale, &reading[1], &reading[0]);
+    return pvid_fourier_step_q31(&weak_q31.self, reading);
 }
 
 static void gap_weak_q31(void)
 {
-    pvid_weak_gap_q31(&weak_q31.self);
+    pvid_fourier_gap_q31(&weak_q31.self);
 }
 
 static void freeze_weak_q31(bool frozen)
 {
-    pvid_weak_freeze_q31(&weak_q31.self, frozen);
+    pvid_fourier_freeze_q31(&weak_q31.self, frozen);
 }
 
 static void check_weak_q31(bool published)
@@ -472,9 +508,9 @@ static void check_weak_q31(bool published)
     pvid_estimate_q31 copy;
     uint32_t number;
     if (published) {
-        require(pvid_weak_read_q31(&weak_q31.self, &copy, &number) &&
+        require(pvid_fourier_read_q31(&weak_q31.self, &copy, &number) &&
                     ((number > 0u) == weak_q31.self.trust.published) &&
-                    (memcmp(&copy, pvid_weak_estimate_q31(&weak_q31.self), sizeof copy) == 0),
+                    (memcmp(&copy, pvid_fourier_estimate_q31(&weak_q31.self), sizeof copy) == 0),
                 "a read q31 estimate is the published one");
         pvid_estimator_assess_q31(&weak_q31.self.estimator, &copy);
     }
@@ -482,12 +518,12 @@ static void check_weak_q31(bool published)
 
 static size_t save_weak_q31(uint8_t image[], size_t room)
 {
-    return pvid_snapshot_save_weak_q31(&weak_q31.self, &weak_q31.config, any_word(), image, room);
+    return pvid_snapshot_save_fourier_q31(&weak_q31.self, &weak_q31.config, any_word(), image, room);
 }
 
 static pvid_snapshot_status restore_weak_q31(const uint8_t image[], size_t length)
 {
-    return pvid_snapshot_restore_weak_q31(&weak_q31.self, &weak_q31.config, image, length);
+    return pvid_snapshot_restore_fourier_q31(&weak_q31.self, &weak_q31.config, image, length);
 }
 
 static bool weak_q31_has_published(void)

@@ -14,7 +14,7 @@
     ensures \initialized(out) && -0x40000000 <= *out <= 0x3FFFFFFF; */
 static bool acceleration(int64_t x, uint32_t shift, uint32_t bits, int32_t *out);
 
-#include "../../firmware/src/strong/strong_q31.c"
+#include "../../firmware/models/kapitza/strong_q31.c"
 
 #define ONE_Q30 ((int32_t)1 << 30)
 

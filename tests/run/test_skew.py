@@ -13,7 +13,6 @@ from bench.campaign.population import shipped
 from bench.campaign.truth import simulate_rig
 from pvid.core.native import Native
 from pvid.rig.run import Run
-from pvid.run.advice import advice
 from pvid.run.identify import identify
 from pvid.run.skew import aligned
 from pvid.sim.pendulum import simulate, standard_sensors
@@ -47,16 +46,12 @@ def test_without_a_delay_none_is_found(native: Native) -> None:
     assert result.skew == 0.0 and result.warning is None
 
 
-def test_delay_that_moves_the_estimate_is_reported_and_covered(native: Native) -> None:
-    """2.4 ms took 27 % off d2, and the residuals looked like a small disturbance."""
+def test_delay_that_moves_the_estimate_is_estimated(native: Native) -> None:
+    """2.4 ms took 27 % off d2 in the weak form: the refinement finds them."""
     simulated = simulate_rig(native, shipped(), 1, 41)
     record, result = identify_rig(native, simulated)
-    assert result is not None and result.warning is not None
-    assert "y seems to be sampled 2.4 ms later than phi" in result.warning
-    assert not record["silently_wrong"] and abs(record["d2_error"]) > 0.2  # type: ignore[arg-type]
-    (sentence,) = advice(simulated.run, simulated.file, result, native)
-    assert "--set sensor.y_delay=0.0024" in sentence
-    delay = float(sentence.rsplit("=", 1)[1])
-    cured = identify(aligned(simulated.run, delay), simulated.file, native)
-    assert cured.identified and cured.skew == 0.0
-    assert cured.value["d2"] == pytest.approx(simulated.p[2], rel=0.01)
+    assert result is not None and result.identified
+    assert not record["silently_wrong"] and abs(record["d2_error"]) < 0.01  # type: ignore[arg-type]
+    assert result.refinement is not None and result.refinement.adopted and result.refinement.outcome is not None
+    tau, _ = result.refinement.outcome.extras["tau"]
+    assert abs(tau) == pytest.approx(0.00244, rel=0.02)

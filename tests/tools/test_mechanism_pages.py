@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from conftest import ROOT
 
-from bench.mechanism_pages import errors_of, printed_answer
+from bench.mechanism_pages import errors_of
 from pvid.model.report import check_report
 from pvid.models.mechanisms import compiled_of, names, path_of
 
@@ -31,8 +31,3 @@ def test_a_page_shows_the_mechanism_as_it_is(name: str) -> None:
 def test_rows_of_one_mechanism_are_taken_from_the_table() -> None:
     assert errors_of("errors", TABLE, "arm") == ["| parameter | RMS % |", "| --- | --- |", "| I1 | 0.2 |"]
     assert errors_of("errors", TABLE, "boat") == []
-
-
-def test_the_answer_on_the_page_is_the_one_that_the_commands_print() -> None:
-    text = (DOCS / "models.md").read_text(encoding="utf-8")
-    assert printed_answer() in text, "write it anew: ./tools/pvid bench answer --update host/docs/models.md"

@@ -21,9 +21,9 @@ from pvid.rig.run import Run
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
 from pvid.settings.q31 import GateConfigQ31
-from pvid.setup.f32 import strong_config, weak_config
+from pvid.setup.f32 import strong_config
 from pvid.setup.q31 import gate_config_q31, strong_config_q31, weak_config_q31
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
+from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.twin.f32.gate import Gate
 from pvid.twin.q31.gate import GateQ31
 from pvid.twin.q31.scaled import Scaled, scaled
@@ -153,9 +153,6 @@ def test_disabled_gate_accepts_and_keeps_scale() -> None:
 # ---- in the identifiers ----
 
 
-WEAK = {"form": "weak", "outlier_gate": 4.0}
-PATIENT = {**WEAK, "outlier_patience_s": 2.0}
-CORRECTED = {"full_angle": True, "damping": True}
 STRONG = {"form": "strong", "stride": 8, "outlier_gate": 6.0, "forgetting_s": 2.0}
 
 
@@ -163,9 +160,6 @@ STRONG = {"form": "strong", "stride": 8, "outlier_gate": 6.0, "forgetting_s": 2.
 @pytest.mark.parametrize(
     ("core", "identifier"),
     [
-        *(("f32", {**gate, **other}) for gate in (WEAK, PATIENT) for other in ({}, CORRECTED)),
-        ("q31", {**WEAK, "test_functions": 8}),
-        ("q31", {**PATIENT, "test_functions": 8, "zero": False}),
         ("q31", STRONG),
         ("q31", {**STRONG, "outlier_patience_s": 0.5}),
     ],
@@ -175,8 +169,7 @@ def test_the_core_equals_its_twin(
 ) -> None:
     rig, case = rig_with(**identifier), CASES[identifier["form"], core]
     config, samples = case.settings(rig, 1000.0), case.samples(rig, jolted)
-    if case.form == "strong":
-        samples = samples[0][28_500:31_000], samples[1][28_500:31_000]
+    samples = samples[0][28_500:31_000], samples[1][28_500:31_000]
     (lane,) = assert_lanes_equal(matrix.values(), config, *samples)
     assert (lane.record.reason == OUTLIER).sum() == lane.counters["rejected_outlier"] > 0
 
@@ -188,24 +181,6 @@ def test_the_strong_form_equals_its_twin_in_every_lane(matrix: dict[str, Native]
     lanes = [replace(config.estimator, forgetting_s=tau, feedback_hz=f) for tau in (0.0, 2.0) for f in (0.0, 10.0)]
     for lane in assert_lanes_equal(matrix.values(), config, phi, y, lanes):
         assert lane.counters["rejected_outlier"] == (lane.record.reason == OUTLIER).sum() > 0
-
-
-@pytest.mark.parametrize("core", CORES)
-def test_disturbed_windows_are_rejected(core: str, native: Native, jolted: Run) -> None:
-    errors, case = {}, CASES["weak", core]
-    for sigmas in (0.0, 4.0):
-        rig = rig_with(outlier_gate=sigmas)
-        config = case.settings(rig, 1000.0)
-        record = native.identifier(config).run(*case.samples(rig, jolted))
-        errors[sigmas] = np.abs(case.p_of(config, record.published[-1])[:3] / STANDARD_PENDULUM.linear - 1).max()
-        refused = np.flatnonzero(record.reason == OUTLIER)
-        # each lies in two or three windows of 1.71 s, and nothing else is refused
-        assert len(refused) == 0 if sigmas == 0.0 else 4 <= len(refused) <= 6
-        assert np.isin(refused // 1000, (25, 26, 27, 30, 31, 32)).all()
-        for tick in refused:  # and it changes nothing but its counter
-            assert np.array_equal(record.p[tick - 300], record.p[tick])
-            assert np.array_equal(record.sums[tick - 300], record.sums[tick])
-    assert errors[4.0] < 5e-4 < errors[0.0]
 
 
 def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
@@ -227,19 +202,6 @@ def test_gate_is_enabled_in_the_stationary_law_and_can_be_disabled(core: str, jo
         for chosen, expected in (({}, sigmas), ({"law": "pseudovelocity"}, 0), ({"outlier_gate": 0.0}, 0)):
             config = CASES[form, core].settings_for_run(rig_with(form=form, stride=8, **chosen), jolted)
             assert config.gate == kind(expected * one, 0)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_gate_rejects_nothing_of_a_regular_run(seed: int, native: Native) -> None:
-    # 40 s from a start that is half wrong: the same bits with the gate and without it
-    run = simulate(sensors=standard_sensors(14), truth="linear", duration=40.0, seed=seed).run
-    hashes = []
-    for sigmas in (0.0, 4.0):
-        core = native.identifier(weak_config(rig_with(outlier_gate=sigmas), 1000.0, standard_start(seed)))
-        core.run(run.phi, run.y, sums=False)
-        assert core.counters["rejected_outlier"] == 0
-        hashes.append(core.running_hash)
-    assert hashes[0] == hashes[1]
 
 
 # ---- settings ----

@@ -15,9 +15,9 @@ from pvid.design.weak import design
 from pvid.design.weak_sizing import Sizes
 from pvid.models.kapitza.physical import linear
 from pvid.settings.enums import Law, Reason
-from pvid.settings.f32 import EstimatorConfig, TrustConfig, WeakConfig
+from pvid.settings.f32 import EstimatorConfig, WeakConfig
 from pvid.settings.record import Record
-from pvid.sim.pendulum import STANDARD_PENDULUM, Simulation, simulate, standard_sensors, standard_start
+from pvid.sim.pendulum import Simulation, simulate, standard_sensors, standard_start
 from pvid.twin.weak import WeakTwin
 
 BUILDS = ("gcc-O0", "gcc-O2", "gcc-O3", "clang-O0", "clang-O2", "clang-O3")
@@ -70,46 +70,10 @@ def records_of(
     return [lane.record for lane in assert_lanes_equal(natives, config, phi, y, lanes, len(phi))]
 
 
-def test_twelve_lanes_equal_the_twin_in_every_build(matrix: dict[str, Native], standard_14_bits: Simulation) -> None:
-    run = standard_14_bits.run
-    lanes = [replace(estimator(seed), forgetting_s=tau) for seed in range(4) for tau in (0.0, 5.0, 40.0)]
-    records = records_of([matrix[name] for name in BUILDS], configuration(), lanes, run.phi, run.y)
-    for record in records:
-        # a window every 0.855 s; this configuration takes the pivot's sensor for exact
-        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 19
-        assert record.p[-1, :3] == pytest.approx(standard_14_bits.p, rel=0.005)
-
-
-@pytest.mark.parametrize(
-    ("full_angle", "friction"), [(True, False), (True, True), (False, True)], ids=["angle", "both", "friction"]
-)
-def test_the_correction_equals_the_twin_in_every_build(
-    matrix: dict[str, Native], full_angle: bool, friction: bool
-) -> None:
-    pendulum = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
-    run = simulate(pendulum, sensors=standard_sensors(14), truth="full", duration=20.0, seed=1).run
-    lanes = [with_friction(estimator(seed)) if friction else estimator(seed) for seed in range(3)]
-    config = replace(configuration(), full_angle=full_angle, friction=friction, angle_limit=0.12)
-    config = replace(config, trust=TrustConfig(misfit_max=6.0))
-    records = records_of([matrix[name] for name in BUILDS], config, lanes, run.phi, run.y)
-    for record in records:
-        assert np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)).sum() >= 14
-        assert record.published[-1, :3] == pytest.approx(STANDARD_PENDULUM.linear, rel=0.02)
-
-
 def test_the_correction_of_hostile_samples_equals_the_twin(native: Native, standard_14_bits: Simulation) -> None:
     phi, y = hostile(standard_14_bits)
     config = replace(configuration(), full_angle=True, friction=True)
     records_of([native], config, [with_friction(estimator(seed)) for seed in range(3)], phi, y)
-
-
-def test_a_zeroed_encoder_equals_the_twin_in_every_build(
-    matrix: dict[str, Native], standard_14_bits: Simulation
-) -> None:
-    run = standard_14_bits.run
-    lanes = [estimator(seed, zero_unknown=False) for seed in range(3)]
-    config = replace(configuration(zero_unknown=False), iterations=2)
-    records_of([matrix[name] for name in BUILDS], config, lanes, run.phi[:8000], run.y[:8000])
 
 
 @pytest.mark.parametrize(
@@ -122,36 +86,6 @@ def test_laws_and_divider_equal_the_twin(
     run = standard_14_bits.run
     lanes = [replace(estimator(seed), law=law, feedback_hz=feedback_hz, divider=divider) for seed in range(3)]
     records_of([native], configuration(), lanes, run.phi[:10000], run.y[:10000])
-
-
-@pytest.mark.parametrize(
-    "sizes",
-    [
-        Sizes(decimation=1, taps=31, functions=4, window_s=0.25),
-        Sizes(decimation=2, taps=31, functions=4, window_s=0.5),
-        Sizes(decimation=3, taps=21, functions=7, window_s=0.6),
-        Sizes(decimation=5, taps=61, functions=16, window_s=0.75),
-        Sizes(decimation=32, taps=81, functions=5, window_s=2.0),
-        Sizes(decimation=64, taps=401, functions=16, window_s=1.3),
-    ],
-    ids=lambda sizes: f"D{sizes.decimation}-K{sizes.functions}",
-)
-def test_every_size_equals_the_twin(native: Native, standard_14_bits: Simulation, sizes: Sizes) -> None:
-    run = standard_14_bits.run
-    records = records_of([native], configuration(sizes=sizes), [estimator(0)], run.phi[:8000], run.y[:8000])
-    assert (records[0].reason != Reason.WARMING_UP).any()
-
-
-def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
-    """200 Hz, no decimation, both corrections: several stages at every sample."""
-    pendulum = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
-    run = simulate(pendulum, sensors=standard_sensors(14), sample_rate=200.0, truth="full", duration=20.0, seed=1).run
-    tables = design(L1, 200.0, NOMINAL, Sizes(window_s=0.3, decimation=1, taps=15, functions=12)).f32
-    config = WeakConfig(200.0, L1, tables, with_friction(estimator(0)), full_angle=True, friction=True)
-    assert tables.window == 61
-    assert WeakTwin(config).stages_per_tick >= 8
-    record = records_of([native], config, [config.estimator], run.phi, run.y)[0]
-    assert (record.reason == Reason.HELD_UNCERTAIN).any()  # windows are worked off, short as they are
 
 
 def hostile(simulation: Simulation) -> tuple[Samples, Samples]:
@@ -203,44 +137,6 @@ def test_without_motion_or_drive_p_does_not_move(native: Native, standard_14_bit
         record = records_of([native], config, [estimator(0)], phi, drive)[0]
         assert np.array_equal(record.p[-1, :3], estimator(0).start[:3])
         assert (record.reason == Reason.HELD_NOT_EXCITED).any()
-
-
-def test_a_pause_of_the_drive_freezes_p_and_the_sums(native: Native, standard_14_bits: Simulation) -> None:
-    phi, y = standard_14_bits.run.phi, standard_14_bits.run.y.copy()
-    y[8000:16000] = y[8000]
-    config = replace(configuration(), drive_min=0.4)
-    record = records_of([native], config, [estimator(0)], phi, y)[0]
-    # the last window that saw the drive is complete 1.79 s after it stops, and worked off 0.3 s later
-    paused = slice(8000 + 2100, 16000)
-    assert (record.p[paused] == record.p[paused.start]).all()
-    assert (record.sums[paused] == record.sums[paused.start]).all()
-    assert (record.p[-1] != record.p[paused.start]).any()
-
-
-def test_a_run_in_two_pieces_has_the_bits_of_one(native: Native, standard_14_bits: Simulation) -> None:
-    run = standard_14_bits.run
-    whole = native.identifier(configuration())
-    whole.run(run.phi[:9000], run.y[:9000])
-    pieces = native.identifier(configuration())
-    for part in (slice(0, 1), slice(1, 2345), slice(2345, 2346), slice(2346, 9000)):
-        pieces.run(run.phi[part], run.y[part])
-    assert pieces.running_hash == whole.running_hash
-
-
-def test_a_gap_keeps_the_sums_and_starts_the_windows_again(native: Native, standard_14_bits: Simulation) -> None:
-    run = standard_14_bits.run
-    config = configuration()
-    reported, seen = native.identifier(config), native.identifier(config)
-    for core in (reported, seen):
-        core.run(run.phi[:8000], run.y[:8000])
-    reported.gap()
-    told_record = reported.run(run.phi[7000:9000], run.y[7000:9000])
-    broken = np.concatenate([[np.nan], run.phi[7000:9000]])
-    seen_record = seen.run(broken, np.concatenate([[0.0], run.y[7000:9000]]))
-    assert np.array_equal(told_record.p, seen_record.p[1:])
-    assert np.array_equal(told_record.sums, seen_record.sums[1:])
-    assert told_record.sums[0, -1] > 0
-    assert told_record.reason[0] in (Reason.WARMING_UP, Reason.UPDATED)
 
 
 def test_lanes_with_different_schedules_are_refused() -> None:

@@ -54,56 +54,12 @@ def compared(
     return twin
 
 
-def test_twenty_starts_equal_the_twin_in_every_build(matrix: dict[str, Native], counts: tuple[Counts, Counts]) -> None:
-    lanes = [configuration(seed).estimator for seed in range(20)]
-    config = configuration()
-    twin = compared([matrix[name] for name in BUILDS], config, lanes, *counts)
-    compared([matrix["gcc-O2"]], config, lanes[:1], *counts, hashed_ticks=len(counts[0]))
-    # from every start: 1.5 times what the standard errors of this run promise
-    assert p_of(config, twin.estimator.p.T)[:, :3] == pytest.approx(
-        np.tile(STANDARD_PENDULUM.linear, (20, 1)), rel=0.001
-    )
-
-
-@pytest.mark.parametrize("forgetting_s", [5.0, 40.0])
-def test_forgetting_equals_the_twin(native: Native, counts: tuple[Counts, Counts], forgetting_s: float) -> None:
-    lanes = [configuration(seed, forgetting_s=forgetting_s).estimator for seed in range(3)]
-    assert lanes[0].forgetting_groups > 0
-    compared([native], configuration(), lanes, *counts)
-
-
-def test_many_stages_a_tick_equal_the_twin(native: Native) -> None:
-    """200 Hz without decimation: several stages at every sample."""
-    run = simulate(sensors=standard_sensors(14), sample_rate=200.0, truth="linear", duration=20.0, seed=1).run
-    settings = replace(RIG.identifier, window_s=0.3, decimation=1, smoothing_s=0.075)
-    config = weak_config_q31(replace(RIG, identifier=settings), 200.0, standard_start(0))
-    assert config.design.window == 61
-    assert WeakTwinQ31(config).stages_per_tick >= 5
-    twin = compared([native], config, [config.estimator], *counts_of(RIG, run))
-    assert twin.estimator.counters["updates"][0] > 0
-
-
-def test_a_zeroed_encoder_equals_the_twin(native: Native, counts: tuple[Counts, Counts]) -> None:
-    lanes = [configuration(seed, zero_unknown=False).estimator for seed in range(3)]
-    compared([native], configuration(zero_unknown=False), lanes, *counts)
-
-
 @pytest.mark.parametrize(("gain", "divider"), [(0, 1), (2**28, 1), (2**30, 3)])
 def test_laws_and_divider_equal_the_twin(
     native: Native, counts: tuple[Counts, Counts], gain: int, divider: int
 ) -> None:
     lanes = [replace(configuration(seed).estimator, gain=gain, divider=divider) for seed in range(3)]
     compared([native], configuration(), lanes, *(c[:15000] for c in counts))
-
-
-@pytest.mark.parametrize(
-    "sizes", [{"decimation": 1, "window_s": 0.15}, {"decimation": 2, "window_s": 0.4}, {"test_functions": 16}]
-)
-def test_other_sizes_equal_the_twin(native: Native, counts: tuple[Counts, Counts], sizes: dict[str, Any]) -> None:
-    functions = {"test_functions": 4} if "decimation" in sizes else {}
-    config = configuration(**{**sizes, **functions})
-    # after so many ticks no window is in work, whose solves the core counts before the twin does
-    compared([native], config, [config.estimator], *(c[:8020] for c in counts))
 
 
 def hostile_to(name: str, config: WeakConfigQ31, ticks: int = 8000) -> tuple[Counts, Counts]:
@@ -145,12 +101,3 @@ def test_a_sample_beyond_full_scale_costs_a_window_and_no_more(native: Native, c
     assert record.reason[20000] == Reason.REJECTED_SATURATED
     assert core.counters["rejected_saturated"] == 1
     assert p_of(config, record.p[-1])[:3] == pytest.approx(STANDARD_PENDULUM.linear, rel=0.001)
-
-
-def test_a_run_in_pieces_is_the_same_run(native: Native, counts: tuple[Counts, Counts]) -> None:
-    whole = native.identifier(configuration())
-    whole.run(*counts)
-    pieces = native.identifier(configuration())
-    for part in np.array_split(np.arange(len(counts[0])), 7):
-        pieces.run(counts[0][part], counts[1][part])
-    assert pieces.running_hash == whole.running_hash

@@ -38,7 +38,7 @@ static void plant_rate(double t, const double x[4], double dx[4])
     dx[3] = (g * x[0]) - ((plant_p[1] - 1.0) * g * x[1]);
 }
 
-static void plant_step(plant_state *plant, double *phi, double *y)
+static inline void plant_step(plant_state *plant, double *phi, double *y)
 {
     const double h = 1.0 / PLANT_RATE;
     double k[4][4];
@@ -59,7 +59,7 @@ static void plant_step(plant_state *plant, double *phi, double *y)
     plant->t += h;
 }
 
-static plant_state released_plant(void)
+static inline plant_state released_plant(void)
 {
     const plant_state plant = {0.0, {0.06, 0.08, 0.0, 0.0}};
     return plant;

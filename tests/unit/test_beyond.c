@@ -9,12 +9,12 @@
 #include <cmocka.h>
 
 #include "solve/state_q31.h"
+#include "engine_q31.h"
 #include "first_order.h"
-#include "plant.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
+#include "pvid/snapshot_fourier_q31.h"
 #include "strong_table_q31.h"
-#include "weak_table_q31.h"
 
 /* ---- physical parameters in float32 ---- */
 
@@ -166,14 +166,14 @@ static void a_shifted_derivative_may_be_too_large(void **state)
     assert_largest(&finer, PHI2, limit / 16, 0, 0, 0);
 }
 
-static pvid_weak_q31 identifier;
+static pvid_fourier_q31 identifier;
 
 /* ---- what is remembered ---- */
 
 static void a_weight_beyond_its_counter_is_its_end(void **state)
 {
     (void)state;
-    assert_int_equal(pvid_weak_init_q31(&identifier, &weak_unit), PVID_OK);
+    assert_int_equal(pvid_fourier_init_q31(&identifier, &kapitza_config_q31), PVID_OK);
     pvid_information_q31 *information = &identifier.estimator.information;
     pvid_estimate_q31 estimate;
     int64_t *weight = &information->sums[information->n_sums - 1u];
@@ -234,72 +234,16 @@ static void a_snapshot_of_another_form_is_of_another_kind(void **state)
 {
     (void)state;
     static pvid_strong_q31 other;
-    static uint8_t image[PVID_SNAPSHOT_WEAK_Q31];
+    static uint8_t image[PVID_SNAPSHOT_FOURIER_Q31];
     static uint8_t strong_image[PVID_SNAPSHOT_STRONG_Q31];
-    assert_int_equal(pvid_weak_init_q31(&identifier, &weak_unit), PVID_OK);
+    assert_int_equal(pvid_fourier_init_q31(&identifier, &kapitza_config_q31), PVID_OK);
     assert_int_equal(pvid_strong_init_q31(&other, &strong_unit), PVID_OK);
-    const size_t n = pvid_snapshot_save_weak_q31(&identifier, &weak_unit, 1, image, sizeof image);
+    const size_t n = pvid_snapshot_save_fourier_q31(&identifier, &kapitza_config_q31, 1, image, sizeof image);
     const size_t m = pvid_snapshot_save_strong_q31(&other, &strong_unit, 1, strong_image, sizeof strong_image);
     assert_int_equal(pvid_snapshot_restore_strong_q31(&other, &strong_unit, image, n), PVID_SNAPSHOT_OTHER_KIND);
-    assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &weak_unit, strong_image, m),
+    assert_int_equal(pvid_snapshot_restore_fourier_q31(&identifier, &kapitza_config_q31, strong_image, m),
                      PVID_SNAPSHOT_OTHER_KIND);
     assert_int_equal(pvid_snapshot_restore_strong_q31(&other, &strong_unit, strong_image, m), PVID_SNAPSHOT_RESTORED);
-}
-
-/* ---- a design whose Gram tables say nothing, or too little ---- */
-
-static void run(const pvid_weak_design_q31 *design, int reasons[16])
-{
-    pvid_weak_config_q31 config = weak_unit;
-    config.design = design;
-    assert_int_equal(pvid_weak_init_q31(&identifier, &config), PVID_OK);
-    plant_state plant = released_plant();
-    memset(reasons, 0, 16 * sizeof reasons[0]);
-    for (int i = 0; i < 12000; i++) {
-        double phi;
-        double y;
-        plant_step(&plant, &phi, &y);
-        reasons[pvid_weak_step_q31(&identifier, (int32_t)floor((phi / 3.834951969714103e-4) + 0.5),
-                                   (int32_t)floor((y / 5.0e-6) + 0.5))]++;
-    }
-}
-
-/* Without a factor the rows keep the whitening of the design, which is made at its nominal p: still the same answer. */
-static void a_gram_matrix_that_cannot_be_factored_leaves_the_designs_whitening(void **state)
-{
-    (void)state;
-    static int32_t nothing[PVID_WEAK_GRAMS * 21];
-    static const double unit[3] = {4.0421986745463477e-07, 5.9604644775390625e-08, 2.9802322387695312e-08};
-    int reasons[16];
-    pvid_weak_design_q31 design = weak_unit_design;
-    design.gram = nothing;
-    run(&design, reasons);
-    assert_false(identifier.finish.whitened);
-    assert_int_equal(identifier.estimator.counters.rejected_saturated, 0);
-    assert_true(identifier.estimator.counters.rows >= 90u);
-    for (int k = 0; k < 3; k++) {
-        assert_true(fabs((unit[k] * (double)identifier.estimator.p[k] / plant_p[k]) - 1.0) < 0.02);
-    }
-}
-
-/* A factor that is far too small makes rows far too large: they are refused and counted, and p stays. */
-static void rows_that_whitening_makes_too_large_are_refused(void **state)
-{
-    (void)state;
-    static int32_t small[PVID_WEAK_GRAMS * 21];
-    for (size_t i = 0; i < sizeof small / sizeof small[0]; i++) {
-        small[i] = weak_unit_design.gram[i] / (1 << 20);
-    }
-    int reasons[16];
-    pvid_weak_design_q31 design = weak_unit_design;
-    design.gram = small;
-    run(&design, reasons);
-    assert_true(identifier.estimator.counters.rejected_saturated > 0u);
-    assert_true(reasons[PVID_REJECTED_SATURATED] > 0);
-    for (int k = 0; k < 4; k++) {
-        const pvid_estimator_config_q31 *bounds = &weak_unit.estimator;
-        assert_true((identifier.estimator.p[k] >= bounds->lower[k]) && (identifier.estimator.p[k] <= bounds->upper[k]));
-    }
 }
 
 int main(void)
@@ -313,8 +257,6 @@ int main(void)
         cmocka_unit_test(rows_that_do_not_fit_are_counted_tick_by_tick),
         cmocka_unit_test(a_snapshot_of_another_form_is_of_another_kind),
         cmocka_unit_test(a_weight_beyond_its_counter_is_its_end),
-        cmocka_unit_test(a_gram_matrix_that_cannot_be_factored_leaves_the_designs_whitening),
-        cmocka_unit_test(rows_that_whitening_makes_too_large_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -15,9 +15,11 @@
 #include "fourier/columns_f32.h"
 #include "fourier/fourier_finish_f32.h"
 #include "fourier/fourier_front_f32.h"
+#include "fourier/sums_f32.h"
 #include "fourier/white_f32.h"
 #include "pvid/pvid.h"
 #include "solve/products_f32.h"
+#include "solve/state_f32.h"
 
 static pvid_fourier_f32 self;
 
@@ -138,8 +140,8 @@ static void sums_are_those_of_the_definition(void **state)
         for (int h = 0; h <= HIGHEST; h++) {
             double sum[2];
             sum_of(channel[c], h, sum);
-            assert_true(fabs((double)self.finish.work.rows.window[c][0][h] - sum[0]) < 3e-6 * size);
-            assert_true(fabs((double)self.finish.work.rows.window[c][1][h] - sum[1]) < 3e-6 * size);
+            assert_true(fabs((double)pvid_fourier_window_f32(&self)[h][c][0] - sum[0]) < 3e-6 * size);
+            assert_true(fabs((double)pvid_fourier_window_f32(&self)[h][c][1] - sum[1]) < 3e-6 * size);
         }
     }
 }
@@ -384,6 +386,30 @@ static void stages_are_as_many_as_counted(void **state)
         }
         assert_int_equal(stages, pvid_fourier_finish_stages_f32(&self));
     }
+}
+
+static void assessment_takes_the_stated_number_of_stages(void **state)
+{
+    (void)state;
+    static pvid_fourier_f32 weak;
+    const pvid_fourier_design_f32 design = design_of(&mechanism);
+    const pvid_fourier_config_f32 settings = config_of(&design);
+    assert_int_equal(pvid_fourier_init_f32(&weak, &settings), PVID_OK);
+    first_order rig = {.generator = 1u};
+    for (int i = 0; i < 10 * HOP; i++) {
+        float sample[2];
+        next_sample(&rig, sample);
+        (void)pvid_fourier_step_f32(&weak, sample);
+    }
+    static pvid_estimator_solve_f32 solve;
+    pvid_estimate_f32 estimate;
+    pvid_estimator_begin_assessment_f32(&weak.estimator, &solve, &estimate);
+    uint32_t stages = 1;
+    while (!pvid_estimator_assess_advance_f32(&weak.estimator, &solve)) {
+        stages++;
+    }
+    assert_int_equal(stages, pvid_estimator_assessment_stages_f32(&weak.estimator));
+    assert_true(pvid_estimator_assess_advance_f32(&weak.estimator, &solve)); /* nothing is left to do */
 }
 
 static void a_window_that_cannot_be_processed_in_time_is_refused(void **state)
@@ -700,6 +726,7 @@ int main(void)
         cmocka_unit_test(rows_have_the_moments_of_generalised_least_squares),
         cmocka_unit_test(jets_are_those_of_the_filters_for_every_decimation),
         cmocka_unit_test(stages_are_as_many_as_counted),
+        cmocka_unit_test(assessment_takes_the_stated_number_of_stages),
         cmocka_unit_test(a_window_that_cannot_be_processed_in_time_is_refused),
         cmocka_unit_test(estimates_do_not_depend_on_the_slices_of_the_schedule),
         cmocka_unit_test(a_gap_restarts_the_windows_and_keeps_the_sums),

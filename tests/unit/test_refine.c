@@ -101,11 +101,12 @@ static void run_pass(pvid_refine_pass_f32 *pass, const double r[], const double 
         pvid_refine_signals_f32 signals;
         uint32_t first = 0;
         memset(&signals, 0, sizeof signals);
-        if (pvid_refine_pass_needs_f32(pass, &first)) {
-            for (uint32_t k = 0; k < (3u + (2u * PVID_REFINE_REACH)); k++) {
+        const uint32_t steps = pvid_refine_pass_needs_f32(pass, &first);
+        if (steps > 0u) {
+            for (uint32_t k = 0; k < (steps + (2u * PVID_REFINE_REACH)); k++) {
                 signals.u[k][0] = (float)input_at(((double)(first + k) - (double)PVID_REFINE_REACH) * STEP_S);
             }
-            memcpy(signals.z, &measured[first], sizeof signals.z);
+            memcpy(signals.z, &measured[first], steps * sizeof signals.z[0]);
         }
         pvid_refine_pass_job_f32(pass, linear, weight, &signals);
     }
@@ -302,7 +303,7 @@ static void test_init_refuses(void **state)
     REFUSES(most_passes, 1, PVID_BAD_ITERATIONS);
     REFUSES(sd[0], 0.0f, PVID_BAD_ROW_SD);
     REFUSES(prior_sd[6], nan, PVID_BAD_START_SD);
-    REFUSES(gain_sd[0], -1.0f, PVID_BAD_START_SD);
+    REFUSES(gain_sd[0], nan, PVID_BAD_START_SD);
     REFUSES(state_limit[3], 0.0f, PVID_BAD_BOUNDS);
     REFUSES(forgetting_s, -1.0f, PVID_BAD_FORGETTING);
     REFUSES(gate, nan, PVID_BAD_GATE_SIGMAS);

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,7 +72,6 @@ TABLES = (
     ("strong", "strong", "Errors of the strong form by encoder resolution and differentiator."),
     ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
     ("pendulum", "pendulum", "The pendulum through the weak engine, beside its own weak form: errors over 80 seeds."),
-    ("refine", "refine", "The refinement behind the weak form: errors beside the Cramer-Rao bound, 80 seeds."),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
 )
 
@@ -89,6 +89,23 @@ def _add_table(name: str, module: str, about: str) -> None:
 
 for _table in TABLES:
     _add_table(*_table)
+
+
+@bench.command(name="refine")
+@click.option("--seeds", default=80, show_default=True, type=click.IntRange(min=2), help="Runs of each case.")
+@click.option("--imperfect", default=20, show_default=True, type=click.IntRange(min=2), help="Of each imperfection.")
+@UPDATE
+def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
+    """The refinement behind the weak engine: errors beside the Cramer-Rao bound, and on imperfect rigs."""
+    from bench import refine, refine_imperfect
+
+    with progress_bar("refine", seeds * len(refine.CASES) + imperfect * len(refine_imperfect.FAULTS)) as advance:
+        done = count(1)
+        rows = refine.refine_table(seeds, lambda: advance(next(done)))
+        wrong = refine_imperfect.imperfect_table(imperfect, lambda: advance(next(done)))
+    put_table(update, "refine", markdown(refine.HEADER, rows))
+    put_table(update, "refine-imperfect", markdown(refine_imperfect.HEADER, wrong))
+    return DONE
 
 
 @bench.command(name="mechanisms")
@@ -329,7 +346,7 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
     "--columns",
     "columns",
     multiple=True,
-    help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, engine, peers.",
+    help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, peers.",
 )
 @click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
 @click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")

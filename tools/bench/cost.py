@@ -7,12 +7,11 @@ its cost is the difference between two numbers of ticks, so that start-up falls 
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.spread import PERIOD, require_valgrind
 from pvid.base.errors import PvidError
 from pvid.core.sources import INCLUDES, ROOT, sources_of
 
@@ -24,33 +23,46 @@ STAGES = {
     "staged": "samples in, five points, a solve at every eighth row in stages",
     "smoothing": "as tick, behind a Savitzky-Golay bank of 315 samples in blocks of nine",
     "assess": "standard errors and kappa (only when published)",
-    "weak": "weak form, samples in, parameters out: mean over its windows (K = 10, 1 kHz)",
+    "weak": "weak form, samples in, parameters out: mean over its windows (the pendulum's shipped rig)",
     "rls": "plain packed RLS of the same 11 parameters",
     "ud": "recursive least squares of the same 11 parameters in U-D form",
     "kalman": "extended Kalman filter of 7 states, u by 71 taps, samples in, parameters out",
 }
 
+PENDULUM = ROOT / "tests" / "unit" / "pendulum"  # tables of the weak form's rig
+_PERIOD = 768  # ticks from window to window of that rig
 _TICKS = 2496  # a multiple of the fold's block of 64 ticks
-_WEAK_TICKS = 3 * PERIOD
+_WEAK_TICKS = 3 * _PERIOD
 
 
 RLS_STATE_BYTES = 4 * (66 + 11 + 2)  # P packed, theta, lambda and its inverse: sizeof(rls_f32); U-D has as many
 
 
-def build(folder: Path, compiler: str = "gcc", level: str = "-O2", definitions: Sequence[str] = ()) -> Path:
-    """Compiles tests/cost with the float32 core as a device does, into `folder`; returns the binary.
+def require_valgrind() -> None:
+    """Raises a PvidError where valgrind is missing."""
+    if shutil.which("valgrind") is None:
+        raise PvidError("valgrind is not installed: run ./tools/test once, or install the package valgrind")
 
-    `definitions` are macros, NAME=VALUE: sizes of tests/cost/weak_rig.h, bounds of pvid/config.h.
+
+def build(folder: Path, compiler: str = "gcc", level: str = "-O2") -> Path:
+    """Compiles tests/cost with the float32 core as a device does, into `folder`; returns the binary.
 
     Raises
     ------
     PvidError
         When the compiler is missing or refuses.
     """
-    sources = sorted([*sources_of("f32"), *(ROOT / "tests" / "cost").glob("*.c")])
+    sources = sorted([*sources_of("f32"), *(ROOT / "tests" / "cost").glob("*.c"), PENDULUM / "kapitza_weak_f32.c"])
     binary = folder / "tick_cost"
-    command = [compiler, "-std=c99", level, "-ffp-contract=off", *INCLUDES]
-    command += [f"-D{definition}" for definition in ("PVID_PLAIN_NAMES", *definitions)]  # callgrind is given names
+    command = [
+        compiler,
+        "-std=c99",
+        level,
+        "-ffp-contract=off",
+        "-DPVID_PLAIN_NAMES",
+        *INCLUDES,
+    ]  # callgrind is given names
+    command.append(f"-I{PENDULUM.parent}")
     try:
         done = subprocess.run(
             [*command, *map(str, sources), "-o", str(binary), "-lm"], capture_output=True, text=True, check=False
@@ -66,7 +78,7 @@ _SIZES = """#include <stdio.h>
 #include "pvid/pvid.h"
 int main(void) {
     printf("%zu %zu ", sizeof(pvid_estimator_f32), sizeof(pvid_strong_estimator_f32));
-    printf("%zu %zu", sizeof(pvid_strong_f32), sizeof(pvid_weak_f32));
+    printf("%zu %zu", sizeof(pvid_strong_f32), sizeof(pvid_fourier_f32));
     return 0;
 }
 """

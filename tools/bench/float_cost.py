@@ -13,8 +13,8 @@ from pvid.board.boards import BOARDS
 from pvid.board.engine_image import engine_image
 from pvid.board.mechanism_image import mechanism_run
 from pvid.board.sizes import Configuration, measure
+from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.models.mechanisms import names
-from pvid.setup.fourier_sizes import sizes_for_one
 
 BOARD = "mps2-an386"
 TICK_HEADER = ("part of a tick", "instructions")
@@ -42,11 +42,10 @@ _STRUCTS = (
     ("inputs, gains and integrals of the last steps", "sizeof(pvid_fourier_history_f32)"),
     ("range and least motion of the samples", "sizeof(pvid_fourier_watch_f32)"),
     ("sums of two half windows", "sizeof(((pvid_fourier_sums_f32 *)0)->sum)"),
-    ("two blocks of eight steps", "sizeof(((pvid_fourier_sums_f32 *)0)->block)"),
-    ("sums of the last whole window", "sizeof(((pvid_fourier_rows_f32 *)0)->window)"),
+    ("blocks of eight steps", "sizeof(((pvid_fourier_sums_f32 *)0)->block)"),
     (
-        "rows while they are made, or a solve",
-        "sizeof(pvid_fourier_work_f32) - sizeof(((pvid_fourier_rows_f32 *)0)->window)",
+        "rows while they are made, with the window's sums if these need a place; or a solve",
+        "sizeof(pvid_fourier_work_f32)",
     ),
     ("noise of the rows and their reflections", "sizeof(pvid_fourier_white_f32)"),
     ("scores of the windows", "sizeof(pvid_fourier_scores_f32)"),
@@ -64,7 +63,7 @@ def tick_rows(model: str) -> list[tuple[str, ...]]:
 
 def state_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the state by part, as in STATE_HEADER."""
-    sizes = sizes_for_one(mechanism_run(model).config.design)
+    sizes = fitted_sizes(mechanism_run(model).config)
     return state_table("pvid/fourier.h", _STRUCTS, "sizeof(pvid_fourier_f32)", "schedule, pointers, padding", sizes)
 
 

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,13 +23,16 @@ import numpy.typing as npt
 from bench.longevity_signals import CHUNK, L1, RATE_HZ, Disturbance, Sensing, Signals
 from pvid.base.errors import PvidError
 from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.core.fourier_native import FourierIdentifier, FourierNative
-from pvid.core.headers import Headers, default_library
-from pvid.core.native import Identifier, Native
+from pvid.core.fourier_native_q31 import FourierIdentifierQ31, FourierNativeQ31
+from pvid.core.headers import Filled, Headers, default_library
+from pvid.core.native import Identifier, Native, Publisher
 from pvid.core.sources import PUBLIC_FOLDERS, ROOT
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
 from pvid.run.engine_design import config_for_simulated_rig
+from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.settings.bounds import SIZES
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
@@ -42,7 +46,7 @@ Float = npt.NDArray[np.float64]
 LIBRARY = "liblongevity.so"
 STRIDE = 8  # ticks between the points of the strong form's Savitzky-Golay filters
 STRONG_FORGETTING_S = (0.1, 1.0, 10.0, 100.0, 0.0)
-WEAK_FORGETTING_S = (10.0, 100.0, 0.0)  # a group is a window of 0.62 s: below four of them init refuses
+WEAK_FORGETTING_S = (10.0, 100.0, 0.0)  # a group is a window: below four of them init refuses
 PEERS = ("RLS", "UD RLS")
 ENCODER = Sensing()
 EXACT = Sensing(phi_lsb=0.0, y_lsb=0.0, zero=0.0)
@@ -59,13 +63,13 @@ JUDGED = (
 BACK = 3.0  # standard errors
 PATIENCE = 3.0  # of the gate, in times of forgetting, as a rig file has it that does not say
 # What the filters make of the standard rig, relative, of w, d1, d2, and of which the standard errors know nothing: see
-# `filter_bias`; of the engine with exact samples 0.9e-5, 1.0e-5 and 1.8e-5.
-FILTER_BIAS = {"weak": (0.0, 0.0, 0.0), "engine": (1.3e-5, 1.4e-5, 2.6e-5), "strong": (0.0015, 0.0015, 0.0035)}
+# `filter_bias`; of the weak form with exact samples 0.9e-5, 1.0e-5 and 1.8e-5.
+FILTER_BIAS = {"weak": (1.3e-5, 1.4e-5, 2.6e-5), "strong": (0.0015, 0.0015, 0.0035)}
 
 
 @dataclass(frozen=True)
 class Lane:
-    """One estimator: `kind` weak, engine, strong, RLS or UD RLS; forgetting_s 0: none; of ours in float32 or fixed
+    """One estimator: `kind` weak, strong, RLS or UD RLS; forgetting_s 0: none; of ours in float32 or fixed
     point, with the outlier gate as a rig file has it that does not say, or without; the strong form with exact sensors
     or with FINE ones, as in fixed point always."""
 
@@ -84,17 +88,16 @@ class Lane:
 
     @property
     def sensing(self) -> Sensing:
-        """The weak forms take a 14-bit encoder, the others an exact or a fine one: they need it."""
-        if self.kind in ("weak", "engine"):
+        """The weak form takes a 14-bit encoder, the others an exact or a fine one: they need it."""
+        if self.kind == "weak":
             return ENCODER
         return FINE if self.fine or self.core == "q31" else EXACT
 
 
-ENGINE_LANES = (
-    *(Lane("engine", tau) for tau in WEAK_FORGETTING_S),
-    *(Lane("engine", tau, gated=False) for tau in (10.0, 0.0)),
+WEAK_LANES = (
+    *(Lane("weak", tau) for tau in WEAK_FORGETTING_S),
+    *(Lane("weak", tau, gated=False) for tau in (10.0, 0.0)),
 )
-WEAK_LANES = (*(Lane("weak", tau) for tau in WEAK_FORGETTING_S), Lane("weak", 0.0, gated=False))
 STRONG_LANES = (
     *(Lane("strong", tau) for tau in STRONG_FORGETTING_S),
     *(Lane("strong", tau, gated=False) for tau in (10.0, 0.0)),
@@ -110,7 +113,6 @@ COLUMNS = {
     "weak-q31": WEAK_Q31_LANES,
     "strong-q31": STRONG_Q31_LANES,
     "strong-fine": FINE_LANES,
-    "engine": ENGINE_LANES,
     "peers": PEER_LANES,
 }
 OURS = tuple(name for name in COLUMNS if name != "peers")
@@ -147,7 +149,7 @@ class Outcome:
 
 
 def rig_of(lane: Lane) -> RigFile:
-    """The standard rig with the lane's settings; the strong form with a filter that is cheap enough for 10^7 ticks.
+    """The standard rig with the settings of a lane of the strong form; its filter is cheap enough for 10^7 ticks.
 
     The signals are those of linear equations: no sines are corrected.
     """
@@ -160,21 +162,19 @@ def rig_of(lane: Lane) -> RigFile:
         core=lane.core,  # type: ignore[arg-type]
     )
     sensor = replace(rig.sensor, phi_lsb=lane.sensing.phi_lsb, y_lsb=lane.sensing.y_lsb)
-    if lane.kind != "weak":
-        settings = replace(settings, form="strong", stride=STRIDE)
-    return replace(rig, identifier=settings, sensor=sensor)
+    return replace(rig, identifier=replace(settings, form="strong", stride=STRIDE), sensor=sensor)
 
 
 @cache
 def config_q31_of(lane: Lane) -> ConfigQ31:
-    """Settings of a lane in fixed point, of which the design takes a second."""
+    """Settings of a lane of the strong form in fixed point, of which the design takes a second."""
     return config_of_q31(rig_of(lane), RATE_HZ)
 
 
 class _Ours(ABC):
     """A lane of the shipped core."""
 
-    identifier: Identifier | FourierIdentifier
+    identifier: Publisher
 
     def __init__(self, lane: Lane) -> None:
         self.bias = FILTER_BIAS[lane.kind]
@@ -219,8 +219,8 @@ class _Ours(ABC):
         self.outcome.told = Reason(alarms[-1] if alarms else (self._lately or [Reason.WARMING_UP])[-1]).text
 
 
-class _InFloat(_Ours):
-    """In float32."""
+class _StrongInFloat(_Ours):
+    """The strong form in float32."""
 
     identifier: Identifier
 
@@ -238,27 +238,35 @@ class _InFloat(_Ours):
         return seen["p"][:3].astype(np.float64), seen["se"][:3].astype(np.float64)
 
 
+_START = (0.8, 1.2, 0.8, 1.0)  # over the guess
+
+
+def _start_of(start: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A start that is up to 20 % off."""
+    return np.asarray(start * np.array(_START), start.dtype)
+
+
 @cache
-def engine_of(lane: Lane) -> tuple[FourierNative, FourierConfig]:
+def weak_of(lane: Lane) -> tuple[FourierNative, FourierConfig]:
     """The compiled pendulum and the settings of a lane, with the design of its shipped rig."""
     compiled = compiled_of("kapitza")
     config = config_for_simulated_rig(compiled)
     gate = config.gate if lane.gated else GateConfig()
-    start = config.estimator.start * np.array([0.8, 1.2, 0.8, 1.0], np.float32)
+    start = _start_of(config.estimator.start)
     estimator = replace(config.estimator, start=start, forgetting_s=lane.forgetting_s)
     if lane.forgetting_s and lane.gated:
         gate = replace(gate, patience_s=PATIENCE * lane.forgetting_s)
     return fourier_native(compiled, config.design), replace(config, estimator=estimator, gate=gate)
 
 
-class _Engine(_Ours):
-    """The weak engine of any mechanism with the compiled pendulum, in float32."""
+class _WeakInFloat(_Ours):
+    """The weak form with the compiled pendulum, in float32."""
 
     identifier: FourierIdentifier
 
     def __init__(self, lane: Lane) -> None:
         super().__init__(lane)
-        native, config = engine_of(lane)
+        native, config = weak_of(lane)
         self.identifier = native.identifier_of(config)
 
     def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
@@ -270,8 +278,56 @@ class _Engine(_Ours):
         return seen["p"][:3].astype(np.float64), seen["se"][:3].astype(np.float64)
 
 
-class _InFixedPoint(_Ours):
-    """In integers, which are always finite."""
+@cache
+def weak_q31_of() -> tuple[FixedEngine, FourierNativeQ31]:
+    """The compiled pendulum in fixed point, with the design of its shipped rig."""
+    engine = engine_for_simulated_rig(compiled_of("kapitza"))
+    return engine, fourier_native_q31(engine.made, engine.parameters, engine.config)
+
+
+class _ChangedQ31(FourierIdentifierQ31):
+    """The identifier with the settings of a lane: a copy of those that its library has."""
+
+    def __init__(self, native: FourierNativeQ31, lane: Lane, hop_s: float) -> None:
+        self._lane, self._hop_s = lane, hop_s
+        super().__init__(native)
+
+    def _filled_with(self, native: Native, kind: str, config: object) -> Filled:
+        struct = native.headers.ffi.new(f"{kind} *", self._config)[0]
+        estimator, groups = struct.estimator, round(self._lane.forgetting_s / self._hop_s)
+        given = np.array(list(estimator.start)[: len(_START)], np.int64)
+        for i, start in enumerate(_start_of(given)):
+            estimator.start[i] = int(start)
+        estimator.forgetting_groups = groups
+        if groups:
+            struct.gate.patience_groups = round(PATIENCE * groups)
+        return Filled(struct, {}, {}, [])
+
+
+class _WeakInFixedPoint(_Ours):
+    """The weak form in integers, which are always finite."""
+
+    identifier: FourierIdentifierQ31
+
+    def __init__(self, lane: Lane) -> None:
+        super().__init__(lane)
+        self._engine, native = weak_q31_of()
+        self.identifier = _ChangedQ31(native, lane, self._engine.hop_s)
+
+    def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
+        lsb = dict(zip(self._engine.sample_names, self._engine.lsb, strict=True))
+        counts = [counts_of_samples(x, lsb[name]) for name, x in (("y", y), ("phi", phi))]
+        record = self.identifier.run_samples(np.stack(counts, axis=1), sums=False, hashes=False)
+        return record.reason, 0
+
+    def look(self) -> tuple[Float, Float]:
+        seen = self.identifier.estimate
+        p, se = (self._engine.values(seen[name][: self.identifier.n_p]) for name in ("p", "se"))
+        return p[:3], se[:3]
+
+
+class _StrongInFixedPoint(_Ours):
+    """The strong form in integers, which are always finite."""
 
     identifier: Identifier
 
@@ -373,9 +429,9 @@ def build_library(folder: Path) -> ctypes.CDLL:
 def _player(native: Native, library: ctypes.CDLL, lane: Lane) -> _Ours | _Peer:
     if lane.kind in PEERS:
         return _Peer(library, lane)
-    if lane.kind == "engine":
-        return _Engine(lane)
-    return _InFixedPoint(native, lane) if lane.core == "q31" else _InFloat(native, lane)
+    if lane.kind == "weak":
+        return _WeakInFixedPoint(lane) if lane.core == "q31" else _WeakInFloat(lane)
+    return _StrongInFixedPoint(native, lane) if lane.core == "q31" else _StrongInFloat(native, lane)
 
 
 def measure(
@@ -407,9 +463,9 @@ def measure(
     return outcomes
 
 
-def engine_bias(library: ctypes.CDLL) -> Float:
-    """Errors of w, d1, d2, relative, of the engine after 100 s of exact samples of the standard rig."""
-    player = _Engine(Lane("engine", 0.0))
+def weak_bias(library: ctypes.CDLL) -> Float:
+    """Errors of w, d1, d2, relative, of the weak form after 100 s of exact samples of the standard rig."""
+    player = _WeakInFloat(Lane("weak", 0.0))
     for phi, y in Signals(library, Disturbance("perfect", ""), 5 * CHUNK, EXACT).chunks():
         player.run(phi, y, disturbed=False)
     return np.asarray(np.abs(player.look()[0] / np.array(STANDARD_PENDULUM.linear[:3]) - 1))
@@ -420,7 +476,7 @@ def filter_bias(native: Native, library: ctypes.CDLL, change: float, drive: tupl
     is changed by this factor: what FILTER_BIAS is to cover."""
     lane = Lane("strong", 0.0)
     signals = Signals(library, Disturbance("step", "", change=change, drive=drive), 5 * CHUNK, lane.sensing)
-    player = _InFloat(native, lane)
+    player = _StrongInFloat(native, lane)
     for phi, y in list(signals.chunks())[1:]:
         player.run(phi, y, disturbed=False)
     truth = np.array([signals.w(signals.ticks), *STANDARD_PENDULUM.linear[1:3]])

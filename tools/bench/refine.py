@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -26,7 +26,14 @@ from pvid.run.mechanism import model_of
 from pvid.settings.fourier import FourierConfig
 from pvid.settings.refine import RefineConfig
 from pvid.setup.fourier import config_of, design_tables, for_engine
-from pvid.sim.pendulum import STANDARD_PENDULUM, STANDARD_RELEASE, Pendulum, Sensors, simulate, standard_sensors
+from pvid.sim.pendulum import (
+    STANDARD_PENDULUM,
+    STANDARD_RELEASE,
+    Pendulum,
+    Sensors,
+    simulate,
+    standard_sensors,
+)
 from pvid.sim.pendulum import standard_start as start_of
 
 Float = npt.NDArray[np.float64]
@@ -49,7 +56,7 @@ HEADER = (
 )
 
 # Of the standard release: the largest angles are those of the table.
-_RELEASE = {0.1: 1.0, 0.2: 1.88, 0.3: 2.85}
+RELEASE = {0.1: 1.0, 0.2: 1.88, 0.3: 2.85}
 _SOON_S = 5.0
 _STEPS = np.array([1e-6] * 3 + [1e-5] * 2 + [1.0, 1e-6] + [1e-6] * 2)  # of log w, .., start, for the bound
 
@@ -63,24 +70,27 @@ class Case:
     damping: tuple[float, float] = (0.0, 0.0)  # [m^2/s]
     skew_s: float = 0.0
     duration: float = 40.0
+    exact_drive: bool = False
 
     @property
     def label(self) -> str:
         """What is added to the standard rig."""
         friction = f"friction {self.damping[0]:g}, {self.damping[1]:g} m^2/s" if any(self.damping) else ""
         skew = f"skew {1e3 * self.skew_s:g} ms" if self.skew_s else ""
-        return ", ".join(one for one in (friction, skew) if one) or "standard"
+        drive = "exact drive" if self.exact_drive else ""
+        return ", ".join(one for one in (friction, skew, drive) if one) or "standard"
 
 
 _FRICTION = (0.002, 0.0005)
 CASES = (
-    *(Case(angle, bits) for angle in _RELEASE for bits in (14, 16)),
-    *(Case(angle, 14, _FRICTION) for angle in _RELEASE),
-    *(Case(angle, 14, skew_s=0.001) for angle in _RELEASE),
+    *(Case(angle, bits) for angle in RELEASE for bits in (12, 14, 16)),
+    *(Case(angle, 14, _FRICTION) for angle in RELEASE),
+    *(Case(angle, 14, skew_s=0.001) for angle in RELEASE),
     Case(0.2, 14, _FRICTION, 0.001),
     Case(0.2, 16, _FRICTION, 0.001),
+    Case(0.2, 16, exact_drive=True),
+    Case(0.3, 16, exact_drive=True),
 )
-STEPS = SEEDS * len(CASES)
 
 
 def _angle(case: Case, change: Float) -> Float:
@@ -88,7 +98,7 @@ def _angle(case: Case, change: Float) -> Float:
     w, d1, d2 = TRUTH * np.exp(change[:3])
     ratio = d1 - d2 - 1
     l2 = L1 * ratio / d2
-    scale = _RELEASE[case.angle]
+    scale = RELEASE[case.angle]
     pendulum = Pendulum(
         l1=L1,
         l2=l2,
@@ -122,7 +132,7 @@ def bound_of(case: Case) -> Float:
 def _truth(case: Case) -> tuple[Float, Float]:
     """The exact angle and pivot; the pivot is read `skew_s` later than the angle."""
     pendulum = replace(STANDARD_PENDULUM, damping1=case.damping[0], damping2=case.damping[1])
-    scale = _RELEASE[case.angle]
+    scale = RELEASE[case.angle]
     found = simulate(
         pendulum,
         sensors=Sensors(skew_s=case.skew_s),
@@ -186,6 +196,8 @@ def engine_of(bits: int) -> Engine:
 def run_case(case: Case, seed: int, **changes: Any) -> Outcome:
     """One run through both stages; `changes` of the refinement's settings."""
     phi, y = standard_sensors(case.bits).measure(*_truth(case), seed)
+    if case.exact_drive:
+        y = _truth(case)[1]
     identifier = engine_of(case.bits).identifier(start_of(seed), **changes)
     found = identifier.run_both(np.stack([y, phi], axis=1))
     with np.errstate(invalid="ignore"):
@@ -220,13 +232,13 @@ def row_of(case: Case, runs: list[Outcome]) -> tuple[str, ...]:
     )
 
 
-def refine_table(progress: Callable[[int], None] = lambda _: None, seeds: int = SEEDS) -> Iterator[tuple[str, ...]]:
+def refine_table(seeds: int, progress: Callable[[], None], cases: Sequence[Case] = CASES) -> list[tuple[str, ...]]:
     """A row for each case."""
-    done = 0
-    for case in CASES:
+    rows = []
+    for case in cases:
         runs = []
         for seed in range(seeds):
             runs.append(run_case(case, seed))
-            done += 1
-            progress(done)
-        yield row_of(case, runs)
+            progress()
+        rows.append(row_of(case, runs))
+    return rows

@@ -221,6 +221,26 @@
 #error "PVID_MAX_POWER must lie in 2..12"
 #endif
 
+/* Blocks of steps in the sums: 2, one of which fills while the other is added; 1 where the ticks of one step add and
+ * join a whole block, which `pvid model build` tells. RAM: 32 bytes each for a channel, 16 in the fixed-point core.
+ * init refuses a design that needs 2. */
+#ifndef PVID_MAX_BLOCKS
+#define PVID_MAX_BLOCKS 2
+#endif
+#if PVID_MAX_BLOCKS < 1 || PVID_MAX_BLOCKS > 2
+#error "PVID_MAX_BLOCKS must lie in 1..2"
+#endif
+
+/* Windows whose sums have a place of their own: 1, or 0 where all columns of a window are formed before the next half's
+ * first block is added, which `pvid model build` tells: they are then in the place of the older half's. Float only.
+ * RAM: 8 bytes for each channel and harmonic. init refuses a design that needs 1. */
+#ifndef PVID_MAX_WINDOWS
+#define PVID_MAX_WINDOWS 1
+#endif
+#if PVID_MAX_WINDOWS < 0 || PVID_MAX_WINDOWS > 1
+#error "PVID_MAX_WINDOWS must lie in 0..1"
+#endif
+
 /* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid
  * model build` prints with the design, exactly; init refuses others (PVID_BAD_DESIGN). Their loops are of constant
  * length: fewer instructions, more flash, the same bits. */
@@ -236,6 +256,29 @@
 #define PVID_EXACT_RUNS 0
 #define PVID_EXACT_SIGNS 0
 #define PVID_EXACT_INTEGRANDS 0
+#define PVID_EXACT_CHANNELS 0 /* that are summed */
+#endif
+
+/* Parts that a design or its settings may do without, for less flash; `pvid model build` tells. init refuses settings
+ * that need a part which is left out: a dead zone with PVID_BAD_DEAD_ZONE, a second stage with PVID_BAD_POINTER. */
+#ifndef PVID_DEAD_ZONE /* dead zone of estimator.h */
+#define PVID_DEAD_ZONE 1
+#endif
+#if PVID_DEAD_ZONE != 0 && PVID_DEAD_ZONE != 1
+#error "PVID_DEAD_ZONE must be 0 or 1"
+#endif
+#ifndef PVID_REFINEMENT /* second stage of fourier.h */
+#define PVID_REFINEMENT 1
+#endif
+#if PVID_REFINEMENT != 0 && PVID_REFINEMENT != 1
+#error "PVID_REFINEMENT must be 0 or 1"
+#endif
+#ifndef PVID_CHECK_TABLES /* init checks every number of a float model and design; 0: their counts alone, of tables    \
+                             that are as printed, which pvid has checked */
+#define PVID_CHECK_TABLES 1
+#endif
+#if PVID_CHECK_TABLES != 0 && PVID_CHECK_TABLES != 1
+#error "PVID_CHECK_TABLES must be 0 or 1"
 #endif
 
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your

@@ -19,7 +19,7 @@
  *   other context: if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
  * The model: refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is spread over the ticks,
- * one job each; that of a tick is bounded (1 100 instructions on a Cortex-M4F for the pendulum).
+ * one job each; that of a tick is bounded (with the weak form 1 500 instructions on a Cortex-M4F for the pendulum).
  */
 #ifndef PVID_REFINE_H
 #define PVID_REFINE_H
@@ -68,7 +68,7 @@ typedef struct pvid_refine_config_f32 {
     uint8_t most_passes;                  /* of a block whose steps do not become small, 1..16; recommended: 8 */
     float sd[PVID_REFINE_OUTPUTS];        /* of the noise of a row, at low frequencies [unit of the output], > 0 */
     float prior_sd[PVID_REFINE_PARAMETERS]; /* of the weak form's estimate, in the search; relative if logarithmic */
-    float gain_sd[PVID_REFINE_PARAMETERS];  /* errors by the gain of the sensors: part of the standard errors, >= 0 */
+    float gain_sd[PVID_REFINE_PARAMETERS];  /* errors of the steps by one error of a sensor's gain, with their signs */
     float state_limit[PVID_REFINE_ORDER *
                       PVID_REFINE_COORDINATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
     float forgetting_s;                         /* time constant of the triangle [s], > 0; 0: it does not forget */
@@ -80,7 +80,7 @@ typedef struct pvid_refine_config_f32 {
                          recommended: 2 */
     float se_max;     /* largest relative standard error of a published estimate, > 0 */
     float distance;   /* relative distance from the weak form's estimate that the bias of its equations allows, >= 0. 0:
-                         they are the refinement's, and only smaller standard errors than its own are published */
+                         they are the refinement's, and the geometric mean of the standard errors must be below its */
 } pvid_refine_config_f32;
 
 /* An estimate; all numbers are finite. */
@@ -89,6 +89,8 @@ typedef struct {
     float se[PVID_REFINE_PARAMETERS];                                 /* standard errors [units of r] */
     float covariance[PVID_REFINE_PARAMETERS][PVID_REFINE_PARAMETERS]; /* of the steps of r: relative if logarithmic */
     float level; /* residual variance over its expectation from the sensors' noise */
+    float clash; /* square by which blocks differ from their past, over its expectation from that noise. The standard
+                    errors contain the root of the larger one of the two; well above 1 the equations lack something */
 } pvid_refine_estimate_f32;
 
 /* State: detail/refine_state.h, not API. Only the functions below write to it. */

@@ -24,20 +24,20 @@
 
 #define PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
                       integers, moments_q31, c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds,     \
-                      columns, power, enums)                                                                           \
-    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_enum##enums
+                      columns, power, blocks, windows, enums)                                                          \
+    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_blocks##blocks##_windows##windows##_enum##enums
 #define PVID_SIZED_OF(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
                       integers, moments_q31, c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds,     \
-                      columns, power, enums)                                                                           \
+                      columns, power, blocks, windows, enums)                                                          \
     PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers,    \
                   moments_q31, c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power,   \
-                  enums)
+                  blocks, windows, enums)
 #define PVID_SIZED(name)                                                                                               \
     PVID_SIZED_OF(name, PVID_MAX_WINDOW, PVID_MAX_THETA, PVID_MAX_P, PVID_MAX_MOMENTS, PVID_MAX_TAPS,                  \
                   PVID_MAX_DECIMATION, PVID_MAX_WEAK_WINDOW, PVID_MAX_FUNCTIONS, PVID_MAX_ITERATIONS, PVID_MAX_PASSES, \
                   PVID_MAX_THETA_Q31, PVID_MAX_MOMENTS_Q31, PVID_MAX_C_Q31, PVID_MAX_SAMPLES, PVID_MAX_RING,           \
                   PVID_MAX_INPUTS, PVID_MAX_CHANNELS, PVID_MAX_INTEGRANDS, PVID_MAX_HARMONICS, PVID_MAX_KINDS,         \
-                  PVID_MAX_COLUMNS, PVID_MAX_POWER, PVID_ENUM_SIZE)
+                  PVID_MAX_COLUMNS, PVID_MAX_POWER, PVID_MAX_BLOCKS, PVID_MAX_WINDOWS, PVID_ENUM_SIZE)
 
 /* differentiator.h */
 #define pvid_differentiator_init_f32 PVID_SIZED(pvid_differentiator_init_f32)

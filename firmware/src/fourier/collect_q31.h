@@ -21,6 +21,9 @@ typedef enum {
 /* Fewest ticks that are free for a window's work before the next one is joined. */
 uint32_t pvid_fourier_free_ticks_q31(const pvid_fourier_design_q31 *design);
 
+/* Returns whether PVID_MAX_BLOCKS are enough: one is where the ticks of a step add and join all harmonics. */
+bool pvid_fourier_blocks_fit_q31(const pvid_fourier_design_q31 *design);
+
 /* Requires a valid design; offset as in the configuration. */
 void pvid_fourier_collect_init_q31(pvid_fourier_collect_q31 *self, const pvid_fourier_design_q31 *design,
                                    const int32_t offset[]);

@@ -15,8 +15,11 @@
 
 #define SKIP 1.0e-6f
 
+/* Numbers between the sums of a channel at two harmonics. */
+#define BETWEEN (2u * (size_t)PVID_MAX_CHANNELS)
+
 void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const pvid_fourier_term_f32 *term,
-                                  const pvid_fourier_white_f32 *white, const float window[][2][PVID_MAX_HARMONICS],
+                                  const pvid_fourier_white_f32 *white, const float window[][PVID_MAX_CHANNELS][2],
                                   float part[])
 {
     if (design->model->channel[term->channel].gain == PVID_FOURIER_NONE) {
@@ -27,8 +30,8 @@ void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const p
     /* (-i omega)^m: 1, -i omega, -omega^2, i omega^3, omega^4, ... */
     const bool turned = (term->order % 2u) != 0u;
     const bool negative = ((term->order + 1u) % 4u) >= 2u;
-    const float *re = window[term->channel][turned ? 1u : 0u];
-    const float *im = window[term->channel][turned ? 0u : 1u];
+    const float *re = &window[0][term->channel][turned ? 1u : 0u];
+    const float *im = &window[0][term->channel][turned ? 0u : 1u];
     const float sign = negative ? -term->factor : term->factor;
     const float of_re = turned ? -sign : sign;
     const float unit = white->omega;
@@ -47,9 +50,9 @@ void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const p
         for (size_t i = order; i > 0u; i--) {
             weight *= rate;
         }
-        part[h] += (of_re * weight) * re[h];
+        part[h] += (of_re * weight) * re[h * BETWEEN];
         if (h <= sines) {
-            imaginary[h] += (sign * weight) * im[h];
+            imaginary[h] += (sign * weight) * im[h * BETWEEN];
         }
     }
 }

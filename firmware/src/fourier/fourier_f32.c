@@ -92,6 +92,12 @@ static inline bool is_ready(const pvid_fourier_f32 *self)
     return ready;
 }
 
+/* Returns whether there is a second stage. */
+static inline bool refines(const pvid_fourier_f32 *self)
+{
+    return (PVID_REFINEMENT != 0) && (self->refine != NULL);
+}
+
 /* Reason of a tick without anything else to report. */
 static inline pvid_reason idle(const pvid_fourier_f32 *self)
 {
@@ -124,11 +130,24 @@ static pvid_status init_refinement(pvid_fourier_f32 *self, const pvid_fourier_re
     if (refine == NULL) {
         return PVID_OK;
     }
-    if (refine->stage == NULL) {
+    if ((PVID_REFINEMENT == 0) || (refine->stage == NULL)) {
         return PVID_BAD_POINTER;
     }
     self->refine = refine;
     return refine->stage->init(refine->storage, refine->config);
+}
+
+/* Returns whether the sums of a window have a place of their own, or are used before the next half's first block. */
+static bool window_has_place(const pvid_fourier_f32 *self, uint32_t free_ticks)
+{
+#if PVID_MAX_WINDOWS > 0
+    (void)self;
+    (void)free_ticks;
+    return true;
+#else
+    const uint32_t adding = ((2u * (uint32_t)self->harmonics) + (self->items_per_tick - 1u)) / self->items_per_tick;
+    return pvid_fourier_finish_columns_f32(self) <= (self->stages_per_tick * (free_ticks - adding));
+#endif
 }
 
 static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)
@@ -165,6 +184,9 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
     self->design = design;
     self->harmonics = (uint8_t)((design->functions / 2u) + (design->power / 2u) + 1u);
     self->channels = summed_channels(design->model);
+    if ((PVID_EXACT != 0) && (self->channels != PVID_EXACT_CHANNELS)) {
+        return PVID_BAD_DESIGN;
+    }
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_fourier_front_init_f32(&self->front, design, config->sample_rate_hz);
     pvid_fourier_step_init_f32(&self->history,
@@ -176,11 +198,17 @@ static pvid_status prepare(pvid_fourier_f32 *self, const pvid_fourier_config_f32
         self->front.limit[i] = pvid_fourier_front_limit_f32((config->range != NULL) ? config->range[i] : LARGEST);
     }
     const uint32_t free_ticks = pvid_fourier_free_ticks_f32(design->decimation);
+    if (pvid_fourier_blocks_f32(free_ticks, self->harmonics) > (uint32_t)PVID_MAX_BLOCKS) {
+        return PVID_BAD_DESIGN;
+    }
     self->items_per_tick = pvid_fourier_items_f32(free_ticks, self->harmonics);
     self->stages_per_tick =
         pvid_fourier_stages_f32(pvid_fourier_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
     if (self->stages_per_tick == 0u) {
         return PVID_BAD_ITERATIONS;
+    }
+    if (!window_has_place(self, free_ticks)) {
+        return PVID_BAD_DESIGN;
     }
     restart(self);
     return init_refinement(self, config->refine);
@@ -196,7 +224,7 @@ void pvid_fourier_gap_f32(pvid_fourier_f32 *self)
 {
     if (is_ready(self)) {
         restart(self);
-        if (self->refine != NULL) {
+        if (refines(self)) {
             self->refine->stage->gap(self->refine->storage);
         }
     }
@@ -206,7 +234,7 @@ void pvid_fourier_freeze_f32(pvid_fourier_f32 *self, bool frozen)
 {
     if (is_ready(self)) {
         self->frozen = frozen;
-        if (self->refine != NULL) {
+        if (refines(self)) {
             self->refine->stage->freeze(self->refine->storage, frozen);
         }
     }
@@ -275,7 +303,7 @@ static pvid_reason add(pvid_fourier_f32 *self)
     pvid_fourier_sums_f32 *sums = &self->sums;
     for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
         if (pvid_fourier_sums_joins_f32(sums)) {
-            pvid_fourier_sums_join_one_f32(sums, self->design, self->channels, self->dt, self->finish.work.rows.window);
+            pvid_fourier_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_fourier_window_f32(self));
             if (sums->joined == self->harmonics) {
                 pvid_fourier_finish_begin_f32(&self->finish);
                 rest(self);
@@ -418,7 +446,7 @@ PVID_SELDOM static pvid_reason both_ticks(pvid_fourier_f32 *self, const float sa
 
 pvid_reason pvid_fourier_step_f32(pvid_fourier_f32 *self, const float sample[])
 {
-    return ((self != NULL) && (self->refine != NULL)) ? both_ticks(self, sample) : weak_tick(self, sample);
+    return ((self != NULL) && refines(self)) ? both_ticks(self, sample) : weak_tick(self, sample);
 }
 
 const pvid_estimate_f32 *pvid_fourier_candidate_f32(const pvid_fourier_f32 *self)

@@ -11,6 +11,7 @@
 #include "fourier/columns_f32.h"
 #include "fourier/noise_f32.h"
 #include "fourier/scores_f32.h"
+#include "fourier/sums_f32.h"
 #include "fourier/white_f32.h"
 #include "number/count.h"
 #include "number/exact.h"
@@ -176,7 +177,7 @@ PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
     if ((finish->index == 0u) && (finish->kind == 0u)) {
         memset(finish->candidate.covariance, 0, sizeof finish->candidate.covariance);
     }
-    pvid_fourier_slopes_f32 *slopes = &finish->work.rows.of_kind.before.slopes;
+    pvid_fourier_slopes_f32 *slopes = &finish->work.rows.of_kind.slopes;
     if (finish->phase == 0u) {
         if (!finish->shares) {
             pvid_fourier_noise_shares_f32(&finish->white, design, finish->white.share);
@@ -210,7 +211,7 @@ PVID_SELDOM static bool noise_stage(pvid_fourier_f32 *self)
 PVID_SELDOM static bool basis_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_fourier_white_basis_f32(&finish->white, finish->index, &finish->work.rows.of_kind.before.basis);
+    pvid_fourier_white_basis_f32(&finish->white, finish->index, &finish->work.rows.of_kind.basis);
     finish->index++;
     return finish->index < pvid_fourier_basis_stages(self->design);
 }
@@ -221,8 +222,8 @@ PVID_SELDOM static bool share_stage(pvid_fourier_f32 *self)
     const size_t parts = pvid_fourier_parts(self->design);
     const size_t end = (size_t)finish->index + SHARES_PER_STAGE;
     const size_t last = (end < parts) ? end : parts;
-    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.of_kind.before.basis.leverage,
-                                 finish->index, last);
+    pvid_fourier_white_share_f32(&finish->white, self->design, finish->work.rows.of_kind.basis.leverage, finish->index,
+                                 last);
     finish->index = (uint16_t)last;
     return last < parts;
 }
@@ -235,7 +236,7 @@ static bool gather_term(pvid_fourier_f32 *self)
     const uint16_t end = kind_of(self)->end;
     if ((finish->term < end) && (term[finish->term].column == finish->index)) {
         pvid_fourier_columns_add_f32(self->design, &term[finish->term], &finish->white,
-                                     (const float (*)[2][PVID_MAX_HARMONICS])finish->work.rows.window,
+                                     (const float (*)[PVID_MAX_CHANNELS][2])pvid_fourier_window_f32(self),
                                      finish->work.rows.part);
         finish->term++;
     }
@@ -749,28 +750,44 @@ static uint32_t project_stages(const pvid_fourier_design_f32 *design, const pvid
     return (stages > 0u) ? stages : 1u;
 }
 
-static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
+/* Of a kind until its columns are formed. */
+static uint32_t stages_of_columns(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
 {
     const pvid_fourier_design_f32 *design = self->design;
     const uint32_t columns = (uint32_t)columns_of(kind);
-    const uint32_t thetas = kind->thetas;
     const uint32_t entries = parts_of(design->n_noise, ENTRIES_PER_STAGE);
-    const uint32_t products = (uint32_t)products_per_stage(design);
     const uint32_t pairs = (uint32_t)pvid_fourier_noise_pairs_f32(design, (uint8_t)(kind - design->model->kind));
     const uint32_t noise =
         checks_noise(self)
             ? (1u + parts_of(design->model->model->n_c, NONZEROS_PER_STAGE) + parts_of(pairs, PAIRS_PER_STAGE))
             : 1u;
-    uint32_t stages = entries + 3u + noise; /* SPECTRUM, SCALE, GATE */
-    stages +=
-        (uint32_t)pvid_fourier_basis_stages(design) + gather_stages(design, kind) + (reflect_stages(design) * columns);
-    stages += project_stages(design, kind);
+    const uint32_t shares = self->finish.shares ? parts_of((uint32_t)pvid_fourier_parts(design), SHARES_PER_STAGE) : 0u;
+    return entries + 2u + noise + (uint32_t)pvid_fourier_basis_stages(design) + shares + gather_stages(design, kind) +
+           (reflect_stages(design) * columns); /* 2: SPECTRUM, SCALE */
+}
+
+static uint32_t stages_of_kind(const pvid_fourier_f32 *self, const pvid_fourier_kind *kind)
+{
+    const pvid_fourier_design_f32 *design = self->design;
+    const uint32_t thetas = kind->thetas;
+    const uint32_t products = (uint32_t)products_per_stage(design);
+    uint32_t stages = stages_of_columns(self, kind) + project_stages(design, kind) + 1u; /* GATE */
     stages += parts_of(design->functions, (uint32_t)rows_per_stage(kind)) + parts_of(thetas, products);
     stages += parts_of((thetas * (thetas + 1u)) / 2u, products) + 1u;
     if (self->finish.shares) {
-        stages += parts_of((uint32_t)pvid_fourier_parts(design), SHARES_PER_STAGE) + entries + 1u; /* CORRECT */
+        stages += parts_of(design->n_noise, ENTRIES_PER_STAGE) + 1u; /* CORRECT */
     }
     return stages;
+}
+
+uint32_t pvid_fourier_finish_columns_f32(const pvid_fourier_f32 *self)
+{
+    const pvid_fourier_model_f32 *model = self->design->model;
+    uint32_t stages = 0;
+    for (size_t i = 0; (i + 1u) < model->kinds; i++) {
+        stages += stages_of_kind(self, &model->kind[i]);
+    }
+    return stages + stages_of_columns(self, &model->kind[model->kinds - 1u]);
 }
 
 uint32_t pvid_fourier_finish_stages_f32(const pvid_fourier_f32 *self)

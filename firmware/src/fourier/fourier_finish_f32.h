@@ -34,4 +34,7 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason);
 /* Number of stages of a window. */
 uint32_t pvid_fourier_finish_stages_f32(const pvid_fourier_f32 *self);
 
+/* Number of stages until all columns of a window are formed, at most. */
+uint32_t pvid_fourier_finish_columns_f32(const pvid_fourier_f32 *self);
+
 #endif

@@ -54,7 +54,7 @@ static pvid_status prepare(pvid_fourier_q31 *self, const pvid_fourier_config_q31
     if (status != PVID_OK) {
         return status;
     }
-    if (config->offset == NULL) {
+    if ((config->offset == NULL) || !pvid_fourier_blocks_fit_q31(design)) {
         return PVID_BAD_DESIGN;
     }
     for (size_t i = 0; i < design->model->samples; i++) {

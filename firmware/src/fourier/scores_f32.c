@@ -52,14 +52,16 @@ void pvid_fourier_scores_add_f32(pvid_fourier_scores_f32 *self, size_t n_p, floa
     const float least = (self->memory > 0.0f) ? (1.0f / self->memory) : 0.0f;
     const float weight = (newest > least) ? newest : least;
     self->residual += weight * (residual - self->residual);
+    size_t pair = 0;
     for (size_t a = 0; a < n_p; a++) {
         for (size_t b = a; b < n_p; b++) {
             const float same = self->own[a] * self->own[b];
-            self->same[a][b] += weight * (same - self->same[a][b]);
+            self->same[pair] += weight * (same - self->same[pair]);
             if (self->known) {
                 const float both = (self->own[a] * self->before[b]) + (self->before[a] * self->own[b]);
-                self->neighbour[a][b] += weight * (both - self->neighbour[a][b]);
+                self->neighbour[pair] += weight * (both - self->neighbour[pair]);
             }
+            pair++;
         }
     }
     memcpy(self->before, self->own, sizeof self->before);
@@ -72,13 +74,15 @@ float pvid_fourier_scores_variance_f32(const pvid_fourier_scores_f32 *self, size
 {
     float same = 0.0f;
     float neighbour = 0.0f;
+    size_t pair = 0;
     for (size_t b = 0; b < n_p; b++) {
         const float of_b = covariance[a][b] / wide;
         for (size_t c = b; c < n_p; c++) {
             const float twice = (b == c) ? 1.0f : 2.0f;
             const float both = twice * (of_b * (covariance[a][c] / wide));
-            same += both * self->same[b][c];
-            neighbour += both * self->neighbour[b][c];
+            same += both * self->same[pair];
+            neighbour += both * self->neighbour[pair];
+            pair++;
         }
     }
     return windows * ((neighbour > 0.0f) ? (same + neighbour) : same);

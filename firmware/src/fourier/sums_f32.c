@@ -37,10 +37,12 @@ void pvid_fourier_sums_reset_f32(pvid_fourier_sums_f32 *self, uint8_t harmonics)
 }
 
 /* s_j and d_j of the step `place` behind the centre and its partner. */
-static void pair(float (*block)[PVID_MAX_CHANNELS], size_t place, size_t channels)
+static void pair(float (*block)[PVID_MAX_CHANNELS], size_t place, size_t number)
 {
+    const size_t channels = PVID_COUNT(PVID_EXACT_CHANNELS, number);
     float *after = block[place];
     float *before = block[(2u * CENTRE) - place];
+    PVID_UNROLL_BY_FOUR
     for (size_t c = 0; c < channels; c++) {
         const float x = after[c];
         const float y = before[c];
@@ -62,7 +64,7 @@ bool pvid_fourier_sums_count_f32(pvid_fourier_sums_f32 *self, uint16_t hop, size
     self->start = (uint16_t)(self->index - PVID_FOURIER_BLOCK);
     self->target = self->half;
     self->harmonic = 0;
-    self->filling ^= 1u;
+    self->filling = (uint8_t)(PVID_MAX_BLOCKS - 1u - self->filling);
     if (self->index < hop) {
         return false;
     }
@@ -101,7 +103,7 @@ void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_d
     }
     float (*sum)[2] = self->sum[self->target][h];
     const float (*last)[2] = (self->start == 0u) ? nothing : (const float (*)[2])sum;
-    const float *x = self->block[self->filling ^ 1u][0];
+    const float *x = self->block[PVID_MAX_BLOCKS - 1u - self->filling][0];
     PVID_UNROLL_BY_TWO
     for (size_t c = 0; c < channels; c++) {
         float even = x[CENTRE * PVID_MAX_CHANNELS];
@@ -130,9 +132,10 @@ static float edge_of(const pvid_fourier_sums_f32 *self, const pvid_fourier_chann
     return self->edge[fold - 1u][one->integrand];
 }
 
-void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                                    float dt, float window[][2][PVID_MAX_HARMONICS])
+void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t number,
+                                    float dt, float window[][PVID_MAX_CHANNELS][2])
 {
+    const size_t channels = PVID_COUNT(PVID_EXACT_CHANNELS, number);
     const float half_time = dt * (float)design->hop;
     const size_t h = self->joined;
     self->joined++;
@@ -154,7 +157,7 @@ void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_four
         } else {
             /* no integral */
         }
-        window[c][0][h] = ((h % 2u) != 0u) ? (a[c][0] - re) : (a[c][0] + re);
-        window[c][1][h] = ((h % 2u) != 0u) ? (a[c][1] - im) : (a[c][1] + im);
+        window[h][c][0] = ((h % 2u) != 0u) ? (a[c][0] - re) : (a[c][0] + re);
+        window[h][c][1] = ((h % 2u) != 0u) ? (a[c][1] - im) : (a[c][1] + im);
     }
 }

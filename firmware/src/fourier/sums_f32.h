@@ -38,8 +38,17 @@ static inline bool pvid_fourier_sums_joins_f32(const pvid_fourier_sums_f32 *self
 /* Adds the block to the next harmonic of all channels. */
 void pvid_fourier_sums_add_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels);
 
-/* Joins the next harmonic of all channels to `window`. */
+/* Joins the next harmonic of all channels to `window`, which may be the older half's sums. */
 void pvid_fourier_sums_join_one_f32(pvid_fourier_sums_f32 *self, const pvid_fourier_design_f32 *design, size_t channels,
-                                    float dt, float window[][2][PVID_MAX_HARMONICS]);
+                                    float dt, float window[][PVID_MAX_CHANNELS][2]);
+
+/* The sums of the joined window, [harmonics]: of their own or in the place of the older half's. */
+static inline float (*pvid_fourier_window_f32(pvid_fourier_f32 *self)) [PVID_MAX_CHANNELS][2] {
+#if PVID_MAX_WINDOWS > 0
+    return self->finish.work.rows.window;
+#else
+    return self->sums.sum[self->sums.target ^ 1u];
+#endif
+}
 
 #endif

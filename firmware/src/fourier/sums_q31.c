@@ -24,7 +24,7 @@ void pvid_fourier_sums_next_q31(pvid_fourier_sums_q31 *self, const pvid_fourier_
     }
     const bool last = index + 1u == design->hop;
     const uint8_t harmonics = pvid_fourier_harmonics_q31(design);
-    self->filling ^= 1u;
+    self->filling = (uint8_t)(PVID_MAX_BLOCKS - 1u - self->filling);
     self->item = 0;
     self->angle = 0;
     self->target = half;
@@ -93,7 +93,7 @@ static void add_block(pvid_fourier_sums_q31 *self, const pvid_fourier_design_q31
     const size_t summed = pvid_fourier_summed_q31(design->model);
     const size_t turn = 2u * (size_t)design->hop;
     const size_t three_quarters = turn - ((size_t)design->hop / 2u);
-    const int32_t *x = &self->block[self->filling ^ 1u][0][0];
+    const int32_t *x = &self->block[PVID_MAX_BLOCKS - 1u - self->filling][0][0];
     int32_t *sum = &self->sum[self->target][h][0][0];
     int32_t cosine[BLOCK];
     int32_t sine[BLOCK];

@@ -246,25 +246,12 @@ static pvid_status sizes_are_valid(const pvid_fourier_design_q31 *design)
     return fits ? PVID_OK : PVID_BAD_WINDOW;
 }
 
-pvid_status pvid_fourier_valid_q31(const pvid_fourier_design_q31 *design)
+/* Every number of the tables. */
+static pvid_status tables_are_valid(const pvid_fourier_design_q31 *design)
 {
-    if (design == NULL) {
-        return PVID_BAD_DESIGN;
-    }
     const pvid_fourier_model_q31 *model = design->model;
-    if ((model == NULL) || !counts_fit(model) || !tables_are_given(model) ||
-        !pvid_fourier_signals_are_valid(model->signal, model->signals, model->samples, model->jet, model->jets) ||
-        !channels_are_valid(model)) {
-        return PVID_BAD_MODEL;
-    }
-    const pvid_status sizes = sizes_are_valid(design);
-    if (sizes != PVID_OK) {
-        return sizes;
-    }
-    if (!design_is_given(design)) {
-        return PVID_BAD_DESIGN;
-    }
-    if (!kinds_are_valid(design)) {
+    if (!pvid_fourier_signals_are_valid(model->signal, model->signals, model->samples, model->jet, model->jets) ||
+        !channels_are_valid(model) || !kinds_are_valid(design)) {
         return PVID_BAD_MODEL;
     }
     if (!full_scale_is_valid(design)) {
@@ -273,8 +260,28 @@ pvid_status pvid_fourier_valid_q31(const pvid_fourier_design_q31 *design)
     if (!filters_are_valid(design) || !noise_is_valid(design)) {
         return PVID_BAD_DESIGN;
     }
-    if (pvid_fourier_front_length_q31(design) > PVID_MAX_RING) {
-        return PVID_BAD_TAPS;
-    }
     return shifts_are_valid(design) ? PVID_OK : PVID_BAD_SHIFT;
+}
+
+pvid_status pvid_fourier_valid_q31(const pvid_fourier_design_q31 *design)
+{
+    if (design == NULL) {
+        return PVID_BAD_DESIGN;
+    }
+    const pvid_fourier_model_q31 *model = design->model;
+    if ((model == NULL) || !counts_fit(model) || !tables_are_given(model)) {
+        return PVID_BAD_MODEL;
+    }
+    pvid_status status = sizes_are_valid(design);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if (!design_is_given(design)) {
+        return PVID_BAD_DESIGN;
+    }
+    status = (PVID_CHECK_TABLES != 0) ? tables_are_valid(design) : PVID_OK;
+    if (status != PVID_OK) {
+        return status;
+    }
+    return (pvid_fourier_front_length_q31(design) <= PVID_MAX_RING) ? PVID_OK : PVID_BAD_TAPS;
 }

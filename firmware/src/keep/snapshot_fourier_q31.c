@@ -52,6 +52,7 @@ static const uint32_t layout[] = {
     PVID_MAX_COLUMNS,
     PVID_MAX_POWER,
     PVID_MAX_FUNCTIONS,
+    PVID_MAX_BLOCKS,
 };
 
 static const pvid_snapshot_pointer pointers[] = {

@@ -23,7 +23,7 @@ static const uint32_t layout[] = {
     PLACE(finish.whiten),
     PLACE(finish.solve),
     PLACE(finish.solve.sums),
-    PLACE(finish.solve.factor),
+    PLACE(finish.solve.work),
     PLACE(finish.candidate),
     PLACE(term),
     PLACE(sums),

@@ -40,8 +40,12 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
 /* Entries of the ring before an estimate of the weak form that the search may use. */
 #define RECENT 200u
 
-/* Part of the difference by which the level follows a block's. */
+/* Part of the difference by which level and clash follow a block's. */
 #define LEVEL_GAIN 0.2f
+#define CLASH_GAIN 0.3f
+
+/* Factor on the clash of the first two blocks: they are short, and neighbours err alike. */
+#define FIRST_CLASH 2.0f
 
 static inline bool is_ready(const pvid_refine_f32 *self)
 {
@@ -126,11 +130,16 @@ static bool is_sane(const pvid_refine_f32 *self)
     return sane;
 }
 
-static void take(pvid_refine_f32 *self, float square)
+static void take(pvid_refine_f32 *self, float square, float clash)
 {
     const pvid_refine_config_f32 *config = &self->config;
     self->refused = 0;
     self->lost = 0;
+    if (self->taken > 1u) {
+        self->clash += CLASH_GAIN * (clash - self->clash);
+    } else {
+        self->clash = (self->taken == 0u) ? 1.0f : (FIRST_CLASH * clash);
+    }
     self->taken = (uint8_t)((self->taken < 2u) ? (self->taken + 1u) : 2u);
     self->level = (self->taken == 1u) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
     memcpy(self->r, self->linear, sizeof self->r);
@@ -210,7 +219,7 @@ static void end_block(pvid_refine_f32 *self)
                        (self->solve.size < config->step_max);
     self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
     if (taken) {
-        take(self, square);
+        take(self, square, clash);
         self->verdict = (self->taken > 1u) ? PVID_UPDATED : PVID_HELD_UNCERTAIN; /* one block proves little */
     } else {
         self->verdict = (self->taken > 0u) ? PVID_HELD_BLOCK : PVID_HELD_SEARCHING;
@@ -227,14 +236,16 @@ static void pass_job(pvid_refine_f32 *self)
 {
     pvid_refine_signals_f32 signals;
     uint32_t first = 0;
-    if (pvid_refine_pass_needs_f32(&self->work, &first)) {
+    const uint32_t steps = pvid_refine_pass_needs_f32(&self->work, &first);
+    if (steps > 0u) {
         const uint32_t entry = self->begin + first;
-        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - entry) < (3 + PVID_REFINE_REACH)) {
+        const uint32_t behind = entry + (steps + PVID_REFINE_REACH);
+        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - behind) < 0) {
             self->waiting = true;
-            self->due = entry + (3u + PVID_REFINE_REACH);
+            self->due = behind;
             return;
         }
-        pvid_refine_front_read_f32(&self->front, entry, &signals);
+        pvid_refine_front_read_f32(&self->front, entry, steps, &signals);
     }
     pvid_refine_pass_job_f32(&self->work, self->linear, self->weight, &signals);
     if (pvid_refine_pass_ends_f32(&self->work, self->length)) {
@@ -279,14 +290,22 @@ static void move(pvid_refine_f32 *self)
     }
 }
 
+/* Variance of a row for the standard errors. A block fits with errors of its equations as well, which then differ from
+ * block to block: the scatter of the blocks about their past counts where it is larger than that of the residuals. */
+static float variance_of_row(const pvid_refine_f32 *self)
+{
+    const float level = at_least_one(self->level);
+    const float larger = (self->clash > level) ? self->clash : level;
+    return (self->config.sd[0] * self->config.sd[0]) * larger;
+}
+
 /* A column of the covariance. */
 static void assess(pvid_refine_f32 *self)
 {
     if (self->pass == 0u) {
         pvid_refine_assess_begin_f32(&self->candidate, &self->config);
     }
-    pvid_refine_assess_column_f32(&self->candidate, self->solve.triangle, self->pass,
-                                  (self->config.sd[0] * self->config.sd[0]) * at_least_one(self->level));
+    pvid_refine_assess_column_f32(&self->candidate, self->solve.triangle, self->pass, variance_of_row(self));
     self->pass++;
     self->phase = (self->pass < N) ? ASSESS : JUDGE;
 }
@@ -345,7 +364,7 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
         assess(self);
         break;
     case JUDGE:
-        pvid_refine_assess_end_f32(&self->candidate, self->r, self->level);
+        pvid_refine_assess_end_f32(&self->candidate, self->r, self->level, self->clash);
         self->verdict = pvid_refine_verdict_f32(&self->candidate, &self->config, self->weak, self->weak_se);
         self->phase = PUBLISH;
         break;

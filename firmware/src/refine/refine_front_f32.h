@@ -45,21 +45,19 @@ uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self);
 uint32_t pvid_refine_front_end_f32(const pvid_refine_front_f32 *self);
 uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self);
 
-/* Signals of an entry and the next two; of inputs those of the reach as well. */
-PVID_ALWAYS_INLINE void pvid_refine_front_read_f32(const pvid_refine_front_f32 *self, uint32_t entry,
+/* Signals of `steps` entries, 1 to 3; of inputs those of the reach as well. */
+PVID_ALWAYS_INLINE void pvid_refine_front_read_f32(const pvid_refine_front_f32 *self, uint32_t entry, uint32_t steps,
                                                    pvid_refine_signals_f32 *signals)
 {
     const uint32_t mask = (uint32_t)PVID_REFINE_RING - 1u;
-    PVID_UNROLL for (uint32_t k = 0; k < (3u + (2u * PVID_REFINE_REACH)); k++)
-    {
+    for (uint32_t k = 0; k < (steps + (2u * PVID_REFINE_REACH)); k++) {
         const int16_t *value = self->ring[((entry - PVID_REFINE_REACH) + k) & mask];
         PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_INPUTS; i++)
         {
             signals->u[k][i] = (float)value[i] * self->from_counts[i];
         }
     }
-    PVID_UNROLL for (uint32_t k = 0; k < 3u; k++)
-    {
+    for (uint32_t k = 0; k < steps; k++) {
         const int16_t *value = self->ring[(entry + k) & mask];
         PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++)
         {

@@ -48,9 +48,10 @@ void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const flo
     }
 }
 
-void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level)
+void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level, float clash)
 {
     estimate->level = level;
+    estimate->clash = clash;
     for (size_t i = 0; i < N; i++) {
         const float sd = sqrtf(estimate->covariance[i][i]);
         estimate->r[i] = r[i];
@@ -82,14 +83,14 @@ pvid_reason pvid_refine_verdict_f32(const pvid_refine_estimate_f32 *estimate, co
         return PVID_HELD_UNCERTAIN;
     }
     bool agree = true;
-    bool better = true;
+    float ratio = 1.0f; /* product of the standard errors over the weak form's */
     for (size_t i = 0; i < PVID_REFINE_P; i++) {
         const size_t place = pvid_refine_place_of_p[i];
-        better = better && ((config->distance > 0.0f) || (estimate->se[place] <= weak_se[i]));
+        ratio *= estimate->se[place] / weak_se[i];
         agree = agree && agrees(estimate, place, weak[place], weak_se[i], config->distance);
     }
     if (!agree) {
         return PVID_HELD_DISAGREES;
     }
-    return better ? PVID_UPDATED : PVID_HELD_UNCERTAIN;
+    return ((config->distance > 0.0f) || (ratio <= 1.0f)) ? PVID_UPDATED : PVID_HELD_UNCERTAIN;
 }

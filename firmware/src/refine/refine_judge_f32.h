@@ -18,7 +18,7 @@ bool pvid_refine_within_f32(float x, float limit);
 void pvid_refine_assess_begin_f32(pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config);
 void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const float triangle[], size_t column,
                                    float variance);
-void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level);
+void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level, float clash);
 
 /* PVID_UPDATED, PVID_HELD_UNCERTAIN or PVID_HELD_DISAGREES. */
 pvid_reason pvid_refine_verdict_f32(const pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config,

@@ -17,8 +17,9 @@
 #define V (PVID_REFINE_STATES - N_Q) /* place of the rates in the state; without rates any place */
 #define AB PVID_REFINE_AB
 
-/* Jobs of a pass, in their order; the first two of a pair are those of Runge-Kutta alone. */
-enum { CLEAR, FIRST_A, FIRST_B, FIRST, SECOND_A, SECOND_B, SECOND, COLUMNS, ROWS };
+/* Jobs of a pass, in their order; the first two of a pair of steps are those of Runge-Kutta alone, then one for each
+ * step. */
+enum { CLEAR, FIRST_A, FIRST_B, FIRST, MIDDLE, SECOND_A, SECOND_B, SECOND, END, COLUMNS, ROWS };
 
 #define STARTS 3u /* double steps */
 
@@ -87,7 +88,7 @@ static void clear(pvid_refine_pass_f32 *self)
 
 /* ---- the motion ---- */
 
-PVID_ALWAYS_INLINE void adams_bashforth(pvid_refine_pass_f32 *self)
+PVID_SELDOM static void adams_bashforth(pvid_refine_pass_f32 *self)
 {
     const float *of_velocity = &velocity_weights[AB - self->head];
     const float h = self->h;
@@ -377,10 +378,10 @@ PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[
         float sum = 0.0f;
         PVID_UNROLL for (size_t j = 0; j < PVID_REFINE_INPUTS; j++)
         {
-            float rate = self->slope[0] * signals->u[2][j];
+            float rate = self->slope[0] * signals->u[0][j];
             PVID_UNROLL for (size_t k = 1; k < PVID_REFINE_POINTS; k++)
             {
-                rate += self->slope[k] * signals->u[2u + k][j];
+                rate += self->slope[k] * signals->u[k][j];
             }
             sum += U[(i * PVID_REFINE_INPUTS) + j] * rate;
         }
@@ -398,53 +399,36 @@ PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[
 #endif
 }
 
-/* A step of the motion to the second (`at` 1) or third of the three steps. */
-PVID_SELDOM static void step_to(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
-                                size_t at, bool to_middle)
+/* A step: of Adams-Bashforth, or the first or second one behind Runge-Kutta; `signals` are those of its end. The first
+ * two steps of a big step end at its middle, where the derivatives are needed: there the work is longest, and the state
+ * has been moved there by the job before. */
+PVID_SELDOM static void step(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {
+    const bool middle = self->job == (uint8_t)MIDDLE;
+    const bool started = self->starts == 0u;
+    const float *x = self->state;
     float a[N_Q];
     float u[PVID_REFINE_INPUTS];
-    input(self, signals, at, u);
-    adams_bashforth(self);
-    residuals(self, r, self->state, u, signals->z[at]);
-    if (to_middle) {
+    input(self, signals, 0, u);
+    if (started) {
+        if (!middle) {
+            adams_bashforth(self);
+        }
+    } else if (middle || (self->job == (uint8_t)END)) {
+        memcpy(self->state, self->scratch[0], sizeof self->state);
+        self->starts--;
+    } else {
+        x = self->scratch[1];
+    }
+    residuals(self, r, x, u, signals->z[0]);
+    if (middle) {
         differentiate(self, r, signals, u, a);
     } else {
-        accelerations(self->constants, self->state, u, a);
+        accelerations(self->constants, x, u, a);
     }
     push(self, a);
-}
-
-/* Two steps behind Runge-Kutta. */
-static void first_pair(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals,
-                       bool to_middle)
-{
-    float a[N_Q];
-    float u[PVID_REFINE_INPUTS];
-    input(self, signals, 1, u);
-    residuals(self, r, self->scratch[1], u, signals->z[1]);
-    accelerations(self->constants, self->scratch[1], u, a);
-    push(self, a);
-    input(self, signals, 2, u);
-    memcpy(self->state, self->scratch[0], sizeof self->state);
-    residuals(self, r, self->state, u, signals->z[2]);
-    if (to_middle) {
-        differentiate(self, r, signals, u, a);
-    } else {
-        accelerations(self->constants, self->state, u, a);
-    }
-    push(self, a);
-    self->starts--;
-}
-
-/* Two steps; the first two of a big step end at its middle, where the derivatives are needed. */
-static void pair(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals, bool to_middle)
-{
-    if (self->starts > 0u) {
-        first_pair(self, r, signals, to_middle);
-    } else {
-        step_to(self, r, signals, 1, false);
-        step_to(self, r, signals, 2, to_middle);
+    if (started && (self->job == (uint8_t)FIRST)) {
+        adams_bashforth(self);
     }
 }
 
@@ -609,11 +593,12 @@ static void add_rows(pvid_refine_pass_f32 *self)
 
 /* ---- jobs ---- */
 
-bool pvid_refine_pass_needs_f32(const pvid_refine_pass_f32 *self, uint32_t *first)
+uint32_t pvid_refine_pass_needs_f32(const pvid_refine_pass_f32 *self, uint32_t *first)
 {
-    const bool second = self->job >= (uint8_t)SECOND_A;
-    *first = ((uint32_t)self->step * PVID_REFINE_SUB) + (second ? 2u : 0u);
-    return (self->job >= (uint8_t)FIRST_A) && (self->job <= (uint8_t)SECOND);
+    static const uint8_t steps[] = {0, 3, 3, 1, 1, 3, 3, 1, 1, 0, 0};  /* by job */
+    static const uint8_t begins[] = {0, 0, 0, 1, 2, 2, 2, 3, 4, 0, 0}; /* in the big step */
+    *first = ((uint32_t)self->step * PVID_REFINE_SUB) + begins[self->job];
+    return steps[self->job];
 }
 
 bool pvid_refine_pass_ends_f32(const pvid_refine_pass_f32 *self, uint32_t length)
@@ -646,11 +631,16 @@ void pvid_refine_pass_job_f32(pvid_refine_pass_f32 *self, const float r[], const
         self->job++;
         break;
     case FIRST:
-        pair(self, r, signals, true);
+    case SECOND:
+        step(self, r, signals);
+        self->job++;
+        break;
+    case MIDDLE:
+        step(self, r, signals);
         self->job = job_of_pair(self, SECOND_A, SECOND);
         break;
-    case SECOND:
-        pair(self, r, signals, false);
+    case END:
+        step(self, r, signals);
         self->job = COLUMNS;
         break;
     case COLUMNS:

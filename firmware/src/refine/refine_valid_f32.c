@@ -55,7 +55,7 @@ static pvid_status sizes_are_valid(const pvid_refine_config_f32 *config)
         return PVID_BAD_ROW_SD;
     }
     if (!all_within(config->prior_sd, PVID_REFINE_PARAMETERS, 1.0e-9f, 1.0e9f) ||
-        !all_within(config->gain_sd, PVID_REFINE_PARAMETERS, 0.0f, 1.0e9f)) {
+        !all_within(config->gain_sd, PVID_REFINE_PARAMETERS, -1.0e9f, 1.0e9f)) {
         return PVID_BAD_START_SD;
     }
     if (!all_within(config->state_limit, PVID_REFINE_STATES, 1.0e-9f, 1.0e9f)) {

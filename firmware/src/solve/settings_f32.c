@@ -58,7 +58,7 @@ pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config,
     if (!pvid_within_f32(config->noise_margin, 0.0f, 1.0e6f)) {
         return PVID_BAD_NOISE_MARGIN;
     }
-    if (!pvid_within_f32(config->dead_zone, 0.0f, 100.0f)) {
+    if (!pvid_within_f32(config->dead_zone, 0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f)) {
         return PVID_BAD_DEAD_ZONE;
     }
     if ((config->law != PVID_LAW_STATIONARY) && (config->law != PVID_LAW_PSEUDOVELOCITY)) {

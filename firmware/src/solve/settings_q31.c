@@ -60,7 +60,7 @@ pvid_status pvid_settings_are_valid_q31(const pvid_estimator_config_q31 *config,
     if (config->noise_margin > NOISE_MARGIN_MAX) {
         return PVID_BAD_NOISE_MARGIN;
     }
-    if (config->dead_zone > DEAD_ZONE_MAX) {
+    if (config->dead_zone > ((PVID_DEAD_ZONE != 0) ? DEAD_ZONE_MAX : 0u)) {
         return PVID_BAD_DEAD_ZONE;
     }
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;

@@ -111,7 +111,7 @@ bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self)
 static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     pvid_information_read_f32(&self->information, solve->sums);
-    self->model->jacobian(self->p, solve->c);
+    self->model->jacobian(self->p, solve->work.c);
     const float *tail = &solve->sums[self->model->n_moments + self->model->n_theta]; /* rr, weight */
     solve->system.rss = tail[0];
     solve->system.rounding = self->information.rounding;
@@ -134,11 +134,11 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
     }
     if (next < end) {
         const size_t last = ((end - next) > COLUMNS_PER_STAGE) ? (next + COLUMNS_PER_STAGE) : end;
-        pvid_pattern_add_columns_f32(model, solve->c, next, last, solve->sums, solve->product);
+        pvid_pattern_add_columns_f32(model, solve->work.c, next, last, solve->sums, solve->product);
         solve->next = (uint8_t)last;
         return true;
     }
-    pvid_pattern_project_row_f32(model, solve->c, solve->start, solve->product, solve->system.s[a]);
+    pvid_pattern_project_row_f32(model, solve->work.c, solve->start, solve->product, solve->system.s[a]);
     solve->start = (uint8_t)end;
     solve->end = (uint8_t)pvid_pattern_end_f32(model, end);
     solve->index++;
@@ -147,7 +147,8 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
 
 static void force_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    pvid_pattern_project_row_f32(self->model, solve->c, 0, &solve->sums[self->model->n_moments], solve->system.force);
+    pvid_pattern_project_row_f32(self->model, solve->work.c, 0, &solve->sums[self->model->n_moments],
+                                 solve->system.force);
 }
 
 /* The noise has row_sd^2 in a solve, because the residuals are larger while p is far from the solution, and the
@@ -175,7 +176,7 @@ static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
         solve->diagonal[a] = solve->system.s[a][a];
         solve->system.s[a][a] += self->settings.prior[a];
     }
-    const pvid_reason reason = pvid_step_factor_f32(&solve->system, &self->settings, &solve->factor);
+    const pvid_reason reason = pvid_step_factor_f32(&solve->system, &self->settings, &solve->work.factor);
     const bool noise = (reason == PVID_UPDATED) && !solve->above_noise;
     solve->reason = noise ? PVID_HELD_NOT_EXCITED : reason;
     if (solve->reason != PVID_UPDATED) {
@@ -187,7 +188,7 @@ static void factor_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
 static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, const float rhs[])
 {
     pvid_solution_f32 solution = {.p = solve->p};
-    pvid_step_take_f32(&solve->system, &self->settings, &solve->factor, self->p, rhs, &solution);
+    pvid_step_take_f32(&solve->system, &self->settings, &solve->work.factor, self->p, rhs, &solution);
     if (solution.reason != PVID_UPDATED) {
         solve->reason = pvid_count_held(&self->counters, solution.reason);
     }
@@ -220,9 +221,9 @@ static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve
 
 static void theta_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    self->model->theta(solve->p, solve->theta);
+    self->model->theta(solve->p, solve->work.theta.after);
     for (size_t i = 0; i < self->model->n_theta; i++) {
-        solve->theta_step[i] = solve->theta[i] - self->theta[i];
+        solve->work.theta.step[i] = solve->work.theta.after[i] - self->theta[i];
     }
     solve->fall = 0.0f;
     solve->scale = 0.0f;
@@ -239,10 +240,11 @@ static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_
         pvid_information_block_f32(self->model, i, &block);
         const float *m = &solve->sums[block.moment];
         const size_t row = i - block.first;
-        const float moved = pvid_pattern_times_f32(block.n, m, row, &solve->theta_step[block.first]);
+        const float moved = pvid_pattern_times_f32(block.n, m, row, &solve->work.theta.step[block.first]);
         solve->product[i] = moved;
-        solve->fall += solve->theta_step[i] * (b[i] + (b[i] - moved));
-        solve->scale += m[pvid_pattern_diagonal_f32(block.n, row)] * (solve->theta_step[i] * solve->theta_step[i]);
+        solve->fall += solve->work.theta.step[i] * (b[i] + (b[i] - moved));
+        solve->scale +=
+            m[pvid_pattern_diagonal_f32(block.n, row)] * (solve->work.theta.step[i] * solve->work.theta.step[i]);
     }
     return last;
 }
@@ -265,7 +267,7 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     }
     for (size_t i = 0; i < n; i++) {
         low[i] -= solve->product[i];
-        self->theta[i] = solve->theta[i];
+        self->theta[i] = solve->work.theta.after[i];
     }
     low[n] -= solve->fall;
     const float lost = self->information.rounding + (ROUNDING * solve->scale);
@@ -452,12 +454,12 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
         break;
     case STAGE_WIDEN:
         pvid_assess_widen_f32(&solve->system, &self->settings, wide);
-        solve->solvable =
-            pvid_cholesky_factor_f32(&solve->factor, self->settings.n_p, (const float (*)[PVID_MAX_P])solve->system.s);
+        solve->solvable = pvid_cholesky_factor_f32(&solve->work.factor, self->settings.n_p,
+                                                   (const float (*)[PVID_MAX_P])solve->system.s);
         break;
     case STAGE_INVERT:
         if (solve->solvable) {
-            pvid_cholesky_inverse_column_f32(&solve->factor, solve->index, solve->estimate->covariance);
+            pvid_cholesky_inverse_column_f32(&solve->work.factor, solve->index, solve->estimate->covariance);
         }
         solve->index++;
         repeat = solve->index < self->model->n_p;

@@ -172,7 +172,7 @@ static pvid_scaled_q31 newton_decrement_square(const pvid_estimator_q31 *self, c
 
 static bool solve_in_dead_zone(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve)
 {
-    if (self->settings.dead_zone == 0u) {
+    if ((PVID_DEAD_ZONE == 0) || (self->settings.dead_zone == 0u)) {
         return false;
     }
     const pvid_residual_q31 residual = pvid_residual_of_q31(&self->information);

@@ -128,7 +128,8 @@ static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_
     solution->size = 0.0f;
     solution->limited = false;
     solution->bounded = false;
-    solution->in_dead_zone = (settings->dead_zone > 0.0f) && pvid_step_is_in_dead_zone_f32(system, settings, factor);
+    solution->in_dead_zone = (PVID_DEAD_ZONE != 0) && (settings->dead_zone > 0.0f) &&
+                             pvid_step_is_in_dead_zone_f32(system, settings, factor);
     if (solution->in_dead_zone) {
         return;
     }

@@ -66,6 +66,16 @@ typedef struct {
     float first_pivot;               /* pivot of index 0 over its diagonal entry: 1 - R^2 */
 } pvid_cholesky_f32;
 
+/* What one part of a solve needs after the other; an assessment needs C and the factor. */
+typedef union {
+    float c[PVID_MAX_THETA * PVID_MAX_P]; /* until S and F are formed */
+    pvid_cholesky_f32 factor;             /* until dp is known */
+    struct {
+        float after[PVID_MAX_THETA]; /* the step */
+        float step[PVID_MAX_THETA];  /* dtheta */
+    } theta;
+} pvid_solve_work_f32;
+
 /* A solve or an assessment in progress; the caller owns it. Read reason, size, group_rss and above_noise when it is
  * complete. The caller may set fallback and noise after begin. */
 struct pvid_estimator_solve_f32 {
@@ -90,14 +100,11 @@ struct pvid_estimator_solve_f32 {
     float fall;        /* decrease of rr by the step */
     float scale;       /* sum of M_ii dtheta_i^2: size of the terms that cancel in `fall` */
     float sums[PVID_MAX_SUMS];
-    float c[PVID_MAX_THETA * PVID_MAX_P];
+    pvid_solve_work_f32 work;
     pvid_system_f32 system;
-    float p[PVID_MAX_P]; /* p and theta after the step */
-    float theta[PVID_MAX_THETA];
-    float theta_step[PVID_MAX_THETA]; /* dtheta */
-    float product[PVID_MAX_THETA];    /* M times a column of C, then M dtheta: b -= product */
-    float diagonal[PVID_MAX_P];       /* of S without H0 */
-    pvid_cholesky_f32 factor;
+    float p[PVID_MAX_P];           /* after the step */
+    float product[PVID_MAX_THETA]; /* M times a column of C, then M dtheta: b -= product */
+    float diagonal[PVID_MAX_P];    /* of S without H0 */
 };
 
 #endif

@@ -68,17 +68,18 @@ typedef struct {
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
 typedef struct {
-    uint8_t half;                                           /* that fills, 0 or 1 */
-    uint8_t halves;                                         /* complete since the restart, 0..2 */
-    uint8_t filling;                                        /* block that fills, 0 or 1 */
-    uint8_t target;                                         /* half to which the other block is being added */
-    uint8_t harmonic;                                       /* next one to which it is added; all: none */
-    uint8_t joined;                                         /* next one to be joined; all: none */
-    uint16_t index;                                         /* of the next step in its half */
-    uint16_t start;                                         /* of the first step of that block in its half */
-    float edge[2][PVID_MAX_INTEGRANDS];                     /* I^1 and I^2 of the window's first half at its end */
-    float block[2][PVID_FOURIER_BLOCK][PVID_MAX_CHANNELS];  /* steps, then their sums and differences: sums_f32.c */
-    float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
+    uint8_t half;                       /* that fills, 0 or 1 */
+    uint8_t halves;                     /* complete since the restart, 0..2 */
+    uint8_t filling;                    /* block that fills */
+    uint8_t target;                     /* half to which the other block is being added */
+    uint8_t harmonic;                   /* next one to which it is added; all: none */
+    uint8_t joined;                     /* next one to be joined; all: none */
+    uint16_t index;                     /* of the next step in its half */
+    uint16_t start;                     /* of the first step of that block in its half */
+    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the window's first half at its end */
+    float block[PVID_MAX_BLOCKS][PVID_FOURIER_BLOCK][PVID_MAX_CHANNELS]; /* steps, then their sums and differences:
+                                                                           sums_f32.c */
+    float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2];              /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_f32;
 
 /* Most parts of a window's sums that its rows are made of. */
@@ -99,6 +100,9 @@ typedef struct {
     float share[PVID_MAX_POWER];                              /* Q_j = tr(R^-1 dR/dc_j) */
 } pvid_fourier_white_f32;
 
+/* Products of two parameters. */
+#define PVID_FOURIER_PAIRS ((PVID_MAX_P * (PVID_MAX_P + 1)) / 2)
+
 /* Mean products of the windows' scores s = C^T (sum N e), of a window with itself and with the one before. */
 typedef struct {
     uint16_t windows; /* in the means */
@@ -107,8 +111,8 @@ typedef struct {
     float residual;   /* mean square of their residuals */
     float own[PVID_MAX_P];
     float before[PVID_MAX_P];
-    float same[PVID_MAX_P][PVID_MAX_P]; /* upper triangle */
-    float neighbour[PVID_MAX_P][PVID_MAX_P];
+    float same[PVID_FOURIER_PAIRS]; /* upper triangle, row by row */
+    float neighbour[PVID_FOURIER_PAIRS];
 } pvid_fourier_scores_f32;
 
 /* Orthonormal directions that the test functions leave out, one of each family in a row. */
@@ -127,12 +131,10 @@ typedef struct {
     uint8_t place[PVID_MAX_THETA][PVID_MAX_P];
 } pvid_fourier_slopes_f32;
 
-/* What the columns of a kind need before they are formed, and they themselves. */
+/* What the columns of a kind need before they are formed, one after the other, and they themselves. */
 typedef union {
-    struct {
-        pvid_fourier_basis_f32 basis;
-        pvid_fourier_slopes_f32 slopes;
-    } before;
+    pvid_fourier_basis_f32 basis;
+    pvid_fourier_slopes_f32 slopes;
     float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
 } pvid_fourier_columns_f32;
 
@@ -140,7 +142,9 @@ typedef union {
 typedef struct {
     pvid_reason reason; /* of the solve, with its pointers: they keep their place (pvid/snapshot_fourier.h) */
     const void *pointer[3];
-    float window[PVID_MAX_CHANNELS][2][PVID_MAX_HARMONICS]; /* S_h: real parts, imaginary parts */
+#if PVID_MAX_WINDOWS > 0
+    float window[PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* S_h: real and imaginary part */
+#endif
     float own[PVID_MAX_COLUMNS];    /* square of each nuisance before projection, then inverse of what remains; then
                                        squares of theta's columns */
     float pull[PVID_MAX_THETA];     /* g: what the sensors' noise takes from B */

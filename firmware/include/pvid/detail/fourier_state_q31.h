@@ -43,7 +43,7 @@ typedef struct {
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
 typedef struct {
-    uint8_t filling; /* block that fills, 0 or 1 */
+    uint8_t filling; /* block that fills */
     uint8_t left;    /* items until the other one is added and joined; 0: it is */
     uint8_t item;    /* the next one */
     uint8_t target;  /* half to which it is added */
@@ -51,7 +51,7 @@ typedef struct {
     uint8_t halves;  /* complete since the restart, 0..2 */
     uint16_t start;  /* of its first step in its half */
     uint16_t angle;  /* of the next harmonic at this step */
-    int32_t block[2][PVID_FOURIER_BLOCK_Q31][PVID_MAX_CHANNELS];
+    int32_t block[PVID_MAX_BLOCKS][PVID_FOURIER_BLOCK_Q31][PVID_MAX_CHANNELS];
     int32_t sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_fourier_sums_q31;
 

@@ -15,9 +15,10 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header
 from pvid.board.replay_image import REPORT_EVERY
 from pvid.codegen import files_design, files_fourier
+from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_library import fourier_native
-from pvid.core.sizes import at_least
+from pvid.core.sizes import smallest
 from pvid.core.sources import left_out
 from pvid.design.c_tables import float_literal
 from pvid.model.compiled import CompiledModel
@@ -26,7 +27,7 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.run.engine_design import config_for_simulated_rig, samples_of
 from pvid.settings.enums import Core
 from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier_sizes import sizes_for_one, sizes_of_design, sizes_of_model
+from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin import fnv
 from pvid.twin.fourier import FourierTwin
@@ -176,7 +177,7 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
             f"{target.name}: float32 has no bits of the twin on an AVR: its division differs at the extremes"
         )
     return build_with(
-        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), sizes_for_one(run.config.design), "f32"
+        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32"
     )
 
 
@@ -208,6 +209,6 @@ def build_with(
     }
     if refined:
         options["PVID_REFINE_MODEL"] = str(folder)
-    options |= {macro: str(size) for macro, size in at_least(sizes).items()}
+    options |= {macro: str(size) for macro, size in smallest(sizes).items()}
     tree = build(target, BUILD / f"{target.name}-{whole}", options)
     return tree / "apps" / "replay" / "replay.elf", tree

@@ -18,7 +18,6 @@ from pvid.models import mechanisms
 from pvid.run import engine_files_q31
 from pvid.run.engine_design import simulated_run_of
 from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
-from pvid.setup.fourier_sizes import sizes_of_q31
 from pvid.twin import fnv
 from pvid.twin.fourier_q31 import FourierTwinQ31
 
@@ -48,8 +47,7 @@ class FixedRun:
     @property
     def sizes(self) -> dict[str, int]:
         """Of the core's arrays."""
-        model = self.engine.parameters.model
-        return sizes_of_q31(self.engine.config.design, model.n_p, len(model.c_row))
+        return engine_files_q31.fitted_of(self.engine)
 
 
 @cache

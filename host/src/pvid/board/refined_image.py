@@ -13,6 +13,7 @@ from pvid.board.boards import Board
 from pvid.board.mechanism_image import MADE_BY, MechanismRun, build_with, files_of, mechanism_run
 from pvid.codegen import files_refine
 from pvid.codegen.build import refine_functions
+from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.refine import RefineFunctions
 from pvid.core.fourier_native import RefinedIdentifier
@@ -20,7 +21,6 @@ from pvid.design.c_tables import float_literal
 from pvid.models.simulated_rig import simulated_rig
 from pvid.run.refine_design import refine_settings
 from pvid.settings.refine import RefineConfig
-from pvid.setup.fourier_sizes import sizes_for_one
 
 _START = "#define REPLAY_INIT pvid_fourier_init_f32"
 _HASH = "#define REPLAY_HASH pvid_fnv_estimator_f32"
@@ -133,4 +133,4 @@ def build_refined_image(target: Board, run: RefinedRun) -> tuple[Path, Path]:
     files["pvid/refine_shape.h"] = files_refine.shape(run.made, MADE_BY)
     files["refine_model_f32.h"] = files_refine.header(run.made, MADE_BY)
     name = f"{run.weak.name}-refined-f32-{len(run.weak.counts)}"
-    return build_with(target, name, files, sizes_for_one(run.weak.config.design), "f32", refined=True)
+    return build_with(target, name, files, fitted_sizes(run.weak.config, refined=True), "f32", refined=True)

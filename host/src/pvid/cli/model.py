@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ from pvid.cli.rig_design import model_of_rig, recorded
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.codegen.strong_twin import StrongModelConfig
     from pvid.model.compiled import CompiledModel
+    from pvid.models.simulated_rig import SimulatedRig
     from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
     from pvid.settings.fourier import FourierConfig
@@ -211,7 +213,16 @@ def build(
 @_MODEL
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.")
-@click.option("--duration", type=_ABOVE_0, help="Length [s].  [default: the rig's]")
+@click.option("--duration", type=_ABOVE_0, help="Length [s].  [default: the rig's; of a model file 20]")
+@click.option("--rate", type=_ABOVE_0, help="Sample rate [Hz].  [default: the rig's; of a model file 1000]")
+@click.option("--drive", help="A drive of `model predict`.  [default: the rig's; of a model file steps]")
+@click.option(
+    "--truth",
+    "truths",
+    multiple=True,
+    metavar="UNKNOWN=VALUE",
+    help="Its true value; repeatable.  [default: the rig's; of a model file the guess]",
+)
 @click.option("--friction", type=click.Choice(["sharp", "soft"]), default="sharp", show_default=True)
 @click.option("--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp.")
 @click.option(
@@ -226,25 +237,59 @@ def simulate(
     out: Path,
     seed: int,
     duration: float | None,
+    rate: float | None,
+    drive: str | None,
+    truths: tuple[str, ...],
     friction: str,
     stiction: float,
     imperfect: tuple[str, ...],
 ) -> int:
-    """Simulates the shipped rig of MODEL with its sensors; writes the run OUT and its rig file."""
+    """Simulates a rig of MODEL with its sensors; writes the run OUT and its rig file.
+
+    Of a shipped mechanism it is the shipped rig. Of a model file it is one at rest, whose inputs follow a drive within
+    half their reach.
+    """
     from pvid.models.mechanisms import compiled_of
-    from pvid.models.simulated_rig import simulated_rig
     from pvid.sim.imperfections import Imperfections, sizes_of
     from pvid.sim.simulated_run import RigSimulation, write_simulated_run
 
     compiled = compiled_of(model)
-    rig = simulated_rig(compiled.name)
-    rig = rig if duration is None else replace(rig, duration=duration)
+    rig = _rig_to_simulate(compiled, model, duration, rate, drive)
+    true = _numbers(truths, "--truth", "--truth m=1.3")
+    for name in true:
+        if name not in compiled.p_names:
+            raise PvidError(f"--truth {name}: the model has no such unknown; it has {', '.join(compiled.p_names)}")
+    rig = replace(rig, truth={**rig.truth, **true})
     law = Imperfections("sharp" if friction == "sharp" else "soft", stiction, **sizes_of(imperfect))
     simulation = RigSimulation.of(compiled, rig)
     run = simulation.run(seed, law)
-    settings = write_simulated_run(out, run, simulation)
+    settings = write_simulated_run(out, run, simulation, _name_beside(out, model))
     write_stderr(f"{out}: {simulation.samples} samples of {', '.join(run)}; rig file {settings}")
     return DONE
+
+
+def _rig_to_simulate(
+    compiled: CompiledModel, model: str, duration: float | None, rate: float | None, drive: str | None
+) -> SimulatedRig:
+    """The shipped rig, or one of the guesses at rest with a drive of the list."""
+    from pvid.models.mechanisms import names as names_of_shipped
+    from pvid.models.simulated_rig import simulated_rig
+    from pvid.sim.simulated_run import rig_of_guess
+
+    if model in names_of_shipped():
+        rig = simulated_rig(compiled.name)
+        rig = replace(rig, duration=duration or rig.duration, sample_rate=rate or rig.sample_rate)
+        if drive is None:
+            return rig
+        length, hz = rig.duration, rig.sample_rate
+        return replace(rig, drive=rig_of_guess(compiled, drive, 10 / length, hz / 50, rate=hz, duration=length).drive)
+    length, hz = duration or 20.0, rate or 1000.0
+    return rig_of_guess(compiled, drive or "steps", 10 / length, hz / 50, rate=hz, duration=length)
+
+
+def _name_beside(out: Path, model: str) -> str:
+    """A mechanism's name, or the path of a model file from the folder of the rig file."""
+    return os.path.relpath(model, out.parent) if model.endswith(".py") else model
 
 
 def _strong_design_of(
@@ -302,7 +347,7 @@ def _fixed_weak(
 ) -> tuple[dict[str, str], str | None]:
     """Files of the fixed-point weak form, or why there are none."""
     from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
-    from pvid.run.engine_files_q31 import files_of
+    from pvid.run.engine_files_q31 import config_of, files_of
 
     try:
         if run_path is None:
@@ -311,10 +356,10 @@ def _fixed_weak(
             engine = engine_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions, soft_signs)
     except PvidError as error:
         return {}, str(error)
-    return files_of(engine, title), None
+    return files_of(engine, title) | config_of(engine, title), None
 
 
-def _numbers(given: tuple[str, ...], option: str) -> dict[str, float]:
+def _numbers(given: tuple[str, ...], option: str, example: str = "--reach phi_1=40") -> dict[str, float]:
     """NAME=VALUE, several times.
 
     Raises
@@ -328,5 +373,5 @@ def _numbers(given: tuple[str, ...], option: str) -> dict[str, float]:
         try:
             found[name] = float(value)
         except ValueError as error:
-            raise PvidError(f"{option} {one}: write NAME=VALUE, as in {option} phi_1=40") from error
+            raise PvidError(f"{option} {one}: write NAME=VALUE, as in {example}") from error
     return found

@@ -22,6 +22,7 @@ from pvid.codegen import (
     twin_file,
 )
 from pvid.codegen.banner import banner
+from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.fixed_model import fixed_model
 from pvid.codegen.fourier import fourier_functions_of
 from pvid.codegen.fourier_twin import fourier_model_of
@@ -177,6 +178,7 @@ def _weak_files(compiled: CompiledModel, command: str, options: Options) -> dict
         names = [f"{one.name} [{one.unit or '1'}]" for one in compiled.unknowns]
         needed = sizes_of_design(design.design)
         files[f"{made.name}_design_f32.h"] = files_design.header(design, needed, command, compiled.title, names)
+        files[f"{made.name}_config.h"] = config_header(f"{made.name}_config", fitted_sizes(design), command)
     return files
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pvid.codegen import describe
 from pvid.codegen.files_f32 import guarded
 from pvid.codegen.files_fourier import size_check, table
-from pvid.core.sizes import smallest
+from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.design.c_tables import float_literal
 from pvid.settings.f32 import EstimatorConfig
 from pvid.settings.fourier import Float32, FourierConfig, FourierDesign32
@@ -43,8 +43,8 @@ def header(
         f"The first estimate comes after at most {config.ticks_needed} samples, "
         f"{config.ticks_needed / config.sample_rate:.3g} s.",
         "",
-        "The smallest sizes of the core that hold it, for little RAM:",
-        f"  {' '.join(f'-D{macro}={size}' for macro, size in smallest(needed).items())}",
+        f"Sizes of the core for it alone, for the least RAM and the fewest instructions ({name}_config.h has them):",
+        f"  {' '.join(f'-D{macro}={size}' for macro, size in fitted_sizes(config).items())}",
         "",
         "Parameters:",
         *describe.table(

@@ -9,8 +9,6 @@ from functools import cache
 from pvid.core.sources import FIRMWARE
 
 _DEFINED = re.compile(r"^#define (PVID_MAX_\w+) (\d+)$", re.MULTILINE)
-_LEAST = re.compile(r"^#if (PVID_MAX_\w+) < (\d+)", re.MULTILINE)
-
 _LEAST = re.compile(r"^#if (PVID_MAX_\w+) < (\d+) ", re.MULTILINE)
 
 
@@ -37,15 +35,3 @@ def raised(needed: Mapping[str, int]) -> dict[str, int]:
     """Those of the needed sizes that exceed the defaults."""
     usual = default_sizes()
     return {name: value for name, value in needed.items() if value > usual.get(name, 0)}
-
-
-@cache
-def _least_sizes() -> Mapping[str, int]:
-    """Macro -> least value that pvid/config.h accepts."""
-    text = (FIRMWARE / "include" / "pvid" / "config.h").read_text(encoding="utf-8")
-    return {name: int(value) for name, value in _LEAST.findall(text)}
-
-
-def at_least(needed: Mapping[str, int]) -> dict[str, int]:
-    """The needed sizes, none below what the core accepts: for a board with little memory."""
-    return {name: max(value, _least_sizes().get(name, 0)) for name, value in needed.items()}

@@ -8,20 +8,20 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen import files_design, files_fourier
+from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
 from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_library_q31 import fourier_native_q31
-from pvid.core.sizes import smallest
 from pvid.deploy.arithmetic import FIXED, FLOAT
 from pvid.deploy.deployment import Deployment, Playback, Quantity
 from pvid.model.compiled import CompiledModel
 from pvid.run.engine_design import Run, samples_of
 from pvid.run.engine_design_q31 import FixedEngine
-from pvid.run.engine_files_q31 import files_of
+from pvid.run.engine_files_q31 import files_of, fitted_of
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierConfig, Source
 from pvid.settings.record import Record
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model, sizes_of_q31
+from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
 
 _MOST_NUMBERS = 30_000  # of the example's motion: 60 kB of flash
 _LONGER = 3  # half windows behind the first estimate
@@ -69,7 +69,7 @@ def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, com
         sample_rate=config.sample_rate,
         samples=tuple(Quantity(one, units[one], note=_note(made, k)) for k, one in enumerate(model.sample_names)),
         parameters=tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
-        sizes=smallest(needed),
+        sizes=fitted_sizes(config),
         generated={
             f"{name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), command),
             f"{name}_weak_f32.c": files_fourier.source(made, model, command),
@@ -89,7 +89,6 @@ def deployment_q31(engine: FixedEngine, run: Run, command: str) -> Deployment:
     native = fourier_native_q31(engine.made, engine.parameters, engine.config)
     record = native.identifier().run_samples(counts, sums=False, hashes=False)
     scale = engine.values(np.ones(len(compiled.unknowns)))
-    model = engine.parameters.model
     notes = [
         f"one count is {lsb:.6g} {units[one] or '1'}".rstrip()
         for one, lsb in zip(engine.sample_names, engine.lsb, strict=True)
@@ -106,7 +105,7 @@ def deployment_q31(engine: FixedEngine, run: Run, command: str) -> Deployment:
         parameters=tuple(
             Quantity(one.name, one.unit, float(x)) for one, x in zip(compiled.unknowns, scale, strict=True)
         ),
-        sizes=smallest(sizes_of_q31(design, model.n_p, len(model.c_row))),
+        sizes=fitted_of(engine),
         generated=files_of(engine, command),
         command=command,
         first_s=engine.ticks_needed / engine.sample_rate,

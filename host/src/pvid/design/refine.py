@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.design.refine_filter import second_derivative
+from pvid.design import refine_filter
 from pvid.settings.refine import BIG_STEP, RefineConfig, RefineRig
 
 RING = 512  # PVID_REFINE_RING
@@ -39,12 +39,12 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0) -> RefineConfig:
     most = RING // 6
     block = min(max(round(_PERIODS / rig.slow_hz / (BIG_STEP * h)), _LEAST_BLOCK), most)
     derived = any(one.order == 2 for one in rig.signal)
-    second = second_derivative(HALF, min(_BANDS * rig.fast_hz * h, 0.4)) / h**2
+    second = refine_filter.second_derivative(HALF, min(_BANDS * rig.fast_hz * h, 0.4)) / h**2
     share = math.sqrt(ratio * BIG_STEP)
     return RefineConfig(
         sample_rate=rig.sample_rate,
         ratio=ratio,
-        second=_as_float32(second) if derived else None,
+        second=refine_filter.as_float32(second) if derived else None,
         signal=rig.signal,
         block=block,
         first_block=max(round(0.26 * block), 8),

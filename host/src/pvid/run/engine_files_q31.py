@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pvid.codegen import describe, files_fourier_q31
+from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.run.engine_design_q31 import FixedEngine
 from pvid.setup.fourier_sizes import sizes_of_q31
 
@@ -14,14 +15,30 @@ def files_of(engine: FixedEngine, command: str) -> dict[str, str]:
     ----------
     command : that makes them; no date, so that the same command makes the same files
     """
-    model = engine.parameters.model
-    sizes = sizes_of_q31(engine.config.design, model.n_p, len(model.c_row))
+    sizes = _sizes(engine)
     name = engine.name
     return {
         f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, command),
         f"{name}_weak_q31.c": files_fourier_q31.source(engine.made, engine.parameters, command),
         f"{name}_design_q31.h": files_fourier_q31.design_header(engine.config, name, sizes, command, about(engine)),
     }
+
+
+def config_of(engine: FixedEngine, command: str) -> dict[str, str]:
+    """The sizes of the core for this design alone: name -> text; parameters as of `files_of`."""
+    name = f"{engine.name}_config_q31"
+    return {f"{name}.h": config_header(name, fitted_of(engine), command)}
+
+
+def fitted_of(engine: FixedEngine) -> dict[str, int]:
+    """Sizes of the core for this design alone."""
+    model = engine.parameters.model
+    return fitted_sizes_q31(engine.config, model.n_p, len(model.c_row))
+
+
+def _sizes(engine: FixedEngine) -> dict[str, int]:
+    model = engine.parameters.model
+    return sizes_of_q31(engine.config.design, model.n_p, len(model.c_row))
 
 
 def about(engine: FixedEngine) -> list[str]:

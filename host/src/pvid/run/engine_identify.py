@@ -23,6 +23,7 @@ from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model
 from pvid.run.mechanism_core import CoreAnswer, identify_in_c
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Reason
+from pvid.setup.f32 import nominal_start
 
 _EXPLAINED = 0.97  # R^2 of each row kind: below, the equations do not fit the run
 _FARTHEST = 20.0  # times the guess: what lies beyond is no start
@@ -64,8 +65,19 @@ def identify_by_engine(run: Run, rig: RigFile) -> Identification:
     if rig.identifier.law != "stationary":
         raise PvidError(f"the weak form has the stationary law alone, not {rig.identifier.law}: use --form strong")
     run, rig = run.whole(), resolved(rig, run)
+    _refuse_slow(run, rig)
     answer = identify_mechanism(run.recording, model_of(described(rig)))
     return _identification(run, *_computed(run, rig, answer))
+
+
+def _refuse_slow(run: Run, rig: RigFile) -> None:
+    """No guess is so wrong that samples slower than its fastest mode show the motion."""
+    modes = rig.mechanism.model.modes_hz(nominal_start(rig))
+    if modes and modes[-1] > run.sample_rate:
+        raise PvidError(
+            f"a sample rate of {run.sample_rate:g} Hz shows no mode of {modes[-1]:.3g} Hz, which the guess of the rig "
+            "file has: the unit of t is probably wrong"
+        )
 
 
 def _computed(run: Run, rig: RigFile, answer: MechanismAnswer) -> tuple[RigFile, MechanismAnswer, _Core]:

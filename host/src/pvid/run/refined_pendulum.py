@@ -80,6 +80,8 @@ class _Search:
         self.run, self.rig = run, rig
         self.slow, self.fast = rig.mechanism.model.modes_hz(p)
         rate = run.sample_rate
+        if not 2 * self.fast < rate:
+            raise PvidError(f"{rate:g} samples a second are too few for a mode of {self.fast:.3g} Hz")
         edge = max(_EDGE * drive_edge_hz(run, rig), self.slow)
         front = second_derivative(rate, min(edge, 0.4 * rate))
         there = np.isfinite(run.y)

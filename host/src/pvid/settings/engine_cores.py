@@ -34,7 +34,7 @@ STRONG = EngineCore(
     "f32",
     "float32",
     None,
-    ("_q31", "strong_f32", "_weak_f32", "_fourier_f32", "_refine_f32", "derivatives_f32", "fingerprint_f32"),
+    ("_q31", "_strong_f32", "_weak_f32", "_fourier_f32", "_refine_f32", "fingerprint_f32"),
     "strong",
 )
 STRONG_CORES = (STRONG.name, "f64")  # of a described mechanism: in C, and its analysis in float64

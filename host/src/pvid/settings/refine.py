@@ -48,7 +48,7 @@ class RefineConfig:
     block, first_block : big steps of a full block and of the first one of a search
     sd : of the noise of a row at low frequencies [outputs]
     prior_sd : of the weak form's estimate [parameters], relative if logarithmic
-    gain_sd : errors by the gain of the sensors [parameters]
+    gain_sd : errors of the steps by one error of a sensor's gain, with their signs [parameters]
     state_limit : largest |start| of a block [states]
     passes, most_passes : of a block: at least, and while the steps are not small
     forgetting_s : time constant; 0: none

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pvid.core.sizes import at_least
 from pvid.settings.fourier import NONE, FourierDesign32, FourierModel
 from pvid.settings.fourier_q31 import FourierDesignQ31
 
@@ -31,19 +30,19 @@ def sizes_of_design(design: FourierDesign32) -> dict[str, int]:
         "PVID_MAX_FUNCTIONS": design.functions,
         "PVID_MAX_POWER": design.power,
         "PVID_MAX_DECIMATION": design.decimation,
+        "PVID_MAX_BLOCKS": _blocks(_used_ticks(design.decimation), 8, design),
     }
 
 
-def sizes_for_one(design: FourierDesign32) -> dict[str, int]:
-    """Those of a build for this design alone: none below what the core accepts, and loops of constant length where all
-    are those of the design (PVID_EXACT)."""
-    needed = sizes_of_design(design)
-    found = at_least(needed)
-    if found != needed:
-        return found
-    model = design.model
-    counts = ("signals", "jets", "runs", "signs", "integrands")
-    return found | {"PVID_EXACT": 1} | {f"PVID_EXACT_{one.upper()}": getattr(model, one) for one in counts}
+def _used_ticks(decimation: int) -> int:
+    """Ticks of a step that neither add harmonics nor run stages."""
+    return 0 if decimation == 1 else 2 if decimation >= 4 else 1
+
+
+def _blocks(used: int, steps: int, design: FourierDesign32 | FourierDesignQ31) -> int:
+    """Blocks of so many steps that the sums need: one where the other ticks of a step add and join all harmonics."""
+    free, items = design.decimation - used, 2 * (design.highest + 1)
+    return 1 if free * -(-items // (steps * free)) >= items else 2
 
 
 def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]:
@@ -66,4 +65,5 @@ def sizes_of_q31(design: FourierDesignQ31, n_p: int, n_c: int) -> dict[str, int]
         "PVID_MAX_FUNCTIONS": design.functions,
         "PVID_MAX_POWER": design.power,
         "PVID_MAX_DECIMATION": design.decimation,
+        "PVID_MAX_BLOCKS": _blocks(min(design.decimation - 1, 1), 4, design),
     }

@@ -98,6 +98,7 @@ class LiveState(threading.Thread):
         history, account = self._history, self._stream.account
         up, link = link_words(account)
         newest = history.newest
+        modelled = self._simulation.words  # before the motion: a simulation that ends meanwhile has its curve at once
         kappa, residual = newest.get("kappa", math.nan), newest.get("residual", math.nan)
         return {
             "title": self.title,
@@ -114,7 +115,7 @@ class LiveState(threading.Thread):
             "parameters": self._table(),
             "estimates": self._estimates(),
             "motion": self._motion(),
-            "modelled": self._simulation.words,
+            "modelled": modelled,
             "marks": self._marks(),
         }
 

@@ -198,13 +198,16 @@ def rig_of_guess(
     )
 
 
-def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSimulation) -> Path:
-    """Writes a run (the suffix gives the format) and beside it its rig file, whose path is returned."""
+def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSimulation, name: str = "") -> Path:
+    """Writes a run (the suffix gives the format) and beside it its rig file, whose path is returned.
+
+    `name` of the model in the rig file; default: that of the model.
+    """
     model, rate = simulation.model, simulation.rig.sample_rate
     signals = {one.name: run[one.name] for one in model.signals}
     write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
     settings = rig_path_of(path)
     exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven}
     exact |= {name: {"neglected": 0.0} for name in simulation.linearised}
-    MechanismRig(model.name, rate, known=simulation.rig.knowns, sensor=exact).write(settings)
+    MechanismRig(name or model.name, rate, known=simulation.rig.knowns, sensor=exact).write(settings)
     return settings

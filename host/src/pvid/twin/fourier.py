@@ -42,6 +42,11 @@ class FourierSchedule:
         """Harmonics that a tick adds or joins."""
         return -(-2 * self.harmonics // self.free_ticks)
 
+    def room_for(self, stages: int, stages_per_tick: int) -> bool:
+        """Whether so many stages of a window end before the next half's first block is added to the sums."""
+        joining = -(-2 * self.harmonics // self.items_per_tick)
+        return stages <= stages_per_tick * (self.free_ticks - joining)
+
     def stages_per_tick(self, stages: int) -> int:
         """Fewest stages per tick that finish a window before the next one is joined."""
         adding = -(-self.harmonics // self.items_per_tick)

@@ -24,6 +24,8 @@ _HOPELESS = _F(30)
 _LOST_MOST = 6
 _RECENT = 200
 _LEVEL_GAIN = _F(0.2)
+_CLASH_GAIN = _F(0.3)
+_FIRST_CLASH = _F(2)
 _ERRORS = _F(5)
 
 
@@ -50,6 +52,7 @@ class RefineEstimate:
     se: Float32
     covariance: Float32
     level: np.float32
+    clash: np.float32
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class RefineTwin:
         self.phase = Phase.WAIT
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
         self.passed = self.taken = self.refused = self.lost = self.length = self.begin = 0
-        self.level = _F(0)
+        self.level = self.clash = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
         self.weak_se = np.zeros(len(shape.place_of_p), _F)
         self.triangle = np.zeros((n, n), _F)
@@ -147,9 +150,13 @@ class RefineTwin:
         enough = self.work.used * 10 >= self.length * 6 * self.shape.outputs
         return bool(self.solved and enough and np.all(np.abs(self.start) < self.state_limit))
 
-    def _take(self, square: np.float32) -> None:
+    def _take(self, square: np.float32, clash: np.float32) -> None:
         config = self.config
         self.refused = self.lost = 0
+        if self.taken > 1:
+            self.clash = self.clash + _CLASH_GAIN * (clash - self.clash)
+        else:
+            self.clash = _FIRST_CLASH * clash if self.taken > 0 else _F(1)
         self.taken = min(self.taken + 1, 2)
         self.level = square if self.taken == 1 else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
@@ -202,7 +209,7 @@ class RefineTwin:
         )
         self.begin += self.work.step * BIG_STEP
         if taken:
-            self._take(square)
+            self._take(square, clash)
             self.verdict = Reason.UPDATED if self.taken > 1 else Reason.HELD_UNCERTAIN
         else:
             self.verdict = Reason.HELD_BLOCK if self.taken > 0 else Reason.HELD_SEARCHING
@@ -216,7 +223,8 @@ class RefineTwin:
         if self.passed == 0:
             self.covariance = np.multiply.outer(self.gain_sd, self.gain_sd)
         x = inverse_column(self.solve.triangle, self.passed)
-        variance = self.variance * _at_least_one(self.level)
+        level = _at_least_one(self.level)
+        variance = self.variance * (self.clash if self.clash > level else level)
         upto = self.passed + 1
         self.covariance[:upto, :upto] = self.covariance[:upto, :upto] + np.multiply.outer(variance * x[:upto], x[:upto])
         self.passed += 1
@@ -226,35 +234,36 @@ class RefineTwin:
         sd = np.sqrt(np.diag(self.covariance))
         logarithmic = self.steps.logarithmic
         se = np.where(logarithmic, sd * self.r, sd)
-        self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level)
+        self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level, self.clash)
         certain = np.all(np.isfinite(self.r)) and np.all(np.isfinite(se))
         certain = certain and np.all(~logarithmic | (se <= _F(self.config.se_max) * self.r))
         self.verdict = Reason.UPDATED
         if not certain:
             self.verdict = Reason.HELD_UNCERTAIN
             return
-        better, distance = True, _F(self.config.distance)
+        ratio, distance = _F(1), _F(self.config.distance)
         for i, place in enumerate(self.shape.place_of_p):
             x, error, weak_se = self.r[place], se[place], self.weak_se[i]
             errors = np.sqrt(error * error + weak_se * weak_se)
             allowed = _ERRORS * errors + (distance * x if logarithmic[place] else distance)
             if not -allowed <= x - self.weak[place] <= allowed:
                 self.verdict = Reason.HELD_DISAGREES
-            better = better and bool(distance > 0 or error <= weak_se)
-        if not better and self.verdict is Reason.UPDATED:
+            ratio = ratio * (error / weak_se)
+        if not (distance > 0 or ratio <= 1) and self.verdict is Reason.UPDATED:
             self.verdict = Reason.HELD_UNCERTAIN
 
     # ---- jobs ----
 
     def _pass_job(self) -> None:
-        first = self.work.needs()
+        first, steps = self.work.needs()
         signals = None
-        if first is not None:
+        if steps > 0:
             entry = self.begin + first
-            if self.front.end - entry < 3 + self.shape.reach:
-                self.waiting, self.due = True, entry + 3 + self.shape.reach
+            behind = entry + steps + self.shape.reach
+            if self.front.end < behind:
+                self.waiting, self.due = True, behind
                 return
-            signals = self.front.read(entry)
+            signals = self.front.read(entry, steps)
         self.work.do(self.linear, self.weight, signals)
         if self.work.ends(self.length):
             self.solve.begin()

@@ -10,5 +10,5 @@ RIG = SimulatedRig(
     start={"i": 0.03},
     friction_width=3.0,
     window_s=0.5,
-    design=dict(functions=28, decimation=4, rate_taps=31, rate_degree=6, joint=True),
+    design=dict(functions=40, rate_taps=31, rate_degree=6, joint=True),
 )

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.models.kapitza.model import MODEL
 from pvid.models.kapitza.modes import modes_hz
 from pvid.settings.refine import RefineRig, RefineSignal
 
@@ -18,6 +19,7 @@ _PRIOR_SD = (0.15, 0.15, 0.15, 0.1, 0.05, 0.005, 0.1)
 _STATE_LIMIT = (3.5, 3.5, 60.0, 60.0)
 _ANGLE_RANGE = 1.0
 _INPUT_RANGE = 3.0  # over gravity's w
+_GAIN_OF_Y = next(one for one in MODEL.scales if one.name == "y_gain")
 
 
 def refine_rig(
@@ -57,7 +59,7 @@ def refine_rig(
         ),
         sample_sd=(phi_sd,),
         prior_sd=_PRIOR_SD,
-        gain_sd=(y_gain_sd, *(0.0,) * 6),
+        gain_sd=tuple(y_gain_sd * power for power in (*_GAIN_OF_Y.p, 0.0, 0.0, 0.0, 0.0)),
         state_limit=_STATE_LIMIT,
     )
 

@@ -69,6 +69,11 @@ class Finish:
         project = sum(1 + _parts(own.columns - 1 - i, at_once) for i in range(nuisances)) or 1
         residual = _parts(self.design.functions, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
         squares = _parts(own.thetas, self._products)
+        return self._stages_of_columns(kind) + project + residual + squares + 1
+
+    def _stages_of_columns(self, kind: int) -> int:
+        """Stages of a kind until its columns are formed."""
+        own = self.design.model.kind[kind]
         basis = 2 * self.design.power + self._stages_of_share
         listed = _parts(len(self.estimator.model.c_row), _NONZEROS_PER_STAGE)
         pairs = _parts(len(pairs_of(self.design, kind)), _PAIRS_PER_STAGE)
@@ -76,7 +81,7 @@ class Finish:
         reflect = 1 if self.design.functions <= _BOTH_FAMILIES else 2
         terms = [one.column for one in self.design.model.terms_of(kind)]
         gather = sum(max(1, terms.count(column)) for column in range(own.columns))
-        return self._entries() + 3 + noise + basis + gather + reflect * own.columns + project + residual + squares
+        return self._entries() + 2 + noise + basis + gather + reflect * own.columns
 
     @property
     def _checks_noise(self) -> bool:
@@ -108,14 +113,20 @@ class Finish:
     def _stages_of_pull(self) -> int:
         return self._entries() + 1 if self.shares else 0
 
+    def _stages_of_kind(self, kind: int) -> int:
+        return self._stages_of_rows(kind) + self._stages_of_pull + self._stages_of_adding(kind)
+
+    @property
+    def stages_of_columns(self) -> int:
+        """Of a window until all its columns are formed, at most."""
+        last = self.design.model.kinds - 1
+        return sum(self._stages_of_kind(kind) for kind in range(last)) + self._stages_of_columns(last)
+
     @property
     def stages(self) -> int:
         """Of a window with all its solves."""
         estimator = self.estimator
-        of_kinds = sum(
-            self._stages_of_rows(kind) + self._stages_of_pull + self._stages_of_adding(kind)
-            for kind in range(self.design.model.kinds)
-        )
+        of_kinds = sum(self._stages_of_kind(kind) for kind in range(self.design.model.kinds))
         solves = estimator.solve_stages(True) + (self.iterations - 1) * estimator.solve_stages(False)
         return of_kinds + 6 + len(estimator.p) + solves + estimator.assess_solved_stages
 

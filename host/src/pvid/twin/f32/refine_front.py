@@ -125,10 +125,10 @@ class Front:
         self.wait -= 1
         return Entry.NOTHING if self.wait > 0 else self._end_block(given - self.reference)
 
-    def read(self, entry: int) -> Signals:
-        """Signals of an entry and the next two; of inputs those of the reach as well."""
-        value = self.ring[(entry - self.reach + np.arange(3 + 2 * self.reach)) % RING]
+    def read(self, entry: int, steps: int) -> Signals:
+        """Signals of so many entries; of inputs those of the reach as well."""
+        value = self.ring[(entry - self.reach + np.arange(steps + 2 * self.reach)) % RING]
         found = value.astype(_F) * self.from_counts
-        outputs = found[self.reach : self.reach + 3, self.inputs :]
-        outputs[value[self.reach : self.reach + 3, self.inputs :] == _MISSING] = np.nan
+        outputs = found[self.reach : self.reach + steps, self.inputs :]
+        outputs[value[self.reach : self.reach + steps, self.inputs :] == _MISSING] = np.nan
         return found[:, : self.inputs], outputs

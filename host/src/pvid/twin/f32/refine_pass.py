@@ -16,7 +16,7 @@ _VELOCITY = "198721/60480 -18637/2520 235183/20160 -10754/945 135713/20160 -5603
 _STARTS = 3
 
 Signals = tuple[Float32, Float32]
-"""Inputs [3 + 2 reach, inputs] and outputs [3, outputs] of three neighbouring steps."""
+"""Inputs [steps + 2 reach, inputs] and outputs [steps, outputs] of up to three neighbouring steps."""
 
 
 class Job(IntEnum):
@@ -26,11 +26,20 @@ class Job(IntEnum):
     FIRST_A = 1
     FIRST_B = 2
     FIRST = 3
-    SECOND_A = 4
-    SECOND_B = 5
-    SECOND = 6
-    COLUMNS = 7
-    ROWS = 8
+    MIDDLE = 4
+    SECOND_A = 5
+    SECOND_B = 6
+    SECOND = 7
+    END = 8
+    COLUMNS = 9
+    ROWS = 10
+
+
+_NEEDED = {
+    **dict.fromkeys((Job.FIRST_A, Job.FIRST_B, Job.SECOND_A, Job.SECOND_B), 3),
+    **dict.fromkeys((Job.FIRST, Job.MIDDLE, Job.SECOND, Job.END), 1),
+}
+_BEGINS = {Job.FIRST: 1, Job.MIDDLE: 2, Job.SECOND_A: 2, Job.SECOND_B: 2, Job.SECOND: 3, Job.END: 4}
 
 
 def _weights(text: str) -> Float32:
@@ -83,11 +92,9 @@ class Pass:
         self.state = start.copy()
         self.job, self.head, self.rows, self.starts, self.step, self.used = Job.CLEAR, 0, 0, _STARTS, 0, 0
 
-    def needs(self) -> int | None:
-        """Step of the block whose signals the next job needs, with the next two; None: it needs none."""
-        if not Job.FIRST_A <= self.job <= Job.SECOND:
-            return None
-        return self.step * BIG_STEP + (2 if self.job >= Job.SECOND_A else 0)
+    def needs(self) -> tuple[int, int]:
+        """First step of the block whose signals the next job needs, and how many steps; 0: none."""
+        return self.step * BIG_STEP + _BEGINS.get(self.job, 0), _NEEDED.get(self.job, 0)
 
     def ends(self, length: int) -> bool:
         """Whether the pass is complete."""
@@ -199,7 +206,7 @@ class Pass:
         found = self.model.jacobian(self.constants, x, v, u)
         B = found.B.copy()
         if shape.skew:
-            rate = self._weighted(self.slope, signals, 2)
+            rate = self._weighted(self.slope, signals, 0)
             total: Float32 = np.zeros(q, _F)
             for j in range(shape.inputs):
                 total = total + found.U[:, j] * rate[j]
@@ -229,24 +236,19 @@ class Pass:
         self.kick_v = _damped(D, half, big * D)
         self.kick_r = _damped(D, half, (big * B).T)
 
-    def _pair(self, r: Float32, signals: Signals, to_middle: bool) -> None:
-        starting = self.starts > 0
-        u = self._input(signals, 1)
-        if starting:
-            self._residuals(r, self.middle, u, signals[1][1])
-            self._push(self._motion(self.middle, u))
-        else:
-            self._adams_bashforth()
-            self._residuals(r, self.state, u, signals[1][1])
-            self._push(self._motion(self.state, u))
-        u = self._input(signals, 2)
-        if starting:
-            self.state = self.end
+    def _step(self, r: Float32, signals: Signals) -> None:
+        u, x, started = self._input(signals, 0), self.middle, self.starts == 0
+        if started:
+            if self.job != Job.MIDDLE:
+                self._adams_bashforth()
+            x = self.state
+        elif self.job in (Job.MIDDLE, Job.END):
+            x = self.state = self.end
             self.starts -= 1
-        else:
+        self._residuals(r, x, u, signals[1][0])
+        self._push(self._derivatives(r, signals, u) if self.job == Job.MIDDLE else self._motion(x, u))
+        if started and self.job == Job.FIRST:
             self._adams_bashforth()
-        self._push(self._derivatives(r, signals, u) if to_middle else self._motion(self.state, u))
-        self._residuals(r, self.state, u, signals[1][2])
 
     # ---- columns and rows ----
 
@@ -339,5 +341,8 @@ class Pass:
                 self._second_half(signals)
                 self.job = Job(job + 1)
             else:
-                self._pair(r, signals, job == Job.FIRST)
-                self.job = Job.COLUMNS if job == Job.SECOND else Job.SECOND_A if self.starts else Job.SECOND
+                self._step(r, signals)
+                if job in (Job.FIRST, Job.SECOND):
+                    self.job = Job(job + 1)
+                else:
+                    self.job = Job.COLUMNS if job == Job.END else Job.SECOND_A if self.starts else Job.SECOND
