@@ -56,7 +56,8 @@ unlock() { exec 9>&-; }
 
 # The packages of PROFILE that are missing, judged by what they bring, so that a tool installed in another way
 # counts. Profiles: pvid (to run), demo (to build for the Cortex-M boards and emulate them besides), targets (the same
-# for every board), test (to test, all of that and more), long (the long forms of the tests: a browser besides).
+# for every board), test (to test, all of that and more), long (the long forms of the tests: a browser besides), cycles (to
+# simulate a core from its RTL).
 missing_packages() {
     local missing=()
     need() { # need PACKAGE CHECK...
@@ -81,6 +82,12 @@ missing_packages() {
         need chromium command -v chromium
         need chromium-driver command -v chromedriver
         set -- test
+    fi
+    if [[ $1 == cycles ]]; then
+        need verilator command -v verilator
+        need g++ command -v g++
+        need make command -v make
+        need gcc-riscv64-unknown-elf command -v riscv64-unknown-elf-gcc
     fi
     if [[ $1 == test || $1 == targets || $1 == demo ]]; then
         # No C library for ARM and RISC-V: firmware/ports does without.

@@ -186,6 +186,20 @@ def bench_float_cost(mechanism: str, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="cycles")
+@click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
+@UPDATE
+def bench_cycles(processes: int, update: Path | None) -> int:
+    """Clock cycles of a tick on a real core, CV32E40P, simulated from its RTL by verilator with ideal memory."""
+    from bench import cycles
+
+    with progress_bar("images", cycles.STEPS) as advance:
+        done = iter(range(1, cycles.STEPS + 1))
+        rows = list(cycles.cycle_rows(processes, lambda: advance(next(done))))
+    put_table(update, "cycles", markdown(cycles.HEADER, rows))
+    return DIFFERENT if any(row[-1] != "equal" for row in rows) else DONE
+
+
 @bench.command(name="cost")
 @UPDATE
 def bench_cost(update: Path | None) -> int:

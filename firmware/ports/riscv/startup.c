@@ -29,12 +29,14 @@ __attribute__((naked, section(".reset"))) void pvid_reset(void)
                      "csrs mstatus, t0\n\t"
                      "csrw fcsr, zero\n\t" /* to nearest even */
 #endif
+#if !defined(PVID_NO_PROTECTION)
                      /* The page below the stack is inaccessible (PMP, NAPOT of 4 kB) and locked. */
                      "la t0, pvid_stack_guard + 0x7FF\n\t"
                      "srli t0, t0, 2\n\t"
                      "csrw pmpaddr0, t0\n\t"
                      "li t0, 0x98\n\t"
                      "csrw pmpcfg0, t0\n\t"
+#endif
                      "mv a0, sp\n\t"
                      "la t0, pvid_start\n\t"
                      "jr t0\n\t"
