@@ -6,9 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from bench.cycles import row_of, rtl, same_bits
+from bench.cycles import CLOCKS_MHZ, HEADER, row_of, rtl, same_bits, share
 from pvid.board.replay_image import ReplayReport
+from pvid.core.sources import ROOT
 
 HASHES = np.arange(7, 1007, dtype=np.uint32)
 REPORT = ReplayReport(
@@ -44,3 +46,25 @@ def test_the_core_comes_without_its_models_of_cells(tmp_path: Path) -> None:
     (tmp_path / "cv32e40p_fpu_manifest.flist").write_text(manifest, encoding="utf-8")
     folder = tmp_path / "rtl"
     assert rtl(folder) == [f"+incdir+{folder}/include", f"{folder}/a.sv"]
+
+
+def _rows_of_the_page() -> list[list[str]]:
+    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
+    lines = page.partition("<!-- cycles -->\n")[2].partition("\n<!-- /cycles -->")[0].splitlines()
+    head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    assert tuple(head) == HEADER
+    return rows
+
+
+def test_the_page_follows_from_its_cycles() -> None:
+    rows = _rows_of_the_page()
+    assert len(rows) == 8
+    for _, _, ticks, mean, longest, *shares, bits in rows:
+        assert bits == "equal" and 0 < int(mean) <= int(longest) and int(ticks) >= 1000
+        assert [float(one) for one in shares] == [pytest.approx(share(int(mean), mhz), abs=0.006) for mhz in CLOCKS_MHZ]
+
+
+def test_stages_of_the_fpu_cost_cycles() -> None:
+    mean = {(title, fpu): int(cycles) for title, fpu, _, cycles, *_ in _rows_of_the_page()}
+    slower = [title for title, fpu in mean if fpu == "latency 2"]
+    assert len(slower) == 3 and all(mean[one, "latency 2"] > mean[one, "latency 0"] for one in slower)
