@@ -20,8 +20,8 @@ static uint32_t items(const pvid_fourier_design_q31 *design)
 
 bool pvid_fourier_blocks_fit_q31(const pvid_fourier_design_q31 *design)
 {
-    const uint32_t each = (other_ticks(design) / 4u) * items(design);
-    return (PVID_MAX_BLOCKS > 1) || (each >= (2u * (uint32_t)pvid_fourier_harmonics_q31(design)));
+    return (PVID_MAX_BLOCKS > 1) ||
+           (((other_ticks(design) / 4u) * items(design)) >= (2u * (uint32_t)pvid_fourier_harmonics_q31(design)));
 }
 
 /* The blocks of a half but the one in which the window is joined have ticks without harmonics. */

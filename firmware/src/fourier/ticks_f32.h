@@ -31,11 +31,13 @@ static inline uint8_t pvid_fourier_items_f32(uint32_t free_ticks, uint32_t harmo
     return (uint8_t)(((2u * harmonics) + (free_ticks - 1u)) / free_ticks);
 }
 
-/* Blocks that are needed: one where the free ticks of a step add and join all harmonics, before the next step's channels
- * take the place of the first of the block. */
+/* Blocks that are needed: one where the free ticks of a step add and join all harmonics, before the next step's
+ * channels take the place of the first of the block. */
 static inline uint32_t pvid_fourier_blocks_f32(uint32_t free_ticks, uint32_t harmonics)
 {
-    return (((free_ticks / PVID_FOURIER_BLOCK) * pvid_fourier_items_f32(free_ticks, harmonics)) >= (2u * harmonics)) ? 1u : 2u;
+    return (((free_ticks / PVID_FOURIER_BLOCK) * pvid_fourier_items_f32(free_ticks, harmonics)) >= (2u * harmonics))
+               ? 1u
+               : 2u;
 }
 
 /* Fewest stages per tick that finish a window before the next one is joined; 0: more than PVID_FOURIER_MOST_STAGES. The
