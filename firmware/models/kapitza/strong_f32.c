@@ -15,7 +15,7 @@
 #include "number/finite_f32.h"
 #include "number/init.h"
 #include "number/unroll.h"
-#include "derivatives_f32.h"
+#include "strong_derivatives_f32.h"
 
 /* The gate's scale averages over about a period of the faster mode, because row_sd is only a guess. */
 #define GATE_MEMORY_S 0.25f

@@ -1,4 +1,4 @@
-"""Twin of derivatives_f32.c: the derivatives of both channels of the strong form."""
+"""Twin of strong_derivatives_f32.c: the derivatives of both channels of the strong form."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-#include "derivatives_f32.h"
+#include "strong_derivatives_f32.h"
 
 #include "number/finite_f32.h"
 
