@@ -170,7 +170,7 @@ def test_identifiers_and_files_that_pages_name_exist() -> None:
                 missing.append(f"{page.relative_to(ROOT)}: {name}")
         for name in re.findall(r"[\w/.]+\.(?:c|h|py|toml|cmake|md)\b", span):
             known = name.rsplit("/", 1)[-1] in files or re.match(
-                r"(run|rig|run-tuned|main|RUN|link|motor|my_motor|own|cart|dc_motor\w*|kapitza_\w*|pvid_NAME|NAME_\w+)\b",
+                r"(run|rig|run-tuned|main|RUN|link|motor\w*|my_motor|own|cart|dc_motor\w*|kapitza_\w*|pvid_NAME|NAME_\w+)\b",
                 name,
             )
             if not known:
