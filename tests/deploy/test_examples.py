@@ -16,6 +16,9 @@ from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
 
 EXAMPLES = ROOT / "firmware" / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.c"))
+SRC = ROOT / "firmware" / "src"
+PUBLIC = (f"-I{ROOT / 'firmware' / 'include'}",)
+ESTIMATOR = sorted([*SRC.glob("solve/*_f32.c"), SRC / "solve" / "kinds.c", *SRC.glob("number/*_f32.c")])
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 PRINTED = {
     "minimal": r"(?s).*: updated\n.*\nR = 1\.(19|20)\d* \+- \S+ ohm\n.*",
@@ -35,6 +38,8 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_package(made, "cmake", folder / "p")
     built(folder / "p", folder / "b")
     run("gcc", "-std=c99", "-Ip/src", "-c", "p/example/dc_motor_example.c", "-o", "example.o", cwd=folder)
+    (folder / "core").mkdir()
+    run("gcc", "-std=c99", "-ffp-contract=off", *PUBLIC, f"-I{SRC}", "-c", *ESTIMATOR, cwd=folder / "core")
     run("gcc", "-std=gnu99", "-c", STUBS / "freertos" / "tasks.c", "-o", "tasks.o", cwd=folder)
     return folder
 
@@ -48,8 +53,10 @@ def test_every_example_has_its_output() -> None:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("language", [("gcc", "-std=c99"), ("g++", "-std=c++14", "-x", "c++")], ids=["C", "C++"])
 def test_example(name: str, language: tuple[str, ...], package: Path, tmp_path: Path) -> None:
-    paths = (f"-I{package}/p/src", f"-I{package}/p/example", f"-I{STUBS / 'freertos'}")
-    objects = ("example.o", "tasks.o", "b/libpvid_dc_motor.a")
+    paths: tuple[str, ...] = (f"-I{package}/p/src", f"-I{package}/p/example", f"-I{STUBS / 'freertos'}")
+    objects: tuple[str, ...] = ("example.o", "tasks.o", "b/libpvid_dc_motor.a")
+    if name == "own_mechanism":  # no package's
+        paths, objects = PUBLIC, tuple(f"core/{one.stem}.o" for one in ESTIMATOR)
     flags = (*language[1:], *WARNINGS, *paths)
     run(language[0], *flags, "-c", EXAMPLES / f"{name}.c", "-o", tmp_path / "main.o", cwd=package)
     run(language[0], tmp_path / "main.o", *objects, "-lm", "-pthread", "-o", tmp_path / "it", cwd=package)
