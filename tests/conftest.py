@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = (
-    *("board/targets", "board/stream", "twin/strong_bits_q31", "log/verify", "log/log", "cli/cli"),
+    *("board/targets", "tools/pages", "board/stream", "twin/strong_bits_q31", "log/verify", "log/log", "cli/cli"),
     *("run/advice", "board/memory", "show/report", "cli/run_input", "bench/longevity", "board/port"),
     *("core/strong_q31", "bench/attack", "board/ports", "twin/gate", "bench/liar", "board/field"),
     *("tools/consumer", "core/core_q31", "twin/bits", "core/dead_zone", "twin/weak_bits_q31"),

@@ -55,17 +55,6 @@ def test_the_acceleration_range_follows_the_run_both_ways() -> None:
     assert with_ranges_of(RIG, replace(run, y=y)).sensor.acceleration_range == pytest.approx(4 * 9.8)
 
 
-def test_a_gentle_drive_gives_the_answers_of_float32(native: Native) -> None:
-    """With a range of 4 g, the rounding of the products of u took 10 % off d2, silently, in half of the windows."""
-    rig = simulate_rig(native, shipped(), 1, 50)
-    record, fixed = identify_rig(native, rig, "q31")
-    _, float32 = identify_rig(native, rig, "f32")
-    assert record["publications"] > 100  # type: ignore[operator]
-    assert record["publications_wrong"] == 0
-    assert fixed is not None and float32 is not None
-    assert fixed.value["d2"] == pytest.approx(float32.value["d2"], abs=0.5 * float32.se["d2"])
-
-
 def test_a_run_that_goes_further_sets_them() -> None:
     run = far_run()
     sensor = with_ranges_of(RIG, run).sensor
