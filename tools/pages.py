@@ -39,7 +39,7 @@ NOT_EXECUTED = (
     (r"^\./tools/pvid (bench|campaign)\b", "takes minutes to hours; tests/bench executes its short form"),
     (r"/dev/tty", "needs a board; tests/log executes it on a board of the host"),
     (r"^\./tools/pvid demo", "tests/cli/test_cli.py and test_mechanism_demo.py execute it"),
-    (r"^\./tools/pvid sizes", "builds every image; tests/cost executes it"),
+    (r"^\./tools/pvid sizes", "builds every image; tests/board/test_targets.py measures some of them"),
     (r"--on all\b", "needs every emulator; tests/board executes them"),
     (r"^\./tools/pvid batch", "starts worker processes; tests/fleet/test_batch.py executes it"),
     (r"^\./tools/(test|release)\b", "executes the tests themselves; tests/tools/test_release.py executes parts of it"),
@@ -262,7 +262,7 @@ def shown_lines(printed: str) -> list[str]:
 
 
 def differences(shown: str, printed: str) -> Iterator[str]:
-    """Lines of a page that were not printed, in order; `...` stands for lines that are left out.
+    """Yields the lines that a page shows and the command did not print, in order. `...` matches any lines.
 
     Figures may differ by 5 %: another machine's linear algebra rounds otherwise, and standard errors have two digits.
     """

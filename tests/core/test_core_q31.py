@@ -119,7 +119,7 @@ def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
 
 
 def test_an_encoder_without_a_resolution_is_named(recorded: tuple[Path, Path], tmp_path: Path) -> None:
-    """Nothing is identified at an error of zero, and the step that the run shows is told."""
+    """A resolution of 0 explains no residual: identify gives no estimate, and advises the step that the run shows."""
     rig = RigFile.standard()
     replace(rig, sensor=replace(rig.sensor, phi_lsb=0.0)).write(tmp_path / "rig.toml")
     command = ["identify", str(recorded[0]), "--rig", str(tmp_path / "rig.toml"), "--core", "q31"]

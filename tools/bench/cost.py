@@ -54,15 +54,8 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2") -> Path:
     """
     sources = sorted([*sources_of("f32"), *(ROOT / "tests" / "cost").glob("*.c"), PENDULUM / "kapitza_weak_f32.c"])
     binary = folder / "tick_cost"
-    command = [
-        compiler,
-        "-std=c99",
-        level,
-        "-ffp-contract=off",
-        "-DPVID_PLAIN_NAMES",
-        *INCLUDES,
-    ]  # callgrind is given names
-    command.append(f"-I{PENDULUM.parent}")
+    plain = "-DPVID_PLAIN_NAMES"  # callgrind is given names
+    command = [compiler, "-std=c99", level, "-ffp-contract=off", plain, *INCLUDES, f"-I{PENDULUM.parent}"]
     try:
         done = subprocess.run(
             [*command, *map(str, sources), "-o", str(binary), "-lm"], capture_output=True, text=True, check=False

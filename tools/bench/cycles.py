@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +45,7 @@ _TOP = "cv32e40p_top"
 _TIMEOUT_S = 1800.0
 
 Hashes = npt.NDArray[np.uint32]
+Run = TypeVar("Run")
 
 
 @dataclass(frozen=True)
@@ -79,30 +81,27 @@ class Case:
     hashes: Callable[[], Hashes]
 
 
+def _case(
+    title: str, run: Run, build: Callable[[Board, Run], tuple[Path, Path]], hashes: Callable[[Run], Hashes]
+) -> Case:
+    return Case(title, lambda board: build(board, run), lambda: hashes(run))
+
+
 def _float_engine(model: str) -> Case:
     run = mechanism_image.mechanism_run(model)
-    return Case(
-        f"weak, f32, {model}",
-        lambda board: mechanism_image.build_mechanism_image(board, run),
-        lambda: mechanism_image.native_hashes(run),
-    )
+    return _case(f"weak, f32, {model}", run, mechanism_image.build_mechanism_image, mechanism_image.native_hashes)
 
 
 def _fixed_engine(model: str) -> Case:
     run = mechanism_image_q31.fixed_run(model)
-    return Case(
-        f"weak, q31, {model}",
-        lambda board: mechanism_image_q31.build_fixed_image(board, run),
-        lambda: mechanism_image_q31.native_hashes(run),
-    )
+    return _case(f"weak, q31, {model}", run, mechanism_image_q31.build_fixed_image, mechanism_image_q31.native_hashes)
 
 
 def _strong(core: Core) -> Case:
     run = replay_image.standard_run("strong", STRONG_TICKS, core)
-    return Case(
-        f"strong, {core}, kapitza",
-        lambda board: replay_image.build_image(board, run),
-        lambda: replay_image.native_hashes(run, Native()),
+    native = Native()
+    return _case(
+        f"strong, {core}, kapitza", run, replay_image.build_image, lambda one: replay_image.native_hashes(one, native)
     )
 
 

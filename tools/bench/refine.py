@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +37,8 @@ from pvid.sim.pendulum import (
 from pvid.sim.pendulum import standard_start as start_of
 
 Float = npt.NDArray[np.float64]
+Kind = TypeVar("Kind")
+Found = TypeVar("Found")
 
 RATE_HZ = 1000.0
 SEEDS = 80
@@ -232,13 +234,24 @@ def row_of(case: Case, runs: list[Outcome]) -> tuple[str, ...]:
     )
 
 
-def refine_table(seeds: int, progress: Callable[[], None], cases: Sequence[Case] = CASES) -> list[tuple[str, ...]]:
-    """A row for each case."""
+def table_of(
+    cases: Sequence[Kind],
+    seeds: int,
+    progress: Callable[[], None],
+    run: Callable[[Kind, int], Found],
+    row: Callable[[Kind, list[Found]], tuple[str, ...]],
+) -> list[tuple[str, ...]]:
+    """A row for each case, of its runs with seeds from 0."""
     rows = []
     for case in cases:
         runs = []
         for seed in range(seeds):
-            runs.append(run_case(case, seed))
+            runs.append(run(case, seed))
             progress()
-        rows.append(row_of(case, runs))
+        rows.append(row(case, runs))
     return rows
+
+
+def refine_table(seeds: int, progress: Callable[[], None], cases: Sequence[Case] = CASES) -> list[tuple[str, ...]]:
+    """A row for each case."""
+    return table_of(cases, seeds, progress, run_case, row_of)

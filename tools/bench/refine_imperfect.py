@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from bench.campaign.motion import accelerations, integrate, relative_angle, step_of
 from bench.campaign.pivot import PivotMotion
-from bench.refine import RATE_HZ, RELEASE, TRUTH, engine_of
+from bench.refine import RATE_HZ, RELEASE, TRUTH, engine_of, table_of
 from pvid.core.native import Native
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
 from pvid.sim.imperfections import eccentric, with_play
@@ -184,11 +184,4 @@ def imperfect_table(
     seeds: int, progress: Callable[[], None], faults: Sequence[Fault] = FAULTS
 ) -> list[tuple[str, ...]]:
     """A row for each imperfection."""
-    rows = []
-    for fault in faults:
-        runs = []
-        for seed in range(seeds):
-            runs.append(run_fault(fault, seed))
-            progress()
-        rows.append(row_of(fault, runs))
-    return rows
+    return table_of(faults, seeds, progress, run_fault, row_of)

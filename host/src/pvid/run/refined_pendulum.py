@@ -18,6 +18,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.refined import GOOD, Inputs, Measured, Prior, Problem, Refined, refined, without_outliers
 from pvid.run.refined_kernel import kernel_of
+from pvid.setup.f32 import row_sd_of
 
 Float = npt.NDArray[np.float64]
 
@@ -25,7 +26,6 @@ _PERIODS = 2.0  # of the slow mode in a block
 _SEARCH = (0.15, 0.4)  # of that: blocks of the search for w, d1, d2 and the zero alone
 _SEARCH_PASSES = 12
 _BOUND = 1.5  # slow chi^2 of a search that needs no other start
-_LEAST_SD = 1e-8  # of an angle [rad]: that of an exact sensor in float32
 _EDGE = 1.25  # times the drive's: the pass band
 _STEP = 0.1  # of a step times the fast mode's angular frequency
 _A_PERIOD = 60  # decimated samples in a period of the fast mode
@@ -106,7 +106,7 @@ class _Search:
             sub *= coarse
             inputs = _inputs(*self._track, rate, sub, self.samples)
             phi, grown = averages(self.run.phi[self.first :][: self.samples * self.mean], self.mean)
-            sd = np.array([max(sample_sd(self.rig.sensor.phi_lsb, 0.5), _LEAST_SD) / np.sqrt(self.mean)])
+            sd = np.array([row_sd_of(self.rig, self.mean)])
             kernel = kernel_of(compiled_of(DEFAULT), optional)
             self._problems[optional] = Problem(kernel, Measured(phi[:, None], sd, inputs, rate, sub, grown, coarse))
         return self._problems[optional]

@@ -7,8 +7,9 @@
  *
  * The estimator keeps 57 repeated moments as exact 64-bit sums. A solve shifts them from G to the present u + w in 28
  * bits and a common power of two for each family of columns, and factors S = L D L^T with one division of 32 bits a
- * pivot. Law, reasons and settings are those of estimator_q31.h. For every sequence of rows no sum wraps, no division
- * is by 0, and p stays within its bounds (proved but for what Cauchy-Schwarz says of the sums: host/docs/proofs.md).
+ * pivot. Law, reasons and settings are those of estimator_q31.h. For every sequence of rows no sum overflows, no
+ * divisor is 0, and p stays within its bounds. The proof assumes the Cauchy-Schwarz inequality of the sums
+ * (host/docs/proofs.md).
  * Not thread-safe.
  */
 #ifndef PVID_KAPITZA_STRONG_Q31_H
