@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.model.compiled import CompiledModel
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.choice import MODEL_ERROR, Scored, ranked, score_of
+from pvid.oracle.fourier.choice import MODEL_ERROR, Scored, ranked, ranked_for_engine, score_of
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.gate import gated
@@ -86,38 +86,46 @@ def engine_tables(compiled: CompiledModel, run: Run, design: FourierDesign, p: F
     return EngineTables(rows, fit.p, list(fit.errors), design_tables(tables_of, rows, fit.p, fit.errors))
 
 
-def config_for_recording(compiled: CompiledModel, recording: Recording, functions: int | None = None) -> FourierConfig:
+def config_for_recording(
+    compiled: CompiledModel, recording: Recording, functions: int | None = None, ranking: Sequence[Scored] = ()
+) -> FourierConfig:
     """Settings for the rig that made a recording; the estimate starts at what the recording shows.
 
     Parameters
     ----------
     functions : K; None: chosen
+    ranking : as of design_for_recording
     """
-    design, p, known = design_and_p(compiled, recording, functions)
+    design, p, known = design_and_p(compiled, recording, functions, ranking)
     return engine_config(compiled, recording.signals, design, p, start_there=known)
 
 
 def design_and_p(
-    compiled: CompiledModel, recording: Recording, functions: int | None = None
+    compiled: CompiledModel, recording: Recording, functions: int | None = None, ranking: Sequence[Scored] = ()
 ) -> tuple[FourierDesign, Float, bool]:
     """The design that is chosen for a recording, the parameters that it was chosen at [n_p], whether to start there."""
-    best = design_for_recording(ready(compiled), recording.signals, recording.sample_rate)
+    best = design_for_recording(ready(compiled), recording.signals, recording.sample_rate, ranking)
     return _with(best.design, functions), best.p, best.known
 
 
-def config_to_identify(compiled: CompiledModel, recording: Recording) -> FourierConfig:
+def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FourierConfig:
     """The same, to identify the recording itself: the limit of a standard error is that of the analysis, whose verdict
     judges the answer, not that of a microcontroller on its own."""
-    config = config_for_recording(compiled, recording)
+    config = config_for_recording(compiled, recording, ranking=ranking)
     return replace(config, trust=replace(config.trust, se_max=UNKNOWN))
 
 
-def design_for_recording(model: Compiled, run: Run, sample_rate: float) -> Scored:
+def design_for_recording(model: Compiled, run: Run, sample_rate: float, ranking: Sequence[Scored] = ()) -> Scored:
     """The design of the engine with the least predicted errors, then a cheaper one that is nearly as good.
 
     A model with corners keeps its sample rate: filters before decimation blur them (measured: 0.2 % of a motor's L).
+
+    Parameters
+    ----------
+    ranking : of the analysis of the same run in float64, from the guesses on; used where the engine's is the same
     """
-    best = ranked(model, run, sample_rate, reversals="averaged")[0]
+    tried = ranked_for_engine(model, ranking) or ranked(model, run, sample_rate, reversals="averaged")
+    best = tried[0]
 
     def scored(designs: Iterable[FourierDesign]) -> list[Scored]:
         tried = (score_of(model, run, one, best.p, best.chi2 > MODEL_ERROR) for one in designs)

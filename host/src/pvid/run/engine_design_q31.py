@@ -13,6 +13,7 @@ from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
 from pvid.codegen.parameters_q31 import ParametersQ31, fixed_parameters
 from pvid.design.fourier_q31 import Sensing, fixed_design, most_counts
 from pvid.model.compiled import CompiledModel
+from pvid.oracle.fourier.choice import Scored
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.identify import ready
@@ -166,6 +167,7 @@ def engine_for_recording(
     recording: Recording,
     functions: int | None = None,
     soft_signs: Mapping[str, float] | None = None,
+    ranking: Sequence[Scored] = (),
 ) -> FixedEngine:
     """For the rig that made a recording, with the design that float32 gets.
 
@@ -173,14 +175,15 @@ def engine_for_recording(
     ----------
     functions : K; None: chosen
     soft_signs : as of fixed_engine
+    ranking : as of pvid.run.engine_design.design_for_recording
     """
-    design, p, known = design_and_p(compiled, recording, functions)
+    design, p, known = design_and_p(compiled, recording, functions, ranking)
     return fixed_engine(compiled, recording.signals, design, p, start_there=known, soft_signs=soft_signs)
 
 
-def engine_to_identify(compiled: CompiledModel, recording: Recording) -> FixedEngine:
+def engine_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FixedEngine:
     """The same, to identify the recording itself: as config_to_identify."""
-    engine = engine_for_recording(compiled, recording)
+    engine = engine_for_recording(compiled, recording, ranking=ranking)
     trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS))
     return replace(engine, config=replace(engine.config, trust=trust))
 

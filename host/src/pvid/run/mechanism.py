@@ -14,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
+from pvid.oracle.fourier.choice import Scored
 from pvid.oracle.fourier.identify import Identified, given
 from pvid.oracle.fourier.identify import identify as identified_by
 from pvid.oracle.fourier.weights import Weights
@@ -57,6 +58,11 @@ class MechanismAnswer:
     def identified(self) -> bool:
         """Whether every parameter is."""
         return self.found.verdict.identified
+
+    @property
+    def ranking(self) -> tuple[Scored, ...]:
+        """The designs that were tried, where they were compared as the engine's are; else ()."""
+        return self.found.ranking if self.weights == "residuals" else ()
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""

@@ -170,7 +170,7 @@ def identify_in_c(answer: MechanismAnswer, core: Core = "f32") -> CoreAnswer:
 
 
 def _in_float(answer: MechanismAnswer) -> _Run:
-    config = config_to_identify(answer.model, answer.recording)
+    config = config_to_identify(answer.model, answer.recording, answer.ranking)
     design = config.design
     identifier = fourier_native(answer.model, design).identifier_of(config)
     record = identifier.run_samples(samples_of(config, answer.recording.signals), sums=False)
@@ -190,7 +190,7 @@ def _in_float(answer: MechanismAnswer) -> _Run:
 
 
 def _in_fixed_point(answer: MechanismAnswer) -> _Run:
-    engine = engine_to_identify(answer.model, answer.recording)
+    engine = engine_to_identify(answer.model, answer.recording, answer.ranking)
     design = engine.config.design
     identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
     record = identifier.run_samples(engine.counts_of(answer.recording.signals), sums=False)

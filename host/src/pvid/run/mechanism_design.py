@@ -112,4 +112,5 @@ def designs_tried(compiled: CompiledModel, recording: Recording) -> tuple[list[S
         When the recording is too short.
     """
     model, rate = ready(compiled), recording.sample_rate
-    return ranked(model, recording.signals, rate), design_for_recording(model, recording.signals, rate)
+    ranking = ranked(model, recording.signals, rate)
+    return ranking, design_for_recording(model, recording.signals, rate, ranking)

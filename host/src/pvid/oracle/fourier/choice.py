@@ -7,7 +7,7 @@ the best by truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -189,6 +189,15 @@ def ranked(
         best = min(tried, key=_order)
         attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
     return sorted(tried, key=_order)
+
+
+def ranked_for_engine(model: Compiled, tried: Sequence[Scored]) -> list[Scored] | None:
+    """What `ranked` finds with averaged signs, from what it has found with located ones, all else at its default; None
+    where signs make a difference."""
+    if model.channels.signs:
+        return None
+    alone = [one for one in tried if not one.design.joint]
+    return [replace(one, design=replace(one.design, reversals="averaged")) for one in alone]
 
 
 def _order(one: Scored) -> tuple[bool, float]:

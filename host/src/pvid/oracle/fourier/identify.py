@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Known
 from pvid.oracle.fourier import verdict
 from pvid.oracle.fourier.attenuation import other_line
-from pvid.oracle.fourier.choice import ranked
+from pvid.oracle.fourier.choice import Scored, ranked
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.errors import uncertainty
 from pvid.oracle.fourier.functions import Float
@@ -47,6 +47,7 @@ class Identified:
     equation_errors : of each row kind
     halves : p of either half; None: too short
     fit : rows and residuals, for plots
+    ranking : designs that were tried, the best first; () where the design was given
     """
 
     names: tuple[str, ...]
@@ -65,6 +66,7 @@ class Identified:
     equation_errors: dict[str, EquationError]
     halves: Halves | None
     fit: Fit
+    ranking: tuple[Scored, ...]
     by_gain: dict[str, Float]
     by_known: dict[str, Float]
     by_neglect: Float
@@ -129,9 +131,10 @@ def identify(
     model = ready(compiled)
     begun = start_of(compiled, start)
     with_error = weights == "residuals"
+    ranking: tuple[Scored, ...] = ()
     if design is None:
-        best = ranked(model, run, sample_rate, begun, with_error)[0]
-        used, near = best.design, best.p
+        ranking = tuple(ranked(model, run, sample_rate, begun, with_error))
+        used, near = ranking[0].design, ranking[0].p
     else:
         used, near = design, None
     rows = WeakRows.of(model, run, used)
@@ -193,6 +196,7 @@ def identify(
         equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
         halves=halves,
         fit=fit,
+        ranking=ranking,
         by_gain=by_gain,
         by_known=by_known,
         by_neglect=by_neglect,
