@@ -67,7 +67,6 @@ ESTIMATOR = (
         "src/solve/kinds.c",
         "src/solve/scaled_model_q31.c",
         "src/solve/settings_q31.c",
-        "models/kapitza/kapitza_weak_q31.c",
     ),
     *("src/solve/cholesky_q31.c", "src/number/scaled_q31.c", "src/number/integer_q31.c"),
 )
@@ -148,8 +147,8 @@ PROOFS = (
     ),
     Proof(
         "kapitza_q31",
-        "theta and Jacobian of the weak models within 2^60 for any p, their formats; the strong form's rows",
-        ("models/kapitza/kapitza_weak_q31.c", "src/number/integer_q31.c"),
+        "the strong form's rows from any derivatives; the innovation of any row at any p",
+        ("src/number/integer_q31.c",),
         (
             *("-eva-auto-loop-unroll", "200", "-eva-split-return", "full", "-eva-slevel-function"),
             "pvid_kapitza_strong_row_q31:100,take_angles:50,three_powers:20,powers_to_3:20,powers_to_4:20,"
@@ -182,7 +181,7 @@ PROOFS = (
     ),
     Proof(
         "estimator_q31",
-        "start and rows for the three models and two of three kinds: any configuration, any row on top of any state",
+        "start and rows of models with any theta and C, of one kind and of three: any configuration, any row, any state",
         ESTIMATOR,
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
@@ -317,10 +316,10 @@ PROOFS = (
     ),
     Proof(
         "trust_q31",
-        "any configuration of the three models; any group on top of any state that a group leaves",
+        "any configuration, four parameters and three; any group on top of any state that a group leaves",
         (
             *("src/judge/trust_q31.c", "src/judge/publication.c"),
-            *("src/number/integer_q31.c", "models/kapitza/kapitza_weak_q31.c"),
+            "src/number/integer_q31.c",
         ),
         ("-eva-slevel", "10", "-eva-auto-loop-unroll", "20", "-eva-split-return", "full"),
         taken=("pvid_square_root_q31",),
@@ -336,7 +335,6 @@ PROOFS = (
                 "src/keep/fnv_q31.c",
                 "src/keep/fnv.c",
             ),
-            "models/kapitza/kapitza_weak_q31.c",
         ),
         ("-eva-auto-loop-unroll", "20"),
     ),

@@ -53,21 +53,6 @@ void pvid_replay_derivatives_f32(pvid_strong_f32 *self, uint32_t ticks, const fl
     }
 }
 
-void pvid_replay_weak_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[], const float y[],
-                          const pvid_record_f32 *record)
-{
-    for (uint32_t tick = 0; tick < ticks; tick++) {
-        const pvid_reason reason = pvid_weak_step_f32(self, phi[tick], y[tick]);
-        record_tick(record, tick, &self->estimator, reason);
-        if (record->published != NULL) {
-            const uint32_t n_p = self->estimator.model->n_p;
-            const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(self);
-            memcpy(&record->published[(size_t)tick * n_p], estimate->p, n_p * sizeof(float));
-            memcpy(&record->published_se[(size_t)tick * n_p], estimate->se, n_p * sizeof(float));
-        }
-    }
-}
-
 void pvid_replay_rows_f32(pvid_estimator_f32 *self, uint32_t ticks, const float n[], const float y[],
                           const pvid_record_f32 *record)
 {

@@ -23,8 +23,6 @@ typedef struct {
 const char *pvid_native_build(void);
 
 /* Steps an initialised identifier through a run. */
-void pvid_replay_weak_f32(pvid_weak_f32 *self, uint32_t ticks, const float phi[], const float y[],
-                          const pvid_record_f32 *record);
 void pvid_replay_strong_f32(pvid_strong_f32 *self, uint32_t ticks, const float phi[], const float y[],
                             const pvid_record_f32 *record);
 

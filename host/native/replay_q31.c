@@ -48,24 +48,6 @@ static void record_strong_assessment(const pvid_record_q31 *record, uint32_t tic
     }
 }
 
-void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
-                          const pvid_record_q31 *record)
-{
-    for (uint32_t tick = 0; tick < ticks; tick++) {
-        const pvid_reason reason = pvid_weak_step_q31(self, phi[tick], y[tick]);
-        const pvid_estimate_q31 *estimate = pvid_weak_estimate_q31(self);
-        record_tick(record, tick, &self->estimator, reason);
-        if (record->published != NULL) {
-            const size_t n_p = self->estimator.model->n_p;
-            memcpy(&record->published[tick * n_p], estimate->p, n_p * sizeof estimate->p[0]);
-            memcpy(&record->published_se[tick * n_p], estimate->se, n_p * sizeof estimate->se[0]);
-        }
-        if (is_estimate_due(record, tick)) {
-            record->estimate[tick / record->estimate_every] = *estimate;
-        }
-    }
-}
-
 void pvid_replay_strong_q31(pvid_strong_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
                             const pvid_record_q31 *record)
 {

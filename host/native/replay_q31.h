@@ -21,8 +21,6 @@ typedef struct {
 } pvid_record_q31;
 
 /* Steps an initialised identifier through a run of counts. */
-void pvid_replay_weak_q31(pvid_weak_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
-                          const pvid_record_q31 *record);
 
 void pvid_replay_strong_q31(pvid_strong_q31 *self, uint32_t ticks, const int32_t phi[], const int32_t y[],
                             const pvid_record_q31 *record);

@@ -5,38 +5,20 @@
 
 #if STREAM_FORM == 2
 #define STREAM_CONFIG motor_config_f32
-#elif (STREAM_CORE == 1) && (STREAM_FORM == 1)
-#define STREAM_TYPE pvid_weak_q31
-#define STREAM_CONFIG pvid_weak_config_q31
-#define STREAM_INIT pvid_weak_init_q31
-#define STREAM_STEP pvid_weak_step_q31
 #elif STREAM_CORE == 1
 #define STREAM_TYPE pvid_strong_q31
 #define STREAM_CONFIG pvid_strong_config_q31
 #define STREAM_INIT pvid_strong_init_q31
 #define STREAM_STEP pvid_strong_step_q31
-#elif STREAM_FORM == 1
-#define STREAM_TYPE pvid_weak_f32
-#define STREAM_CONFIG pvid_weak_config_f32
-#define STREAM_INIT pvid_weak_init_f32
-#define STREAM_STEP pvid_weak_step_f32
 #else
 #define STREAM_TYPE pvid_strong_f32
 #define STREAM_CONFIG pvid_strong_config_f32
 #define STREAM_INIT pvid_strong_init_f32
 #define STREAM_STEP pvid_strong_step_f32
 #endif
-#if (STREAM_CORE == 1) && (STREAM_FORM == 1)
-#define STREAM_HASH pvid_fnv_estimator_q31
-#define STREAM_ASSESS pvid_estimator_assess_q31
-#define STREAM_ASSESSED identifier.estimator
-#elif STREAM_CORE == 1
+#if STREAM_CORE == 1
 #define STREAM_HASH pvid_fnv_strong_q31
 #define STREAM_ASSESS pvid_kapitza_estimator_assess_q31
-#define STREAM_ASSESSED identifier.estimator
-#elif STREAM_FORM == 1
-#define STREAM_HASH pvid_fnv_estimator_f32
-#define STREAM_ASSESS pvid_estimator_assess_f32
 #define STREAM_ASSESSED identifier.estimator
 #else
 #define STREAM_HASH pvid_fnv_strong_f32

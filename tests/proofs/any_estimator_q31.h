@@ -6,7 +6,6 @@
 
 #include "number/integer_q31.h"
 #include "pvid/estimator_q31.h"
-#include "pvid/kapitza_weak_q31.h"
 #include "solve/kinds.h"
 
 /* Of every sum: what the end of a group leaves by Cauchy and Schwarz, 2^60, or a step of b and rr, 2^61, and on top of
@@ -18,6 +17,10 @@
 static const uint8_t blocks_end[3] = {4, 5, PVID_MAX_THETA_Q31};
 static const uint8_t blocks_row[PVID_MAX_C_Q31] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0, 4, 10, 1, 2, 3, 5, 6, 7, 8, 9};
 static const uint8_t blocks_column[PVID_MAX_C_Q31] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 3};
+
+#define DENSE_C 16u
+static const uint8_t dense_row[DENSE_C] = {1, 3, 4, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7, 5, 6, 7};
+static const uint8_t dense_column[DENSE_C] = {0, 0, 0, 0, 0, 1, 1, 2, 2, 2, 2, 2, 2, 3, 3, 3};
 
 static void blocks_theta(const int32_t p[], int64_t theta[])
 {
@@ -55,6 +58,19 @@ static const pvid_model_q31 blocks = {
     .kind_end = blocks_end,
     .c_row = blocks_row,
     .c_column = blocks_column,
+    .theta = blocks_theta,
+    .jacobian = blocks_jacobian,
+    .formats = blocks_formats,
+};
+
+/* The same with one kind of rows. */
+static const pvid_model_q31 dense = {
+    .n_theta = 8,
+    .n_p = 4,
+    .n_c = DENSE_C,
+    .positive = 7u,
+    .c_row = dense_row,
+    .c_column = dense_column,
     .theta = blocks_theta,
     .jacobian = blocks_jacobian,
     .formats = blocks_formats,

@@ -38,9 +38,8 @@ static void any_group(const pvid_model_q31 *model)
 
 void main(void)
 {
-    any_group(&pvid_kapitza_weak_q31);
-    any_assessment(&pvid_kapitza_weak_q31);
-    any_assessment(&pvid_kapitza_weak_zeroed_q31);
+    any_group(&dense);
+    any_assessment(&dense);
     any_assessment(&blocks);
     any_assessment(&numbers);
 }

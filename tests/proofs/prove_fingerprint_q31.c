@@ -10,6 +10,8 @@
 static int32_t weights[PVID_ORDERS * BANK_HALF_MAX];
 static pvid_strong_config_q31 strong;
 static pvid_estimator_q31 estimator;
+static const pvid_model_q31 most = {.n_theta = PVID_MAX_THETA_Q31, .n_p = PVID_MAX_P};
+static const pvid_model_q31 few = {.n_theta = 5, .n_p = 3};
 
 /* Any bytes in an object. */
 #define ANY(object) Frama_C_make_unknown((char *)&(object), sizeof(object))
@@ -34,6 +36,6 @@ static void any_estimator(const pvid_model_q31 *model)
 void main(void)
 {
     any_strong();
-    any_estimator(&pvid_kapitza_weak_q31);
-    any_estimator(&pvid_kapitza_weak_zeroed_q31);
+    any_estimator(&most);
+    any_estimator(&few);
 }

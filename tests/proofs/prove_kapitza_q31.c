@@ -1,10 +1,8 @@
-/* The models: theta, its Jacobian and the formats of both of any p and any formats that the estimator takes: theta and
- * C stay within +-2^60. The strong form's rows from any derivatives within their limits in any formats, and the
- * innovation of any row at any p. */
+/* The strong form's rows from any derivatives within their limits in any formats, and the innovation
+ * of any row at any p. */
 #include "prove.h"
 
 #include "pvid/kapitza_strong_q31.h"
-#include "pvid/kapitza_weak_q31.h"
 
 /* Its branch by the upper word is shown in integer_q31: the bound of the result is a relation between two words. */
 /*@ requires -0x4000000000000000 <= product <= 0x4000000000000000;
@@ -15,29 +13,6 @@
 static bool term(const pvid_kapitza_estimator_q31 *self, size_t a, int64_t product, int32_t *out);
 
 #include "kapitza_row_q31.c"
-
-static void any_model(const pvid_model_q31 *model)
-{
-    int32_t p[PVID_MAX_P];
-    int8_t p_bits[PVID_MAX_P];
-    int64_t theta[PVID_MAX_THETA_Q31];
-    int64_t c[PVID_MAX_C_Q31];
-    int16_t theta_bits[PVID_MAX_THETA_Q31];
-    int16_t c_bits[PVID_MAX_C_Q31];
-    for (size_t i = 0; i < PVID_MAX_P; i++) {
-        p[i] = any_i32(-INT32_MAX, INT32_MAX);
-        p_bits[i] = (int8_t)any_i32(-128, 127);
-    }
-    model->theta(p, theta);
-    model->jacobian(p, c);
-    model->formats(p_bits, theta_bits, c_bits);
-    for (size_t i = 0; i < model->n_theta; i++) {
-        /*@ assert -0x1000000000000000 <= theta[i] <= 0x1000000000000000; */
-    }
-    for (size_t k = 0; k < model->n_c; k++) {
-        /*@ assert -0x1000000000000000 <= c[k] <= 0x1000000000000000; */
-    }
-}
 
 static int8_t any_shift(void)
 {
@@ -90,8 +65,6 @@ static void any_innovation(void)
 
 void main(void)
 {
-    any_model(&pvid_kapitza_weak_q31);
-    any_model(&pvid_kapitza_weak_zeroed_q31);
     any_row();
     any_innovation();
 }

@@ -4,12 +4,13 @@
 
 #include "contracts.h"
 
-#include "pvid/kapitza_weak_q31.h"
 #include "pvid/trust_q31.h"
 
 #define VARIANCE_RATIO_MAX (1000000LL << PVID_VARIANCE_RATIO_BITS)
 
 static pvid_estimator_q31 estimator;
+static const pvid_model_q31 most = {.n_theta = 8, .n_p = PVID_MAX_P, .positive = 7u};
+static const pvid_model_q31 few = {.n_theta = 5, .n_p = 3, .positive = 7u};
 
 static void any_estimator(const pvid_model_q31 *model)
 {
@@ -82,7 +83,7 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
 
 void main(void)
 {
-    const pvid_model_q31 *const models[2] = {&pvid_kapitza_weak_q31, &pvid_kapitza_weak_zeroed_q31};
+    const pvid_model_q31 *const models[2] = {&most, &few};
     for (size_t i = 0; i < 2u; i++) {
         any_group(models[i], 0, 0);
         any_group(models[i], 1, UINT16_MAX);

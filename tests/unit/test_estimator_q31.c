@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "pendulum_model_q31.h"
 #include "pvid/pvid_q31.h"
 
 #define ONE_Q20 (1 << 20) /* of rows */
@@ -22,7 +23,7 @@ static int start_again(void **state)
 {
     (void)state;
     memset(&config, 0, sizeof config);
-    config.model = &pvid_kapitza_weak_q31;
+    config.model = &pendulum_model_q31;
     for (int i = 0; i < 4; i++) {
         config.start[i] = (i < 3) ? ((i == 2) ? ONE_Q26 : ((2 + i) * ONE_Q26)) : 0;
         config.start_sd[i] = ONE_Q26;

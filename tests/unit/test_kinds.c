@@ -262,50 +262,6 @@ static void kinds_divide_theta_or_are_refused(void **state)
     assert_int_equal(init_with(2, back, 21), PVID_BAD_MODEL);
 }
 
-static void accumulate_of(const float n[], float y, const float high[], float low[], float sums[])
-{
-    (void)n, (void)y, (void)high, (void)low;
-    memset(sums, 0, PVID_MAX_SUMS * sizeof sums[0]);
-}
-
-static float project_of(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[])
-{
-    (void)p, (void)m, (void)b;
-    memset(s, 0, N_P * sizeof s[0]);
-    memset(f, 0, N_P * sizeof f[0]);
-    return 0.0f;
-}
-
-static float residual_of(const float p[], const float n[], float y, float gradient[])
-{
-    (void)p, (void)n, (void)gradient;
-    return y;
-}
-
-static void a_model_with_functions_of_its_own_has_one_kind(void **state)
-{
-    (void)state;
-    static const uint8_t ends[2] = {3, 6};
-    pvid_model_f32 own = model; /* its three functions are those of a model without information */
-    own.n_kinds = 0;
-    own.kind_end = NULL;
-    own.accumulate = accumulate_of;
-    own.project = project_of;
-    own.innovate = residual_of;
-    pvid_estimator_config_f32 fresh = config();
-    pvid_estimator_f32 estimator;
-    const float n[N_THETA] = {1.0f};
-    fresh.model = &own;
-    fresh.noise_margin = 0.0f;
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &fresh), PVID_OK);
-    assert_int_equal(pvid_estimator_add_kind_f32(&estimator, 0, n, 1.0f), PVID_ACCUMULATED);
-    assert_int_equal(pvid_estimator_add_kind_f32(&estimator, 1, n, 1.0f), PVID_NOT_READY);
-    assert_int_equal(estimator.counters.rows, 1);
-    own.n_kinds = 2;
-    own.kind_end = ends;
-    assert_int_equal(pvid_estimator_init_f32(&estimator, &fresh), PVID_BAD_MODEL);
-}
-
 /* The solution of three rows of each kind without noise. */
 static void several_kinds_find_their_parameters(void **state)
 {
@@ -538,7 +494,6 @@ int main(void)
         cmocka_unit_test(rows_go_to_the_block_of_their_kind),
         cmocka_unit_test(products_with_blocks_equal_dense_products),
         cmocka_unit_test(kinds_divide_theta_or_are_refused),
-        cmocka_unit_test(a_model_with_functions_of_its_own_has_one_kind),
         cmocka_unit_test(several_kinds_find_their_parameters),
         cmocka_unit_test(a_vector_is_added_to_b_or_refused),
         cmocka_unit_test(fixed_point_finds_the_parameters_of_several_kinds),

@@ -157,8 +157,7 @@ static void a_float_model_fits_or_is_refused(void **state)
     REFUSED_F32(model.n_p = 0);
     ACCEPTED_F32(model.n_p = PVID_MAX_P);
     REFUSED_F32(model.n_p = PVID_MAX_P + 1);
-    ACCEPTED_F32(model.n_gated = 3);
-    REFUSED_F32(model.n_gated = 4);
+    REFUSED_F32(model.n_moments = 46);
     REFUSED_F32(model.n_c = 0);
     ACCEPTED_F32(model.n_c = 1);
     ACCEPTED_F32(model.n_c = MOST_C - 1);
@@ -170,44 +169,6 @@ static void a_float_model_fits_or_is_refused(void **state)
     ASSERT_INIT(init_f32, config.lower[1] = 0.0f, PVID_BAD_BOUNDS); /* positive */
     ACCEPTED_F32((config.start[2] = -8.0f, config.lower[2] = -9.0f));
     ACCEPTED_F32(config.start[3] = 0.0f); /* of no parameter */
-}
-
-static void accumulate_f32(const float n[], float y, const float high[], float low[], float sums[])
-{
-    (void)n, (void)y, (void)high, (void)low, (void)sums;
-}
-
-static float project_f32(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[])
-{
-    (void)p, (void)m, (void)b, (void)s, (void)f;
-    return 0.0f;
-}
-
-static float innovate_f32(const float p[], const float n[], float y, float gradient[])
-{
-    (void)p, (void)n, (void)gradient;
-    return y;
-}
-
-/* Functions of its own come together or not at all; with them the moments may be fewer, and theta as long as it can. */
-static void own_functions_are_all_or_none(void **state)
-{
-    (void)state;
-    begin();
-    pvid_model_f32 own = model;
-    own.accumulate = accumulate_f32;
-    own.project = project_f32;
-    own.innovate = innovate_f32;
-    own.n_theta = PVID_MAX_THETA;
-    ACCEPTED_F32(model = own);
-    ASSERT_INIT(init_f32, (model = own, config.row_weight = 0.5f), PVID_BAD_ROW_WEIGHT); /* it accumulates itself */
-    REFUSED_F32((model = own, model.accumulate = NULL));
-    REFUSED_F32((model = own, model.project = NULL));
-    REFUSED_F32((model = own, model.innovate = NULL));
-    REFUSED_F32((model = own, model.n_theta = PVID_MAX_THETA + 1));
-    ACCEPTED_F32((model = own, model.n_moments = PVID_MAX_MOMENTS));
-    REFUSED_F32((model = own, model.n_moments = PVID_MAX_MOMENTS + 1));
-    REFUSED_F32(model.innovate = innovate_f32);
 }
 
 static void a_fixed_point_model_fits_or_is_refused(void **state)
@@ -242,7 +203,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_float_model_fits_or_is_refused),
-        cmocka_unit_test(own_functions_are_all_or_none),
         cmocka_unit_test(a_fixed_point_model_fits_or_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

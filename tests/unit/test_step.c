@@ -32,7 +32,6 @@ static pvid_solve_settings_f32 wide_settings(void)
         .kappa_min = 1.0e-5f,
         .noise_margin = 16.0f,
         .n_p = 2,
-        .n_excited = 2,
         .positive = 1,
     };
     return settings;
@@ -194,25 +193,6 @@ static void too_little_excitation_holds_p(void **state)
     assert_int_equal(solved(&system, &settings, p).reason, PVID_UPDATED);
 }
 
-/* The third parameter imitates the first, but only the first two are checked for excitation. */
-static void a_nuisance_parameter_is_not_checked_for_excitation(void **state)
-{
-    (void)state;
-    pvid_solve_settings_f32 settings = wide_settings();
-    pvid_system_f32 system = known_system();
-    settings.n_p = 3;
-    settings.kappa_min = 0.5f;
-    system.s[0][2] = 7.0f;
-    system.s[2][2] = 8.0f;
-    pvid_cholesky_f32 factor;
-    assert_int_equal(pvid_step_factor_f32(&system, &settings, &factor), PVID_UPDATED);
-    settings.n_excited = 3;
-    assert_int_equal(pvid_step_factor_f32(&system, &settings, &factor), PVID_HELD_NOT_EXCITED);
-    settings.n_excited = 2;
-    system.s[2][2] = 0.0f;
-    assert_int_equal(pvid_step_factor_f32(&system, &settings, &factor), PVID_HELD_PIVOT);
-}
-
 /* F^T S^-1 F = 8 1.75 + 8 1.5 = 26; correlation times s^2, the smaller of 4/32 and 0.25, is 0.25. */
 static void no_step_is_taken_in_the_dead_zone(void **state)
 {
@@ -351,7 +331,6 @@ int main(void)
         cmocka_unit_test(a_singular_system_holds_p),
         cmocka_unit_test(a_number_that_is_none_holds_p),
         cmocka_unit_test(too_little_excitation_holds_p),
-        cmocka_unit_test(a_nuisance_parameter_is_not_checked_for_excitation),
         cmocka_unit_test(no_step_is_taken_in_the_dead_zone),
         cmocka_unit_test(the_covariance_is_the_inverse_of_the_information),
         cmocka_unit_test(without_information_the_errors_are_those_of_the_start),

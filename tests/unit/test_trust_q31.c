@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "pendulum_model_q31.h"
 #include "pvid/pvid_q31.h"
 
 typedef pvid_estimate_q31 an_estimate;
@@ -27,7 +28,7 @@ static int64_t q24(double x)
 static int start_again(void **state)
 {
     (void)state;
-    pvid_estimator_config_q31 config = {.model = &pvid_kapitza_weak_q31,
+    pvid_estimator_config_q31 config = {.model = &pendulum_model_q31,
                                         .row_sd = 256,
                                         .gain = 1 << 30,
                                         .correlation = 1u << 16,

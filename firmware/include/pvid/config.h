@@ -28,8 +28,7 @@
 #error "PVID_MAX_THETA must lie in 1..32"
 #endif
 
-/* Largest number of free parameters p: 3 in the strong form, 4 in the weak, 6 in the weak with friction (with
- * PVID_MAX_MOMENTS 55). */
+/* Largest number of free parameters p: of Kapitza's pendulum 3 in the strong form, 4 in the weak. */
 #ifndef PVID_MAX_P
 #define PVID_MAX_P 4
 #endif
@@ -37,21 +36,13 @@
 #error "PVID_MAX_P must lie in 3..8"
 #endif
 
-/* Largest number of distinct entries of M: 45 for Kapitza's strong form, 36 for the weak, 55 with friction. RAM:
- * 12 bytes each. A model without repeated entries needs n_theta (n_theta + 1) / 2. */
+/* Largest number of entries of M, the sum of n (n + 1) / 2 over the kinds of rows, of n theta each: 36 for Kapitza's
+ * weak form. RAM: 12 bytes each. */
 #ifndef PVID_MAX_MOMENTS
 #define PVID_MAX_MOMENTS 45
 #endif
 #if PVID_MAX_MOMENTS < 1 || PVID_MAX_MOMENTS > 528
 #error "PVID_MAX_MOMENTS must lie in 1..528"
-#endif
-
-/* Longest smoothing window of the weak form's front end [samples]. */
-#ifndef PVID_MAX_TAPS
-#define PVID_MAX_TAPS 81
-#endif
-#if PVID_MAX_TAPS < 5 || PVID_MAX_TAPS > 1023
-#error "PVID_MAX_TAPS must lie in 5..1023"
 #endif
 
 /* Largest decimation of the weak form's front end. RAM: 8 bytes for each of taps + decimation. */
@@ -60,14 +51,6 @@
 #endif
 #if PVID_MAX_DECIMATION < 1 || PVID_MAX_DECIMATION > 255
 #error "PVID_MAX_DECIMATION must lie in 1..255"
-#endif
-
-/* Longest window of test functions [decimated samples]; bounds a table in flash, costs no RAM. */
-#ifndef PVID_MAX_WEAK_WINDOW
-#define PVID_MAX_WEAK_WINDOW 251
-#endif
-#if PVID_MAX_WEAK_WINDOW < 9 || PVID_MAX_WEAK_WINDOW > 4095
-#error "PVID_MAX_WEAK_WINDOW must lie in 9..4095"
 #endif
 
 /* Largest number of test functions. RAM: 160 bytes each and 4 per pair. */
@@ -84,14 +67,6 @@
 #endif
 #if PVID_MAX_ITERATIONS < 1 || PVID_MAX_ITERATIONS > 255
 #error "PVID_MAX_ITERATIONS must lie in 1..255"
-#endif
-
-/* Largest number of passes of the full-angle correction. */
-#ifndef PVID_MAX_PASSES
-#define PVID_MAX_PASSES 8
-#endif
-#if PVID_MAX_PASSES < 1 || PVID_MAX_PASSES > 255
-#error "PVID_MAX_PASSES must lie in 1..255"
 #endif
 
 /* Largest number of entries of theta in the fixed-point core (11: the strong form). */
@@ -123,15 +98,6 @@
  * -std=gnu99) keeps the tables in the first 64 kB of the flash instead of copying them to RAM. */
 #ifndef PVID_TABLE
 #define PVID_TABLE
-#endif
-
-/* 0 removes the correction for large angles and friction (3 kB on a Cortex-M4F) from the image; init then refuses
- * full_angle and friction. The linker alone cannot remove it, because init refers to it. */
-#ifndef PVID_FULL_ANGLE
-#define PVID_FULL_ANGLE 1
-#endif
-#if PVID_FULL_ANGLE != 0 && PVID_FULL_ANGLE != 1
-#error "PVID_FULL_ANGLE must be 0 or 1"
 #endif
 
 /* 0 leaves the texts of pvid/text.h out. */
@@ -291,7 +257,6 @@
 /* ---- fixed sizes ---- */
 
 #define PVID_ORDERS 5        /* derivatives of a channel: orders 0 to 4 */
-#define PVID_NOISE_TRACES 3  /* numbers that describe the noise of a row; see model.h */
 #define PVID_TRUST_SHORT 8   /* groups in the alarm's short mean; see trust.h */
 #define PVID_TRUST_LONG 16   /* least number of groups in its long mean */
 #define PVID_READ_ATTEMPTS 8 /* attempts of a read; one fails only during a put */

@@ -157,19 +157,19 @@ typedef struct pvid_fourier_q31 pvid_fourier_q31;
  * The tables must be those of the design tool: it proves that no sum overflows. */
 pvid_status pvid_fourier_init_q31(pvid_fourier_q31 *self, const pvid_fourier_config_q31 *config);
 
-/* One tick: the readings [samples], taken at the same time. Returns as pvid_weak_step_q31. */
+/* One tick: the readings [samples], taken at the same time. Returns as pvid_fourier_step_f32. */
 pvid_reason pvid_fourier_step_q31(pvid_fourier_q31 *self, const int32_t reading[]);
 
 /* The published estimate, for the context that calls step; the start before the first one. */
 const pvid_estimate_q31 *pvid_fourier_estimate_q31(const pvid_fourier_q31 *self);
 
-/* Copies the published estimate from any context; as pvid_weak_read_q31. */
+/* Copies the published estimate from any context; as pvid_fourier_read_f32. */
 bool pvid_fourier_read_q31(const pvid_fourier_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number);
 
 /* Call this when samples are missing: the windows restart, all other state is kept. */
 void pvid_fourier_gap_q31(pvid_fourier_q31 *self);
 
-/* Freezes the identifier (true) or resumes it (false); as pvid_weak_freeze_q31. */
+/* Freezes the identifier (true) or resumes it (false); as pvid_fourier_freeze_f32. */
 void pvid_fourier_freeze_q31(pvid_fourier_q31 *self, bool frozen);
 
 #ifdef __cplusplus

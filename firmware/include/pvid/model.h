@@ -2,7 +2,7 @@
  *
  * A model is linear in theta, Y = N^T theta, and theta = f(p) depends on few free parameters p. The estimator
  * needs f, its Jacobian C = d theta / d p with a fixed pattern of non-zeros, and nothing else: fill a constant
- * struct and leave the optional functions NULL.
+ * struct.
  *
  *   static const uint8_t row[] = {0, 1, 1}, column[] = {0, 0, 1};
  *   static const pvid_model_f32 mine = { .n_theta = 2, .n_p = 2, .n_moments = 3, .n_c = 3,
@@ -16,9 +16,6 @@
  * M then has a block for each kind and no entries between them. C has all theta: a parameter may occur in several
  * kinds. Every row has the same variance, so rows of different units are divided by their standard deviations.
  *
- * Optional functions: `accumulate` if entries of M repeat (fewer sums than n_theta (n_theta + 1) / 2); `project`
- * and `innovate` if they are cheaper than by the pattern of C. These three are all NULL or all set. `noise` enables
- * the noise check (noise_margin of estimator.h).
  */
 #ifndef PVID_MODEL_H
 #define PVID_MODEL_H
@@ -38,13 +35,11 @@ typedef struct pvid_model_f32 pvid_model_f32;
 struct pvid_model_f32 {
     uint8_t n_theta; /* entries of theta and N, 1..PVID_MAX_THETA */
     uint8_t n_p;     /* free parameters, 1..PVID_MAX_P; kappa refers to p[0] */
-    uint8_t n_gated; /* the first n_gated parameters are checked for excitation, the others are nuisance parameters; 0:
-                        all are checked */
-    uint8_t n_kinds; /* kinds of rows; 0 or 1: all rows have all theta. A model with its own accumulate has one kind */
-    uint16_t n_moments; /* distinct entries of M, 1..PVID_MAX_MOMENTS; without accumulate the sum of n (n + 1) / 2 over
-                           the kinds, of n theta each */
-    uint16_t n_c;       /* structural non-zeros of C */
-    uint32_t positive;  /* bit i set: p[i] > 0; steps and start_sd are relative to p[i] */
+    uint8_t n_kinds; /* kinds of rows; 0 or 1: all rows have all theta */
+    uint16_t
+        n_moments;     /* entries of M, 1..PVID_MAX_MOMENTS: the sum of n (n + 1) / 2 over the kinds, of n theta each */
+    uint16_t n_c;      /* structural non-zeros of C */
+    uint32_t positive; /* bit i set: p[i] > 0; steps and start_sd are relative to p[i] */
 
     const uint8_t
         *kind_end;        /* [n_kinds] one past the last theta of each kind, ascending, at last n_theta; NULL for one */
@@ -55,20 +50,6 @@ struct pvid_model_f32 {
     void (*theta)(const float p[], float theta[]);
     /* c[n_c] = the non-zeros of d theta / d p at p, in the order of c_row */
     void (*jacobian)(const float p[], float c[]);
-
-    /* Adds a row to the sums (layout: information.h) at low[] and writes sums[k] = high[k] + low[k]. NULL: all
-     * products N_i N_j of a kind, upper triangle by rows. */
-    void (*accumulate)(const float n[], float y, const float high[], float low[], float sums[]);
-    /* From moments m[n_moments] and b[n_theta] = sum N Y at p: s[i][j] = (C^T M C)_ij for i <= j < n_p, f[n_p] =
-     * C^T (b - M theta(p)). Returns theta^T M theta - 2 theta^T b. NULL: by the pattern of C, with b relative to
-     * theta(p); see estimator.h. */
-    float (*project)(const float p[], const float m[], const float b[], float s[][PVID_MAX_P], float f[]);
-    /* Information of the sensors' noise alone at p: what noise of unit variance adds to C^T M C per unit of
-     * weight, s[i][j] for i <= j < n_p, from the noise traces of the rows. NULL: unknown; the noise check is
-     * skipped. */
-    void (*noise)(const float p[], const float traces[PVID_NOISE_TRACES], float s[][PVID_MAX_P]);
-    /* Returns e = y - N^T theta(p) and writes gradient[n_p] = C^T N at p. */
-    float (*innovate)(const float p[], const float n[], float y, float gradient[]);
 };
 
 #ifdef __cplusplus

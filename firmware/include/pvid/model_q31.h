@@ -36,10 +36,6 @@ typedef struct {
     uint8_t n_c;       /* structural non-zeros of C, 1..PVID_MAX_C_Q31 */
     uint32_t positive; /* bit i set: p[i] > 0; steps are relative to p[i] */
 
-    /* Entries of N that contain the sensor's noise times chi'' and chi; both 0: unknown. Noise of unit variance in
-     * Y adds noise[0], noise[1], noise[2] to their products 00, 01, 11 (see estimator_q31.h). */
-    uint8_t noisy[2];
-
     const uint8_t *kind_end; /* [n_kinds] one past the last theta of each kind, see model.h; NULL for one kind */
     const uint8_t *c_row;    /* [n_c] row in theta of each non-zero of C, ascending in a column */
     const uint8_t *c_column; /* [n_c] its column (index in p), ascending */

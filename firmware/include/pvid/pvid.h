@@ -1,6 +1,6 @@
 /* pvid.h - identifies the parameters of a mechanism on the microcontroller that drives it.
  *
- * C99, float32, static memory, no library function but sqrtf. Start with weak.h or strong.h (samples in,
+ * C99, float32, static memory, no library function but sqrtf. Start with fourier.h or strong.h (samples in,
  * parameters out), or with estimator.h and model.h for rows of your own model. Integers only: pvid_q31.h.
  */
 #ifndef PVID_PVID_H
@@ -29,6 +29,5 @@
 #include "pvid/text.h"
 #include "pvid/trust.h"
 #include "pvid/version.h"
-#include "pvid/weak.h"
 
 #endif

@@ -5,7 +5,7 @@
  * set of sizes. An application with other sizes does not link, in C and C++, with a static or a shared library, and
  * the linker's message shows its sizes:
  *
- *     undefined reference to `pvid_weak_init_f32_window321_theta11_p6_moments55_taps81_...'
+ *     undefined reference to `pvid_fourier_init_f32_window321_theta11_p6_moments55_...'
  *
  * Solution: set the sizes in one place for the library's sources and yours: a header of yours named by
  * -DPVID_CONFIG_HEADER, the CMake options, or the same -D for all files. Source code uses the plain names; the symbols
@@ -22,22 +22,22 @@
 #define PVID_ENUM_SIZE 0
 #endif
 
-#define PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
-                      integers, moments_q31, c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds,     \
-                      columns, power, blocks, windows, enums)                                                          \
-    name##_window##window##_theta##theta##_p##p##_moments##moments##_taps##taps##_decimation##decimation##_weak##weak##_functions##functions##_iterations##iterations##_passes##passes##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_blocks##blocks##_windows##windows##_enum##enums
-#define PVID_SIZED_OF(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes,          \
-                      integers, moments_q31, c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds,     \
-                      columns, power, blocks, windows, enums)                                                          \
-    PVID_SIZED_AS(name, window, theta, p, moments, taps, decimation, weak, functions, iterations, passes, integers,    \
-                  moments_q31, c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power,   \
-                  blocks, windows, enums)
+#define PVID_SIZED_AS(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31,       \
+                      c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks,    \
+                      windows, enums)                                                                                  \
+    name##_window##window##_theta##theta##_p##p##_moments##moments##_decimation##decimation##_functions##functions##_iterations##iterations##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_blocks##blocks##_windows##windows##_enum##enums
+#define PVID_SIZED_OF(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31,       \
+                      c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks,    \
+                      windows, enums)                                                                                  \
+    PVID_SIZED_AS(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31, c_q31,    \
+                  samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks, windows,      \
+                  enums)
 #define PVID_SIZED(name)                                                                                               \
-    PVID_SIZED_OF(name, PVID_MAX_WINDOW, PVID_MAX_THETA, PVID_MAX_P, PVID_MAX_MOMENTS, PVID_MAX_TAPS,                  \
-                  PVID_MAX_DECIMATION, PVID_MAX_WEAK_WINDOW, PVID_MAX_FUNCTIONS, PVID_MAX_ITERATIONS, PVID_MAX_PASSES, \
-                  PVID_MAX_THETA_Q31, PVID_MAX_MOMENTS_Q31, PVID_MAX_C_Q31, PVID_MAX_SAMPLES, PVID_MAX_RING,           \
-                  PVID_MAX_INPUTS, PVID_MAX_CHANNELS, PVID_MAX_INTEGRANDS, PVID_MAX_HARMONICS, PVID_MAX_KINDS,         \
-                  PVID_MAX_COLUMNS, PVID_MAX_POWER, PVID_MAX_BLOCKS, PVID_MAX_WINDOWS, PVID_ENUM_SIZE)
+    PVID_SIZED_OF(name, PVID_MAX_WINDOW, PVID_MAX_THETA, PVID_MAX_P, PVID_MAX_MOMENTS, PVID_MAX_DECIMATION,            \
+                  PVID_MAX_FUNCTIONS, PVID_MAX_ITERATIONS, PVID_MAX_THETA_Q31, PVID_MAX_MOMENTS_Q31, PVID_MAX_C_Q31,   \
+                  PVID_MAX_SAMPLES, PVID_MAX_RING, PVID_MAX_INPUTS, PVID_MAX_CHANNELS, PVID_MAX_INTEGRANDS,            \
+                  PVID_MAX_HARMONICS, PVID_MAX_KINDS, PVID_MAX_COLUMNS, PVID_MAX_POWER, PVID_MAX_BLOCKS,               \
+                  PVID_MAX_WINDOWS, PVID_ENUM_SIZE)
 
 /* differentiator.h */
 #define pvid_differentiator_init_f32 PVID_SIZED(pvid_differentiator_init_f32)
@@ -133,12 +133,8 @@
 /* snapshot.h */
 #define pvid_snapshot_save_strong_f32 PVID_SIZED(pvid_snapshot_save_strong_f32)
 #define pvid_snapshot_save_strong_q31 PVID_SIZED(pvid_snapshot_save_strong_q31)
-#define pvid_snapshot_save_weak_f32 PVID_SIZED(pvid_snapshot_save_weak_f32)
-#define pvid_snapshot_save_weak_q31 PVID_SIZED(pvid_snapshot_save_weak_q31)
 #define pvid_snapshot_restore_strong_f32 PVID_SIZED(pvid_snapshot_restore_strong_f32)
 #define pvid_snapshot_restore_strong_q31 PVID_SIZED(pvid_snapshot_restore_strong_q31)
-#define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
-#define pvid_snapshot_restore_weak_q31 PVID_SIZED(pvid_snapshot_restore_weak_q31)
 
 /* refine.h */
 #define pvid_refine_init_f32 PVID_SIZED(pvid_refine_init_f32)
@@ -197,21 +193,5 @@
 #define pvid_trust_fade_factor_q31 PVID_SIZED(pvid_trust_fade_factor_q31)
 #define pvid_trust_fallback_q31 PVID_SIZED(pvid_trust_fallback_q31)
 #define pvid_trust_judge_q31 PVID_SIZED(pvid_trust_judge_q31)
-
-/* weak.h */
-#define pvid_weak_init_f32 PVID_SIZED(pvid_weak_init_f32)
-#define pvid_weak_step_f32 PVID_SIZED(pvid_weak_step_f32)
-#define pvid_weak_estimate_f32 PVID_SIZED(pvid_weak_estimate_f32)
-#define pvid_weak_read_f32 PVID_SIZED(pvid_weak_read_f32)
-#define pvid_weak_gap_f32 PVID_SIZED(pvid_weak_gap_f32)
-#define pvid_weak_freeze_f32 PVID_SIZED(pvid_weak_freeze_f32)
-
-/* weak_q31.h */
-#define pvid_weak_init_q31 PVID_SIZED(pvid_weak_init_q31)
-#define pvid_weak_step_q31 PVID_SIZED(pvid_weak_step_q31)
-#define pvid_weak_estimate_q31 PVID_SIZED(pvid_weak_estimate_q31)
-#define pvid_weak_read_q31 PVID_SIZED(pvid_weak_read_q31)
-#define pvid_weak_gap_q31 PVID_SIZED(pvid_weak_gap_q31)
-#define pvid_weak_freeze_q31 PVID_SIZED(pvid_weak_freeze_q31)
 
 #endif

@@ -3,14 +3,14 @@
  * A snapshot is the identifier's memory with a header, a generation and a checksum. restore refuses a snapshot
  * that is damaged, truncated or from another identifier, and then changes nothing.
  *
- *   static uint8_t image[PVID_SNAPSHOT_WEAK_F32];
+ *   static uint8_t image[PVID_SNAPSHOT_STRONG_F32];
  *   (at the start, after init:)
  *   choice = pvid_snapshot_choose(flash_slot_0, flash_slot_1, sizeof image);
  *   if (choice.newest >= 0)
- *       status = pvid_snapshot_restore_weak_f32(&identifier, &config, flash_slot[choice.newest], sizeof image);
- *   if (samples were missed) pvid_weak_gap_f32(&identifier);
+ *       status = pvid_snapshot_restore_strong_f32(&identifier, &config, flash_slot[choice.newest], sizeof image);
+ *   if (samples were missed) pvid_strong_gap_f32(&identifier);
  *   (from time to time, between two ticks:)
- *   n = pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, image, sizeof image);
+ *   n = pvid_snapshot_save_strong_f32(&identifier, &config, choice.generation, image, sizeof image);
  *   write n bytes to the slot choice.next, then choose again
  *
  * Two slots. The slot to write is never that of the newest valid snapshot; a power cut at any byte of a write
@@ -33,7 +33,6 @@
 
 #include "pvid/snapshot_slots.h"
 #include "pvid/strong.h"
-#include "pvid/weak.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -41,8 +40,6 @@ extern "C" {
 
 /* Size of a snapshot of an identifier [bytes]. */
 #define PVID_SNAPSHOT_STRONG_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_f32))
-#define PVID_SNAPSHOT_WEAK_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32))
-#define PVID_SNAPSHOT_WEAK_ANGLE_F32 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_f32) + sizeof(pvid_weak_angle_f32))
 
 /* Writes a snapshot of `self` to image[]; config is the configuration of its init. Returns its length [bytes].
  * Fails (returns 0, writes nothing) iff
@@ -52,16 +49,11 @@ extern "C" {
  * Cost: a copy and a checksum of the object and a hash of the tables, some ticks long. */
 size_t pvid_snapshot_save_strong_f32(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                      uint32_t generation, uint8_t image[], size_t room);
-/* PVID_SNAPSHOT_WEAK_ANGLE_F32 if config.angle is in use, else PVID_SNAPSHOT_WEAK_F32. */
-size_t pvid_snapshot_save_weak_f32(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t generation,
-                                   uint8_t image[], size_t room);
 
 /* Restores `self`, initialised with config, from the snapshot at image[0 .. length - 1]; bytes after the snapshot
  * are ignored. Any answer but PVID_SNAPSHOT_RESTORED leaves `self` unchanged. */
 pvid_snapshot_status pvid_snapshot_restore_strong_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config,
                                                       const uint8_t image[], size_t length);
-pvid_snapshot_status pvid_snapshot_restore_weak_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,
-                                                    const uint8_t image[], size_t length);
 
 #ifdef __cplusplus
 }

@@ -7,7 +7,6 @@
 
 #include "pvid/snapshot_slots.h"
 #include "pvid/strong_q31.h"
-#include "pvid/weak_q31.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -15,19 +14,14 @@ extern "C" {
 
 /* Size of a snapshot of an identifier [bytes]. */
 #define PVID_SNAPSHOT_STRONG_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_q31))
-#define PVID_SNAPSHOT_WEAK_Q31 PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_q31))
 
-/* As pvid_snapshot_save_weak_f32. */
+/* As pvid_snapshot_save_strong_f32. */
 size_t pvid_snapshot_save_strong_q31(const pvid_strong_q31 *self, const pvid_strong_config_q31 *config,
                                      uint32_t generation, uint8_t image[], size_t room);
-size_t pvid_snapshot_save_weak_q31(const pvid_weak_q31 *self, const pvid_weak_config_q31 *config, uint32_t generation,
-                                   uint8_t image[], size_t room);
 
-/* As pvid_snapshot_restore_weak_f32. */
+/* As pvid_snapshot_restore_strong_f32. */
 pvid_snapshot_status pvid_snapshot_restore_strong_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config,
                                                       const uint8_t image[], size_t length);
-pvid_snapshot_status pvid_snapshot_restore_weak_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config,
-                                                    const uint8_t image[], size_t length);
 
 #ifdef __cplusplus
 }

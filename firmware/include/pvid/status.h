@@ -26,18 +26,15 @@ typedef enum {
     PVID_BAD_KAPPA_MIN,     /* not finite or outside [0, 1) */
     PVID_BAD_CORRELATION,   /* not finite or below 1 */
     PVID_BAD_DRIVE_MIN,     /* not finite or negative; q31: or too large */
-    PVID_BAD_ROW_WEIGHT,    /* not finite or outside (0, 1], or not 1 for a model with its own accumulate */
+    PVID_BAD_ROW_WEIGHT,    /* not finite or outside (0, 1] */
     PVID_BAD_DESIGN,        /* the design or a table is NULL, or a table is not finite or could overflow */
     PVID_BAD_ITERATIONS,    /* outside 1..PVID_MAX_ITERATIONS, or too many for the window's hop */
     PVID_BAD_NOISE_MARGIN,  /* not finite or outside 0..1e6 */
     PVID_BAD_PUBLISH_KAPPA, /* kappa_min of trust.h not finite or outside [0, 1) */
     PVID_BAD_SE_MAX,        /* not finite or not positive */
     PVID_BAD_MISFIT_MAX,    /* not finite, or neither 0 nor at least 1 */
-    PVID_BAD_PIVOT_NOISE,   /* not finite or negative */
     PVID_BAD_ANGLE_LIMIT,   /* not finite or negative */
-    PVID_BAD_ANGLE,       /* full_angle or friction without storage, with passes outside 1..PVID_MAX_PASSES, or friction
-                             without zero_unknown or with too small bounds */
-    PVID_BAD_GATE_SIGMAS, /* not finite, or neither 0 nor 2..1e3 */
+    PVID_BAD_GATE_SIGMAS,   /* not finite, or neither 0 nor 2..1e3 */
     PVID_BAD_GATE_PATIENCE, /* not finite or outside 0..1e12 s */
     PVID_BAD_DEAD_ZONE,     /* not finite or outside 0..100 */
     PVID_BAD_HALF,          /* of a bank: below 2, or a window over PVID_MAX_WINDOW for every stride */
@@ -47,7 +44,6 @@ typedef enum {
     PVID_BAD_DECIMATION,    /* of a design: outside 1..PVID_MAX_DECIMATION */
     PVID_BAD_WINDOW,        /* of a design: even, or outside 9..PVID_MAX_WEAK_WINDOW */
     PVID_BAD_FUNCTIONS,     /* of a design: outside 4..PVID_MAX_FUNCTIONS */
-    PVID_BAD_LAG,           /* of a design: 0 */
     PVID_BAD_OVERLAP,       /* of a design: not finite or below 1 */
     PVID_BAD_FULL_SCALE,   /* phi_max, y_max or u_max of a q31 bank or design: not positive, too large, or too large for
                               the weights */

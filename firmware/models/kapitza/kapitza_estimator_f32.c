@@ -146,7 +146,6 @@ static void settings_of(const pvid_strong_estimator_f32 *self, pvid_solve_settin
     settings->row_variance = self->row_variance;
     settings->correlation = self->correlation;
     settings->n_p = PVID_KAPITZA_P;
-    settings->n_excited = PVID_KAPITZA_P;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
         settings->prior[a] = self->prior[a];
         settings->start_sd[a] = sqrtf(self->row_variance / self->prior[a]);

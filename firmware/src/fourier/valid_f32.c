@@ -162,8 +162,7 @@ static bool is_exact(const pvid_fourier_design_f32 *design)
            (harmonics == PVID_MAX_HARMONICS) && (model->samples == PVID_MAX_SAMPLES) &&
            (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
            (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
-           (model->integrands == PVID_EXACT_INTEGRANDS) && (model->model->n_p == PVID_MAX_P) &&
-           (model->model->n_gated == 0u);
+           (model->integrands == PVID_EXACT_INTEGRANDS) && (model->model->n_p == PVID_MAX_P);
 }
 
 static pvid_status sizes_are_valid(const pvid_fourier_design_f32 *design)

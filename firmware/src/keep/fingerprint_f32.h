@@ -5,11 +5,9 @@
 #include <stdint.h>
 
 #include "pvid/strong.h"
-#include "pvid/weak.h"
 
 /* FNV-1a over every field that init reads, in their order; the configuration must be one that init accepts. Costs a
  * hash of all tables. */
 uint32_t pvid_fingerprint_strong_f32(const pvid_strong_config_f32 *config);
-uint32_t pvid_fingerprint_weak_f32(const pvid_weak_config_f32 *config);
 
 #endif

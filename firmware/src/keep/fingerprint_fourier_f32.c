@@ -49,7 +49,7 @@ static uint32_t signal_functions(uint32_t hash, const pvid_fourier_model_f32 *mo
 
 static uint32_t parameters_of(uint32_t hash, const pvid_model_f32 *model)
 {
-    const uint8_t sizes[] = {model->n_theta, model->n_p, model->n_gated, model->n_kinds};
+    const uint8_t sizes[] = {model->n_theta, model->n_p, model->n_kinds};
     uint32_t running = pvid_fingerprint_bytes(hash, sizes, sizeof sizes);
     running = pvid_fnv_word(running, model->n_moments);
     running = pvid_fnv_word(running, model->n_c);

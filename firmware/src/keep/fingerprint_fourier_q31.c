@@ -70,7 +70,7 @@ static uint32_t plain_theta(uint32_t hash, const pvid_model_q31 *model)
 
 static uint32_t parameters_of(uint32_t hash, const pvid_model_q31 *model)
 {
-    const uint8_t sizes[] = {model->n_theta, model->n_p, model->n_kinds, model->n_c, model->noisy[0], model->noisy[1]};
+    const uint8_t sizes[] = {model->n_theta, model->n_p, model->n_kinds, model->n_c};
     uint32_t running = pvid_fingerprint_bytes(hash, sizes, sizeof sizes);
     running = pvid_fnv_word(running, model->positive);
     running = pvid_fingerprint_bytes(running, model->kind_end, (model->n_kinds > 1u) ? model->n_kinds : 0u);

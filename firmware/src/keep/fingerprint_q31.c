@@ -6,31 +6,6 @@
 #include "keep/fingerprint_tables.h"
 #include "pvid/fnv_word.h"
 
-static uint32_t design_of(uint32_t hash, const pvid_weak_design_q31 *design)
-{
-    const size_t half = (design->taps - 1u) / 2u;
-    const size_t functions = design->functions;
-    const int32_t limits[] = {design->phi_max, design->y_max, design->u_max};
-    const uint8_t single[] = {design->lag,     design->smooth_bits, design->phi_shift,
-                              design->u_shift, design->uf_shift,    design->sum_shift};
-    uint32_t running = pvid_fnv_word(hash, design->taps);
-    running = pvid_fnv_word(running, design->decimation);
-    running = pvid_fnv_word(running, design->window);
-    running = pvid_fnv_word(running, design->functions);
-    running = pvid_fingerprint_bytes(running, single, sizeof single);
-    running = pvid_fingerprint_bytes(running, design->integral_shift, sizeof design->integral_shift);
-    running = pvid_fingerprint_bytes(running, design->high_shift, sizeof design->high_shift);
-    running = pvid_fingerprint_bytes(running, design->product_shift, sizeof design->product_shift);
-    running = pvid_fingerprint_bytes(running, design->shift, sizeof design->shift);
-    running = pvid_fingerprint_formats(running, design->gram_bits, PVID_WEAK_GRAMS);
-    running = pvid_fingerprint_words(running, limits, sizeof limits / sizeof limits[0]);
-    running = pvid_fingerprint_table(running, design->smooth, half);
-    running = pvid_fingerprint_table(running, design->second, half);
-    running = pvid_fingerprint_short_table(running, design->chi, 3u * functions * design->window);
-    running = pvid_fingerprint_table(running, design->multiplier, PVID_WEAK_TERMS_Q31);
-    return pvid_fingerprint_table(running, design->gram, (PVID_WEAK_GRAMS / 2u) * functions * (functions + 1u));
-}
-
 static uint32_t bank_of(uint32_t hash, const pvid_fir_bank_q31 *bank)
 {
     const int32_t limits[] = {bank->phi_max, bank->y_max, bank->centre};
@@ -62,18 +37,4 @@ uint32_t pvid_fingerprint_strong_q31(const pvid_strong_config_q31 *config)
     hash = pvid_fnv_word(hash, config->drive_ticks);
     hash = pvid_fingerprint_gate_q31(hash, &config->gate);
     return pvid_fingerprint_estimator_q31(hash, &config->estimator, 0, PVID_KAPITZA_P);
-}
-
-uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config)
-{
-    const pvid_model_q31 *model = config->zero_unknown ? &pvid_kapitza_weak_q31 : &pvid_kapitza_weak_zeroed_q31;
-    const int32_t scalars[] = {config->phi_offset, config->y_offset, config->drive_min, config->pivot_noise.m,
-                               config->pivot_noise.e};
-    uint32_t hash = pvid_fingerprint_words(PVID_FNV_START, scalars, sizeof scalars / sizeof scalars[0]);
-    hash = design_of(hash, config->design);
-    hash = pvid_fnv_word(hash, config->zero_unknown ? 1u : 0u);
-    hash = pvid_fnv_word(hash, config->iterations);
-    hash = pvid_fingerprint_estimator_q31(hash, &config->estimator, model->n_theta, model->n_p);
-    hash = pvid_fingerprint_trust_q31(hash, &config->trust);
-    return pvid_fingerprint_gate_q31(hash, &config->gate);
 }

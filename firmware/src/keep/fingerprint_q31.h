@@ -5,9 +5,7 @@
 #include <stdint.h>
 
 #include "pvid/strong_q31.h"
-#include "pvid/weak_q31.h"
 
 uint32_t pvid_fingerprint_strong_q31(const pvid_strong_config_q31 *config);
-uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config);
 
 #endif

@@ -37,7 +37,7 @@ float pvid_assess_misfit_f32(const pvid_system_f32 *system, const pvid_solve_set
 bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings, float variance,
                                  const float noise[][PVID_MAX_P])
 {
-    const uint8_t n = settings->n_excited;
+    const uint8_t n = settings->n_p;
     const size_t count = PVID_COUNT(PVID_MAX_P, n);
     const float much = (settings->noise_margin * variance) * system->weight;
     float excess[PVID_MAX_P][PVID_MAX_P];
@@ -55,7 +55,7 @@ bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve
 void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
                            pvid_estimate_f32 *estimate)
 {
-    const uint8_t n = settings->n_excited;
+    const uint8_t n = settings->n_p;
     pvid_cholesky_f32 factor;
     estimate->kappa = 0.0f;
     estimate->least_pivot = 0.0f;

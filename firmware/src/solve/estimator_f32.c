@@ -11,7 +11,6 @@
 #include "number/init.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
-#include "solve/direct_f32.h"
 #include "solve/kinds.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
@@ -35,21 +34,10 @@ static bool model_is_valid(const pvid_model_f32 *model)
 {
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
-           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) &&
-           ((PVID_EXACT == 0) || ((model->n_p == PVID_MAX_P) && (model->project == NULL))) &&
-           (model->n_p <= model->n_theta) && (model->n_gated <= model->n_p) && (model->n_c >= 1u) &&
-           (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) && (model->n_moments >= 1u) &&
-           (model->n_moments <= PVID_MAX_MOMENTS) && ((model->accumulate == NULL) == (model->project == NULL)) &&
-           ((model->innovate == NULL) == (model->project == NULL)) &&
-           ((model->accumulate != NULL)
-                ? (model->n_kinds <= 1u)
-                : (model->n_moments == pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end)));
-}
-
-/* The engine of a model. */
-static uint8_t engine_of(const pvid_model_f32 *model)
-{
-    return (model->project == NULL) ? (uint8_t)PVID_ENGINE_STAGED : (uint8_t)PVID_ENGINE_DIRECT;
+           (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && ((PVID_EXACT == 0) || (model->n_p == PVID_MAX_P)) &&
+           (model->n_p <= model->n_theta) && (model->n_c >= 1u) && (model->n_c <= PVID_MAX_THETA * PVID_MAX_P) &&
+           (model->n_moments >= 1u) && (model->n_moments <= PVID_MAX_MOMENTS) &&
+           (model->n_moments == pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end));
 }
 
 static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
@@ -62,11 +50,7 @@ static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
     if (status != PVID_OK) {
         return status;
     }
-    const bool weighted = config->row_weight < 1.0f;
-    return (!pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ||
-            ((engine_of(model) == PVID_ENGINE_DIRECT) && weighted))
-               ? PVID_BAD_ROW_WEIGHT
-               : PVID_OK;
+    return pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ? PVID_OK : PVID_BAD_ROW_WEIGHT;
 }
 
 static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
@@ -96,9 +80,7 @@ static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config
     self->settings.noise_margin = config->noise_margin;
     self->settings.dead_zone = config->dead_zone * config->dead_zone;
     self->settings.n_p = config->model->n_p;
-    self->settings.n_excited = (config->model->n_gated > 0u) ? config->model->n_gated : config->model->n_p;
     self->settings.positive = (uint8_t)(config->model->positive & 0xFFu);
-    self->settings.engine = engine_of(config->model);
     self->divider = config->divider;
     return PVID_OK;
 }
@@ -123,23 +105,14 @@ void pvid_estimator_place_f32(pvid_estimator_f32 *self, const float p[])
     self->model->theta(self->p, self->theta);
 }
 
-/* ---- by the engine that init has chosen ---- */
-
-/* A row of a model with functions of its own. */
-PVID_ALWAYS_INLINE pvid_reason take_row(pvid_estimator_f32 *self, const float n[], float y, bool ends_group)
-{
-    const pvid_model_f32 *model = self->model;
-    float gradient[PVID_MAX_P] = {0};
-    const float e = (self->settings.gain < 1.0f) ? model->innovate(self->p, n, y, gradient) : 0.0f;
-    return pvid_direct_take_row_f32(self, n, y, e, gradient, ends_group);
-}
+/* ---- rows, solves, assessments ---- */
 
 pvid_reason pvid_estimator_add_f32(pvid_estimator_f32 *self, const float n[], float y)
 {
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    return pvid_is_direct_f32(self) ? take_row(self, n, y, false) : pvid_staged_add_f32(self, 0, n, y);
+    return pvid_staged_add_f32(self, 0, n, y);
 }
 
 pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, const float n[], float y)
@@ -152,7 +125,7 @@ pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, 
     if (!exists) {
         return PVID_NOT_READY;
     }
-    return pvid_is_direct_f32(self) ? take_row(self, n, y, false) : pvid_staged_add_f32(self, kind, n, y);
+    return pvid_staged_add_f32(self, kind, n, y);
 }
 
 pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[])
@@ -216,9 +189,6 @@ pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], f
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
     }
-    if (pvid_is_direct_f32(self)) {
-        return take_row(self, n, y, true);
-    }
     const pvid_reason added = pvid_staged_add_f32(self, 0, n, y);
     return (added == PVID_ACCUMULATED) ? pvid_estimator_update_f32(self) : added;
 }
@@ -242,9 +212,5 @@ void pvid_estimator_assess_f32(const pvid_estimator_f32 *self, pvid_estimate_f32
         memset(estimate, 0, sizeof *estimate);
         return;
     }
-    if (pvid_is_direct_f32(self)) {
-        pvid_direct_assess_f32(self, estimate);
-    } else {
-        assess_in_stages(self, estimate);
-    }
+    assess_in_stages(self, estimate);
 }

@@ -70,7 +70,7 @@ static inline void accumulate_block(const pvid_model_f32 *model, const pvid_bloc
 
 #define EIGHT 8u
 
-/* The same for the weak form's 8 entries of N: the compiler unrolls loops of constant length. */
+/* The same for the 8 entries of the pendulum's weak form: the compiler unrolls loops of constant length. */
 static inline void accumulate_eight(const float *restrict n, float y, float row_weight, float *restrict low)
 {
     PVID_UNROLL
@@ -102,15 +102,11 @@ void pvid_information_add_block_f32(pvid_information_f32 *self, const pvid_model
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
                               float sums[PVID_MAX_SUMS])
 {
-    if (model->accumulate != NULL) {
-        model->accumulate(n, y, self->high, self->low, sums);
-    } else {
-        pvid_block block;
-        pvid_information_block_f32(model, 0, &block);
-        pvid_information_add_block_f32(self, model, &block, n, y);
-        if (sums != NULL) {
-            pvid_information_read_f32(self, sums);
-        }
+    pvid_block block;
+    pvid_information_block_f32(model, 0, &block);
+    pvid_information_add_block_f32(self, model, &block, n, y);
+    if (sums != NULL) {
+        pvid_information_read_f32(self, sums);
     }
 }
 

@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-/* The engine for models without their own `project`: it needs theta, C and the pattern of C. A row is added as (e, N)
+/* The solve: it needs theta, C and the pattern of C. A row is added as (e, N)
  * with e = Y - N^T theta, so that the sums are b = B - M theta and rr = sum e^2. Solve and assessment run in stages. */
 #include "solve/staged_f32.h"
 
@@ -12,7 +12,6 @@
 #include "number/finite_f32.h"
 #include "solve/assess_f32.h"
 #include "solve/commit.h"
-#include "solve/direct_f32.h"
 #include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
@@ -30,7 +29,6 @@ enum {
     STAGE_COMMIT,      /* writes p, theta, b and rr */
     STAGE_FOLD,        /* ends the group: information.h */
     STAGE_DONE,
-    STAGE_DIRECT, /* the whole solve by direct_f32.c */
     STAGE_KAPPA,  /* in an assessment after STAGE_ABOVE_NOISE: kappa, residual, misfit */
     STAGE_WIDEN,  /* Cholesky factor of S + prior, for the covariance */
     STAGE_INVERT, /* n_p times: a column of its inverse */
@@ -159,14 +157,8 @@ static void above_noise_stage(const pvid_estimator_f32 *self, pvid_estimator_sol
     const bool judging = solve->estimate != NULL;
     solve->variance = judging ? pvid_assess_variance_f32(&solve->system, settings) : settings->row_variance;
     solve->above_noise = true;
-    if (((self->model->noise != NULL) || (solve->noise != NULL)) && (settings->noise_margin > 0.0f)) {
-        float noise[PVID_MAX_P][PVID_MAX_P];
-        if (solve->noise == NULL) {
-            self->model->noise(self->p, self->noise, noise);
-        }
-        solve->above_noise =
-            pvid_assess_above_noise_f32(&solve->system, settings, solve->variance,
-                                        (solve->noise != NULL) ? solve->noise : (const float (*)[PVID_MAX_P])noise);
+    if ((solve->noise != NULL) && (settings->noise_margin > 0.0f)) {
+        solve->above_noise = pvid_assess_above_noise_f32(&solve->system, settings, solve->variance, solve->noise);
     }
 }
 
@@ -290,7 +282,6 @@ static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
         return (solve->estimate == NULL) ? (uint8_t)STAGE_FACTOR : (uint8_t)STAGE_KAPPA;
     case STAGE_COMMIT:
         return solve->ends_group ? (uint8_t)STAGE_FOLD : (uint8_t)STAGE_DONE;
-    case STAGE_DIRECT:
     case STAGE_SCALE:
         return STAGE_DONE;
     default:
@@ -320,9 +311,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
 {
     reset_solve(self, solve);
     solve->ends_group = ends_group;
-    if (pvid_is_direct_f32(self)) {
-        solve->stage = STAGE_DIRECT;
-    } else if (ends_group) {
+    if (ends_group) {
         solve->group_rss = self->group_rss;
         self->group_rss = 0.0f;
         self->group_weight = 0.0f;
@@ -427,11 +416,6 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
     case STAGE_FOLD:
         pvid_information_end_group_f32(&self->information);
         break;
-    case STAGE_DIRECT:
-        if (pvid_is_direct_f32(self)) {
-            solve->reason = pvid_direct_solve_f32(self, solve->ends_group);
-        }
-        break;
     default:
         return true;
     }
@@ -490,9 +474,6 @@ static size_t projection_stages(const pvid_model_f32 *model)
 uint16_t pvid_estimator_stages_f32(const pvid_estimator_f32 *self, bool ends_group)
 {
     const pvid_model_f32 *model = self->model;
-    if (pvid_is_direct_f32(self)) {
-        return 1;
-    }
     const size_t follow = (model->n_theta + (ROWS_PER_STAGE - 1u)) / ROWS_PER_STAGE;
     return (uint16_t)(projection_stages(model) + 5u + follow + (ends_group ? 1u : 0u));
 }

@@ -77,7 +77,7 @@ static size_t factor_parts(size_t n_p)
 
 static bool checks_noise(const pvid_estimator_q31 *self)
 {
-    return (self->settings.noise_margin > 0u) && ((self->model->noisy[1] > 0u) || (self->noise_rows > 0u));
+    return (self->settings.noise_margin > 0u) && (self->noise_rows > 0u);
 }
 
 static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t part)
@@ -89,11 +89,7 @@ static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_sol
     }
     if (part == 0u) {
         int64_t rest[PVID_MAX_P][PVID_MAX_P];
-        if (self->noise_rows > 0u) {
-            pvid_system_without_table_q31(self, solve, rest);
-        } else {
-            pvid_system_without_noise_q31(self, solve, rest);
-        }
+        pvid_system_without_noise_q31(self, solve, rest);
         pvid_system_begin_factor_q31(&solve->system, n_p, (const int64_t (*)[PVID_MAX_P])rest);
         return;
     }

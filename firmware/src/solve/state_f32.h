@@ -13,13 +13,6 @@ static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
     return ((model->positive >> i) & 1u) != 0u;
 }
 
-/* Returns whether the model has functions of its own: none has in a build for one design of a described mechanism,
- * where their engine is left out. */
-static inline bool pvid_is_direct_f32(const pvid_estimator_f32 *self)
-{
-    return (PVID_EXACT == 0) && (self->settings.engine == (uint8_t)PVID_ENGINE_DIRECT);
-}
-
 /* Returns whether init has accepted a configuration. */
 static inline bool pvid_estimator_is_ready_f32(const pvid_estimator_f32 *self)
 {

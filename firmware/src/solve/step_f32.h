@@ -101,15 +101,12 @@ static inline bool pvid_step_is_in_dead_zone_f32(const pvid_system_f32 *system, 
  *   - a diagonal entry of S + H0 is not a positive normal number or a relative pivot is below PVID_PIVOT_MIN:
  *     PVID_HELD_PIVOT, or
  *   - p[0] is not sufficiently excited: PVID_HELD_NOT_EXCITED.
- * Cost: a factorisation, two if n_excited < n_p. */
+ * Cost: a factorisation. */
 static inline pvid_reason pvid_step_factor_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
                                                pvid_cholesky_f32 *factor)
 {
-    bool solvable = pvid_cholesky_factor_f32(factor, settings->n_excited, system->s);
+    const bool solvable = pvid_cholesky_factor_f32(factor, settings->n_p, system->s);
     const float kappa = factor->first_pivot;
-    if (settings->n_excited < settings->n_p) {
-        solvable = pvid_cholesky_factor_f32(factor, settings->n_p, system->s) && solvable;
-    }
     if (!solvable) {
         return PVID_HELD_PIVOT;
     }

@@ -186,47 +186,7 @@ void pvid_system_eliminate_q31(pvid_system_q31 *system, size_t n_p, size_t part)
     }
 }
 
-/* The noise of so many rows in units of m: its products 00, 01, 11 of the two noisy entries of N. */
-static void scale_noise(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve, int32_t noise[])
-{
-    const uint8_t *noisy = self->model->noisy;
-    const int64_t weight = self->information.sums[self->information.n_sums - 1u];
-    const pvid_scaled_q31 rows = pvid_scaled_times_q31(pvid_scaled_of_q31(weight, -16), solve->variance);
-    const pvid_scaled_q31 much = pvid_scaled_times_q31(pvid_scaled_of_q31(self->settings.noise_margin, -16), rows);
-    for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
-        const int32_t h = solve->h[noisy[i / 2u]] + solve->h[noisy[(i + 1u) / 2u]];
-        const pvid_scaled_q31 own = pvid_scaled_times_q31(much, self->noise[i]);
-        noise[i] = (int32_t)pvid_clamp_q31(pvid_scaled_fixed_q31(own, -h), INT32_MAX);
-    }
-}
-
 void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
-                                   int64_t rest[][PVID_MAX_P])
-{
-    const pvid_model_q31 *model = self->model;
-    int32_t noise[PVID_NOISE_TRACES_Q31];
-    int32_t c[PVID_MAX_P][2] = {0}; /* the noisy rows of C, by parameters */
-    scale_noise(self, solve, noise);
-    for (size_t k = 0; k < model->n_c; k++) {
-        for (size_t i = 0; i < 2u; i++) {
-            if (model->c_row[k] == model->noisy[i]) {
-                c[model->c_column[k]][i] = solve->c[k];
-            }
-        }
-    }
-    for (size_t a = 0; a < model->n_p; a++) {
-        int64_t t[2];
-        for (size_t i = 0; i < 2u; i++) {
-            const int64_t sum = ((int64_t)noise[i] * c[a][0]) + ((int64_t)noise[i + 1u] * c[a][1]);
-            t[i] = pvid_round_shift_q31(sum, PVID_S_BITS);
-        }
-        for (size_t b = a; b < model->n_p; b++) {
-            rest[a][b] = solve->system.s[a][b] - ((c[b][0] * t[0]) + (c[b][1] * t[1]));
-        }
-    }
-}
-
-void pvid_system_without_table_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
                                    int64_t rest[][PVID_MAX_P])
 {
     const int64_t weight = self->information.sums[self->information.n_sums - 1u];

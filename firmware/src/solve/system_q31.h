@@ -11,10 +11,6 @@ int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, in
 void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
                                    int64_t rest[][PVID_MAX_P]);
 
-/* The same, of the table of noise. */
-void pvid_system_without_table_q31(const pvid_estimator_q31 *self, const pvid_estimator_solve_q31 *solve,
-                                   int64_t rest[][PVID_MAX_P]);
-
 /* h: powers of two that bring M's diagonal into [2^28, 2^30). */
 void pvid_system_exponents_q31(const pvid_information_q31 *information, const pvid_model_q31 *model, int16_t h[]);
 

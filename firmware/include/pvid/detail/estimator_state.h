@@ -4,10 +4,6 @@
 
 #include "pvid/estimator.h"
 
-/* How p is solved: in stages by the pattern of C (src/solve/staged_f32.c), or at once by the model's own functions
- * (src/solve/direct_f32.c). */
-enum { PVID_ENGINE_STAGED = 1, PVID_ENGINE_DIRECT = 2 };
-
 /* What the step and the assessment need beside the normal equations; written by init alone. */
 typedef struct {
     float prior[PVID_MAX_P];    /* diagonal of H0 [units of S] */
@@ -20,14 +16,12 @@ typedef struct {
     float step_limit;
     float kappa_min;
     float noise_margin;
-    float dead_zone;   /* square of the configured one */
-    uint8_t n_p;       /* parameters */
-    uint8_t n_excited; /* the first ones, which are checked for excitation */
-    uint8_t positive;  /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a]; PVID_MAX_P <= 8 */
-    uint8_t engine;    /* PVID_ENGINE_ */
+    float dead_zone;  /* square of the configured one */
+    uint8_t n_p;      /* parameters */
+    uint8_t positive; /* bit a set: p[a] > 0, steps are relative to p[a], else to start_sd[a]; PVID_MAX_P <= 8 */
 } pvid_solve_settings_f32;
 
-/* The normal equations of a solve and the residuals at p, which an engine gathers from the sums (estimator.h):
+/* The normal equations of a solve and the residuals at p, gathered from the sums (estimator.h):
  *
  *   (S + H0) dp = g F + (1 - g) sum C^T N e,   S = C^T M C,   F = C^T (B - M theta) */
 typedef struct {
@@ -44,12 +38,11 @@ struct pvid_estimator_f32 {
     const pvid_model_f32 *model;
     pvid_information_f32 information;
     float p[PVID_MAX_P];
-    float theta[PVID_MAX_THETA];  /* f(p); only for models without their own project */
+    float theta[PVID_MAX_THETA];  /* f(p) */
     float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
     pvid_solve_settings_f32 settings;
-    float noise[PVID_NOISE_TRACES]; /* argument of the model's `noise`; the weak form writes it */
-    float group_rss;                /* sum of e^2 of the rows of the current group, each at the p of its tick */
-    float group_weight; /* their weight; group_rss and group_weight only for models without their own project */
+    float group_rss;    /* sum of e^2 of the rows of the current group, each at the p of its tick */
+    float group_weight; /* their weight */
     float expected;     /* mean over the rows in the sums of their variance by the sensors' noise [units of Y^2]: lower
                            limit of the residual variance. 0: unknown */
     uint16_t divider;
@@ -82,7 +75,7 @@ struct pvid_estimator_solve_f32 {
     pvid_reason reason;
     const float *fallback;            /* [n_p] value of p if no step is allowed; NULL: p is unchanged */
     const float (*noise)[PVID_MAX_P]; /* information of noise alone that a solve's S must exceed noise_margin times: of
-                                         unit variance, per unit of weight, upper triangle; NULL: as the model says */
+                                         unit variance, per unit of weight, upper triangle; NULL: unknown, no check */
     pvid_estimate_f32 *estimate;      /* of an assessment; NULL for a solve */
     float size;                       /* largest |dp/p| of the step before step_limit; 0 if p is held */
     float group_rss;                  /* sum of e^2 of the group's rows, each at the p of its tick */

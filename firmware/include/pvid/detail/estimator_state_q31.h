@@ -13,9 +13,6 @@ typedef struct {
     int32_t e;
 } pvid_root_q31;
 
-/* Noise in the regressors N, beside that of Y: PVID_NOISE_TRACES numbers of model.h. */
-#define PVID_NOISE_TRACES_Q31 3
-
 /* The sums M, b, rr and weight. */
 typedef struct {
     uint8_t n_theta;
@@ -61,7 +58,6 @@ struct pvid_estimator_q31 {
     int16_t theta_bits[PVID_MAX_THETA_Q31];
     int16_t c_exponent[PVID_MAX_C_Q31]; /* C_k 2^c_exponent: units of Y per N and p */
     pvid_solve_settings_q31 settings;
-    pvid_scaled_q31 noise[PVID_NOISE_TRACES_Q31]; /* see pvid_model_q31; the weak form writes it */
     int32_t
         noise_table[(PVID_MAX_P * (PVID_MAX_P + 1)) / 2]; /* information of noise of variance 1 in noise_rows rows, */
     uint16_t noise_rows; /* upper triangle by rows, packed (scaled_q31.h); 0: unknown; the engine writes it */

@@ -3,6 +3,5 @@
 #define PVID_MECHANISM_H
 
 #include "pvid/kapitza.h"
-#include "pvid/kapitza_weak.h"
 
 #endif

@@ -4,6 +4,5 @@
 
 #include "pvid/kapitza_q31.h"
 #include "pvid/kapitza_strong_q31.h"
-#include "pvid/kapitza_weak_q31.h"
 
 #endif

@@ -1,8 +1,12 @@
-#include "pvid/kapitza_weak_q31.h"
+/* A fixed-point model in formats of its own, written by hand: theta = (d1, d1 w, d2, d2 w, d2 w^2, d2 c, d2 c w,
+ * d2 c w^2) of p = (w, d1, d2, c). */
+#ifndef PENDULUM_MODEL_Q31_H
+#define PENDULUM_MODEL_Q31_H
 
 #include "number/integer_q31.h"
+#include "pvid/model_q31.h"
 
-enum { W = PVID_KAPITZA_W, D1 = PVID_KAPITZA_D1, D2 = PVID_KAPITZA_D2, C = PVID_KAPITZA_C };
+enum { W, D1, D2, C };
 
 /* p has 31 bits: a single factor is shifted up to 46 bits, a product of two down to 46; a third factor shifts by
  * 31. */
@@ -20,18 +24,13 @@ static int64_t product(int32_t a, int32_t b)
     return pvid_round_shift_q31(pvid_product_q31(a, b), DOWN);
 }
 
-static void zeroed_theta_of(const int32_t p[], int64_t theta[])
+static void theta_of(const int32_t p[], int64_t theta[])
 {
     theta[0] = scale_up(p[D1]);
     theta[1] = product(p[D1], p[W]);
     theta[2] = scale_up(p[D2]);
     theta[3] = product(p[D2], p[W]);
     theta[4] = pvid_times_q31(theta[3], p[W]);
-}
-
-static void theta_of(const int32_t p[], int64_t theta[])
-{
-    zeroed_theta_of(p, theta);
     theta[5] = product(p[D2], p[C]);
     theta[6] = pvid_times_q31(theta[5], p[W]);
     theta[7] = pvid_times_q31(theta[6], p[W]);
@@ -42,7 +41,7 @@ static const uint8_t c_column[16] = {W, W, W, W, W, D1, D1, D2, D2, D2, D2, D2, 
 
 static void jacobian_of(const int32_t p[], int64_t c[])
 {
-    int64_t theta[PVID_KAPITZA_WEAK_THETA];
+    int64_t theta[8];
     theta_of(p, theta);
     c[0] = theta[0];
     c[1] = theta[2];
@@ -62,18 +61,13 @@ static void jacobian_of(const int32_t p[], int64_t c[])
     c[15] = theta[4];
 }
 
-static void zeroed_theta_formats(const int8_t p_bits[], int16_t theta_bits[])
+static void formats_of(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
 {
     theta_bits[0] = (int16_t)(p_bits[D1] + UP);
     theta_bits[1] = (int16_t)(p_bits[D1] + p_bits[W] - DOWN);
     theta_bits[2] = (int16_t)(p_bits[D2] + UP);
     theta_bits[3] = (int16_t)(p_bits[D2] + p_bits[W] - DOWN);
     theta_bits[4] = (int16_t)(theta_bits[3] + p_bits[W] - 31);
-}
-
-static void formats_of(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
-{
-    zeroed_theta_formats(p_bits, theta_bits);
     theta_bits[5] = (int16_t)(p_bits[D2] + p_bits[C] - DOWN);
     theta_bits[6] = (int16_t)(theta_bits[5] + p_bits[W] - 31);
     theta_bits[7] = (int16_t)(theta_bits[6] + p_bits[W] - 31);
@@ -95,40 +89,11 @@ static void formats_of(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bi
     c_bits[15] = theta_bits[4];
 }
 
-static const uint8_t zeroed_c_row[8] = {1, 3, 4, 0, 1, 2, 3, 4};
-static const uint8_t zeroed_c_column[8] = {W, W, W, D1, D1, D2, D2, D2};
-
-static void zeroed_jacobian_of(const int32_t p[], int64_t c[])
-{
-    c[0] = scale_up(p[D1]);
-    c[1] = scale_up(p[D2]);
-    c[2] = 2 * product(p[D2], p[W]);
-    c[3] = (int64_t)1 << ONE_BITS;
-    c[4] = scale_up(p[W]);
-    c[5] = (int64_t)1 << ONE_BITS;
-    c[6] = scale_up(p[W]);
-    c[7] = product(p[W], p[W]);
-}
-
-static void zeroed_formats_of(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
-{
-    zeroed_theta_formats(p_bits, theta_bits);
-    c_bits[0] = theta_bits[0];
-    c_bits[1] = theta_bits[2];
-    c_bits[2] = theta_bits[3];
-    c_bits[3] = ONE_BITS;
-    c_bits[4] = (int16_t)(p_bits[W] + UP);
-    c_bits[5] = ONE_BITS;
-    c_bits[6] = c_bits[4];
-    c_bits[7] = (int16_t)(p_bits[W] + p_bits[W] - DOWN);
-}
-
-const pvid_model_q31 pvid_kapitza_weak_q31 = {
-    .n_theta = PVID_KAPITZA_WEAK_THETA,
-    .n_p = PVID_KAPITZA_WEAK_P,
+static const pvid_model_q31 pendulum_model_q31 = {
+    .n_theta = 8,
+    .n_p = 4,
     .n_c = 16,
     .positive = 7u,
-    .noisy = {1, 4},
     .c_row = c_row,
     .c_column = c_column,
     .theta = theta_of,
@@ -136,15 +101,4 @@ const pvid_model_q31 pvid_kapitza_weak_q31 = {
     .formats = formats_of,
 };
 
-const pvid_model_q31 pvid_kapitza_weak_zeroed_q31 = {
-    .n_theta = PVID_KAPITZA_ZEROED_THETA,
-    .n_p = PVID_KAPITZA_P,
-    .n_c = 8,
-    .positive = 7u,
-    .noisy = {1, 4},
-    .c_row = zeroed_c_row,
-    .c_column = zeroed_c_column,
-    .theta = zeroed_theta_of,
-    .jacobian = zeroed_jacobian_of,
-    .formats = zeroed_formats_of,
-};
+#endif
