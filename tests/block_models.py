@@ -13,8 +13,8 @@ from pvid.core.native import Native
 from pvid.settings.f32 import EstimatorConfig
 from pvid.settings.q31 import EstimatorConfigQ31
 from pvid.twin.f32.pattern import PatternModel
-from pvid.twin.kapitza.weak_q31 import ModelQ31
 from pvid.twin.q31.integer import Int, round_shift
+from pvid.twin.q31.model import ModelQ31
 
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]

@@ -2,50 +2,75 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from block_models import BlockModelQ31, EstimatorQ31InC
 
 from pvid.core.native import Native
-from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31
-from pvid.settings.record import Record
-from pvid.setup.q31 import weak_config_q31
-from pvid.twin.kapitza.weak_q31 import WEAK
 from pvid.twin.q31.estimator import SUM_LIMIT, EstimatorQ31
 
-CONFIG = weak_config_q31(RigFile.standard(), 1000.0).estimator
 LIMIT = 2**28
+UNIT = 2**26  # of p
+N_P, N_THETA = 4, 8
+MODEL = BlockModelQ31.random(np.random.default_rng(3), (N_THETA,), N_P)
+CONFIG = EstimatorConfigQ31(
+    start=(UNIT // 2,) * N_P,
+    start_sd=(UNIT,) * N_P,
+    lower=(UNIT // 16,) * N_P,
+    upper=(15 * UNIT,) * N_P,
+    p_bits=(26,) * N_P,
+    n_bits=(20,) * N_THETA,
+    y_bits=20,
+    row_sd=256,
+)
 Rows = npt.NDArray[np.int64]
 
 
-def against_twin(native: Native, config: EstimatorConfigQ31, n: Rows, y: Rows) -> Record:
+@dataclass(frozen=True)
+class Steps:
+    """State after every tick: p [ticks, n_p], sums [ticks, n_sums], their exponent and the reason [ticks]."""
+
+    p: Rows
+    sums: Rows
+    exponent: Rows
+    reason: Rows
+
+
+def against_twin(native: Native, config: EstimatorConfigQ31, n: Rows, y: Rows) -> Steps:
     """Steps the core and the twin through rows N [ticks, 8], Y [ticks], a group each; all integers must be equal."""
-    core = native.estimator_q31(config)
-    record = core.run(n, y)
-    twin = EstimatorQ31([config], WEAK)
+    core, twin = EstimatorQ31InC(native, MODEL, config), EstimatorQ31([config], MODEL.twin())
+    steps = []
     for tick in range(len(y)):
+        own = core.add(0, n[tick], int(y[tick]))
+        if own == Reason.ACCUMULATED:
+            own = core.update()
         reason = twin.add(n[tick][:, None], y[tick : tick + 1])
         if reason[0] == Reason.ACCUMULATED:
             for reported in twin.solve(ends_group=True):
                 reason = reason if reported is None else reported
-        assert reason[0] == record.reason[tick], tick
-        assert np.array_equal(twin.p[:, 0], record.p[tick]), tick
-        assert np.array_equal(twin.sums[:, 0], record.sums[tick]), tick
-        assert twin.exponent[0] == record.exponent[tick], tick
+        assert reason[0] == own, tick
+        assert np.array_equal(twin.p[:, 0], core.p), tick
+        assert np.array_equal(twin.sums[:, 0], core.sums), tick
+        exponent = int(core.state.information.exponent)
+        assert twin.exponent[0] == exponent, tick
+        steps.append((core.p, core.sums, exponent, own))
     assert core.counters == {name: int(of[0]) for name, of in twin.counters.items()}
     assert core.assess().tobytes() == twin.assess()[0].tobytes()
-    return record
+    return Steps(*(np.array(part) for part in zip(*steps, strict=True)))
 
 
 def loud_rows(ticks: int, largest: int = LIMIT) -> tuple[Rows, Rows]:
-    """Rows at the limit in the one place where theta is 0 at the start, N8, and small elsewhere."""
+    """Rows at the limit in one place, N8, and small elsewhere, with the Y that the start explains."""
     random = np.random.default_rng(5)
-    n = random.integers(-2000, 2001, (ticks, 8))
+    n = random.integers(-2000, 2001, (ticks, N_THETA))
     n[:, 7] = largest
-    return n, random.integers(-1000, 1001, ticks)
+    theta, (bits, _) = MODEL.theta(np.array(CONFIG.start)), MODEL.formats(CONFIG.p_bits)
+    y = np.rint(n @ (theta * 2.0 ** -np.array(bits, np.float64))).astype(np.int64)
+    return n, y
 
 
 def test_sums_at_full_scale_are_divided_and_never_wrap(native: Native) -> None:

@@ -11,16 +11,16 @@ import numpy.typing as npt
 from pvid.settings.enums import Reason
 from pvid.settings.fourier_q31 import FourierConfigQ31
 from pvid.settings.q31 import EstimatorConfigQ31
-from pvid.twin.kapitza.weak_q31 import ModelQ31
+from pvid.twin.play import Work, play
 from pvid.twin.q31 import fourier_finish
 from pvid.twin.q31.estimator import EstimatorQ31
 from pvid.twin.q31.fourier_collect import Schedule, Tick, collect
 from pvid.twin.q31.gate import GateQ31
 from pvid.twin.q31.integer import Int, clamp, integers
+from pvid.twin.q31.model import ModelQ31
 from pvid.twin.q31.scaled import scaled
 from pvid.twin.q31.trust import TrustQ31
 from pvid.twin.record import After, Mask, Reasons, Recorder, TwinRecord
-from pvid.twin.weak_schedule import Work, play
 
 _GATE_MEMORY = 4
 _BEYOND = 2**25  # a reading beyond full scale stays beyond it

@@ -96,10 +96,6 @@ class Estimator:
         """Reference of the relative size of a step [n_p, lanes]."""
         return self.p
 
-    def _kappa(self, s: Float32, whole: cholesky.Factor) -> cholesky.Factor:
-        """The factor for the leading parameters that are checked for excitation; whole: that for all parameters."""
-        return whole
-
     def _step_from(
         self,
         s: Float32,
@@ -115,15 +111,13 @@ class Estimator:
         rhs = gain * force + (np.float32(1) - gain) * self.innovation
         self.innovation = np.where(due, np.float32(0), self.innovation)
         f = cholesky.factor(s)
-        kappa = self._kappa(s, f)
-        solvable = f.ok & kappa.ok
-        own = (kappa.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
-        excited = above_noise & (kappa.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
-        in_dead_zone = due & solvable & excited & self._at_rest(f, force)
+        own = (f.first_pivot * s[0, 0]) >= (np.float32(2) * self.prior[0])
+        excited = above_noise & (f.first_pivot >= self.kappa_min) & (own | ~(self.kappa_min > 0))
+        in_dead_zone = due & f.ok & excited & self._at_rest(f, force)
         dp = cholesky.solve(f, rhs)
         magnitudes = (dp / self._reference()).view(np.uint32) & np.uint32(0x7FFFFFFF)
         size = magnitudes.max(axis=0).view(np.float32)
-        moving = due & solvable & excited & np.isfinite(size) & ~in_dead_zone
+        moving = due & f.ok & excited & np.isfinite(size) & ~in_dead_zone
         self.size = np.where(moving, size, np.float32(0))
         limited = size > self.step_limit
         factor = np.where(limited, self.step_limit / size, np.float32(1)).astype(np.float32, copy=False)
@@ -135,7 +129,7 @@ class Estimator:
         reason = np.full(len(due), Reason.UPDATED, np.uint8)
         reason[~np.isfinite(size) & ~in_dead_zone] = Reason.HELD_PIVOT
         reason[~excited] = Reason.HELD_NOT_EXCITED
-        reason[~solvable] = Reason.HELD_PIVOT
+        reason[~f.ok] = Reason.HELD_PIVOT
         self.counters["limited"] += moving & limited
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         self.counters["held_not_excited"] += due & (reason == Reason.HELD_NOT_EXCITED)
@@ -179,7 +173,7 @@ class Estimator:
     def _assess(self, sums: Float32, s: Float32, variance: Float32) -> npt.NDArray[np.void]:
         n_p = len(self.p)
         weight = sums[-1]
-        kappa = self._kappa(s, cholesky.factor(s))
+        kappa = cholesky.factor(s)
         most = np.ones(len(weight), np.float32)
         for j in range(len(kappa.u)):
             scaled = kappa.u[j, j] * kappa.scale[j]
@@ -227,8 +221,7 @@ class RelativeEstimator(Estimator):
             self.theta = pattern.theta(self.p)
         self.row_weight = _lanes([c.row_weight for c in configs])
         self.noise_margin = _lanes([c.noise_margin for c in configs])
-        self.noise = np.zeros((3, len(configs)), np.float32)
-        self.noise_alone: Float32 | None = None  # that a solve's S must exceed, in place of the model's
+        self.noise_alone: Float32 | None = None  # that a solve's S must exceed
         self.rss = np.zeros(len(configs), np.float32)
         self.group_rss = self.rss
         self.group_weight = np.zeros(len(configs), np.float32)
@@ -394,21 +387,14 @@ class RelativeEstimator(Estimator):
         return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
 
     def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
-        if self.model.noise is None and self.noise_alone is None:
+        if self.noise_alone is None:
             return self.everywhere
-        gated = self.model.gated
-        rest = np.zeros((gated, gated, s.shape[2]), np.float32)
+        rest = np.zeros_like(s)
         much = (self.noise_margin * variance) * weight
-        noise = self.noise_alone if self.model.noise is None else self.model.noise(self.p, self.noise)
-        assert noise is not None
-        for a in range(gated):
-            for b in range(a, gated):
-                rest[a, b] = s[a, b] - much * noise[a, b]
+        for a in range(len(s)):
+            for b in range(a, len(s)):
+                rest[a, b] = s[a, b] - much * self.noise_alone[a, b]
         return cholesky.factor(rest).ok | ~(self.noise_margin > 0)
-
-    def _kappa(self, s: Float32, whole: cholesky.Factor) -> cholesky.Factor:
-        gated = self.model.gated
-        return whole if gated == self.model.n_p else cholesky.factor(s[:gated, :gated])
 
     def _commit(self, gain: Float32, fallback: tuple[npt.NDArray[np.bool_], Float32] | None) -> npt.NDArray[np.uint8]:
         pattern = self.model

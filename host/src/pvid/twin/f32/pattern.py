@@ -19,7 +19,7 @@ Float32 = npt.NDArray[np.float32]
 
 @dataclass(frozen=True)
 class PatternModel:
-    """pvid_model_f32 without functions of its own but theta and its Jacobian.
+    """pvid_model_f32.
 
     kind_end: one past the last theta of each kind of rows; empty: one kind.
     """
@@ -31,14 +31,7 @@ class PatternModel:
     c_column: tuple[int, ...]
     theta: Callable[[Float32], Float32]
     jacobian: Callable[[Float32], Float32]
-    noise: Callable[[Float32, Float32], Float32] | None = None
-    n_gated: int = 0
     kind_end: tuple[int, ...] = ()
-
-    @property
-    def gated(self) -> int:
-        """Leading parameters that the gates look at."""
-        return self.n_gated or self.n_p
 
     @cached_property
     def blocks(self) -> Blocks:

@@ -11,7 +11,6 @@ from pvid.base.errors import PvidError
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31
 from pvid.twin import estimates
-from pvid.twin.kapitza.weak_q31 import ModelQ31
 from pvid.twin.q31 import cholesky
 from pvid.twin.q31.integer import (
     WIDE,
@@ -24,6 +23,7 @@ from pvid.twin.q31.integer import (
     scale,
     times_q31,
 )
+from pvid.twin.q31.model import ModelQ31
 from pvid.twin.q31.scaled import Scaled, pick, scaled
 from pvid.twin.record import COUNTERS
 
@@ -170,7 +170,6 @@ class EstimatorQ31:
         self.kappa_min = lane("kappa_min")
         self.noise_margin = lane("noise_margin")
         self.dead_zone = lane("dead_zone")
-        self.noise = [scaled(np.zeros(lanes, np.int64), 0)] * 3
         self.noise_table: dict[tuple[int, int], Scaled] = {}
         self.noise_rows = 0
         self.rss = np.zeros(lanes, np.int64)
@@ -439,32 +438,10 @@ class EstimatorQ31:
                 s[a, b] = (c[there] * t[rows[there]]).sum(axis=0)
         return s
 
-    def _above_noise(self, s: Int, c: Int, f: Int, h: Int, variance: Scaled) -> Mask:
+    def _above_noise(self, s: Int, f: Int, variance: Scaled) -> Mask:
         """Whether S minus noise_margin times the information of noise of this variance is positive definite."""
-        model = self.model
-        if self.noise_rows:
-            return self._above_table(s, f, variance)
-        if model.noisy is None:
+        if not self.noise_rows:
             return np.ones(self.lanes, np.bool_)
-        first, second = model.noisy
-        much = scaled(self.noise_margin, -16).times(scaled(self.sums[-1], -16).times(variance))
-        noise = [
-            clamp(much.times(own).fixed(-(h[i] + h[j])), 2**31 - 1)
-            for own, i, j in zip(self.noise, (first, first, second), (first, second, second), strict=True)
-        ]
-        rows = np.zeros((2, model.n_p, self.lanes), np.int64)
-        for k, (row, column) in enumerate(zip(model.c_row, model.c_column, strict=True)):
-            if row in model.noisy:
-                rows[model.noisy.index(row), column] = c[k]
-        rest = s.copy()
-        for a in range(model.n_p):
-            t = [round_shift(noise[i] * rows[0, a] + noise[i + 1] * rows[1, a], 32) for i in range(2)]
-            for b in range(a, model.n_p):
-                rest[a, b] = rest[a, b] - (rows[0, b] * t[0] + rows[1, b] * t[1])
-        return np.asarray((self.noise_margin == 0) | cholesky.factor(equilibrated_system(rest)[0]).ok)
-
-    def _above_table(self, s: Int, f: Int, variance: Scaled) -> Mask:
-        """The same of the table of noise."""
         row = scaled(self.row_sd * self.row_sd, -16)
         tables = scaled(self.sums[-1], -16).over(scaled(np.full(self.lanes, self.noise_rows), 0))
         much = scaled(self.noise_margin, -16).times(tables).times(variance.over(row))
@@ -482,7 +459,7 @@ class EstimatorQ31:
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        above_noise = self._above_noise(s, c, f, h, self.expected_variance)
+        above_noise = self._above_noise(s, f, self.expected_variance)
         prior = in_units_of_s(self.prior, self.prior_exponent + 2 * self.exponent, f)
         for a in range(model.n_p):
             s[a, a] = s[a, a] + prior[a]
@@ -631,6 +608,6 @@ class EstimatorQ31:
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
         s = self._project(c, m)
-        above_noise = self._above_noise(s, c, f, h, variance)
+        above_noise = self._above_noise(s, f, variance)
         assess_errors(out, s, f, self.start_sd, *root_of(*variance.times(scaled(self.correlation, -16))))
         return out, above_noise

@@ -10,6 +10,7 @@ from pvid.base.errors import PvidError
 from pvid.settings.enums import Reason
 from pvid.settings.fourier import FourierKind
 from pvid.settings.fourier_q31 import FourierDesignQ31
+from pvid.twin.play import Work
 from pvid.twin.q31 import fourier_noise, fourier_white
 from pvid.twin.q31.estimator import ROW_LIMIT, EstimatorQ31
 from pvid.twin.q31.gate import GateQ31
@@ -17,7 +18,6 @@ from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
 from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.trust import TrustQ31
 from pvid.twin.record import Mask, of_all_lanes
-from pvid.twin.weak_schedule import Work
 
 _ENTRIES_PER_STAGE = 4
 _HARMONICS_PER_STAGE = 2
