@@ -10,17 +10,25 @@ import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
+from block_models import BlockModel, EstimatorInC
+from fourier_rig import engine_rig
 
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.core import snapshot
+from pvid.core.fourier_native_q31 import FourierNativeQ31
 from pvid.core.headers import Headers, Scalar, default_library
 from pvid.core.native import Identifier, Native, Stepper
+from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
+from pvid.run.engine_design_q31 import engine_for_simulated_rig
 from pvid.settings.enums import Status
-from pvid.setup.f32 import strong_config, weak_config
-from pvid.setup.q31 import strong_config_q31, weak_config_q31
+from pvid.settings.f32 import EstimatorConfig
+from pvid.setup.f32 import strong_config
+from pvid.setup.q31 import strong_config_q31
 
 RIG = RigFile.standard()
 HEADERS = Headers.of(default_library())
@@ -104,19 +112,6 @@ STRONG = {
     "estimator.row_weight": Range(1.0, 1.0, Status.BAD_ROW_WEIGHT),
     "exact_every": Range(0, 255, Status.BAD_DIVIDER),
 }
-WEAK = {
-    **RIG_FIELDS,
-    **ESTIMATOR,
-    "pivot_noise": Range(0.0, 1e9, Status.BAD_PIVOT_NOISE),
-    "angle_limit": Range(0.0, 1e9, Status.BAD_ANGLE_LIMIT),
-    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
-    "trust.kappa_min": Range(0.0, 0.999, Status.BAD_PUBLISH_KAPPA),
-    "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
-    "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
-    "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
-    "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.revert_after": Range(0, 65535, Status.OK),
-}
 LEAST = -(2**31)
 FORMAT = Range(-64, 64, Status.BAD_FORMAT)
 ESTIMATOR_Q31 = {
@@ -140,21 +135,6 @@ ESTIMATOR_Q31 = {
     "gate.patience_groups": Range(0, 2**30, Status.BAD_GATE_PATIENCE),
     "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
 }
-WEAK_Q31 = {
-    **ESTIMATOR_Q31,
-    "drive_min": Range(0, 2**18, Status.BAD_DRIVE_MIN),
-    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
-    "pivot_noise.m": Range(0, 2**30, Status.BAD_PIVOT_NOISE),
-    "pivot_noise.e": Range(-200, 200, Status.BAD_PIVOT_NOISE),
-    "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
-    "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
-    "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
-    "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
-    "trust.groups_min": Range(0, 65535, Status.OK),
-    "trust.revert_after": Range(0, 65535, Status.OK),
-}
 SHIFT = Range(0, 62, Status.BAD_SHIFT)
 COUNTS = Range(1, 2**24, Status.BAD_FULL_SCALE)
 STRONG_Q31 = {
@@ -177,33 +157,32 @@ STRONG_Q31 = {
     "bank.y_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
 }
 
-# Sizes, formats and full scales of the tables. Ends of a size may leave a window that cannot be worked off in time, and
-# ends of a shift terms beyond 21 bits.
-IN_TIME = (Status.BAD_ITERATIONS,)
-IN_BITS = (Status.BAD_ITERATIONS, Status.BAD_SHIFT)
+# Sizes of the tables.
 BANK = {
     "bank.half": Range(2, 160, Status.BAD_HALF),
     "bank.stride": Range(1, 80, Status.BAD_STRIDE),
 }
-WEAK_SIZES = {
-    "design.taps": Range(5, 401, Status.BAD_TAPS, IN_TIME, odd=True),
-    "design.decimation": Range(1, 64, Status.BAD_DECIMATION, IN_TIME),
-    "design.window": Range(9, 251, Status.BAD_WINDOW, IN_TIME, odd=True),
-    "design.functions": Range(4, 16, Status.BAD_FUNCTIONS, IN_TIME),
-    "design.lag": Range(1, 255, Status.BAD_LAG),
+TRUST = {
+    "trust.kappa_min": Range(0.0, 0.999, Status.BAD_PUBLISH_KAPPA),
+    "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
+    "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
+    "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
+    "trust.groups_min": Range(0, 65535, Status.OK),
+    "trust.revert_after": Range(0, 65535, Status.OK),
+    "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
 }
-DESIGN = {**WEAK_SIZES, "design.overlap": Range(1.0, 1e6, Status.BAD_OVERLAP)}
-DESIGN_Q31 = {
-    **WEAK_SIZES,
-    "design.smooth_bits": Range(0, 31, Status.BAD_SHIFT, IN_BITS),
-    **{f"design.{name}": replace(SHIFT, also=IN_BITS) for name in ("phi_shift", "uf_shift")},
-    **{f"design.{name}": SHIFT for name in ("u_shift", "integral_shift", "product_shift", "shift")},
-    "design.high_shift": Range(0, 61, Status.BAD_SHIFT),
-    "design.sum_shift": Range(1, 30, Status.BAD_SHIFT),
-    "design.gram_bits": Range(-128, 127, Status.OK),
-    "design.phi_max": replace(COUNTS, also=IN_BITS),
-    "design.y_max": COUNTS,
-    "design.u_max": Range(1, 2**18, Status.BAD_FULL_SCALE, IN_BITS),
+WEAK = {
+    **{name: RIG_FIELDS[name] for name in ("sample_rate_hz", "gate.sigmas", "gate.patience_s")},
+    **ESTIMATOR,
+    **TRUST,
+}
+WEAK_Q31 = {
+    **ESTIMATOR_Q31,
+    **TRUST,
+    "trust.kappa_min": Range(0, 2**30 - 2**30 // 1000, Status.BAD_PUBLISH_KAPPA),
+    "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
+    "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
+    "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
 }
 OWN = {
     **ESTIMATOR,
@@ -214,36 +193,28 @@ OWN = {
 }
 RANGES = {
     "strong": STRONG,
-    "weak": WEAK,
-    "corrected": {**WEAK, "passes": Range(1, 8, Status.BAD_ANGLE, IN_TIME)},
-    "weak q31": WEAK_Q31,
     "strong q31": STRONG_Q31,
+    "weak": WEAK,
+    "weak q31": WEAK_Q31,
     "estimator": OWN,
 }
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 SIZES = {
     "strong": {**BANK, "bank.block": Range(0, 314, Status.BAD_STRIDE)},
-    "weak": DESIGN,
-    "corrected": DESIGN,
-    "weak q31": DESIGN_Q31,
     "strong q31": {**BANK, "bank.block": Range(0, 315, Status.BAD_STRIDE)},
+    "weak": {},
+    "weak q31": {},
     "estimator": {},
 }
-WITHOUT = {
-    "weights": Status.BAD_BANK,
-    "angle": Status.BAD_ANGLE,
-    "model": Status.BAD_MODEL,
-}  # else BAD_DESIGN: its tables
-# Flags; what a form's init fills in; what is used with a correction alone.
-SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}
-SET_BY_WEAK_INIT = SET_BY_INIT | {"estimator.correlation", "estimator.row_weight"}
-FLAGS = {"full_angle", "friction", "zero_unknown"}
+WITHOUT = {"weights": Status.BAD_BANK, "model": Status.BAD_MODEL}
+SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}  # what a form's init fills in
+# Of the engine: tests/core/test_fourier_valid_q31.py, tests/unit/test_fourier.c.
+ELSEWHERE = {"design", "refine", "range", "drive_min", "offset"}
 UNUSED = {
     "strong": SET_BY_INIT,
-    "weak": {*SET_BY_WEAK_INIT, *FLAGS, "angle", "passes"},
-    "corrected": {*SET_BY_WEAK_INIT, *FLAGS},
-    "weak q31": {*SET_BY_INIT, *FLAGS},
     "strong q31": SET_BY_INIT | {"estimator.n_bits", "estimator.y_bits"},
+    "weak": SET_BY_INIT | {"estimator.correlation", "estimator.row_weight", "compensation"} | ELSEWHERE,
+    "weak q31": SET_BY_INIT | {"estimator.row_weight", "compensation"} | ELSEWHERE,
     "estimator": set(),
 }
 
@@ -268,23 +239,25 @@ class Subject:
         prefix = "estimator." if self.name == "estimator" else ""
         sizes = {name: table.size for name, table in self.identifier.tables.items()}
         self.tables: dict[str, Any] = {}
-        self.fields = {field.name: field for field in headers.scalars(config, prefix)}
+        all_of_them = {field.name: field for field in headers.scalars(config, prefix)}
+        self.fields = {name: field for name, field in all_of_them.items() if not name.startswith("design.")}
         model = getattr(self.identifier.estimator, "model", None)  # the strong forms have estimators of their own
         self.n_theta = int(model.n_theta) if model is not None else 0
-        self.design: Any = config.design[0] if "design.taps" in self.fields else None
-        self.entries = {name: sizes[name.rpartition(".")[2]] for name, field in self.fields.items() if is_table(field)}
-        structs = [config, *([self.design] if self.design is not None else [])]
-        self._memory = [headers.ffi.buffer(headers.ffi.addressof(struct)) for struct in structs]
+        self.entries = {
+            name: sizes[name.rpartition(".")[2]]
+            for name, field in self.fields.items()
+            if is_table(field) and name not in ELSEWHERE
+        }
+        self._memory = headers.ffi.buffer(headers.ffi.addressof(config))
         self.keep()
 
     def keep(self) -> None:
         """The configuration as it stands is the good one."""
-        self._good = [bytes(memory) for memory in self._memory]
+        self._good = bytes(self._memory)
 
     def restore(self) -> None:
         """The good configuration again."""
-        for memory, good in zip(self._memory, self._good, strict=True):
-            memory[:] = good
+        self._memory[:] = self._good
 
     def status_with(self, values: dict[str, Any]) -> Status:
         """The status of init for the good configuration with other values."""
@@ -296,7 +269,7 @@ class Subject:
     def empty_tables(self) -> dict[str, Any]:
         """Gives it tables of zeros that are longer than any size asks for, by name, and a window of five samples."""
         for field in self.fields.values():
-            if is_table(field):
+            if field.name in self.entries:
                 self.tables[field.name] = HEADERS.ffi.new(f"{field.kind.item.cname.removeprefix('const ')}[]", ROOM)
                 field.set(self.tables[field.name])
         if "bank.stride" in self.fields:
@@ -305,7 +278,7 @@ class Subject:
         return self.tables
 
     def is_used(self, field: Scalar) -> bool:
-        """Whether init reads it: it is no flag, and the model has such an entry."""
+        """Whether init reads it, and the model has such an entry."""
         name = field.group.removeprefix("estimator.")
         if name in ("start", "start_sd", "lower", "upper", "p_bits"):
             return field.place < self.identifier.n_p
@@ -322,7 +295,7 @@ class Subject:
         """Every pointer, and what init answers to NULL."""
         for field in self.fields.values():
             if field.kind.kind == "pointer" and self.is_used(field):
-                yield field, WITHOUT.get(field.name.rpartition(".")[2], Status.BAD_DESIGN)
+                yield field, WITHOUT[field.name.rpartition(".")[2]]
 
     def edges(self) -> Iterator[tuple[str, Any, tuple[Status, ...]]]:
         """Field, value and what init may answer, for all edges of all fields."""
@@ -333,30 +306,47 @@ class Subject:
             yield field.name, HEADERS.ffi.NULL, (status,)
 
 
+def estimator_of_rows(native: Native) -> Stepper:
+    """An estimator by itself: eight theta of four parameters, three of which are positive."""
+    start = np.array([31.0, 8.0, 5.0, 0.0], np.float32)
+    bounds = np.array([620.0, 160.0, 100.0, 1.0], np.float32)
+    lower = np.array([1.5, 0.4, 0.25, -1.0], np.float32)
+    config = EstimatorConfig(start, np.full(4, 2.0, np.float32), lower, bounds, row_sd=1e-3)
+    ones = np.ones(4, np.float32)
+    accepted = replace(config, start=ones, lower=ones / 2, upper=2 * ones)
+    owner = EstimatorInC(native, BlockModel.random(np.random.default_rng(1), (8,), 4), accepted, OWN_RATE)
+    owner.model.positive = 7
+    stepper = Stepper(native, "estimator", "f32", config, replay="rows", model=owner.model, update_rate_hz=OWN_RATE)
+    stepper.owner = owner  # type: ignore[attr-defined]  # of the model in C
+    return stepper
+
+
+@cache
+def _fixed() -> FourierNativeQ31:
+    engine = engine_for_simulated_rig(compiled_of("kapitza"))
+    return fourier_native_q31(engine.made, engine.parameters, engine.config)
+
+
+def fixed_identifier() -> Stepper:
+    """The pendulum's weak form in fixed point."""
+    return _fixed().identifier()
+
+
 def subjects(native: Native) -> dict[str, Subject]:
-    """One of each form and core, one with every correction, and an estimator by itself."""
-    weak, strong = RIG, rig_with(form="strong", differentiator="finite-difference", stride=20)
-    own = replace(weak_config(weak, OWN_RATE).estimator, forgetting_s=0.0)
-    model = native.headers.ffi.addressof(native.library, "pvid_kapitza_weak_f32")
+    """Both forms in both cores, and an estimator by itself."""
+    strong = rig_with(form="strong", differentiator="finite-difference", stride=20)
     made: dict[str, Stepper] = {
         "strong": native.identifier(strong_config(strong, 1000.0)),
-        "weak": native.identifier(weak_config(rig_with(full_angle=False), 1000.0)),
-        "corrected": native.identifier(weak_config(rig_with(full_angle=True, damping=True), 1000.0)),
-        "weak q31": native.identifier(weak_config_q31(weak, 1000.0)),
         "strong q31": native.identifier(strong_config_q31(strong, 1000.0)),
-        "estimator": Stepper(native, "estimator", "f32", own, replay="rows", model=model, update_rate_hz=OWN_RATE),
+        "weak": engine_rig("kapitza").native.identifier_of(engine_rig("kapitza").config),
+        "weak q31": fixed_identifier(),
+        "estimator": estimator_of_rows(native),
     }
     return {name: Subject(name, stepper) for name, stepper in made.items()}
 
 
-# Fields that contradict each other, or the flags: for the identifiers that have them.
+# Fields that contradict each other: for the identifiers that have them.
 TOGETHER: tuple[dict[str, Any], ...] = (
-    {"zero_unknown": False},
-    {"zero_unknown": False, "estimator.start_sd[3]": 0},
-    {"friction": True},
-    {"full_angle": False, "friction": False, "passes": 0},
-    {"design.window": 9, "design.decimation": 1, "iterations": 10},
-    {"design.window": 9, "design.decimation": 64, "iterations": 10},
     {"gate.sigmas": 4.0, "gate.patience_s": 2.0},
     {"estimator.feedback_hz": 0.01},
     {"estimator.gain": 2**29},
@@ -388,7 +378,4 @@ def digest(native: Native) -> str:
                     table[place] = value
                     tell(subject, (name, place, value), subject.identifier.initialise())
                 table[place] = 0
-        if subject.design is not None:
-            subject.identifier.config_struct.design = HEADERS.ffi.NULL
-            tell(subject, "no design", subject.identifier.initialise())
     return told.hexdigest()[:16]

@@ -1,9 +1,9 @@
-"""All that one build of the core shows of a few seconds of data, under every setting, as one number a variant; and what
-its inits answer to every edge of every setting, as one number.
+"""All that one build of the core shows of a few seconds of data in the strong form, under every setting, as one number
+a variant; and what its inits answer to every edge of every setting, as one number.
 
 tools/mutate.py plays it before the CMocka programs: a change of the core shows, or not. The bits of the core as it is
-are compared with the numpy twin under these settings by test_bits, test_weak_bits, test_gate, test_freeze and their
-fixed-point counterparts; the answers are those of test_bad_config. tools/coverage.py counts the branches of both.
+are compared with the numpy twin under these settings by test_bits, test_gate, test_freeze and their fixed-point
+counterparts; the answers are those of test_bad_config. tools/coverage.py counts the branches of both.
 """
 
 from __future__ import annotations
@@ -23,21 +23,19 @@ from linear_rig import LINEAR_RIG
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.settings.enums import Law
-from pvid.settings.f32 import StrongConfig, TrustConfig, WeakConfig
-from pvid.settings.q31 import StrongConfigQ31, TrustConfigQ31, WeakConfigQ31
-from pvid.setup.f32 import strong_config, weak_config
-from pvid.setup.q31 import counts_of, scale_of, strong_config_q31, weak_config_q31
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.settings.f32 import StrongConfig
+from pvid.settings.q31 import StrongConfigQ31
+from pvid.setup.f32 import strong_config
+from pvid.setup.q31 import counts_of, scale_of, strong_config_q31
+from pvid.sim.pendulum import simulate, standard_sensors
 
-Config = WeakConfig | StrongConfig | WeakConfigQ31 | StrongConfigQ31
+Config = StrongConfig | StrongConfigQ31
 Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
 UNIT = Path(__file__).resolve().parent / "unit"
 RATE = 1000.0
 RIG = LINEAR_RIG
 FINE = replace(RIG, sensor=replace(RIG.sensor, phi_lsb=standard_sensors(20).phi_lsb))
-WEAK_TICKS = 22_000
 STRONG_TICKS = 2600
 PIECE = 650  # ticks between two looks at everything
 
@@ -60,39 +58,15 @@ def with_settings(rig: RigFile = RIG, **settings: Any) -> RigFile:
 
 
 @cache
-def clean(bits: int, truth: str, ticks: int) -> Samples:
-    """The standard rig; with friction where its truth is the full one."""
-    damped = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=1e-4)
-    pendulum = damped if truth == "full" else STANDARD_PENDULUM
-    sensors = standard_sensors(bits)
-    run = simulate(pendulum, sensors=sensors, truth=truth, duration=ticks / RATE, seed=1).run  # type: ignore[arg-type]
+def clean(bits: int, ticks: int) -> Samples:
+    """The standard rig's linear equations."""
+    run = simulate(sensors=standard_sensors(bits), truth="linear", duration=ticks / RATE, seed=1).run
     return run.phi, run.y
-
-
-def weak_samples(truth: str = "linear") -> Samples:
-    """A run, then a jolt, an encoder that sticks, samples that nobody should send, a pivot that stands."""
-    phi, y = (x.copy() for x in clean(14, truth, WEAK_TICKS))
-    phi[9000:9600] += 0.02 * np.sin(np.pi * np.arange(600) / 600) ** 2
-    phi[12_800:13_100] = phi[12_800]
-    phi[16_000], y[16_001], phi[16_002], y[16_003] = np.nan, np.inf, 3e30, -1e9
-    y[18_000:] = y[18_000]
-    return phi, y
-
-
-def hostile_samples() -> Samples:
-    """Angles that overflow what is made of them, a pivot that leaps, zeros."""
-    phi, y = (x.copy() for x in clean(14, "linear", WEAK_TICKS))
-    random = np.random.default_rng(7)
-    phi[5500:5600] = 1e30 * random.standard_normal(100)
-    y[8500:8510] = 3e38
-    phi[12_000:] = 0.0
-    y[16_500:] = 0.0
-    return phi, y
 
 
 def strong_samples() -> Samples:
     """A run with an outlier, samples that nobody should send, absurd ones, a pivot that stands."""
-    phi, y = (x.copy() for x in clean(20, "linear", STRONG_TICKS))
+    phi, y = (x.copy() for x in clean(20, STRONG_TICKS))
     phi[900] += 0.01
     phi[1300], y[1301], phi[1302] = np.nan, -np.inf, 3e37
     phi[1800:1850] *= 1e12
@@ -107,80 +81,7 @@ def counted(rig: RigFile, samples: Samples) -> Samples:
     return counts_of(rig, Run(t=times, phi=limited[0], y=limited[1], sample_rate=RATE))
 
 
-def full_scale_counts(config: WeakConfigQ31) -> Samples:
-    """Square waves as far as the sensors reach."""
-    t = np.arange(WEAK_TICKS)
-    phi = config.design.phi_max * np.where(t // 125 % 2, 1, -1)
-    y = np.rint(0.3 * config.design.y_max * np.sin(0.05 * t)).astype(np.int64)
-    return phi, np.where(t < 9000, y, config.design.y_max * np.where(t // 70 % 2, 1, -1))
-
-
 # ---- settings ----
-
-
-def weak_variants() -> list[Variant]:
-    """Of both cores."""
-    found: list[Variant] = []
-
-    def add(
-        name: str,
-        samples: Samples,
-        rig: RigFile = RIG,
-        estimator: dict[str, Any] | None = None,
-        estimator_q31: dict[str, Any] | None = None,
-        others: dict[str, Any] | None = None,
-        others_q31: dict[str, Any] | None = None,
-    ) -> None:
-        one, other = weak_config(rig, RATE), weak_config_q31(rig, RATE)
-        one = replace(one, estimator=replace(one.estimator, **(estimator or {})), **(others or {}))
-        other = replace(other, estimator=replace(other.estimator, **(estimator_q31 or {})), **(others_q31 or {}))
-        found.append(Variant(f"weak, {name}", one, samples))
-        found.append(Variant(f"weak q31, {name}", other, counted(rig, samples)))
-
-    samples = weak_samples()
-    add("as it comes", samples)
-    sizes: dict[str, dict[str, Any]] = {
-        "forgetting": {"forgetting_s": 5.0},
-        "zeroed": {"zero": False},
-        "two ticks a sample": {"decimation": 2, "window_s": 0.4, "test_functions": 4, "smoothing_s": 0.031},
-        "a tick a sample": {"decimation": 1, "window_s": 0.25, "test_functions": 4, "smoothing_s": 0.031},
-        "sixteen functions": {"decimation": 5, "window_s": 0.75, "test_functions": 16},
-        "32 ticks a sample": {"decimation": 32, "window_s": 2.0, "test_functions": 5},
-    }
-    for name, settings in sizes.items():
-        add(name, samples, with_settings(**settings))
-    add("the paper's law", samples, estimator={"law": Law.PSEUDOVELOCITY}, estimator_q31={"gain": 0})
-    add("feedback", samples, estimator={"feedback_hz": 0.5}, estimator_q31={"gain": 2**28})
-    add("divider", samples, estimator={"divider": 3}, estimator_q31={"divider": 3})
-    ungated: dict[str, Any] = {"kappa_min": 0, "noise_margin": 0}
-    add("no gates", samples, estimator=ungated, estimator_q31=ungated)
-    add("short steps", samples, estimator={"step_limit": 0.02}, estimator_q31={"step_limit": 1311})
-    hasty: dict[str, Any] = {"groups_min": 0, "revert_after": 1, "misfit_max": 0}
-    open_door = {"trust": TrustConfig(**hasty), "drive_min": 0.0}, {"trust": TrustConfigQ31(**hasty), "drive_min": 0}
-    add("hostile", hostile_samples(), others=open_door[0], others_q31=open_door[1])
-    add("shut at once", samples, others=open_door[0], others_q31=open_door[1])
-    add(
-        "never shut",
-        samples,
-        with_settings(forgetting_s=1e5),
-        others={"trust": TrustConfig(revert_after=0)},
-        others_q31={"trust": TrustConfigQ31(revert_after=0)},
-    )
-    add("gate", samples, with_settings(outlier_gate=4.0, outlier_patience_s=3.0))
-    add("dead zone", samples, with_settings(dead_zone=1.0))
-    found.append(Variant("weak, small angles", replace(weak_config(RIG, RATE), angle_limit=0.1), samples))
-    for full_angle, damping in ((True, False), (True, True), (False, True)):
-        config = weak_config(with_settings(full_angle=full_angle, damping=damping), RATE)
-        found.append(Variant(f"weak, sines {full_angle}, friction {damping}", config, weak_samples("full")))
-    sines = weak_config(with_settings(full_angle=True), RATE)
-    found.append(Variant("weak, sines, still pivot", replace(sines, drive_min=0.0), weak_samples("full")))
-    for decimation, window_s in ((2, 0.4), (5, 0.75)):
-        quick = with_settings(full_angle=True, decimation=decimation, window_s=window_s, test_functions=4)
-        config = weak_config(with_settings(quick, smoothing_s=0.031), RATE)
-        found.append(Variant(f"weak, sines, {decimation} ticks a sample", config, weak_samples("full")))
-    config_q31 = replace(weak_config_q31(RIG, RATE), drive_min=0)
-    found.append(Variant("weak q31, full scale", config_q31, full_scale_counts(config_q31)))
-    return found
 
 
 def strong_variants() -> list[Variant]:
@@ -235,20 +136,13 @@ def strong_variants() -> list[Variant]:
 @cache
 def variants() -> tuple[Variant, ...]:
     """All of them."""
-    return (*weak_variants(), *strong_variants())
+    return tuple(strong_variants())
 
 
 def unit_tests() -> list[Path]:
     """The CMocka programs of the core and the link: those that CMake gives no other sources."""
     listed = (UNIT / "CMakeLists.txt").read_text(encoding="utf-8")
     return [path for path in sorted(UNIT.glob("test_*.c")) if f"target_sources({path.stem} " not in listed]
-
-
-def started(native: Native, config: Config) -> Identifier:
-    """The identifier of a configuration."""
-    if isinstance(config, WeakConfig):
-        return native.identifier(config)
-    return native.identifier(config)
 
 
 # ---- what they show ----
@@ -262,7 +156,7 @@ def look(core: Identifier, native: Native, config: Config, into: Any) -> None:
     if core.publishes:
         into.update(core.estimate.tobytes())
         into.update(repr(core.misfit).encode())
-    if isinstance(config, WeakConfigQ31 | StrongConfigQ31):
+    if isinstance(config, StrongConfigQ31):
         in_counts = native.physical_q31(estimate, scale_of(config, RIG.l1))
         into.update(b"" if in_counts is None else b"".join(x.tobytes() for x in in_counts))
     else:
@@ -273,7 +167,7 @@ def look(core: Identifier, native: Native, config: Config, into: Any) -> None:
 def digest(native: Native, variant: Variant) -> str:
     """What the variant records, estimates and counts."""
     told = hashlib.sha256()
-    core = started(native, variant.config)
+    core = native.identifier(variant.config)
     phi, y = variant.samples
     frozen = PIECE * (len(phi) // (4 * PIECE))
     for first in range(0, len(phi), PIECE):

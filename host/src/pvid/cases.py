@@ -31,8 +31,6 @@ from pvid.setup.ranges_q31 import Beyond, with_ranges_of
 from pvid.twin.record import Twin
 from pvid.twin.strong import StrongTwin
 from pvid.twin.strong_q31 import StrongTwinQ31
-from pvid.twin.weak import WeakTwin
-from pvid.twin.weak_q31 import WeakTwinQ31
 
 Float = npt.NDArray[np.float64]
 Samples = npt.NDArray[Any]  # float32 [rad], [m], or int32 counts
@@ -377,9 +375,7 @@ def _places(values: npt.ArrayLike) -> tuple[Any, ...]:
 CASES: dict[tuple[str, str], Case] = {
     (case.form, case.core): case
     for case in (
-        _Float("weak", WeakTwin),
         _Float("strong", StrongTwin),
-        _Fixed("weak", WeakTwinQ31),
         _Fixed("strong", StrongTwinQ31),
     )
 }

@@ -36,11 +36,13 @@ class FourierIdentifierQ31(Publisher):
     """The identifier: readings of every tick in counts."""
 
     def __init__(self, native: FourierNativeQ31) -> None:
-        self._config = getattr(native.library, f"{native.name}_settings_q31")[0]
+        given = getattr(native.library, f"{native.name}_settings_q31")[0]  # a constant of the library
+        self._owned = native.headers.ffi.new("pvid_fourier_config_q31 *", given)
+        self._config = self._owned[0]
         super().__init__(native, "fourier", "q31", native.config, replay="fourier")
 
     def _filled_with(self, native: Native, kind: str, config: object) -> Filled:
-        """The configuration in the library."""
+        """A copy of the configuration in the library."""
         return Filled(self._config, {}, {}, [])
 
     def run_samples(

@@ -186,7 +186,7 @@ class Headers:
             pointed = kind == "pointer" and field.type.item.kind == "struct" and name not in _FILLED_LATER
             if kind == "struct":
                 yield from self.scalars(getattr(struct, name), f"{path}.")
-            elif pointed:
+            elif pointed and getattr(struct, name):
                 yield from self.scalars(getattr(struct, name)[0], f"{path}.")
             elif kind == "array":
                 array = getattr(struct, name)
