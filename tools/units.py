@@ -88,20 +88,19 @@ def ports() -> list[Unit]:
 
 
 def applications(machine: str) -> list[Unit]:
-    """`replay` and, but for an AVR, `stream`, in every form and core."""
+    """`replay` and, but for an AVR, `stream`, of the strong form in every core; of the weak form what differs."""
     found: list[Unit] = []
     board = '-DPVID_BOARD_NAME="board"'
-    for core_name, form in ((core_name, form) for core_name in (0, 1) for form in (0, 1)):
-        kind = (RIG, board, f"-DSTREAM_CORE={core_name}", f"-DSTREAM_FORM={form}")
+    for core_name in (0, 1):
+        kind = (RIG, board, f"-DSTREAM_CORE={core_name}", "-DSTREAM_FORM=0")
         replay, stream = FIRMWARE / "apps" / "replay", FIRMWARE / "apps" / "stream"
-        first = core_name == form == 0
+        first = core_name == 0
         found += _units(machine, [replay / "main.c"], *kind)
         if first:
             found += _units(machine, [replay / "report.c"], *kind)
         if machine != "avr":
             found += _units(machine, [stream / f"identifier_{('f32', 'q31')[core_name]}.c"], *kind)
-            if form != core_name:  # the program itself does not ask for the form
-                found += _units(machine, [stream / "main.c"], *kind)
+            found += _units(machine, [stream / "main.c"], *kind)
             if first:
                 found += _units(machine, [stream / "answers.c", stream / "sensor.c"], *kind)
                 engine = (RIG, board, "-DSTREAM_CORE=0", "-DSTREAM_FORM=2")

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+from fourier_rig import engine_rig
 from lanes import assert_lanes_equal
 from linear_rig import LINEAR_RIG
 
 from pvid.base.errors import PvidError
 from pvid.cases import CASES, Case
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.core.native import Native
+from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.run.engine_design_q31 import engine_for_simulated_rig
+from pvid.sim.pendulum import simulate, standard_sensors
 
+Float = npt.NDArray[np.float64]
 RIG = LINEAR_RIG
 every_case = pytest.mark.parametrize("case", CASES.values(), ids=lambda case: f"{case.form}-{case.core}")
-both_cores = pytest.mark.parametrize("case", [CASES["weak", "f32"], CASES["weak", "q31"]], ids=lambda case: case.core)
 LAWS: dict[str, dict[str, Any]] = {
     "gauss-newton": {"feedback_hz": 0.0},
     "feedback": {"feedback_hz": 10.0},
@@ -33,54 +39,53 @@ def rig_with(**identifier: Any) -> RigFile:
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    """19.9 s of the standard rig with an encoder of 14 bits: its last tick is not within a solve that is spread over
-    ticks, whose counters would be those of a part of it."""
-    return simulate(sensors=standard_sensors(14), truth="linear", duration=19.9, seed=1).run
+    """2 s of the standard rig with an encoder of 14 bits."""
+    return simulate(sensors=standard_sensors(14), truth="linear", duration=2.0, seed=1).run
 
 
 @pytest.mark.parametrize("law", LAWS)
 @every_case
 def test_the_core_equals_its_twin(case: Case, law: str, native: Native, run: Run) -> None:
     rig = rig_with(form=case.form, dead_zone=1.5, forgetting_s=4.0, **LAWS[law])
-    ticks = 19_900 if case.form == "weak" else 2_000
-    phi, y = (x[:ticks] for x in case.samples(rig, run))
+    phi, y = (x[:2000] for x in case.samples(rig, run))
     (lane,) = assert_lanes_equal([native], case.settings(rig, 1000.0), phi, y)
     assert lane.counters["at_rest"] > 0 or law == "paper"  # whose F does not decay
 
 
-@both_cores
-def test_p_stays_within_the_zone_of_the_solution(case: Case, native: Native, run: Run) -> None:
-    """As far as the zone says from the answer without one, hardly moved, and the published errors are the same."""
-    ends, errors, solves = [], [], []
-    for dead_zone in (0.0, 1.0):
-        rig = rig_with(dead_zone=dead_zone)
-        config = case.settings(rig, 1000.0)
-        core = native.identifier(config)
-        record = core.run(*case.samples(rig, run), hashes=False)
-        ends.append(case.p_of(config, record.p[-1]))
-        errors.append(case.se_of(config, core.estimate["se"][:4]))
-        solves.append((core.counters["updates"], core.counters["at_rest"]))
+Played = tuple[Float, Float, dict[str, int]]
+
+
+def in_float(dead_zone: float) -> Played:
+    """The end p of the pendulum's shipped rig in the weak form, its published standard errors, the counters."""
+    rig = engine_rig("kapitza")
+    estimator = replace(rig.config.estimator, dead_zone=dead_zone)
+    core = rig.native.identifier_of(replace(rig.config, estimator=estimator))
+    record = core.run_samples(rig.samples, hashes=False)
+    return np.array(record.p[-1], np.float64), np.array(core.estimate["se"][:4], np.float64), core.counters
+
+
+def in_fixed_point(dead_zone: float) -> Played:
+    """The same in fixed point."""
+    engine, rig = engine_for_simulated_rig(compiled_of("kapitza")), engine_rig("kapitza")
+    estimator = replace(engine.config.estimator, dead_zone=round(dead_zone * 2**16))
+    config = replace(engine.config, estimator=estimator)
+    core = fourier_native_q31(engine.made, engine.parameters, config).identifier()
+    samples = dict(zip(engine.sample_names, rig.samples.T, strict=True))
+    record = core.run_samples(engine.counts_of(samples), hashes=False)
+    return engine.values(record.p[-1]), engine.values(core.estimate["se"][:4]), core.counters
+
+
+@pytest.mark.parametrize("played", [in_float, in_fixed_point])
+def test_p_stays_within_the_zone_of_the_solution(played: Callable[[float], Played]) -> None:
+    """As far as the zone says from the answer without one, hardly moved, and the published errors are no smaller."""
+    (end, error, counters), (rested, as_before, at_rest) = played(0.0), played(1.0)
     # each parameter within one standard error: the zone bounds the largest of all combinations
-    assert (np.abs(ends[1] - ends[0]) <= 1.02 * errors[0]).all()
-    assert errors[1] == pytest.approx(errors[0], rel=0.02)
-    assert ends[1][:3] == pytest.approx(STANDARD_PENDULUM.linear, rel=2e-3)
-    assert solves[0][1] == 0
-    assert sum(solves[1]) == solves[0][0]  # the same solves, and most of them needed no step
-    assert solves[1][1] > 0.8 * solves[0][0]
-
-
-@both_cores
-def test_a_mechanism_that_changes_is_followed(case: Case, native: Native) -> None:
-    """A change of many standard errors leaves the zone: where p comes to rest again differs by less than the zone."""
-    heavier = replace(STANDARD_PENDULUM, g=STANDARD_PENDULUM.g * 1.05)
-    rig = rig_with(dead_zone=1.0, forgetting_s=4.0)
-    config = case.settings(rig, 1000.0)
-    core = native.identifier(config)
-    for pendulum in (STANDARD_PENDULUM, heavier):
-        part = simulate(pendulum, sensors=standard_sensors(14), truth="linear", duration=15.0, seed=1).run
-        p = case.p_of(config, core.run(*case.samples(rig, part), hashes=False).p[-1])
-    assert p[0] == pytest.approx(heavier.linear[0], rel=5e-3)
-    assert core.counters["at_rest"] > 0
+    assert (np.abs(rested - end) <= 1.02 * error).all()
+    # not smaller; the scores of windows scatter more where p is off by up to a standard error
+    assert (as_before >= 0.98 * error).all() and (as_before <= 1.1 * error).all()
+    assert counters["at_rest"] == 0
+    assert at_rest["updates"] + at_rest["at_rest"] == counters["updates"]  # the same solves
+    assert at_rest["at_rest"] > 0.5 * counters["updates"]  # and most of them needed no step
 
 
 @every_case

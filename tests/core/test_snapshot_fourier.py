@@ -122,6 +122,8 @@ def test_a_model_with_the_same_tables_and_another_function_is_another_model() ->
 def test_snapshot_of_another_form_is_of_another_kind(native: Native) -> None:
     rig = engine_rig("kapitza")
     one, _, _owner = engines(rig, rig.config)
-    weak = native.identifier(CASES["weak", "f32"].settings(RigFile.standard(), 1000.0))
-    assert one.restore(snapshot.save(weak)) is SnapshotStatus.OTHER_KIND
-    assert snapshot.restore(weak, one.save()) is SnapshotStatus.OTHER_KIND
+    standard = RigFile.standard()
+    own = replace(standard, identifier=replace(standard.identifier, form="strong"))
+    strong = native.identifier(CASES["strong", "f32"].settings(own, 1000.0))
+    assert one.restore(snapshot.save(strong)) is SnapshotStatus.OTHER_KIND
+    assert snapshot.restore(strong, one.save()) is SnapshotStatus.OTHER_KIND

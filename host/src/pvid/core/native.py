@@ -69,13 +69,6 @@ _ARITHMETIC: dict[Core, _Arithmetic] = {
     ),
 }
 
-# Models of the fixed-point core by the lengths of p and theta.
-_MODELS_Q31 = {
-    (4, 8): f"pvid_{DEFAULT}_weak_q31",
-    (3, 5): f"pvid_{DEFAULT}_weak_zeroed_q31",
-}
-
-
 class Native:
     """One build of the C core.
 
@@ -121,12 +114,6 @@ class Native:
     def of_derivatives(self, config: StrongConfig) -> Stepper:
         """An initialised identifier of the strong form in float32; its input are phi [ticks, 5] and u [ticks, 3]."""
         return StrongStepper(self, "strong", "f32", config, replay="derivatives")
-
-    def estimator_q31(self, config: EstimatorConfigQ31) -> Stepper:
-        """An initialised fixed-point estimator on one of the core's models; its input are rows, one per group."""
-        name = _MODELS_Q31[len(config.p_bits), len(config.n_bits)]
-        model = self.headers.ffi.addressof(self.library, name)
-        return Stepper(self, "estimator", "q31", config, replay="rows", model=model)
 
     def strong_rows(self, phi: npt.ArrayLike, u: npt.ArrayLike) -> tuple[Float32, Float32]:
         """Rows of the strong form: N [ticks, 11], Y [ticks] from phi [ticks, 5], u [ticks, 3]."""
@@ -412,7 +399,7 @@ class Publisher(Stepper):
         return float(self.estimate["misfit"]) * self._arithmetic.misfit_unit or math.nan
 
     def freeze(self, frozen: bool) -> None:
-        """Freezes (True) or resumes (False) the identifier: pvid_weak_freeze_f32."""
+        """Freezes (True) or resumes (False) the identifier: pvid_fourier_freeze_f32."""
         self._call("freeze", frozen)
 
     def gap(self) -> None:
@@ -425,14 +412,10 @@ class Identifier(Publisher):
 
     def __init__(self, native: Native, config: Settings) -> None:
         self.form = config.form
-        given = {}
-        kind = f"pvid_{config.form}_config_{config.core}"
-        if "angle" in dict(native.headers.ffi.typeof(kind).fields):  # storage of the correction for large angles
-            self._angle = given["angle"] = native.headers.ffi.new("pvid_weak_angle_f32 *")
-        super().__init__(native, config.form, config.core, config, replay=config.form, **given)
+        super().__init__(native, config.form, config.core, config, replay=config.form)
 
     def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
-        return arithmetic.any_model if FORMS[self.form].uses_windows else arithmetic.strong
+        return arithmetic.strong
 
     @property
     def publishes(self) -> bool:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pvid.core.native import Identifier, Native
 from pvid.settings.enums import SnapshotStatus
 
-# Header, checksum, and the storage of the angle's correction, which stands behind the object.
-ROOM_BESIDE_THE_OBJECT = 40 + 8192
+ROOM_BESIDE_THE_OBJECT = 40  # header and checksum
 
 
 @dataclass(frozen=True)
