@@ -1,4 +1,4 @@
-"""One interface to the four identifiers: CASES[form, core], or `case_of` for settings or a rig file.
+"""One interface to the strong form's identifiers: CASES[form, core], or `case_of` for settings or a rig file.
 
 A case converts a rig file to settings, a run to samples and the core's numbers to SI. It makes the frames of the link,
 the twin and the C header of the same settings. Code that depends on form or core belongs here.
@@ -15,17 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.design.weak_sizing import raised_bounds
 from pvid.link import frames
-from pvid.models.registry import DEFAULT, MODELS
+from pvid.models.registry import DEFAULT
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.settings.bounds import MAX_MOMENTS
 from pvid.settings.enums import Core, Form, Law
-from pvid.settings.forms import FORMS
 from pvid.settings.kinds import Settings
 from pvid.setup import q31 as fixed
-from pvid.setup.f32 import config_of
+from pvid.setup.f32 import strong_config
 from pvid.setup.header import fixed_notes, scale_lines, settings_header
 from pvid.setup.ranges_q31 import Beyond, with_ranges_of
 from pvid.twin.record import Twin
@@ -34,8 +31,6 @@ from pvid.twin.strong_q31 import StrongTwinQ31
 
 Float = npt.NDArray[np.float64]
 Samples = npt.NDArray[Any]  # float32 [rad], [m], or int32 counts
-
-_MOST_P = len(MODELS[DEFAULT].parameters)
 
 # Fields of the settings that a Configure frame has for every parameter.
 _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
@@ -67,17 +62,11 @@ class Case(ABC):
     configure_frame: ClassVar[Any]
     umbrella: ClassVar[str]  # the header of the whole core
     matrix: ClassVar[str]  # in an estimate: covariance, or correlation beside standard errors
-    linear_rows_only: ClassVar[bool]  # whether its weak form has no correction for large angles
     _single: ClassVar[tuple[str, ...]]  # fields of the estimator's settings in a Configure frame, besides
 
     def __init__(self, form: Form, twin: type[Any]) -> None:
         self.form = form
         self._twin = twin
-
-    @property
-    def publishes(self) -> bool:
-        """Whether it publishes trusted estimates only (pvid/trust.h)."""
-        return FORMS[self.form].publishes
 
     @property
     def numbers(self) -> tuple[frames.Form, frames.Core]:
@@ -104,53 +93,29 @@ class Case(ABC):
         """A C header that defines the settings as `name`, with their tables, for a rod of l1 [m]."""
 
     def facts(self, config: Any) -> list[str]:
-        """Of the design of the weak form: its sizes, and the macros of pvid/config.h whose defaults it exceeds."""
-        if self.form == "strong":
-            return []
-        design = config.design
-        facts = [
-            f"taps {design.taps}, decimation {design.decimation}, windows of {design.window} samples, "
-            f"{design.functions} test functions"
-        ]
-        raised = [f"-D{macro}={value}" for macro, value in raised_bounds(design).items()]
-        return [*facts, f"build the core with {' '.join(raised)}"] if raised else facts
+        """What a user should know of the settings; none in float32."""
+        return []
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
         """Macros of pvid/config.h that the settings need.
 
         exact: the smallest sizes that suffice, for a board with little memory.
         """
-        if self.form == "strong":
-            return {"PVID_MAX_WINDOW": str(max(config.bank.memory, 5))}
-        design = config.design
-        bounds = raised_bounds(design)
-        if exact:
-            bounds |= {"PVID_MAX_TAPS": design.taps, "PVID_MAX_DECIMATION": design.decimation}
-            bounds |= {"PVID_MAX_FUNCTIONS": design.functions}
-        return {macro: str(value) for macro, value in bounds.items()}
+        return {"PVID_MAX_WINDOW": str(max(config.bank.memory, 5))}
 
-    def alike_from(self, config: Any, ticks: int) -> int:
-        """First tick of `ticks` that counts in the mean cost of a tick. From there on the weak form has whole periods
-        of its windows, each with a solve, and the strong form has full windows (after 500 ticks)."""
-        if self.form == "strong":
-            return min(500, ticks // 2)
-        period = config.hop * config.design.decimation
-        settled = 3 * period + config.design.taps
-        return int(ticks - max((ticks - settled) // period, 1) * period)
+    def alike_from(self, ticks: int) -> int:
+        """First tick of `ticks` that counts in the mean cost of a tick: from there on windows are full."""
+        return min(500, ticks // 2)
 
     @property
     def hash_function(self) -> str:
-        """The function in C that continues the running hash over the estimator: the strong forms have their own."""
-        own = "strong" if self.form == "strong" else "estimator"
-        return f"pvid_fnv_{own}_{self.core}"
+        """The function in C that continues the running hash over the estimator."""
+        return f"pvid_fnv_strong_{self.core}"
 
     @property
+    @abstractmethod
     def assess_call(self) -> tuple[str, str]:
         """The function in C that assesses the estimator, and what of `identifier` it takes."""
-        return {
-            ("strong", "f32"): ("pvid_strong_assess_f32", "identifier"),
-            ("strong", "q31"): (f"pvid_{DEFAULT}_estimator_assess_q31", "identifier.estimator"),
-        }.get((self.form, self.core), (f"pvid_estimator_assess_{self.core}", "identifier.estimator"))
 
     # ---- samples
 
@@ -188,13 +153,9 @@ class Case(ABC):
     def kappa_of(self, estimate: npt.NDArray[np.void]) -> Float:
         """kappa of estimates."""
 
-    def beyond(self, config: Any, phi: Samples, y: Samples, rejected: int) -> Beyond | None:
-        """Samples beyond the core's ranges; None in a core without ranges. rejected: count of rejected samples."""
+    def beyond(self, config: Any, phi: Samples, y: Samples) -> Beyond | None:
+        """Samples beyond the core's ranges; None in a core without ranges."""
         return None
-
-    def zero_shift(self, rig: RigFile, run: Run, phi: Samples) -> float:
-        """Mean of the run's angles minus the samples of the core [rad]."""
-        return 0.0
 
     # ---- frames
 
@@ -242,22 +203,21 @@ class _Float(Case):
     configure_frame = frames.Configure
     umbrella = "pvid/pvid.h"
     matrix = "covariance"
-    linear_rows_only = False
     _single = ("row_sd", "forgetting_s", "feedback_hz", "law")
     _neutral: ClassVar[Mapping[str, Any]] = {"forgetting_s": 0.0, "feedback_hz": 0.0, "law": Law.STATIONARY}
 
     def settings(self, rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> Settings:
-        return config_of(rig, sample_rate, start)
+        return strong_config(rig, sample_rate, start)
 
     def settings_for_run(self, rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> Settings:
-        return config_of(rig, run.sample_rate, start)
+        return strong_config(rig, run.sample_rate, start)
 
     def header(self, config: Any, l1: float, name: str, made_by: str) -> str:
         return settings_header(config, name, made_by, self.umbrella)
 
-    def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
-        more = {"PVID_MAX_P": str(_MOST_P), "PVID_MAX_MOMENTS": str(MAX_MOMENTS)}
-        return super().sizes(config, exact) | (more if len(config.estimator.start) > 4 else {})
+    @property
+    def assess_call(self) -> tuple[str, str]:
+        return "pvid_strong_assess_f32", "identifier"
 
     def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:
         return run.phi, run.y
@@ -300,12 +260,11 @@ class _Fixed(Case):
     configure_frame = frames.ConfigureQ31
     umbrella = "pvid/pvid_q31.h"
     matrix = "correlation"
-    linear_rows_only = True
     _single = ("row_sd", "forgetting_groups", "gain")
     _neutral: ClassVar[Mapping[str, Any]] = {"forgetting_groups": 0, "gain": 2**30}
 
     def settings(self, rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> Settings:
-        return fixed.config_of_q31(rig, sample_rate, start)
+        return fixed.strong_config_q31(rig, sample_rate, start)
 
     def settings_for_run(self, rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> Settings:
         return fixed.config_for_run(with_ranges_of(rig, run), run, start)
@@ -319,7 +278,7 @@ class _Fixed(Case):
 
     def facts(self, config: Any) -> list[str]:
         spare = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
-        return [*super().facts(config), f"bits to spare at full scale: {spare}"]
+        return [f"bits to spare at full scale: {spare}"]
 
     def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
         n_theta = len(config.estimator.n_bits)
@@ -351,12 +310,12 @@ class _Fixed(Case):
     def kappa_of(self, estimate: npt.NDArray[np.void]) -> Float:
         return np.asarray(estimate["kappa"] / 2**30)
 
-    def beyond(self, config: Any, phi: Samples, y: Samples, rejected: int) -> Beyond | None:
-        return fixed.beyond_range(config, phi, y, rejected)
+    def beyond(self, config: Any, phi: Samples, y: Samples) -> Beyond | None:
+        return fixed.beyond_range(config, phi, y)
 
-    def zero_shift(self, rig: RigFile, run: Run, phi: Samples) -> float:
-        """0 when the run was recorded as counts."""
-        return float(np.nanmean(run.phi - phi * rig.sensor.phi_lsb))
+    @property
+    def assess_call(self) -> tuple[str, str]:
+        return f"pvid_{DEFAULT}_estimator_assess_q31", "identifier.estimator"
 
     @staticmethod
     def _array(values: tuple[Any, ...]) -> Any:
@@ -387,9 +346,9 @@ def case_of(what: HasCase) -> Case:
     Raises
     ------
     PvidError
-        For core f64, which exists in Python only.
+        For core f64, which exists in Python only, and for the weak form.
     """
     case = CASES.get((what.form, what.core))
     if case is None:
-        raise PvidError(f"targets hold the cores f32 and q31, not {what.core}")
+        raise PvidError(f"the strong form is in the cores f32 and q31, not {what.form} {what.core}")
     return case

@@ -133,7 +133,7 @@ def standard_run(form: Form, ticks: int, core: Core = "f32", divider: int = 1) -
         counts=counts.astype(np.int16),
         phi_lsb=np.float32(sensors.phi_lsb),
         y_lsb=np.float32(sensors.y_lsb),
-        measure_from=case_of(identifier).alike_from(config, ticks),
+        measure_from=case_of(identifier).alike_from(ticks),
     )
 
 

@@ -14,8 +14,8 @@ from pvid.codegen.formats import bits_of
 from pvid.codegen.functions import Function, ModelFunctions
 from pvid.codegen.intervals import Interval, bounds_of
 from pvid.codegen.twin_file import namespace
-from pvid.twin.q31.model import ModelQ31
 from pvid.twin.q31.integer import Int, integers, round_shift
+from pvid.twin.q31.model import ModelQ31
 from pvid.twin.q31.scaled import Scaled, scaled
 
 _BITS = 58  # of theta and of C: they fit 2^60

@@ -14,8 +14,8 @@ from pvid.codegen.banner import banner
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import ModelFunctions
 from pvid.twin.f32.pattern import PatternModel
-from pvid.twin.q31.model import ModelQ31, ScaledModelQ31
 from pvid.twin.q31.integer import Int
+from pvid.twin.q31.model import ModelQ31, ScaledModelQ31
 from pvid.twin.q31.scaled import Scaled
 
 Float32 = npt.NDArray[np.float32]

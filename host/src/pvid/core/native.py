@@ -69,6 +69,7 @@ _ARITHMETIC: dict[Core, _Arithmetic] = {
     ),
 }
 
+
 class Native:
     """One build of the C core.
 

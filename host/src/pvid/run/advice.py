@@ -1,7 +1,7 @@
 """Finds likely mistakes in a run that is not identified, or identified with a warning, and options that correct them.
 
-Magnitudes show mistakes of units. For other mistakes the run is identified again with the suspected mistake corrected,
-which takes some hundredths of a second; a trial counts if it identifies the run, or if its chi^2 is much smaller. A
+Magnitudes show mistakes of units. For other mistakes the run is identified again with the suspected mistake corrected
+(pvid.run.trial), which takes some tenths of a second; a trial counts if it identifies the run, or if its chi^2 is much smaller. A
 mistake is corrected before the search continues: two mistakes give two sentences, one mistake gives one.
 """
 
@@ -14,15 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native
-from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile, Unset
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolution_of
 from pvid.rig.turns import joined
 from pvid.run.excitation import excitation_of
-from pvid.run.identify import Identification, identify
-from pvid.run.survey import fitted
+from pvid.run.identify import VALID_ANGLE, Identification
+from pvid.run.trial import Trial, trial_of
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start
 from pvid.setup.ranges_q31 import pivot_acceleration, reach
@@ -38,7 +36,6 @@ _LIKELY_RODS = (0.03, 2.0)  # m
 _MOST_ACCELERATION = 3.0  # of the pivot [gravity], rms
 _LIKELY_ACCELERATION = (0.005, 2.0)
 _WIDE_SWING = 1.0  # rad: a larger swing may be degrees that are read as radians
-_SMALL_ANGLE = 0.05  # rad: below it phi - sin phi is within a 14-bit encoder's noise
 _USUAL_SWING = 0.75 * VALID_ANGLE  # largest swing that is assumed in order to guess the counts per turn
 _FULL_TURN = 2 * math.pi
 _FAR_REST = 1.5  # rad
@@ -48,7 +45,8 @@ _WHOLE_BITS = 0.01  # a turn of 2 pi is off by 0.16
 
 _FADING = 2.5  # rms of the swing in the first fifth of a run, over that in the last
 
-_LINEAR_TOLD = 0.005  # relative error of fixed point's linear rows from which on a sentence reports it
+_SKEWED = 5.0  # standard errors of a skew of the sensors that is told, if it is
+_SKEW_TOLD = 0.1  # ticks, at least
 
 _MOST_SAMPLES = 200_000  # of a run, for trials
 _BETTER = 0.5  # largest chi^2 of a trial that counts, relative to that without it
@@ -74,7 +72,7 @@ class Cure:
     case: Case
 
 
-def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tuple[str, ...]:
+def advice(run: Run, rig: RigFile, result: Identification) -> tuple[str, ...]:
     """Sentences that name likely mistakes; () for a run that is identified without a warning and whose sensors and
     scales are plausible.
 
@@ -84,50 +82,50 @@ def advice(run: Run, rig: RigFile, result: Identification, native: Native) -> tu
         As given to `identify`.
     result
         What it returned.
-    native
-        The C core, for trials.
     """
     case = Case(_shortened(run), rig)
     if result.beyond_words is not None and not result.identified:
         return (_wider_ranges(result),)
-    if result.parts_disagree and result.skew != 0.0:
-        delay = rig.sensor.y_delay + result.skew
+    if (skew := _skew_of(result)) is not None:
+        delay = rig.sensor.y_delay + skew
         return (f"phi and y are not sampled at one instant: do so, or use --set sensor.y_delay={delay:.3g}",)
     if _is_good(result):
-        if result.linear_error > _LINEAR_TOLD:
-            return (
-                f"{_not_corrected(result)}; its standard errors contain {100 * result.linear_error:.2g} % for that",
-            )
-        degrees = _angle_in_degrees(case, native)
+        degrees = _angle_in_degrees(case)
         if degrees:
             return (degrees[0].sentence,)
-        # the trials use the start and design of this result
-        found, case, now = _put_right(Case(case.run, _settled(case)), native, units=False)
-    else:
-        found, case, now = _put_right(case, native)
+    found, case, now = _put_right(case, units=not _is_good(result))
     if not found:
         found = list(_remaining(case, result, now))
     elif not _is_good(result) and not _answers(now):  # there is more to it
-        found += _remaining(case, now or result, now)
-    answer = now if now is not None and _answers(now) else result
-    if answer.identified:
-        found += _clock_of(answer, rig)
+        found += _remaining(case, result, now)
+    if now is not None and _answers(now) and (found or not result.identified):
+        found += _clock_of(now.value.get("g", GRAVITY), 0.0, rig)
+    elif result.identified:
+        found += _clock_of(result.value.get("g", GRAVITY), result.se.get("g", 0.0), rig)
     return tuple(found)
+
+
+def _skew_of(result: Identification) -> float | None:
+    """How much later y is sampled than phi [s], by the refinement; None: not at all, or unknown."""
+    refined = result.refinement
+    if refined is None or not refined.adopted or "tau" not in refined.outcome.extras:
+        return None
+    tau, se = refined.outcome.extras["tau"]
+    least = _SKEW_TOLD / refined.outcome.problem.measured.rate
+    return float(tau) if abs(tau) > max(_SKEWED * se, least) else None
 
 
 def suspected_unit(run: Run, rig: RigFile) -> str | None:
     """The mistake of a unit that magnitudes alone show, without a trial; None: there is none."""
-    case = Case(_shortened(run), rig)
-    far = _swing(case.run)[1] >= _FULL_TURN or _steps_in_degrees(case)
-    for cures in (_time_unit(case), _angle_in_counts(case), _rod_units(case), _height_units(case)):
+    for cures in _by_magnitude(Case(_shortened(run), rig), tries=False):
         if cures:
-            return cures[0].sentence.partition(": use ")[0]
-    return "phi looks like degrees" if far else None
+            return cures[0].sentence.partition(": use ")[0].partition(" (it swings")[0]
+    return None
 
 
-def advice_on_refusal(run: Run, rig: RigFile, native: Native) -> tuple[str, ...]:
+def advice_on_refusal(run: Run, rig: RigFile) -> tuple[str, ...]:
     """Sentences for a run whose settings were refused."""
-    return tuple(_put_right(Case(_shortened(run), rig), native)[0])
+    return tuple(_put_right(Case(_shortened(run), rig))[0])
 
 
 def behind(advices: tuple[str, ...], error: PvidError) -> PvidError:
@@ -135,23 +133,23 @@ def behind(advices: tuple[str, ...], error: PvidError) -> PvidError:
     return PvidError(f"{'; '.join(advices)} (as it is: {error})" if advices else str(error))
 
 
-def _put_right(case: Case, native: Native, units: bool = True) -> tuple[list[str], Case, Identification | None]:
+def _put_right(case: Case, units: bool = True) -> tuple[list[str], Case, Trial | None]:
     """The mistakes found, the case without them, its identification; units: whether mistakes of units are sought."""
     found: list[str] = []
     for _ in range(_MOST_ROUNDS if units else 0):
-        cure = _unit_mistake(case, native)
+        cure = _unit_mistake(case)
         if cure is None or cure.sentence in found:
             break
         found.append(cure.sentence)
         case = cure.case
-    now = _trial(case, native)
+    now = _trial(case)
     for search in (_exchanged, _step_of, _equation_mistake):
         for _ in range(_MOST_ROUNDS):
-            cure = None if search is _equation_mistake and _is_explained(now) else search(case, now, native)
+            cure = None if search is _equation_mistake and _is_explained(now) else search(case, now)
             if cure is None or cure.sentence in found:
                 break
-            found += [cure.sentence] if cure.sentence else []
-            case, now = cure.case, _trial(cure.case, native)
+            found.append(cure.sentence)
+            case, now = cure.case, _trial(cure.case)
     return found, case, now
 
 
@@ -165,62 +163,51 @@ def _shortened(run: Run) -> Run:
     return replace(run, t=run.t[first], phi=run.phi[first], y=run.y[first])
 
 
-def _trial(case: Case, native: Native) -> Identification | None:
-    """The case identified in the weak form and float32, with residuals relative to the sensors' noise alone; None if
-    the settings are refused."""
-    identifier = case.rig.identifier
-    float32 = identifier.in_weak_form(core="f32", law="stationary")
-    try:
-        return identify(case.run, _settled(Case(case.run, replace(case.rig, identifier=float32))), native, points=1)
-    except PvidError:
-        return None
+def _trial(case: Case) -> Trial | None:
+    return trial_of(case.run, case.rig)
 
 
-def _settled(case: Case) -> RigFile:
-    """The rig with the result of the run's survey, but without its disturbance."""
-    rig = fitted(case.rig, case.run)
-    return replace(rig, identifier=replace(rig.identifier, disturbance=case.rig.identifier.disturbance))
-
-
-def _is_good(result: Identification | None) -> bool:
+def _is_good(result: Identification | Trial | None) -> bool:
     return result is not None and result.identified and result.warning is None
 
 
-def _is_explained(result: Identification | None) -> bool:
-    return _is_good(result) and result is not None and (result.chi2 is None or result.chi2 < _EXPLAINED)
+def _is_explained(result: Trial | None) -> bool:
+    return _is_good(result) and result is not None and result.chi2 < _EXPLAINED
 
 
-def _answers(trial: Identification | None) -> bool:
+def _answers(trial: Trial | None) -> bool:
     """Whether a trial is identified with physical parameters."""
     return trial is not None and trial.identified and all(name in trial.value for name in trial.model.physical_names)
 
 
-def _is_better(trial: Identification | None, now: Identification | None) -> bool:
+def _is_better(trial: Trial | None, now: Trial | None) -> bool:
     """Whether a trial identifies the run and `now` does not, or has a much smaller chi^2."""
     if trial is None or not _answers(trial):
         return False
     if now is None or not now.identified:
         return True
-    if trial.chi2 is None or now.chi2 is None:
-        return trial.warning is None and now.warning is not None
     return trial.chi2 < _BETTER * now.chi2
 
 
 # ---- units
 
 
-def _unit_mistake(case: Case, native: Native) -> Cure | None:
+def _by_magnitude(case: Case, tries: bool = True) -> Iterator[list[Cure]]:
+    """Mistakes of units that magnitudes show, each with the units that it may be; tries: trials decide where magnitudes
+    do not."""
+    yield _time_unit(case)
+    yield _angle_in_counts(case)
+    yield _angle_in_degrees(case, tries)
+    yield _far_rest(case) if tries else []
+    yield _rod_units(case)
+    yield _height_units(case)
+
+
+def _unit_mistake(case: Case) -> Cure | None:
     """The first mistake of a unit that magnitudes show; of several units the first that identifies the run."""
-    for cures in (
-        _time_unit(case),
-        _angle_in_counts(case),
-        _angle_in_degrees(case, native),
-        _far_rest(case),
-        _rod_units(case),
-        _height_units(case),
-    ):
+    for cures in _by_magnitude(case):
         if len(cures) > 1:
-            return next((cure for cure in cures if _answers(_trial(cure.case, native))), cures[0])
+            return next((cure for cure in cures if _answers(_trial(cure.case))), cures[0])
         if cures:
             return cures[0]
     return None
@@ -268,7 +255,7 @@ def _angle_in_counts(case: Case) -> list[Cure]:
     ]
 
 
-def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
+def _angle_in_degrees(case: Case, tries: bool = True) -> list[Cure]:
     """Detected by the swing, if it is a whole turn or a trial in degrees is better; or by the encoder's step."""
     run = case.run
     _, swing = _swing(run)
@@ -276,7 +263,7 @@ def _angle_in_degrees(case: Case, native: Native) -> list[Cure]:
     if swing < _WIDE_SWING and not by_step:
         return []
     in_degrees = Case(replace(run, phi=joined(np.radians(run.phi))[0]), case.rig)
-    if swing < _FULL_TURN and not by_step and not _is_better(_trial(in_degrees, native), _trial(case, native)):
+    if swing < _FULL_TURN and not by_step and not (tries and _is_better(_trial(in_degrees), _trial(case))):
         return []
     return [
         Cure(
@@ -355,7 +342,7 @@ def _height_units(case: Case) -> list[Cure]:
 # ---- sensors
 
 
-def _exchanged(case: Case, now: Identification | None, native: Native) -> Cure | None:
+def _exchanged(case: Case, now: Trial | None) -> Cure | None:
     """phi and y exchanged: the run is identified only after exchanging them back."""
     if now is not None and now.identified:
         return None
@@ -366,7 +353,7 @@ def _exchanged(case: Case, now: Identification | None, native: Native) -> Cure |
         right = Case(replace(case.run, phi=case.run.y, y=case.run.phi), replace(case.rig, sensor=lsb))
     except PvidError:
         return None
-    trial = _trial(right, native)
+    trial = _trial(right)
     if not (_is_good(trial) and _answers(trial)):
         return None
     return Cure(
@@ -375,7 +362,7 @@ def _exchanged(case: Case, now: Identification | None, native: Native) -> Cure |
     )
 
 
-def _step_of(case: Case, now: Identification | None, native: Native) -> Cure | None:
+def _step_of(case: Case, _: Trial | None) -> Cure | None:
     return next(iter(_steps(case)), None)
 
 
@@ -403,39 +390,15 @@ def _steps(case: Case) -> list[Cure]:
 # ---- equations
 
 
-def _equation_mistake(case: Case, now: Identification | None, native: Native) -> Cure | None:
-    """The mistake whose trial is the best."""
-    best: tuple[Cure, Identification] | None = None
-    for cure in _suspected(case, now):
-        trial = _trial(cure.case, native)
-        if trial is not None and _is_better(trial, now) and (best is None or _is_better(trial, best[1])):
-            best = cure, trial
-    return best[0] if best is not None else _first_answered(case, now, native)
-
-
-def _suspected(case: Case, now: Identification | None) -> Iterator[Cure]:
-    run, rig = case.run, case.rig
-
-    def with_identifier(**changed: bool) -> Case:
-        return Case(run, replace(rig, identifier=replace(rig.identifier, **changed)))  # type: ignore[arg-type]
-
-    if now is None or not now.identified:
-        yield Cure(
-            "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
-            Case(replace(run, y=-run.y), rig),
-        )
-    # The trials' equations; the answer itself is refined by the full ones.
-    if not rig.identifier.full_angle:
-        yield Cure("", with_identifier(full_angle=True))
-    elif rig.identifier.corrects_angles:
-        yield Cure("", with_identifier(full_angle=False))
-    if not rig.identifier.damping and rig.identifier.zero:
-        yield Cure("", with_identifier(damping=True))
-
-
-def _first_answered(case: Case, now: Identification | None, native: Native) -> Cure | None:
-    """A clock with which a run is identified that is not identified with its own."""
-    return None if now is not None and now.identified else _clock(case, native)
+def _equation_mistake(case: Case, now: Trial | None) -> Cure | None:
+    """The sign of y, or the clock, with which a run is identified that is not identified as it is."""
+    if now is not None and now.identified:
+        return None
+    turned = Cure(
+        "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
+        Case(replace(case.run, y=-case.run.y), case.rig),
+    )
+    return turned if _is_better(_trial(turned.case), now) else _clock(case)
 
 
 def _at_rate(case: Case, factor: float) -> Case:
@@ -443,7 +406,7 @@ def _at_rate(case: Case, factor: float) -> Case:
     return Case(run, replace(case.rig, sample_rate=None))
 
 
-def _clock(case: Case, native: Native) -> Cure | None:
+def _clock(case: Case) -> Cure | None:
     """A clock that runs too slow or too fast. Any clock fits a run, with another gravity: the first trial moves the
     dominant frequency of phi to the nominal slow mode; from its gravity follows the right clock."""
     modes = case.rig.mechanism.model.modes_hz(nominal_start(case.rig))
@@ -451,12 +414,12 @@ def _clock(case: Case, native: Native) -> Cure | None:
     tried = slow / _dominant_hz(case.run)
     if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
         return None
-    trial = _trial(_at_rate(case, tried), native)
+    trial = _trial(_at_rate(case, tried))
     if trial is None or not _answers(trial):
         return None
     factor = tried * math.sqrt(GRAVITY / trial.value["g"])
     right = _at_rate(case, factor)
-    if abs(math.log(factor)) < math.log(1 + _CLOCK_OFF) or not _answers(_trial(right, native)):
+    if abs(math.log(factor)) < math.log(1 + _CLOCK_OFF) or not _answers(_trial(right)):
         return None
     rate = case.run.sample_rate
     return Cure(
@@ -478,9 +441,9 @@ def _size(ratio: float) -> str:
     return f"{ratio:.3g} times too large" if ratio > 1 else f"{1 / ratio:.3g} times too small"
 
 
-def _clock_of(result: Identification, rig: RigFile) -> tuple[str, ...]:
+def _clock_of(g: float, se: float, rig: RigFile) -> tuple[str, ...]:
     """Sentence for an estimate with a gravity above the Earth's, or much below that and the rig file's."""
-    g, error = result.value.get("g", GRAVITY), 3 * result.se.get("g", 0.0)
+    error = 3 * se
     if g - error > _MOST_GRAVITY:
         unless = ""
     elif g + error < _TILTED * min(GRAVITY, rig.nominal.g):
@@ -499,15 +462,15 @@ def _clock_of(result: Identification, rig: RigFile) -> tuple[str, ...]:
 
 def _wider_ranges(result: Identification) -> str:
     assert result.beyond is not None
-    names = [name for name in ("phi", "y", "acceleration") if getattr(result.beyond, name)]
+    names = [name for name in ("phi", "y") if getattr(result.beyond, name)]
     return (
         f"{result.beyond_words}: raise {' and '.join(f'{name}_range' for name in names)} in the rig file, "
         f"or omit the key to derive it from the run"
     )
 
 
-def _remaining(case: Case, result: Identification, now: Identification | None) -> Iterator[str]:
-    """Sentences for a run in which no mistake was found; now: its identification in the weak form and float32."""
+def _remaining(case: Case, result: Identification, now: Trial | None) -> Iterator[str]:
+    """Sentences for a run in which no mistake was found; now: its trial."""
     if _is_good(result):
         return
     if result.form == "strong" and _is_good(now):
@@ -517,10 +480,7 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
         yield "equation (5) does not arrive from this guess: use --law stationary, which explains this run"
         return
     if result.core == "q31" and _answers(now):
-        if result.largest_angle > _SMALL_ANGLE:
-            yield _not_corrected(result)
-        else:
-            yield "fixed point does not resolve this run: use --core f32, which answers it"
+        yield "fixed point does not resolve this run: use --core f32, which answers it"
         return
     excitation = excitation_of(case.run, case.rig)
     if excitation.weak is not None:
@@ -545,10 +505,3 @@ def _remaining(case: Case, result: Identification, now: Identification | None) -
             "signs and clocks: is phi the angle of link 2 relative to link 1, is y the pivot's height, are both "
             "sampled at the same time, and is the motion free of impacts and dry friction?"
         )
-
-
-def _not_corrected(result: Identification) -> str:
-    return (
-        f"angles reach {result.largest_angle:.2g} rad, and fixed point does not correct sines and cosines: use "
-        f"--core f32, or smaller angles"
-    )

@@ -26,16 +26,13 @@ def as_json(result: Identification) -> dict[str, Any]:
         "parameters": parameters,
         **parameters,
         "chi2": result.chi2,
-        "unexplained": result.unexplained,
         "kappa": result.kappa,
         "largest_angle": result.largest_angle,
         "modes_hz": list(result.modes_hz) or None,
         "first_publication_s": result.first_publication_s,
         "trusted_s": result.trusted_s,
         "reasons": dict(result.reasons),
-        "samples_beyond_range": None
-        if beyond is None
-        else {"phi": beyond.phi, "y": beyond.y, "acceleration": beyond.acceleration},
+        "samples_beyond_range": None if beyond is None else {"phi": beyond.phi, "y": beyond.y},
         "input": list(result.notes),
         "ticks": result.ticks,
         "updates": result.updates,

@@ -14,13 +14,20 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import UNKNOWN
-from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.described import described
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
 from pvid.run.excitation import excitation_of
-from pvid.run.identify import UNEXPLAINED, Identification, Publications, Trajectory, largest_angle, parts_of
+from pvid.run.identify import (
+    UNEXPLAINED,
+    VALID_ANGLE,
+    Identification,
+    Publications,
+    Trajectory,
+    largest_angle,
+    parts_of,
+)
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.run.mechanism_core import CoreAnswer, identify_in_c
 from pvid.settings.engine_cores import ENGINE_CORES

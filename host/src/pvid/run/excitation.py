@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.base.errors import PvidError
-from pvid.rig.file import Identifier, RigFile
+from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.setup.f32 import NOISE_LSB, nominal_start, weak_config
+from pvid.setup.f32 import NOISE_LSB, nominal_start
 
 Float = npt.NDArray[np.float64]
 
@@ -84,13 +83,9 @@ def excitation_of(run: Run, rig: RigFile) -> Excitation:
     weight = np.where(frequency <= min(_BAND * fast, 0.4 * rate), (2 * np.pi * frequency) ** 4, 0.0) / rig.l1**2
     power = float((weight * density).sum() * frequency[1])
     noise = (NOISE_LSB * rig.sensor.y_lsb) ** 2 * 2 / rate * float(weight.sum() * frequency[1])
-    try:
-        least = weak_config(replace(rig, identifier=Identifier()), rate).drive_min / _NOISY
-    except PvidError:
-        least = 0.0
     return Excitation(
         u=float(np.sqrt(max(power - noise, 0.0))),
-        u_noise=max(float(np.sqrt(noise)), least),
+        u_noise=float(np.sqrt(noise)),
         w=float(p[0]),
         angle=float(run.phi[np.isfinite(run.phi)].std()) if np.isfinite(run.phi).any() else 0.0,
         angle_step=rig.sensor.phi_lsb,

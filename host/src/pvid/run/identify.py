@@ -1,12 +1,9 @@
-"""Identifies a run with one core; `pvid identify` prints the result.
-
-run -> survey (start, design) -> settings -> C core, every tick -> verdict of all windows -> Identification
-"""
+"""The answer for a pendulum's run, of either form; and the strong form's, by one core."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,33 +14,24 @@ from pvid.cases import case_of
 from pvid.core.native import Native
 from pvid.models.model import Model
 from pvid.oracle import strong as oracle
-from pvid.oracle.weak import WeakSettings, identify_weak
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.excitation import excitation_of
-from pvid.run.linear_rows import linear_error
-from pvid.run.survey import fitted
-from pvid.run.verdict import DISAGREES, verdict
-from pvid.settings.enums import Form, Law, Reason
-from pvid.settings.f32 import StrongConfig, WeakConfig
+from pvid.rig.sensor_steps import resolved
+from pvid.settings.enums import Form, Reason
+from pvid.settings.f32 import StrongConfig
 from pvid.settings.forms import FORMS
-from pvid.setup.f32 import bank_of, config_of, weak_design_of
+from pvid.setup.f32 import bank_of, strong_config
 from pvid.setup.ranges_q31 import Beyond
 
 Float = npt.NDArray[np.float64]
 
 # Largest relative standard error of the first parameter of an identified run, in the strong form.
 WORST_SE = 0.1
-# Largest relative error by the fixed-point core's linear rows of an identified run; the same as the core's se_max.
-WORST_LINEAR = 0.05
+# Largest angle from rest for which the weak form's equations are meant [rad]: sines are approximated.
+VALID_ANGLE = 0.2
 
 # Last reasons of the strong form with which a run is identified.
 _GOOD = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
-
-_FADING = 4  # windows during which the sums fade after the correction is enabled (pvid.oracle.weak)
-
-# Fewest windows in the float64 core's alarm, as PVID_TRUST_LONG.
-MISFIT_WINDOWS = 16
 
 # Status of a run that is not identified because too many samples are beyond the fixed-point core's ranges.
 SATURATED = "saturated"
@@ -52,14 +40,8 @@ UNEXPLAINED = "held not explained"
 
 # Share of the samples beyond the fixed-point core's ranges that gives a warning beside an estimate.
 _BEYOND_WARNED = 0.01
-# Each of them costs a window: one or two per second at 1 kHz suffice for the status SATURATED.
+# From here on they are the reason why a run is not identified.
 _BEYOND_FATAL = 1e-3
-
-# An old estimate gives a warning if fewer windows than this share published.
-_RARELY = 0.1
-
-# A warning contains the unexplained share of the motion from this share on.
-_UNEXPLAINED_TOLD = 1e-3
 
 
 @dataclass(frozen=True)
@@ -95,8 +77,8 @@ class Publications:
 
 @dataclass(frozen=True)
 class ErrorParts:
-    """Parts of a standard error, in the parameter's unit: `noise`, the larger of the core's standard error and that of
-    the run's windows (pvid.run.verdict); `scales`, those of the model's scales by name."""
+    """Parts of a standard error, in the parameter's unit: `noise`, that of the run; `scales`, those of the model's
+    scales by name."""
 
     noise: float
     scales: Mapping[str, float]
@@ -118,27 +100,11 @@ class Identification:
         parameters, with their standard errors. If `identified` is false they are the start, not an estimate.
     parts
         of the standard errors; empty if the run is not identified
-    friction
-        the nuisance parameters, where they are estimated; else ()
-    kappa
-        share of the information on the first parameter that the other parameters cannot explain
     trusted_s, first_publication_s
         times of the core's last and first publication [s]; None: never. trusted_s is None in the strong form, which
         publishes every estimate
     chi2
         residual variance over its expectation from the sensors' noise; None: not judged yet, or the strong form
-    unexplained
-        rms of the residuals beyond the encoder's noise, relative to the rms of the rows; None in the strong form
-    skew
-        estimated delay of y after phi [s]; 0 if a delay does not reduce the residuals
-    judged
-        whether the run has enough windows to compare with the estimate; True without a verdict
-    linear_error
-        largest relative error of the mapped parameters by the fixed-point core's linear rows, which is contained in
-        the standard errors; 0 in other cores
-    parts_disagree
-        the least squares of the run's windows, corrected for large angles, differ from the published estimate, or
-        scatter, by much more than the core's standard errors
     alarm
         whether chi2 is too large. The strong form has its own alarm (pvid/misfit.h); its float64 core has none
     status
@@ -185,13 +151,7 @@ class Identification:
     on: str
     trajectory: Trajectory
     publications: Publications
-    unexplained: float | None = None
-    parts_disagree: bool = False
-    skew: float = 0.0
-    linear_error: float = 0.0
-    judged: bool = True
     parts: dict[str, ErrorParts] = field(default_factory=dict)
-    friction: tuple[float, ...] = ()
     first_publication_s: float | None = None
     reasons: Mapping[str, int] = field(default_factory=dict)
     largest_angle: float = 0.0
@@ -220,38 +180,18 @@ class Identification:
     @property
     def warning(self) -> str | None:
         """Reasons to doubt the estimate, in words; None if there are none."""
-        if self.doubts:
-            return " ".join(self.doubts)
-        words = []
-        if self.alarm and self.chi2 is not None:
-            words.append(
-                f"the residuals have {self.chi2:.1f} times the variance that the sensors' noise explains: large "
-                f"angles, friction, or a wrong phi_lsb; the errors exceed the standard errors"
-            )
-        elif self.alarm:
+        words = list(self.doubts or ())
+        if not words and self.alarm:
             words.append(
                 "the residuals of the rows are too large: the encoder is too coarse for the strong form, a jolt is in "
                 "sums without forgetting, or the mechanism has changed; do not trust the estimate"
+                if self.chi2 is None
+                else f"the residuals have {self.chi2:.1f} times the variance that the sensors' noise explains: the "
+                "errors exceed the standard errors"
             )
-        if self.parts_disagree and self.skew != 0.0:
-            when = "later" if self.skew > 0 else "earlier"
-            words.append(
-                f"y seems to be sampled {1e3 * abs(self.skew):.2g} ms {when} than phi; the standard errors cover it"
-            )
-        elif self.parts_disagree:
-            words.append(
-                "the windows of the run disagree with the estimate or with one another: friction, large angles or a "
-                "mechanism that has changed; the standard errors cover the disagreement"
-            )
-        if not self.judged:
-            words.append("too few windows can be compared with the estimate: the run is short, or its angles are large")
-        if self.is_old and (self.parts_disagree or self._share_published < _RARELY):
-            words.append(f"the estimate is that of {self.trusted_s:.1f} s; since then: {self.status}")
-        if words and self.unexplained is not None and self.unexplained >= _UNEXPLAINED_TOLD:
-            words.append(f"the equations leave {100 * self.unexplained:.2g} % of the motion unexplained")
         if self.identified and self.beyond is not None and self.beyond.share >= _BEYOND_WARNED:
             words.append(f"{self.beyond_words}: those samples were left out")
-        return "; ".join(words) or None
+        return " ".join(words) or None
 
     @property
     def is_old(self) -> bool:
@@ -260,13 +200,6 @@ class Identification:
             return False
         new = (Reason.UPDATED.text, Reason.MISFIT.text, Reason.ACCUMULATED.text)
         return self.trusted_s is not None and self.status not in new
-
-    @property
-    def _share_published(self) -> float:
-        """Share of the windows with a moving pivot that published."""
-        published = sum(self.reasons.get(one.text, 0) for one in (Reason.UPDATED, Reason.MISFIT))
-        doubted = sum(self.reasons.get(one.text, 0) for one in (Reason.HELD_UNCERTAIN, Reason.HELD_OUT_OF_RANGE))
-        return published / max(published + doubted, 1)
 
     @property
     def verdict(self) -> str:
@@ -286,7 +219,7 @@ def _is_answer(form: Form, trusted_s: float | None, updates: int, status: str, s
 def identify(
     run: Run, rig: RigFile, native: Native, *, start: npt.ArrayLike | None = None, points: int = 400
 ) -> Identification:
-    """Identifies a run with the core, form and law of the rig file.
+    """Identifies a run by the strong form, with the core and law of the rig file.
 
     Parameters
     ----------
@@ -295,7 +228,7 @@ def identify(
     native
         The C core, used by cores "f32" and "q31".
     start
-        p = (w, d1, d2) to start from; by default the result of the run's survey (pvid.run.survey).
+        p = (w, d1, d2) to start from; by default the rig file's nominal.
     points
         Number of points of the trajectory.
 
@@ -304,94 +237,54 @@ def identify(
     PvidError
         When the run is shorter than the window, or the settings do not fit the core.
     """
-    if start is None:
-        rig = fitted(rig, run)
-    config = config_of(rig, run.sample_rate, start)
+    rig = resolved(rig, run)
+    config = strong_config(rig, run.sample_rate, start)
     if len(run.t) < config.ticks_needed:
         raise PvidError(
-            f"the run has {len(run.t)} samples and the {rig.identifier.form} form needs {config.ticks_needed} for its "
-            f"first estimate: record longer or shorten window_s"
+            f"the run has {len(run.t)} samples and the strong form needs {config.ticks_needed} for its first "
+            f"estimate: record longer or shorten window_s"
         )
     every = max(1, len(run.t) // points)
     if rig.identifier.core == "f64":
-        return _IN_FLOAT64[rig.identifier.form](run, rig, config, every)
+        return _in_float64(run, rig, config, every)
     return _in_core(run, rig, start, every, native)
 
 
 def _in_core(run: Run, rig: RigFile, start: npt.ArrayLike | None, every: int, native: Native) -> Identification:
-    """Identifies a run with the C core of the rig file's form and arithmetic."""
+    """Identifies a run with the C core of the rig file's arithmetic."""
     case = case_of(rig.identifier)
     rig = case.with_ranges(rig, run)
     config, samples = case.settings_for_run(rig, run, start), case.samples(rig, run)
     identifier = native.identifier(config)
     record = identifier.run(*samples, sums=False, estimate_every=every)
     counters, last = identifier.counters, identifier.estimate
-    model, n_all = rig.mechanism.model, record.p.shape[1]
-    n, n_p = model.n_mapped, min(n_all, len(model.published))
-    p = case.p_of(config, last["p"][:n_all])
-    friction, p = tuple(map(float, p[n_p:])), p[:n_p]
-    if n_p > n:
-        p[n] += case.zero_shift(rig, run, samples[0])
-    trusted = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
-    status, linear = _final_status(record.reason), None
-    if case.linear_rows_only and case.publishes:
-        linear = np.zeros(n)
-        if rig.identifier.full_angle and len(trusted):
-            found = linear_error(rig, run, p)
-            if found is None or np.abs(found).max() > WORST_LINEAR:
-                trusted, status = trusted[:0], Reason.HELD_OUT_OF_RANGE.text
-            else:
-                linear = found
-    any_trusted = len(trusted) > 0
-    publications = Publications.none(model)
-    if case.publishes:
-        published = case.p_of(config, record.published[trusted])[:, :n]
-        se = case.se_of(config, record.published_se[trusted])[:, :n]
-        publications = Publications(
-            t=run.t[trusted],
-            p=published,
-            se=se if linear is None else np.hypot(se, linear * published),
-            alarm=record.reason[trusted] == Reason.MISFIT,
-        )
-    beyond = case.beyond(config, *samples, counters["rejected_saturated"])
-    estimates = case.p_of(config, record.estimate["p"][:, :n_all])[:, :n_p]
-    covariance, covariances = (
-        _with_linear_error(case.covariance_of(config, one)[..., :n_p, :n_p], at, linear)
-        for one, at in ((last, p), (record.estimate, estimates))
-    )
+    updated = np.flatnonzero(np.isin(record.reason, (Reason.UPDATED, Reason.MISFIT)))
+    beyond = case.beyond(config, *samples)
+    n_p = record.p.shape[1]
     return _identification(
         rig,
         run,
-        p=p,
-        friction=friction,
-        covariance=covariance,
+        p=case.p_of(config, last["p"][:n_p]),
+        covariance=case.covariance_of(config, last),
         kappa=float(case.kappa_of(last)),
-        trusted_s=float(run.t[trusted[-1]]) if any_trusted and case.publishes else None,
-        first_publication_s=float(run.t[trusted[0]]) if any_trusted else None,
+        first_publication_s=float(run.t[updated[0]]) if len(updated) else None,
         reasons=counted(record.reason),
         beyond=beyond,
         beyond_words=None if beyond is None else beyond.words(rig.sensor),
-        chi2=_judged(identifier.misfit) if case.publishes else None,
-        alarm=any_trusted and bool(record.reason[trusted[-1]] == Reason.MISFIT),
-        status=status,
+        alarm=bool(len(updated)) and bool(record.reason[updated[-1]] == Reason.MISFIT),
+        status=_final_status(record.reason),
         ticks=len(run.t),
         updates=counters["updates"],
         lost=counters["rejected_not_finite"] + counters["rejected_saturated"],
         running_hash=identifier.running_hash,
-        trajectory=_trajectory(run.t[::every], estimates, covariances, rig, case.kappa_of(record.estimate)),
-        publications=publications,
-        linear=linear,
+        trajectory=_trajectory(
+            run.t[::every],
+            case.p_of(config, record.estimate["p"][:, :n_p]),
+            case.covariance_of(config, record.estimate),
+            rig,
+            case.kappa_of(record.estimate),
+        ),
     )
-
-
-def _with_linear_error(covariance: Float, p: Float, linear: Float | None) -> Float:
-    """Adds the error by linear rows, relative of the mapped parameters [n_mapped], to a covariance [..., n_p, n_p] at
-    p [..., n_p]."""
-    if linear is None:
-        return covariance
-    error, n = np.zeros_like(p), len(linear)
-    error[..., :n] = p[..., :n] * linear
-    return np.asarray(covariance + error[..., :, None] * error[..., None, :])
 
 
 def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Identification:
@@ -432,8 +325,6 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
         p=result.last.p,
         covariance=result.last.covariance,
         kappa=result.last.kappa,
-        trusted_s=None,
-        chi2=None,
         alarm=False,
         status=(Reason.UPDATED if moved_at_end else Reason.HELD_NOT_EXCITED).text,
         reasons=_windows_counted(result.updated, result.updated),
@@ -451,84 +342,6 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
     )
 
 
-def _weak_in_float64(run: Run, rig: RigFile, config: WeakConfig, every: int) -> Identification:
-    """Identifies a run with the weak form in float64; the trajectory has one point per window."""
-    if config.estimator.law is not Law.STATIONARY or config.estimator.divider != 1:
-        raise PvidError("core f64 has the weak form's stationary law with a solve at every window only: use f32")
-    settings = config.estimator
-    model = rig.mechanism.model
-    n, n_p = model.n_mapped, min(len(settings.start), len(model.published))
-    result = identify_weak(
-        run.phi,
-        run.y,
-        weak_design_of(rig, run.sample_rate),
-        WeakSettings(
-            start=settings.start[:n_p].astype(np.float64),
-            row_sd=settings.row_sd,
-            start_sd=settings.start_sd[:n_p].astype(np.float64),
-            forgetting_s=settings.forgetting_s,
-            iterations=config.iterations,
-            step_limit=settings.step_limit,
-            kappa_min=settings.kappa_min,
-            drive_min=config.drive_min,
-            full_angle=rig.identifier.full_angle,
-            damping=rig.identifier.damping,
-            pivot_noise=config.pivot_noise,
-            misfit_max=config.trust.misfit_max,
-            renewal=config.trust.renewal,
-        ),
-    )
-    # conditions of publication and alarm of pvid/trust.h, without the noise check
-    trust = config.trust
-    relative = (result.se[:, :n] / result.p[:, :n]).max(axis=1)
-    arrived = np.arange(len(result.t)) + 1 >= trust.groups_min
-    good = result.updated & arrived & (result.kappa >= trust.kappa_min) & (relative <= trust.se_max)
-    trusted = np.flatnonzero(good)
-    if len(trusted) == 0:
-        p, covariance = (
-            settings.start[:n_p].astype(np.float64),
-            np.diag(settings.start_sd[:n_p].astype(np.float64) ** 2),
-        )
-        status, chi2, alarm = Reason.HELD_NOT_EXCITED, None, False
-    else:
-        p, covariance = result.p[trusted[-1], :n_p], result.covariance[trusted[-1], :n_p, :n_p]
-        # judged after the first publication, and after the rows without correction have faded
-        judged = result.misfit[
-            max(trusted[0], _FADING * int(result.corrected.any()) + int(np.argmax(result.corrected))) :
-        ]
-        judged = judged[np.isfinite(judged)]
-        chi2 = _judged(float(result.chi2[trusted[-1]]))
-        lately = len(judged) >= MISFIT_WINDOWS and float(np.mean(judged)) > trust.misfit_max
-        alarm = trust.misfit_max > 0 and (lately or not result.agrees[trusted[-1]])
-        status = Reason.MISFIT if alarm else Reason.UPDATED
-        if not good[-1]:
-            status = Reason.HELD_UNCERTAIN if result.updated[-1] else Reason.HELD_NOT_EXCITED
-    return _identification(
-        rig,
-        run,
-        p=p,
-        covariance=covariance,
-        kappa=float(result.kappa[trusted[-1]]) if len(trusted) else result.last.kappa,
-        trusted_s=float(run.t[0] + result.t[trusted[-1]]) if len(trusted) else None,
-        first_publication_s=float(run.t[0] + result.t[trusted[0]]) if len(trusted) else None,
-        reasons=_windows_counted(result.updated, good),
-        chi2=chi2,
-        alarm=alarm,
-        status=status.text,
-        ticks=len(run.t),
-        updates=config.iterations * int(result.updated.sum()),
-        lost=0,
-        running_hash=None,
-        trajectory=_trajectory(run.t[0] + result.t, result.p, result.covariance, rig, result.kappa),
-    )
-
-
-_IN_FLOAT64: dict[str, Callable[[Run, RigFile, Any, int], Identification]] = {
-    "weak": _weak_in_float64,
-    "strong": _in_float64,
-}
-
-
 def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
     """The result of a run without a drive: the start with its standard deviations."""
     p = config.estimator.start.astype(np.float64)
@@ -539,8 +352,6 @@ def _start_held(run: Run, rig: RigFile, config: StrongConfig) -> Identification:
         p=p,
         covariance=covariance,
         kappa=0.0,
-        trusted_s=None,
-        chi2=None,
         alarm=False,
         status=Reason.HELD_NOT_EXCITED.text,
         reasons={Reason.HELD_NOT_EXCITED.text: len(run.t)},
@@ -601,11 +412,6 @@ def _windows_counted(updated: npt.NDArray[np.bool_], good: npt.NDArray[np.bool_]
     return {name: count for name, count in counts.items() if count}
 
 
-def _judged(misfit: float) -> float | None:
-    """A core's misfit, which is 0 until it has been judged."""
-    return misfit if np.isfinite(misfit) and misfit > 0.0 else None
-
-
 def largest_angle(run: Run, rest: float | None) -> float:
     """Largest |phi - rest| of a run [rad]; None: from the median."""
     phi = run.phi[np.isfinite(run.phi)]
@@ -621,9 +427,7 @@ def _identification(
     p: Float,
     covariance: Float,
     kappa: float,
-    trusted_s: float | None,
     first_publication_s: float | None = None,
-    chi2: float | None,
     alarm: bool,
     status: str,
     reasons: Mapping[str, int],
@@ -632,68 +436,36 @@ def _identification(
     lost: int,
     running_hash: int | None,
     trajectory: Trajectory,
-    publications: Publications | None = None,
-    friction: tuple[float, ...] = (),
     beyond: Beyond | None = None,
     beyond_words: str | None = None,
-    linear: Float | None = None,
 ) -> Identification:
-    """Compares an estimate with all windows of the run, and adds the errors of the scales.
-
-    linear: relative errors of the mapped parameters [n_mapped] by linear rows; the covariance contains them.
-    """
+    """The answer of the strong form, with the errors of the scales."""
     mechanism = rig.mechanism
-    model, n = mechanism.model, mechanism.model.n_mapped
+    model = mechanism.model
     names = model.p_names[: len(p)]
     value = dict(zip(names, map(float, p), strict=True))
-    unexplained, parts_disagree, skew, judged = None, False, 0.0, True
-    if rig.identifier.form_traits.publishes and trusted_s is not None:
-        unbiased = np.append(p, friction)
-        if linear is not None:  # the verdict's rows are corrected for large angles
-            unbiased[:n] /= 1 + linear
-        over_run = verdict(rig, run, unbiased)
-        own = np.sqrt(np.diag(covariance))
-        wider = np.maximum(over_run.se[: len(p)] / own, 1.0)
-        covariance = covariance * np.outer(wider, wider)
-        unexplained, parts_disagree = over_run.unexplained, bool(wider[:n].max() > DISAGREES)
-        skew, judged = over_run.skew, over_run.judged
-        if publications is not None:  # the scatter of the windows applies to all publications
-            scatter = np.maximum(over_run.scatter[:n] / own[:n], 1.0)
-            publications = replace(publications, se=publications.se * scatter)
     noise = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
     physical = mechanism.physical(p)
     if np.isfinite(physical).all():
         value.update(zip(model.physical_names, map(float, physical), strict=True))
         noise.update(zip(model.physical_names, map(float, mechanism.physical_errors(p, covariance)), strict=True))
     se, parts = noise, {}
-    answered = _is_answer(rig.identifier.form, trusted_s, updates, status, noise[names[0]], value[names[0]])
+    answered = _is_answer(rig.identifier.form, None, updates, status, noise[names[0]], value[names[0]])
     if answered:
         parts = parts_of(noise, p, rig)
         se = {name: one.whole for name, one in parts.items()}
     elif beyond is not None and beyond.share >= _BEYOND_FATAL:
         status = SATURATED
-    elif (
-        rig.identifier.form_traits.uses_windows
-        and status == Reason.HELD_NOT_EXCITED.text
-        and not excitation_of(run, rig).weak
-    ):
-        status = UNEXPLAINED
     return Identification(
         model=model,
         value=value,
         se=se,
         parts=parts,
-        friction=friction,
         kappa=kappa,
-        trusted_s=trusted_s,
+        trusted_s=None,
         first_publication_s=first_publication_s,
-        chi2=chi2,
+        chi2=None,
         alarm=alarm,
-        unexplained=unexplained,
-        parts_disagree=parts_disagree,
-        skew=skew,
-        judged=judged,
-        linear_error=0.0 if linear is None else float(np.abs(linear).max()),
         status=status,
         reasons=reasons,
         ticks=ticks,
@@ -708,15 +480,8 @@ def _identification(
         law=rig.identifier.law,
         on="host",
         trajectory=trajectory,
-        publications=Publications.none(model) if publications is None else _widened(publications, rig),
+        publications=Publications.none(model),
     )
-
-
-def _widened(published: Publications, rig: RigFile) -> Publications:
-    """Publications with the errors of the scales in their standard errors."""
-    scales = rig.mechanism.scale_errors(published.p, rig.scale_sd).values()
-    se = np.sqrt(sum((one.p**2 for one in scales), published.se**2))
-    return Publications(published.t, published.p, se, published.alarm)
 
 
 def parts_of(noise: Mapping[str, float], p: Float, rig: RigFile) -> dict[str, ErrorParts]:

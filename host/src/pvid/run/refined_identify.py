@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,12 +17,12 @@ from pvid.rig.sensor_steps import resolved
 from pvid.run.identify import Identification, largest_angle, parts_of
 from pvid.run.refined import GOOD
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
-from pvid.run.survey import starts_about
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start
 
 Float = npt.NDArray[np.float64]
 
+_SCALES = (1.0, 0.45, 2.2)  # of the guessed lengths: starts
 BEARABLE = 5.0  # slow chi^2 up to which a refined answer is published where there is no other
 LARGEST_SE = 0.05  # relative, of w, d1, d2: beyond, the run does not determine them
 
@@ -61,7 +63,7 @@ def refined_identification(run: Run, rig: RigFile, weak: Identification) -> Iden
     model = weak.model
     names = (*model.mapped_names, model.offset_name)
     starts = [{model.offset_name: rest, **{name: weak.value[name] for name in names if name in weak.value}}]
-    for guess in starts_about(rig):
+    for guess in _starts_about(rig):
         starts.append(dict(zip(names, map(float, (*nominal_start(guess), rest)), strict=True)))
     try:
         outcome = refine_pendulum(run, rig, starts, sure=weak.identified)
@@ -70,6 +72,15 @@ def refined_identification(run: Run, rig: RigFile, weak: Identification) -> Iden
     adopted, text = _judged(outcome, weak)
     verdict = RefinementVerdict(adopted, text, outcome)
     return _answer(run, rig, weak, verdict) if adopted else replace(weak, refinement=verdict)
+
+
+def _starts_about(rig: RigFile) -> Iterator[RigFile]:
+    """Rig files with guesses about that of the rig file, itself first."""
+    guess = rig.nominal
+    for l2 in _SCALES:
+        for rho2 in _SCALES:
+            with suppress(PvidError):  # a length beyond those of a rig file
+                yield replace(rig, nominal=replace(guess, l2=guess.l2 * l2, rho2=guess.rho2 * rho2))
 
 
 def _judged(outcome: RefinedPendulum, weak: Identification) -> tuple[bool, str]:
@@ -122,7 +133,6 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
         value=value,
         se={name: one.whole for name, one in parts.items()},
         parts=parts,
-        friction=(),
         trusted_s=float(run.t[-1]),
         first_publication_s=weak.first_publication_s if weak.first_publication_s is not None else float(run.t[-1]),
         chi2=found.slow_chi2,
@@ -130,11 +140,6 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
         doubts=None if weak.doubts is None else (),
         remarks=(),
         status=Reason.UPDATED.text,
-        unexplained=None,
-        parts_disagree=False,
-        skew=0.0,
-        judged=True,
-        linear_error=0.0,
         largest_angle=largest_angle(run, value[model.offset_name]),
         refinement=verdict,
     )

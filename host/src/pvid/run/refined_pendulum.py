@@ -13,12 +13,11 @@ from pvid.codegen.refine import LOG_SD
 from pvid.design.second_derivative import second_derivative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.oracle.weak import sample_sd
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.refined import GOOD, Inputs, Measured, Prior, Problem, Refined, refined, without_outliers
 from pvid.run.refined_kernel import kernel_of
-from pvid.setup.f32 import row_sd_of
+from pvid.setup.f32 import NOISE_LSB, row_sd_of
 
 Float = npt.NDArray[np.float64]
 
@@ -342,7 +341,7 @@ def drive_edge_hz(run: Run, rig: RigFile) -> float:
     n = len(y)
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((y - y.mean()) * window)) ** 2
-    floor = sample_sd(rig.sensor.y_lsb, 0.5) ** 2 * float(np.sum(window**2))
+    floor = (NOISE_LSB * rig.sensor.y_lsb) ** 2 * float(np.sum(window**2))
     hz = np.fft.rfftfreq(n, 1 / run.sample_rate)
     weighted = spectrum * hz**4
     shown = spectrum > 30 * floor

@@ -1,10 +1,8 @@
-"""Type of the settings of any identifier."""
+"""Type of the settings of an identifier of the strong form."""
 
 from __future__ import annotations
 
-from pvid.settings.f32 import StrongConfig, WeakConfig
-from pvid.settings.q31 import StrongConfigQ31, WeakConfigQ31
+from pvid.settings.f32 import StrongConfig
+from pvid.settings.q31 import StrongConfigQ31
 
-FloatSettings = WeakConfig | StrongConfig
-FixedSettings = WeakConfigQ31 | StrongConfigQ31
-Settings = FloatSettings | FixedSettings
+Settings = StrongConfig | StrongConfigQ31

@@ -1,4 +1,5 @@
-"""Settings of the fixed-point identifiers, as in weak_q31.h and strong_q31.h."""
+"""Settings of the estimator and what judges it, and of the strong form, in fixed point: as in estimator_q31.h,
+strong_q31.h."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from pvid.settings.enums import Core, Form
-from pvid.settings.tables import FirBankQ31, RowFormatQ31, StrongDesignQ31, WeakTablesQ31
+from pvid.settings.tables import FirBankQ31, RowFormatQ31, StrongDesignQ31
 
 
 @dataclass(frozen=True)
@@ -58,38 +59,6 @@ class GateConfigQ31:
 
 
 @dataclass(frozen=True)
-class WeakConfigQ31:
-    """Settings of the fixed-point weak-form identifier, as in weak_q31.h; offsets in counts, drive_min in U's unit."""
-
-    design: WeakTablesQ31
-    estimator: EstimatorConfigQ31
-    phi_offset: int = 0
-    y_offset: int = 0
-    drive_min: int = 0
-    zero_unknown: bool = True
-    iterations: int = 3
-    pivot_noise: tuple[int, int] = (0, 0)
-    trust: TrustConfigQ31 = TrustConfigQ31()
-    gate: GateConfigQ31 = GateConfigQ31()
-
-    form: ClassVar[Form] = "weak"
-    core: ClassVar[Core] = "q31"
-    corrects_angles: ClassVar[bool] = False
-    counts_about_rest: ClassVar[bool] = True  # phi_offset is where the encoder rests
-    limits_acceleration: ClassVar[bool] = True  # samples are rejected for the pivot's acceleration, too
-
-    @property
-    def full_scale(self) -> tuple[int, int]:
-        """Of phi and y [counts]."""
-        return self.design.phi_max, self.design.y_max
-
-    @property
-    def hop(self) -> int:
-        """Decimated samples from the start of a window to the start of the next."""
-        return (self.design.window - 1) // 2
-
-
-@dataclass(frozen=True)
 class StrongConfigQ31:
     """Settings of the fixed-point strong-form identifier, as in strong_q31.h: counts, and drive_min in u's unit."""
 
@@ -103,9 +72,6 @@ class StrongConfigQ31:
 
     form: ClassVar[Form] = "strong"
     core: ClassVar[Core] = "q31"
-    corrects_angles: ClassVar[bool] = False
-    counts_about_rest: ClassVar[bool] = False  # the encoder's zero is taken for the equilibrium
-    limits_acceleration: ClassVar[bool] = False
 
     @property
     def full_scale(self) -> tuple[int, int]:

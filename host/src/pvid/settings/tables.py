@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 Float = npt.NDArray[np.float64]
-Int16 = npt.NDArray[np.int16]
 Int32 = npt.NDArray[np.int32]
 Int64 = npt.NDArray[np.int64]
 
@@ -41,26 +40,6 @@ class Folded:
     def delay(self) -> int:
         """Samples from the newest one back to the instant the derivatives refer to."""
         return self.half * self.stride + (self.block - 1) // 2
-
-
-class WeakSizes(Protocol):
-    """Sizes of a weak-form design, or of its tables in either arithmetic."""
-
-    @property
-    def taps(self) -> int:
-        """Length of the front end's filters [samples]."""
-
-    @property
-    def decimation(self) -> int:
-        """Samples per decimated sample."""
-
-    @property
-    def window(self) -> int:
-        """Length of a window [decimated samples]."""
-
-    @property
-    def functions(self) -> int:
-        """Test functions per window."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,70 +141,3 @@ class StrongDesignQ31:
         own_phi = np.rint(phi * self.tau ** np.arange(5) / self.angle_unit)
         own_u = np.rint(u * self.dt ** np.arange(2, 5) * 2.0**RATE_BITS)
         return own_phi.astype(np.int64), own_u.astype(np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class WeakTablesQ31:
-    """pvid_weak_design_q31: tables, shifts and formats. A value is its integer times 2^-bits.
-
-    Attributes
-    ----------
-    taps, decimation, window, functions, lag : as in the float design
-    phi_max, y_max : full scale of the counts, about their offsets
-    smooth, second : int32 [(taps - 1) / 2]
-    smooth_bits : format of smooth
-    phi_shift, u_shift : from the FIR sums to F and U
-    uf_shift : from U F to its 20 bits
-    integral_shift : int [3], of the integrals of UF, F, U in dt^2/12
-    high_shift : int [2], of UIUF_HIGH, UIF_HIGH
-    product_shift : int [5], of what these leave of UIUF, UIF, UIU, UI1, UT
-    sum_shift : of every product chi * term before it is added
-    chi : int16 [window, 3, functions]
-    multiplier : int32 [15], shift : int [15], from a term's sum to its share of a column
-    gram : int32 [6, functions (functions + 1) / 2]; gram_bits : int [6]
-    column_bits : int [11], formats of N1..N8, Y, a, b
-    u_bits : format of U [1/dt^2]
-    f_unit : one unit of F [rad]; dt [s]
-    overlap : as in the float design
-    margins : for each quantity the bits that its largest value leaves free
-    """
-
-    taps: int
-    decimation: int
-    window: int
-    functions: int
-    lag: int
-    phi_max: int
-    y_max: int
-    u_max: int
-    smooth: Int32
-    second: Int32
-    smooth_bits: int
-    phi_shift: int
-    u_shift: int
-    uf_shift: int
-    integral_shift: tuple[int, ...]
-    high_shift: tuple[int, ...]
-    product_shift: tuple[int, ...]
-    sum_shift: int
-    chi: Int16
-    multiplier: Int32
-    shift: tuple[int, ...]
-    gram: Int32
-    gram_bits: tuple[int, ...]
-    column_bits: tuple[int, ...]
-    u_bits: int
-    f_unit: float
-    dt: float
-    overlap: float
-    margins: dict[str, float]
-
-    @property
-    def p_units(self) -> Float:
-        """What w, d1, d2 and c are counted in, in SI."""
-        return np.array([1 / self.dt**2, 1.0, 1.0, self.f_unit])
-
-    @property
-    def encoder_count(self) -> float:
-        """One count of the encoder [rad]."""
-        return float(self.f_unit * 2.0 ** (self.smooth_bits - self.phi_shift))

@@ -1,4 +1,4 @@
-"""Settings of the float32 core from a rig file. All defaults that depend on the rig are here."""
+"""Settings of the strong form in float32 from a rig file. All defaults that depend on the rig are here."""
 
 from __future__ import annotations
 
@@ -9,13 +9,10 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.design.fir import FirBank, finite_difference, savitzky_golay
-from pvid.design.weak import WeakDesign, design
-from pvid.design.weak_sizing import Sizes, decimation_of
-from pvid.oracle.weak import VALID_ANGLE
 from pvid.rig.file import RigFile
 from pvid.settings.bounds import MAX_WINDOW
 from pvid.settings.enums import Law
-from pvid.settings.f32 import EstimatorConfig, GateConfig, StrongConfig, TrustConfig, WeakConfig
+from pvid.settings.f32 import EstimatorConfig, GateConfig, StrongConfig
 
 # The start is a rough guess with an error of up to 50 %; the bounds are a factor of 20 away.
 START_RELATIVE_SD = 0.5
@@ -105,39 +102,8 @@ def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None 
     )
 
 
-# Bounds and start_sd of the encoder's offset c [rad]. Steps are limited to 0.3 start_sd, which must be larger than an
-# offset of 0.1 rad.
-ZERO_BOUND = 3.0
-ZERO_SD = 0.5
-
-# start_sd and bounds of friction over the mass of body 2 [m^2/s]. A rig has about 1e-4; 0.1 would stop the pendulum
-# within a second.
-FRICTION_SD = 1e-3
-FRICTION_BOUND = 0.1
-
 # Noise of a sensor in LSB: rounding, and half an LSB of its own.
 NOISE_LSB = float(np.sqrt(1 / 12 + 1 / 4))
-
-# Below this kappa the information on w is rounding: without a drive float32 gives up to 6e-7.
-WEAK_KAPPA_MIN = 5e-6
-
-
-def weak_design_of(rig: RigFile, sample_rate: float) -> WeakDesign:
-    """The tables of a rig file at `sample_rate` [Hz], whitened at its nominal p."""
-    settings = rig.identifier
-    sizes = Sizes(
-        window_s=settings.window_s or None,
-        functions=settings.test_functions or None,
-        decimation=settings.decimation or None,
-        taps=round(min(settings.smoothing_s * sample_rate, 1e9)) | 1 if settings.smoothing_s > 0 else None,
-        pass_hz=settings.pass_hz or None,
-    )
-    nominal = nominal_start(rig)
-    if settings.disturbance == 0:
-        return design(rig.l1, sample_rate, nominal, sizes)
-    dt = decimation_of(nominal, sample_rate, sizes) / sample_rate
-    ratio = settings.disturbance / math.sqrt(dt) / row_sd_of(rig, round(dt * sample_rate))
-    return design(rig.l1, sample_rate, nominal, sizes, ratio)
 
 
 def row_sd_of(rig: RigFile, decimation: int) -> float:
@@ -146,62 +112,3 @@ def row_sd_of(rig: RigFile, decimation: int) -> float:
     An exact sensor has the noise of float32.
     """
     return max(rig.sensor.phi_lsb * NOISE_LSB, 1e-8) / math.sqrt(decimation)
-
-
-# A window counts as driven if the rms of u exceeds that of a still pivot so many times: in total, and in the band of
-# the rows, where noise of u would bias the estimate.
-_STILL = 1.3
-_STILL_IN_BAND = 10.0
-
-
-def weak_drive_threshold(rig: RigFile, tables: WeakDesign) -> float:
-    """Rms of u [1/s^2] below which a window counts as undriven."""
-    whole, band = tables.drive_noise(NOISE_LSB * rig.sensor.y_lsb)
-    return float(max(np.hypot(_STILL * whole, _STILL_IN_BAND * band), 1e-3 * nominal_start(rig)[0]))
-
-
-def weak_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfig:
-    """Settings of the weak-form identifier for samples at `sample_rate` [Hz]; `start` overrides the nominal p."""
-    settings = rig.identifier
-    tables = weak_design_of(rig, sample_rate)
-    p = np.asarray(nominal_start(rig) if start is None else start, np.float64)
-    zero = 1 if settings.zero else 0
-    # the offset c [rad], then the frictions c1 and c2 [m^2/s]: start_sd and bounds
-    extra_sd = [ZERO_SD] * zero + [FRICTION_SD] * (2 * settings.damping)
-    extra_bound = [ZERO_BOUND] * zero + [FRICTION_BOUND] * (2 * settings.damping)
-    extra = np.array([rig.sensor.phi_zero] * zero + [0.0] * (2 * settings.damping))
-    if settings.damping and not settings.zero:
-        raise PvidError("[identifier] damping needs zero = true: friction is estimated beside the encoder's zero")
-    return WeakConfig(
-        sample_rate=sample_rate,
-        l1=rig.l1,
-        design=tables.f32,
-        zero_unknown=settings.zero,
-        full_angle=settings.full_angle,
-        friction=settings.damping,
-        angle_limit=VALID_ANGLE if settings.full_angle else 0.0,
-        drive_min=weak_drive_threshold(rig, tables),
-        pivot_noise=tables.pivot_noise(rig.sensor.y_lsb * NOISE_LSB),
-        trust=TrustConfig(),
-        gate=gate_config(rig),
-        estimator=EstimatorConfig(
-            start=np.concatenate([p, extra]).astype(np.float32),
-            start_sd=np.concatenate([START_RELATIVE_SD * p, extra_sd]).astype(np.float32),
-            lower=np.concatenate([p / BOUND_FACTOR, extra - extra_bound]).astype(np.float32),
-            upper=np.concatenate([p * BOUND_FACTOR, extra + extra_bound]).astype(np.float32),
-            row_sd=row_sd_of(rig, tables.decimation),
-            forgetting_s=settings.forgetting_s,
-            feedback_hz=0.0,
-            kappa_min=min(settings.kappa_min, WEAK_KAPPA_MIN),
-            law=LAWS[settings.law],
-            dead_zone=settings.dead_zone,
-            divider=settings.divider,
-        ),
-    )
-
-
-def config_of(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig | WeakConfig:
-    """Settings of the rig file's form."""
-    if rig.identifier.form == "weak":
-        return weak_config(rig, sample_rate, start)
-    return strong_config(rig, sample_rate, start)

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from pvid.core.headers import Headers, default_library
 from pvid.design.c_tables import array, struct_initializer
-from pvid.design.weak_sizing import bounds_of
 from pvid.models.kapitza import MODEL
-from pvid.settings.forms import FORMS
-from pvid.settings.kinds import FixedSettings, Settings
+from pvid.settings.kinds import Settings
+from pvid.settings.q31 import StrongConfigQ31
 from pvid.setup.q31 import scale_of, units_of
 
 _COMMENTS = {
-    "smooth": "value, folded",
-    "second": "second derivative, folded",
-    "chi": "[{taps[0]}][3][{taps[2]}]: orders 0, 2, 4",
-    "multiplier": "of a term's share of its column",
-    "gram": "44, 42+24, 40+04, 22, 20+02, 00",
     "weights": "[order][point - 1]",
 }
 
@@ -28,7 +21,6 @@ def settings_header(
 ) -> str:
     """A C header that defines `static const pvid_<form>_config_<core> name` and its tables name_<table>.
 
-    In the weak form also its design name_design and, where it corrects for large angles, the storage name_angle.
     No date: the same settings make the same file.
 
     Parameters
@@ -49,13 +41,7 @@ def settings_header(
     headers = Headers.of(default_library())
     filled = headers.filled(f"pvid_{config.form}_config_{config.core}", config)
     pointers = {table: f"{name}_{table}" for table in filled.tables}
-    parts = [
-        array(f"{name}_{table}", values, _COMMENTS[table].format(taps=values.shape))
-        for table, values in filled.tables.items()
-    ]
-    if config.corrects_angles:
-        parts.append(f"static pvid_weak_angle_f32 {name}_angle;")
-        pointers["angle"] = f"&{name}_angle"
+    parts = [array(f"{name}_{table}", values, _COMMENTS[table]) for table, values in filled.tables.items()]
     for field, struct in [*filled.designs.items(), ("config", filled.struct)]:
         own = name if field == "config" else f"{name}_{field}"
         initializer = struct_initializer(headers, struct, pointers)
@@ -71,21 +57,14 @@ def settings_header(
         "",
         f'#include "{umbrella}"',
         "",
-        f"#if {' || '.join(f'{macro} < {needed}' for macro, needed in _bounds(config).items())}",
+        f"#if PVID_MAX_WINDOW < {config.bank.memory}",
         f'#error "the bounds of pvid/config.h are too small for {name}"',
         "#endif",
     ]
     return "\n".join([*lines, *(f"\n{part}" for part in parts), "", *more, *([""] if more else []), "#endif", ""])
 
 
-def _bounds(config: Any) -> dict[str, int]:
-    """What pvid/config.h must hold at least."""
-    if not FORMS[config.form].uses_windows:
-        return {"PVID_MAX_WINDOW": config.bank.memory}
-    return bounds_of(config.design)
-
-
-def fixed_notes(config: FixedSettings) -> list[str]:
+def fixed_notes(config: StrongConfigQ31) -> list[str]:
     """The ranges of the counts, and what one unit of each parameter is."""
     phi_max, y_max = config.full_scale
     units = zip(MODEL.parameters, units_of(config), strict=False)
@@ -95,7 +74,7 @@ def fixed_notes(config: FixedSettings) -> list[str]:
     ]
 
 
-def scale_lines(config: FixedSettings, l1: float, name: str) -> list[str]:
+def scale_lines(config: StrongConfigQ31, l1: float, name: str) -> list[str]:
     """NAME_SCALE for a rod of l1 [m]."""
     scale = scale_of(config, l1)
     values = (scale.l1, scale.g_multiplier, scale.g_shift, scale.d1_bits, scale.d2_bits)

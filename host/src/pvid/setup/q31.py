@@ -10,27 +10,17 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.design.strong_q31 import strong_design_q31
-from pvid.design.weak_q31 import weak_tables_q31
 from pvid.rig.file import RigFile, Sensor
 from pvid.rig.run import Run
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig
-from pvid.settings.kinds import FixedSettings
-from pvid.settings.q31 import (
-    EstimatorConfigQ31,
-    GateConfigQ31,
-    ScaleQ31,
-    StrongConfigQ31,
-    TrustConfigQ31,
-    WeakConfigQ31,
-)
-from pvid.settings.tables import RATE_BITS, StrongDesignQ31, WeakTablesQ31
-from pvid.setup.f32 import bank_of, nominal_start, strong_config, weak_config, weak_design_of
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, ScaleQ31, StrongConfigQ31
+from pvid.settings.tables import RATE_BITS, StrongDesignQ31
+from pvid.setup.f32 import bank_of, nominal_start, strong_config
 from pvid.setup.ranges_q31 import Beyond, beyond_ranges, middle_of_travel, reach, with_default_ranges, with_ranges_of
 
 Float = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
-ConfigQ31 = FixedSettings
 
 PATIENCE_MAX = 2**30  # groups of rows, of gate_q31.h
 FORGETTING_MIN, FORGETTING_MAX = 4, 2**24  # likewise, of estimator_q31.h
@@ -50,19 +40,6 @@ def _counting(rig: RigFile) -> Sensor:
                 f"[sensor] {name} is 0, and the fixed-point core counts in it: set it to the sensor's resolution"
             )
     return sensor
-
-
-def tables_of(rig: RigFile, sample_rate: float) -> WeakTablesQ31:
-    """The tables of a rig file."""
-    sensor = _counting(rig)
-    return weak_tables_q31(
-        weak_design_of(rig, sample_rate),
-        sensor.phi_lsb,
-        sensor.y_lsb,
-        sensor.phi_range,
-        sensor.y_range,
-        sensor.acceleration_range,
-    )
 
 
 def strong_design_of(rig: RigFile, sample_rate: float) -> StrongDesignQ31:
@@ -98,36 +75,29 @@ def counts_of_samples(values: npt.NDArray[np.float64], lsb: float) -> Int64:
     return np.clip(counts, -(2.0**31), 2.0**31 - 1).astype(np.int64)
 
 
-def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> ConfigQ31:
-    """Settings of the rig file's form; ranges that are missing in the file contain the run.
+def config_for_run(rig: RigFile, run: Run, start: npt.ArrayLike | None = None) -> StrongConfigQ31:
+    """Settings for a run; ranges that are missing in the file contain it.
 
-    A run that does not fit about 0 is counted about the middle of its travel. In the strong form the encoder's zero is
-    the equilibrium, so only y has an offset.
+    Heights that do not fit about 0 are counted about the middle of their travel; the encoder's zero is the equilibrium.
     """
-    if rig.identifier.form_traits.estimates_zero and rig.identifier.damping:
-        raise PvidError("core q31 has no damping: use --core f32")
     rig = with_ranges_of(rig, run)
-    config = config_of_q31(rig, run.sample_rate, start)
-    phi, y = counts_of(rig, run)
-    phi_max, y_max = config.full_scale
-    phi_offset = _offset(phi, phi_max, config.phi_offset) if config.counts_about_rest else config.phi_offset
-    return replace(config, phi_offset=phi_offset, y_offset=_offset(y, y_max))
+    config = strong_config_q31(rig, run.sample_rate, start)
+    return replace(config, y_offset=_offset(counts_of(rig, run)[1], config.full_scale[1]))
 
 
-def _offset(counts: Int64, limit: int, given: int = 0) -> int:
-    """Offset of a sensor [counts]: `given`, if the median is within half of the full scale `limit` and the whole
-    travel fits; else the middle of the travel, the median or `given`, that with most samples in range."""
+def _offset(counts: Int64, limit: int) -> int:
+    """Offset of a sensor [counts]: 0, if the median is within half of the full scale `limit` and the whole travel fits;
+    else the middle of the travel, the median or 0, that with most samples in range."""
     ordinary = counts[np.abs(counts) < 2**31 - 1]
     middle, median = round(middle_of_travel(ordinary)), round(float(np.median(ordinary))) if len(ordinary) else 0
-    if abs(median - given) <= limit // 2 and reach(ordinary.astype(np.float64), float(given)) <= limit:
-        return given
-    return max((middle, median, given), key=lambda at: int((np.abs(ordinary - at) <= limit).sum()))
+    if abs(median) <= limit // 2 and reach(ordinary.astype(np.float64), 0.0) <= limit:
+        return 0
+    return max((middle, median, 0), key=lambda at: int((np.abs(ordinary - at) <= limit).sum()))
 
 
-def beyond_range(config: ConfigQ31, phi: Int64, y: Int64, rejected: int) -> Beyond:
-    """Counts phi, y [n] beyond the ranges of this configuration; rejected: number of rejected samples."""
-    limited = rejected if config.limits_acceleration else 0
-    return beyond_ranges(phi - config.phi_offset, y - config.y_offset, *config.full_scale, limited)
+def beyond_range(config: StrongConfigQ31, phi: Int64, y: Int64) -> Beyond:
+    """Counts phi, y [n] beyond the ranges of this configuration."""
+    return beyond_ranges(phi - config.phi_offset, y - config.y_offset, *config.full_scale)
 
 
 def _estimator_q31(
@@ -210,59 +180,6 @@ def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
     return GateConfigQ31(round(gate.sigmas * 2**16), max(round(patience), 1) if patience > 0 else 0)
 
 
-def weak_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> WeakConfigQ31:
-    """Settings of the weak form at `sample_rate` [Hz]; `start` overrides the nominal p.
-
-    What the encoder reads at rest becomes the offset of its counts, and c is counted from there.
-    """
-    tables = tables_of(rig, sample_rate)
-    offset = round(rig.sensor.phi_zero / rig.sensor.phi_lsb)
-    rig = replace(rig, sensor=replace(rig.sensor, phi_zero=0.0))
-    float_config = weak_config(rig, sample_rate, start)
-    windows_hz = sample_rate / (tables.decimation * float_config.hop)
-    e = float_config.estimator
-    n_p = 4 if float_config.zero_unknown else 3
-    functions = tables.functions
-    estimator = _estimator_q31(
-        e,
-        weak_config(rig, sample_rate).estimator,
-        tables.p_units[:n_p],
-        tables.column_bits[: 8 if n_p == 4 else 5],
-        tables.column_bits[8],
-        tables.f_unit,
-        forgetting_groups=forgetting_groups_q31(e.forgetting_s, windows_hz),
-        gain=0 if e.law is Law.PSEUDOVELOCITY else 2**30,
-        correlation=round(tables.overlap * 2**16),
-        row_weight=round((functions - 2) / functions * 2**16),
-        noise_margin=round(e.noise_margin * 2**16),
-    )
-    lag_s = tables.lag * tables.dt
-    return WeakConfigQ31(
-        design=tables,
-        estimator=estimator,
-        phi_offset=offset,
-        zero_unknown=float_config.zero_unknown,
-        iterations=float_config.iterations,
-        drive_min=round(float_config.drive_min * tables.dt**2 * 2.0**tables.u_bits),
-        pivot_noise=_scaled(float_config.pivot_noise / lag_s**4 * 4.0**estimator.y_bits),
-        trust=TrustConfigQ31(
-            kappa_min=round(float_config.trust.kappa_min * 2**30),
-            se_max=round(float_config.trust.se_max * 2**24),
-            misfit_max=round(float_config.trust.misfit_max * 2**16),
-            groups_min=float_config.trust.groups_min,
-            revert_after=float_config.trust.revert_after,
-            renewal=round(float_config.trust.renewal * 2**16),
-        ),
-        gate=gate_config_q31(float_config.gate, windows_hz),
-    )
-
-
-def _scaled(x: float) -> tuple[int, int]:
-    """x >= 0 as pvid_scaled_q31: m 2^e, m of 30 bits."""
-    part, exponent = math.frexp(x)
-    return (round(part * 2.0**30), exponent - 30) if x > 0 else (0, 0)
-
-
 def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfigQ31:
     """Settings of the strong form at `sample_rate` [Hz]; `start` overrides the nominal p."""
     design = strong_design_of(rig, sample_rate)
@@ -290,32 +207,23 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
     )
 
 
-def config_of_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> ConfigQ31:
-    """Settings of the rig file's form."""
-    make = weak_config_q31 if rig.identifier.form == "weak" else strong_config_q31
-    return make(rig, sample_rate, start)
-
-
-def units_of(config: ConfigQ31) -> Float:
+def units_of(config: StrongConfigQ31) -> Float:
     """One unit of each of the core's integers p in SI [n_p]."""
     bits = np.array(config.estimator.p_bits, np.float64)
     return np.asarray(config.design.p_units[: len(bits)] * 2.0**-bits)
 
 
-def p_of(config: ConfigQ31, p: npt.ArrayLike) -> Float:
-    """p = (w, d1, d2, c) in SI from the core's integers [..., n_p]; c is the encoder's reading at rest."""
-    values = np.asarray(p, np.float64) * units_of(config)
-    if values.shape[-1] > 3 and isinstance(config.design, WeakTablesQ31):
-        values[..., 3] += config.phi_offset * config.design.encoder_count
-    return np.asarray(values)
+def p_of(config: StrongConfigQ31, p: npt.ArrayLike) -> Float:
+    """p = (w, d1, d2) in SI from the core's integers [..., n_p]."""
+    return np.asarray(np.asarray(p, np.float64) * units_of(config))
 
 
-def se_of(config: ConfigQ31, se: npt.ArrayLike) -> Float:
+def se_of(config: StrongConfigQ31, se: npt.ArrayLike) -> Float:
     """Standard errors in SI from the core's integers [..., n_p]."""
     return np.asarray(np.asarray(se, np.float64) * units_of(config))
 
 
-def covariance_of(config: ConfigQ31, estimate: npt.NDArray[np.void]) -> Float:
+def covariance_of(config: StrongConfigQ31, estimate: npt.NDArray[np.void]) -> Float:
     """Covariance of p in SI [..., n_p, n_p] from estimates of the core."""
     n_p = len(config.estimator.p_bits)
     se = se_of(config, estimate["se"][..., :n_p])
@@ -326,7 +234,7 @@ def covariance_of(config: ConfigQ31, estimate: npt.NDArray[np.void]) -> Float:
 LENGTH_BITS = 24  # of pvid_kapitza_q31
 
 
-def scale_of(config: ConfigQ31, l1: float) -> ScaleQ31:
+def scale_of(config: StrongConfigQ31, l1: float) -> ScaleQ31:
     """Scale factors from the estimates of a configuration to metres, for a rod of l1 [m]."""
     if not 2.0**-LENGTH_BITS <= l1 < 2.0 ** (31 - LENGTH_BITS):
         raise PvidError(f"l1 = {l1:g} m does not fit the fixed-point core's lengths, which end at 127 m")

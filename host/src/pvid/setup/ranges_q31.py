@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.oracle.weak import front_end
 from pvid.rig.file import RigFile, Sensor
 from pvid.rig.run import Run
-from pvid.setup.f32 import weak_design_of
 
 Float = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
@@ -27,7 +25,6 @@ _ORDINARY = 0.999
 _ORDINARY_ACCELERATION = 0.99  # a jump of y by one fault is spread by the smoother
 _FAULT = 3.0
 _SMOOTHING_S = 0.05  # smoothing window for the pivot's acceleration
-# A range of acceleration that is twice too wide does no harm; ten times too wide, rounding of its products biases d2.
 _ACCELERATION_MARGIN = 2.0
 
 
@@ -47,31 +44,17 @@ def with_ranges_of(rig: RigFile, run: Run) -> RigFile:
     the default."""
     default = with_default_ranges(rig)
     given = rig.sensor
-    rest = None if rig.identifier.form_traits.estimates_zero else 0.0
     ranges = {
-        "phi_range": given.phi_range or max(default.phi_range, _MARGIN * reach(run.phi, rest)),
+        "phi_range": given.phi_range or max(default.phi_range, _MARGIN * reach(run.phi, 0.0)),
         "y_range": given.y_range or max(default.y_range, _MARGIN * reach(run.y)),
-        "acceleration_range": given.acceleration_range or _acceleration_range(rig, run, default.acceleration_range),
+        "acceleration_range": given.acceleration_range or _acceleration_range(run, default.acceleration_range),
     }
     return replace(rig, sensor=replace(default, **ranges))
 
 
-def _acceleration_range(rig: RigFile, run: Run, default: float) -> float:
-    """The range that the run needs [m/s^2]. If it is above the default, faults of the sensor are excluded. In the
-    strong form, whose products do not lose bits, it is at least the default."""
-    if rig.identifier.form_traits.uses_windows:
-        largest = _ACCELERATION_MARGIN * _largest_acceleration(rig, run)
-        if 0 < largest <= default:
-            return largest
+def _acceleration_range(run: Run, default: float) -> float:
+    """The range that the run needs [m/s^2], without faults of the sensor; at least the default."""
     return max(default, _ACCELERATION_MARGIN * reach(pivot_acceleration(run), 0.0, _ORDINARY_ACCELERATION))
-
-
-def _largest_acceleration(rig: RigFile, run: Run) -> float:
-    """Largest acceleration in the weak form's core, with noise and faults [m/s^2]; 0 if the run is too short."""
-    design, height = weak_design_of(rig, run.sample_rate), _height(run)
-    if len(height) < design.taps:
-        return 0.0
-    return rig.l1 * float(np.abs(front_end(height, height, design)[1]).max())
 
 
 def middle_of_travel(x: npt.ArrayLike) -> float:
@@ -114,18 +97,17 @@ def _height(run: Run) -> Float:
 
 @dataclass(frozen=True)
 class Beyond:
-    """Counts of the samples of a run that the core rejected: `phi` and `y` beyond their ranges; `acceleration` for a
-    pivot acceleration beyond its range, at this sample or a neighbour. `samples`: all samples of the run."""
+    """Counts of the samples of a run that the core rejected: `phi` and `y` beyond their ranges. `samples`: all samples
+    of the run."""
 
     phi: int
     y: int
-    acceleration: int
     samples: int
 
     @property
     def share(self) -> float:
-        """The largest of the three counts as a share of all samples, 0 to 1."""
-        return max(self.phi, self.y, self.acceleration) / max(self.samples, 1)
+        """The larger count as a share of all samples, 0 to 1."""
+        return max(self.phi, self.y) / max(self.samples, 1)
 
     def words(self, sensor: Sensor) -> str | None:
         """Share of samples beyond each range, one clause for each; None if there are none."""
@@ -134,7 +116,6 @@ class Beyond:
             for count, name, value, unit in (
                 (self.phi, "phi_range", sensor.phi_range, "rad"),
                 (self.y, "y_range", sensor.y_range, "m"),
-                (self.acceleration, "acceleration_range", sensor.acceleration_range, "m/s^2"),
             )
             if count
         ]
@@ -145,8 +126,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= 0.01 else f"{100 * share:.2g} %"
 
 
-def beyond_ranges(phi: Int64, y: Int64, phi_max: int, y_max: int, rejected: int) -> Beyond:
-    """From sensor counts without offset [n] and full scales [counts]; `rejected`: samples that the core rejected."""
-    outside_phi, outside_y = np.abs(phi) > phi_max, np.abs(y) > y_max
-    thrown = max(0, rejected - int((outside_phi | outside_y).sum()))
-    return Beyond(int(outside_phi.sum()), int(outside_y.sum()), thrown, len(phi))
+def beyond_ranges(phi: Int64, y: Int64, phi_max: int, y_max: int) -> Beyond:
+    """From sensor counts without offset [n] and full scales [counts]."""
+    return Beyond(int((np.abs(phi) > phi_max).sum()), int((np.abs(y) > y_max).sum()), len(phi))

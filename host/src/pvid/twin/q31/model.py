@@ -48,4 +48,3 @@ class ModelQ31:
     def n_sums(self) -> int:
         """M, B, yy, weight."""
         return self.blocks.n_sums
-

@@ -1,0 +1,101 @@
+"""A quick identification of a pendulum's run, to see whether a suspected mistake in it explains the run better.
+
+The rows of the weak form in float64, with windows of a few lengths and two filters: some tenths of a second. `identify`
+tries more designs and judges the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.models.model import Model
+from pvid.oracle.fourier.choice import Scored, lengths, made, power_of, score_of
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.fourier.functions import Float
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.rows import Compiled
+from pvid.oracle.fourier.starts import starts_about
+from pvid.rig.described import described
+from pvid.rig.file import RigFile
+from pvid.rig.run import Run
+from pvid.rig.sensor_steps import resolved
+from pvid.run.mechanism import model_of
+
+_LENGTHS = 3  # of windows, the longest ones
+_FILTERS = ((101, 6), (41, 4))  # samples and degree of the derivatives' polynomials
+_FEWEST = 8  # windows
+_MISFIT = 4.0  # chi^2 above which the answer is doubted
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a quick identification found.
+
+    Attributes
+    ----------
+    model : of the mechanism
+    value : mapped parameters, the offset, and inside the physical region the physical ones
+    chi2 : variance of the residuals over what the sensors' noise explains
+    identified : every parameter has a value that means something
+    """
+
+    model: Model
+    value: dict[str, float]
+    chi2: float
+    identified: bool
+
+    @property
+    def warning(self) -> str | None:
+        """Why the answer is doubted; None: it is not."""
+        return "the residuals exceed the sensors' noise" if self.chi2 > _MISFIT else None
+
+
+def trial_of(run: Run, rig: RigFile) -> Trial | None:
+    """The best of a few designs; None where none fits the run.
+
+    Gaps in the run are left out as `identify` does.
+    """
+    try:
+        run = run.whole()
+        rig = resolved(rig, run)
+        found = _best(ready(model_of(described(rig))), run)
+    except PvidError:
+        return None
+    if found is None:
+        return None
+    mechanism = rig.mechanism
+    model = mechanism.model
+    value = dict(zip((*model.mapped_names, model.offset_name), map(float, found.p), strict=True))
+    physical = mechanism.physical(found.p)
+    if np.isfinite(physical).all():
+        value.update(zip(model.physical_names, map(float, physical), strict=True))
+    return Trial(model, value, found.chi2, found.known and model.is_plausible(found.p))
+
+
+@np.errstate(all="ignore")  # what diverges from a start is judged and left out
+def _best(model: Compiled, run: Run) -> Scored | None:
+    signals = {"phi": run.phi, "y": run.y}
+    basis = FourierDesign(run.sample_rate, 64 / run.sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
+    designs = [
+        made(basis, window_s=length, rate_taps=taps, rate_degree=degree)
+        for taps, degree in _FILTERS
+        for length in lengths(len(run.t), run.sample_rate)[:_LENGTHS]
+    ]
+    found = [one for one in _scored(model, signals, designs, None) if one.known]
+    if not found:  # from other starts than the guess
+        starts = starts_about(model.parameters, model.parameters.checked(None))
+        found = [one for start in starts for one in _scored(model, signals, designs[:1], start) if one.known]
+    return min(found, key=lambda one: (one.chi2 > _MISFIT, one.score), default=None)
+
+
+def _scored(
+    model: Compiled, signals: dict[str, Float], designs: list[FourierDesign], start: Float | None
+) -> Iterator[Scored]:
+    for design in designs:
+        one = score_of(model, signals, design, start, False, _FEWEST)
+        if one is not None:
+            yield one
