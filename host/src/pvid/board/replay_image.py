@@ -119,7 +119,6 @@ def standard_run(form: Form, ticks: int, core: Core = "f32", divider: int = 1) -
         core=core,
         differentiator="finite-difference",
         stride=1,
-        full_angle=False,  # the run's equations are linear
         divider=divider,
     )
     rig = replace(standard, identifier=identifier, sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb))

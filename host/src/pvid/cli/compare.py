@@ -19,7 +19,7 @@ from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run.survey import fitted
+from pvid.rig.sensor_steps import resolved
 
 if TYPE_CHECKING:
     from pvid.board.compare_on import Outcome
@@ -73,7 +73,7 @@ def command(
         given = {"core": core, "form": form, "law": law}
         return _shown(compare_recording(run_path, described, columns, targets_of(targets), **given))
     run = read_input(run_path, rig, columns)
-    rig = fitted(rig, run)
+    rig = resolved(rig, run)
     native = Native()
     outcomes: list[Outcome] = []
     for arithmetic in ["f32", "q31"] if core == "all" else [core or rig.identifier.core_traits.in_c]:

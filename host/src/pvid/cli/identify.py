@@ -19,7 +19,6 @@ from pvid.log.rig_settings import rig_for
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.advised import identified
-from pvid.run.survey import fitted
 
 
 @click.command(name="identify")
@@ -105,7 +104,7 @@ def command(
         from pvid.board.stream_rig import played_samples, stream_rig
         from pvid.board.target import verify
 
-        image = stream_rig(fitted(rig, run), run.sample_rate, run)
+        image = stream_rig(rig, run.sample_rate, run)
         with progress_bar(f"streaming to {target}", len(run.t)) as advance:
             verdict = verify(target, image, native, *played_samples(rig, run), progress=advance)
         write_stderr(f"{target}: {verdict.playback.account}")

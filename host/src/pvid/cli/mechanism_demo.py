@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import click
+import numpy as np
+import numpy.typing as npt
 from rich.console import Console
 from rich.table import Table
 
@@ -15,15 +17,17 @@ from pvid.base.rounding import with_error
 from pvid.board.engine_board import verify_recording
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import names as shipped
-from pvid.models.simulated_rig import simulated_rig
+from pvid.models.simulated_rig import SimulatedRig, simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.mechanism import identify_mechanism
+from pvid.run.mechanism import identify_mechanism, model_of, outputs_at
 from pvid.run.mechanism_compare import compare_recording
 from pvid.run.mechanism_core import CoreAnswer, identify_in_c
 from pvid.settings.engine_cores import ENGINE_CORES, FIXED, FLOAT
 from pvid.show.mechanism_figure import convergence
 from pvid.sim.simulated_run import RigSimulation
+
+_THE_SAME = 1e-3  # relative, of a guess and the truth
 
 
 def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
@@ -41,14 +45,15 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
     if model not in shipped():
         raise PvidError(f"there is no shipped mechanism {model}; there are {', '.join(shipped())}")
     rig = simulated_rig(model)
-    compiled = compiled_of(model)
-    simulation = RigSimulation.of(compiled, rig)
+    simulation = RigSimulation.of(compiled_of(model), rig)
     run = simulation.run(seed)
     t = run.pop("t") if "t" in run else simulation.motion().t
+    own = _guessed(model, rig, simulation.truth, seed)
+    compiled = model_of(own)
     recording = Recording(t, {one.name: run[one.name] for one in compiled.signals}, rig.sample_rate)
-    truth = dict(zip(compiled.p_names, simulation.truth.tolist(), strict=True))
-    write_stderr(f"{compiled.title}: {t[-1]:.0f} s at {rig.sample_rate:g} Hz; the guesses of the model start it")
-    own = MechanismRig(model, rig.sample_rate, known=rig.knowns)
+    truth = {**outputs_at(compiled, simulation.truth), **dict(zip(compiled.p_names, simulation.truth, strict=True))}
+    starts = (f"{one.name} {one.guess:.4g}" for one in compiled.unknowns)
+    write_stderr(f"{compiled.title}: {t[-1]:.0f} s at {rig.sample_rate:g} Hz; start {', '.join(starts)}")
     answer = identify_mechanism(recording, compiled)
     equal = True
     for core in (FLOAT.name, FIXED.name):
@@ -74,17 +79,28 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
     return DONE if equal else DIFFERENT
 
 
+def _guessed(model: str, rig: SimulatedRig, truth: npt.NDArray[np.float64], seed: int) -> MechanismRig:
+    """The rig with a start: the guesses of the model; one that is the truth is moved by up to 50 %."""
+    random, nominal = np.random.default_rng(seed), {}
+    for one, x in zip(compiled_of(model).unknowns, truth.tolist(), strict=True):
+        factor = float(random.uniform(0.5, 1.5))
+        if x and abs(one.guess / x - 1) < _THE_SAME:
+            nominal[one.name] = float(f"{factor * x:.4g}")
+    return MechanismRig(model, rig.sample_rate, known=rig.knowns, nominal=nominal)
+
+
 def _print(found: CoreAnswer, truth: Mapping[str, float]) -> None:
     title = f"{found.oracle.model.title}: weak form, C in {ENGINE_CORES[found.core].words}"
-    table = Table("parameter", "truth", "estimate", "standard error", "error / s.e.", title=title)
+    table = Table("parameter", "truth", "estimate", "standard error", "of noise alone", "error / noise", title=title)
     for column in table.columns[1:]:
         column.justify = "right"
     for name, one in found.values.items():
         if one.value is None or one.se is None or name not in truth:
             continue
-        apart = (one.value - truth[name]) / one.se if one.se > 0 else 0.0
+        noise = one.se_noise or one.se
+        apart = (one.value - truth[name]) / noise if noise > 0 else 0.0
         label = f"{name} \\[{one.unit}]" if one.unit else name
-        table.add_row(label, f"{truth[name]:g}", *with_error(one.value, one.se), f"{apart:+.1f}")
+        table.add_row(label, f"{truth[name]:g}", *with_error(one.value, one.se), f"{noise:.2g}", f"{apart:+.1f}")
     Console().print(table)
     misfit = "not judged" if found.misfit is None else f"{found.misfit:.2g}"
     click.echo(

@@ -97,8 +97,6 @@ def command(**options: Any) -> int:
         l1=pendulum.l1,
         sample_rate=options["rate"],
         sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
-        # linear equations have no sines to correct
-        identifier=replace(standard.identifier, full_angle=options["truth"] == "full"),
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())

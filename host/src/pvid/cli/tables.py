@@ -1,8 +1,7 @@
-"""`pvid tables` and `pvid schema`: C headers, printed or checked."""
+"""`pvid tables` and `pvid schema`: C headers of the strong form and of the link, printed or checked."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,24 +10,23 @@ import click
 from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cases import CASES
-from pvid.cli.input import read_input, with_overrides
+from pvid.cli.input import with_overrides
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.rig.file import load
 from pvid.settings.forms import FORMS
 
-_NAMES = {"weak": "weak_config", "strong": "strong_config", "fir": "fir_bank"}
+_NAMES = {"strong": "strong_config", "fir": "fir_bank"}
 _FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1, "block": 1}
 
 
 @click.command(name="tables")
 @click.option(
-    "--form", type=click.Choice([*FORMS, "fir"]), default="weak", show_default=True, help="Form of the tables."
+    "--form", type=click.Choice([*FORMS, "fir"]), default="strong", show_default=True, help="Form of the tables."
 )
 @click.option("--core", type=click.Choice(["f32", "q31"]), help="Arithmetic.  [default: f32]")
-@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file (TOML); weak and strong only.")
-@click.option("--run", "run_path", type=click.Path(path_type=Path), help="Size the weak tables for this recorded run.")
-@click.option("--name", help="Name in C.  [default: weak_config, strong_config, fir_bank]")
+@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file (TOML); strong only.")
+@click.option("--name", help="Name in C.  [default: strong_config, fir_bank]")
 @click.option("--check", type=click.Path(path_type=Path), help="Compare this file with the output instead of printing.")
 @click.option("--points", type=int, help="fir: points of the Savitzky-Golay window, odd.  [default: 241]")
 @click.option("--degree", type=int, help="fir: degree of its polynomial, 4 to 12.  [default: 12]")
@@ -39,23 +37,24 @@ def command(
     form: str,
     core: str | None,
     rig_path: Path | None,
-    run_path: Path | None,
     name: str | None,
     check: Path | None,
     **fir: Any,
 ) -> int:
     """Prints a header for the C core.
 
-    weak, strong: the whole configuration for init, with its tables. fir: a bank of derivative filters for a
-    configuration of the strong form in float32 that is written by hand (pvid_fir_bank_f32).
+    strong: the whole configuration for init, with its tables. fir: a bank of derivative filters for a configuration of
+    the strong form in float32 that is written by hand (pvid_fir_bank_f32). The weak form's are printed by `pvid model
+    build`.
 
-    The sizes of the weak tables follow the modes of the rig file's guess, or with --run the modes of a recorded run, as
-    in identify. Facts of the design, and for q31 the bits to spare at full scale, are printed on standard error.
+    For q31 the bits to spare at full scale are printed on standard error.
     """
+    if form not in _NAMES:
+        raise PvidError("the weak form's configuration is printed by `pvid model build kapitza --rig RIG -o FOLDER`")
     name = name or _NAMES[form]
     if form == "fir":
-        if rig_path is not None or run_path is not None:
-            raise PvidError("--form fir does not depend on a rig: omit --rig and --run")
+        if rig_path is not None:
+            raise PvidError("--form fir does not depend on a rig: omit --rig")
         if core == "q31":
             raise PvidError("--form fir has float32 filters only: the fixed-point bank is part of --form strong")
         given = {key: value for key, value in fir.items() if value is not None}
@@ -65,20 +64,12 @@ def command(
     if rig_path is None:
         raise PvidError(f"--form {form} needs --rig FILE")
     core = core or "f32"
-    rig, run = with_overrides(load(rig_path), form=form, core=core), None
+    rig = with_overrides(load(rig_path), form=form, core=core)
     made_by = f"pvid tables --form {form} --core {core} --rig {rig_path.name}"
-    if run_path is not None:
-        if not rig.identifier.form_traits.uses_windows:
-            raise PvidError("--run is for --form weak")
-        from pvid.run.survey import fitted
-
-        run = read_input(run_path, rig)
-        rig = replace(fitted(rig, run), sample_rate=run.sample_rate)
-        made_by += f" --run {run_path.name}"
     if rig.sample_rate is None:
         raise PvidError(f"{rig_path}: sample_rate is required to compute the tables")
     case = CASES[form, core]
-    config: Any = case.settings(rig, rig.sample_rate) if run is None else case.settings_for_run(rig, run)
+    config: Any = case.settings(rig, rig.sample_rate)
     for fact in case.facts(config):
         write_stderr(fact)
     return _print_header(case.header(config, rig.l1, name, f"{made_by} --name {name}"), check)

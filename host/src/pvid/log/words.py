@@ -120,5 +120,5 @@ def residual_words(hello: Hello | None) -> str:
     """What the residuals are so many times of."""
     if hello is not None and hello.form == Form.FOURIER:
         return "times the noise of the sensors"
-    weak = hello is not None and FORMS[hello.form_name].uses_windows
+    weak = hello is not None and FORMS[hello.form_name].publishes
     return "times the encoder's noise" if weak else "times the row_sd that was configured"

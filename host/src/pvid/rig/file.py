@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from dataclasses import MISSING, Field, dataclass, field, fields
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
@@ -74,8 +74,8 @@ class Sensor:
     phi_range : fixed point: largest angle from rest that is accepted; 0: 0.5 rad, or more if the run needs it
     y_range : fixed point: largest height of the pivot about the middle of its travel; 0: a tenth of l1, or more if the
         run needs it
-    acceleration_range : fixed point: largest acceleration of the pivot; 0: twice that of the run, without a run four
-        times the nominal g. Ten times that of the run would cost accuracy, because products of u are rounded
+    acceleration_range : fixed point, strong form: largest acceleration of the pivot; 0: twice that of the run, without
+        a run four times the nominal g
     """
 
     phi_lsb: float = _number(Unset(2.0 * math.pi / 2**14), "rad", 0.0, 1.0)
@@ -119,27 +119,15 @@ class Identifier:
     form : "weak" (integrals, for real encoders) or "strong" (the derivatives of the paper, for 20 bits and more)
     law : "stationary" (with feedback, converges) or "pseudovelocity" (the paper's equation (5), literally)
     core : "f32" (float32), "q31" (fixed point) or "f64" (the float64 oracle, on the host only)
-    window_s : window of the weak form or of the differentiator; 0: 1.3 slow periods of the nominal pendulum (weak
-        form), 0.241 s (strong form)
+    window_s : strong form: window of the differentiator; 0: 0.241 s
     differentiator : filters of the strong form
     degree : strong form: degree of the Savitzky-Golay polynomial
     stride : strong form: samples between the points of the differentiator; with a block at least its length
     block : strong form, Savitzky-Golay: odd number of samples whose mean is a point; a window of window_s then
         takes the time of window_s / block points, with 2 % (phi) to 14 % (its fourth derivative) more noise
-    test_functions : weak form: modulating functions per window, at least 4; 0: 8 to 16, up to 1.5 times the nominal
-        fast mode
-    decimation : weak form: samples per decimated sample; 0: about 200 decimated samples per window
-    smoothing_s : weak form: length of the filters before decimation; 0: the shortest that suffice
-    pass_hz : weak form: these filters pass the motion unchanged up to this frequency; 0: 7 times the nominal fast mode
     forgetting_s : time constant of forgetting; 0: no forgetting
     feedback_hz : stationary law: rate at which F decays; 0: a whole Gauss-Newton step at every solve
     divider : ticks (strong form) or windows (weak form) per solve
-    disturbance : white disturbance of the joints' angular accelerations: rows are weighted by it beside the noise of
-        the encoder; a survey finds it from the residuals
-    survey : search a recorded run for start and design before the core identifies it; false: use [nominal]
-    full_angle : weak form, float32: correct the rows for sines and cosines
-    damping : weak form, float32: two more regressors, for viscous friction
-    zero : weak form: the zero of the encoder is unknown, a fourth parameter
     kappa_min : hold the estimate while less than this share of the information on w is its own
     outlier_gate : reject rows or windows whose residuals exceed this multiple of the usual; 0: no gate; default: 4
         (weak form), 6 (strong form), and no gate with the law pseudovelocity
@@ -156,18 +144,9 @@ class Identifier:
     degree: int = _number(12, "", 4, 12)
     stride: int = _number(1, "samples", 1, 65535)
     block: int = _number(1, "samples", 1, 8191)
-    test_functions: int = _number(0, "", 0, 16)
-    decimation: int = _number(0, "samples", 0, 64)
-    smoothing_s: float = _number(0.0, "s", 0.0, 1e6)
-    pass_hz: float = _number(0.0, "Hz", 0.0, 1e6)
     forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
     feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)
     divider: int = _number(1, "", 1, 65535)
-    disturbance: float = _number(0.0, "rad/s^2/sqrt(Hz)", 0.0, 1e9)
-    survey: bool = True
-    full_angle: bool = True
-    damping: bool = False
-    zero: bool = True
     kappa_min: float = _number(1e-5, "", 0.0, 0.999)
     outlier_gate: float | None = _number(None, "", 0.0, 1e3)
     outlier_patience_s: float | None = _number(None, "s", 0.0, 1e12)
@@ -185,16 +164,6 @@ class Identifier:
     def core_traits(self) -> CoreTraits:
         """What depends on the core."""
         return CORES[self.core]
-
-    @property
-    def corrects_angles(self) -> bool:
-        """Whether the form can be corrected for large angles in this core."""
-        return self.form_traits.uses_windows and self.core_traits.corrects_angles
-
-    def in_weak_form(self, **changed: Any) -> Identifier:
-        """The same in the weak form; window_s of a differentiator is dropped."""
-        window_s = self.window_s if self.form_traits.uses_windows else 0.0
-        return replace(self, form="weak", window_s=window_s, **changed)
 
     @property
     def strong_window_s(self) -> float:
@@ -265,8 +234,7 @@ class RigFile:
     def n_core(self) -> int:
         """Number of the mapped parameters and, where it is estimated, of the offset."""
         model = self.mechanism.model
-        with_offset = self.identifier.zero and self.identifier.form_traits.estimates_zero
-        return len(model.published) if with_offset else model.n_mapped
+        return len(model.published) if self.identifier.form_traits.estimates_zero else model.n_mapped
 
     @property
     def scale_sd(self) -> dict[str, float]:
@@ -399,10 +367,21 @@ def _field(owner: type, name: str) -> Field[Any]:
     return next(f for f in fields(owner) if f.name == name)
 
 
+_CHOSEN = "the weak form chooses it from the run; leave it out"
+_REFINED = "`identify` fits the full equations, with both viscous frictions, after the weak form; leave it out"
+_GONE = {
+    **dict.fromkeys(("test_functions", "decimation", "smoothing_s", "pass_hz", "disturbance", "survey"), _CHOSEN),
+    **dict.fromkeys(("full_angle", "damping"), _REFINED),
+    "zero": "the weak form estimates the zero of the encoder always; leave it out",
+}
+
+
 def _known(owner: type, given: Mapping[str, Any], place: str) -> dict[str, Any]:
     """The keys of a table, refused when the dataclass has no such field."""
     names = [f.name for f in fields(owner)]
     for key in given:
+        if (gone := _GONE.get(key)) and key not in names:
+            raise PvidError(f"{place}{key} is no key any more: {gone}")
         if key not in names:
             raise PvidError(f"{place}{key!a} is not a key of a rig file; known keys: {', '.join(names)}")
     return dict(given)

@@ -1,8 +1,8 @@
 """Finds likely mistakes in a run that is not identified, or identified with a warning, and options that correct them.
 
 Magnitudes show mistakes of units. For other mistakes the run is identified again with the suspected mistake corrected
-(pvid.run.trial), which takes some tenths of a second; a trial counts if it identifies the run, or if its chi^2 is much smaller. A
-mistake is corrected before the search continues: two mistakes give two sentences, one mistake gives one.
+(pvid.run.trial), which takes some tenths of a second; a trial counts if it identifies the run, or if its chi^2 is much
+smaller. A mistake is corrected before the search continues: two mistakes give two sentences, one mistake gives one.
 """
 
 from __future__ import annotations

@@ -53,5 +53,5 @@ def identified(
     try:
         result = answered(run, rig, native, refine=refine, of_image=of_image)
     except PvidError as error:
-        raise behind(advice_on_refusal(run, rig, native), error) from error
-    return replace(result, notes=run.notes, advice=advice(run, rig, result, native))
+        raise behind(advice_on_refusal(run, rig), error) from error
+    return replace(result, notes=run.notes, advice=advice(run, rig, result))

@@ -166,6 +166,11 @@ def values_of(model: CompiledModel, p: Float, covariance: Float, gains: Float, *
     return values
 
 
+def outputs_at(model: CompiledModel, p: Float) -> dict[str, float]:
+    """Outputs of the model at p [n_p], by name."""
+    return {one.name: _output(model, p, one)[0] for one in model.outputs}
+
+
 def _output(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:
     """Value at p and its gradient [n_p]; NaN where it does not exist at p."""
     value = model.with_knowns(output.value)

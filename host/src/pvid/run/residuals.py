@@ -9,12 +9,11 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.oracle import strong as oracle
-from pvid.oracle.weak import WeakOracle, WeakSettings, end_times
-from pvid.oracle.windows import Windows
+from pvid.oracle.fourier.rows import EquationError
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.settings.f32 import WeakConfig
-from pvid.setup.f32 import bank_of, strong_config, weak_config, weak_design_of
+from pvid.run.trial import rows_near
+from pvid.setup.f32 import bank_of, strong_config
 
 Float = npt.NDArray[np.float64]
 
@@ -58,12 +57,10 @@ class Residuals:
 def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
     """Residuals of a run in the rig file's form.
 
-    The weak form uses the tables of this rig file; identify uses those of the rig file from `survey.fitted`.
-
     Parameters
     ----------
     p
-        w, d1, d2, then c if the offset is unknown, then both frictions if they are estimated.
+        w, d1, d2, in the weak form then c.
 
     Raises
     ------
@@ -74,21 +71,14 @@ def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
 
 
 def _weak(run: Run, rig: RigFile, p: Float) -> Residuals:
-    config: WeakConfig = weak_config(rig, run.sample_rate)
-    design = weak_design_of(rig, run.sample_rate)
-    n_core = rig.n_core
-    settings = WeakSettings(
-        start=p[:n_core],
-        row_sd=config.estimator.row_sd,
-        full_angle=rig.identifier.full_angle,
-        damping=rig.identifier.damping,
-    )
-    at = WeakOracle(design, settings, corrected=rig.identifier.full_angle or rig.identifier.damping)
-    at.p[: len(p)] = p[: len(at.p)]
-    windows = Windows.of(run, design)
-    e = windows.residuals(at) / config.estimator.row_sd
-    t = run.t[0] + end_times(len(e), design)
-    return Residuals(t, e, design.functions - 2, design.hop_s, expected=True, shared=1)
+    rows = rows_near(run, rig, p)
+    if rows is None:
+        raise PvidError(f"the run of {len(run.t) / run.sample_rate:.3g} s is too short for the rows of the weak form")
+    theta = rows.compiled.parameters.theta(p)
+    white = rows.white((0,), theta, [EquationError()] * rows.kinds)
+    e = white.residuals(theta)
+    free = white.free // max(len(e), 1)
+    return Residuals(run.t[0] + rows.end_times(), e, free, rows.functions.dt * rows.functions.hop, True, shared=1)
 
 
 def _strong(run: Run, rig: RigFile, p: Float) -> Residuals:

@@ -17,7 +17,7 @@ from pvid.oracle.fourier.choice import Scored, lengths, made, power_of, score_of
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import Compiled
+from pvid.oracle.fourier.rows import Compiled, WeakRows
 from pvid.oracle.fourier.starts import starts_about
 from pvid.rig.described import described
 from pvid.rig.file import RigFile
@@ -76,15 +76,33 @@ def trial_of(run: Run, rig: RigFile) -> Trial | None:
     return Trial(model, value, found.chi2, found.known and model.is_plausible(found.p))
 
 
-@np.errstate(all="ignore")  # what diverges from a start is judged and left out
-def _best(model: Compiled, run: Run) -> Scored | None:
-    signals = {"phi": run.phi, "y": run.y}
+def rows_near(run: Run, rig: RigFile, p: Float) -> WeakRows | None:
+    """Rows of the design that suits parameters p [n_p] best; None where none fits the run."""
+    rig = resolved(rig, run)
+    model = ready(model_of(described(rig)))
+    found = [*_scored(model, _signals(run), _designs(model, run), p)]
+    if not found:
+        return None
+    best = min(found, key=lambda one: (not one.known, one.score))
+    return WeakRows.of(model, _signals(run), best.design)
+
+
+def _signals(run: Run) -> dict[str, Float]:
+    return {"phi": run.phi, "y": run.y}
+
+
+def _designs(model: Compiled, run: Run) -> list[FourierDesign]:
     basis = FourierDesign(run.sample_rate, 64 / run.sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
-    designs = [
+    return [
         made(basis, window_s=length, rate_taps=taps, rate_degree=degree)
         for taps, degree in _FILTERS
         for length in lengths(len(run.t), run.sample_rate)[:_LENGTHS]
     ]
+
+
+@np.errstate(all="ignore")  # what diverges from a start is judged and left out
+def _best(model: Compiled, run: Run) -> Scored | None:
+    signals, designs = _signals(run), _designs(model, run)
     found = [one for one in _scored(model, signals, designs, None) if one.known]
     if not found:  # from other starts than the guess
         starts = starts_about(model.parameters, model.parameters.checked(None))

@@ -19,17 +19,14 @@ class FormTraits:
         similar residuals.
     patience
         Default time until the gate accepts a changed mechanism [time constants of forgetting].
-    uses_windows
-        Whether window_s is the length of a window of rows; else of the differentiator.
     publishes
         Whether it publishes trusted estimates only (pvid/trust.h).
     estimates_zero
-        Whether it can estimate the encoder's offset, and friction; else the offset is 0.
+        Whether it estimates the encoder's offset; else the offset is 0.
     """
 
     gate: float
     patience: float
-    uses_windows: bool
     publishes: bool
     estimates_zero: bool
 
@@ -40,23 +37,20 @@ class CoreTraits:
 
     in_c
         The C core for it: the core itself; for f64, which is in Python only, f32.
-    corrects_angles
-        Whether its weak form can correct its rows for large angles.
     takes_gaps
         Whether it accepts runs with missing samples.
     """
 
     in_c: Literal["f32", "q31"]
-    corrects_angles: bool
     takes_gaps: bool
 
 
 FORMS: dict[Form, FormTraits] = {
-    "weak": FormTraits(gate=4.0, patience=3.0, uses_windows=True, publishes=True, estimates_zero=True),
-    "strong": FormTraits(gate=6.0, patience=6.0, uses_windows=False, publishes=False, estimates_zero=False),
+    "weak": FormTraits(gate=4.0, patience=3.0, publishes=True, estimates_zero=True),
+    "strong": FormTraits(gate=6.0, patience=6.0, publishes=False, estimates_zero=False),
 }
 CORES: dict[AnyCore, CoreTraits] = {
-    "f32": CoreTraits(in_c="f32", corrects_angles=True, takes_gaps=True),
-    "q31": CoreTraits(in_c="q31", corrects_angles=False, takes_gaps=True),
-    "f64": CoreTraits(in_c="f32", corrects_angles=True, takes_gaps=False),
+    "f32": CoreTraits(in_c="f32", takes_gaps=True),
+    "q31": CoreTraits(in_c="q31", takes_gaps=True),
+    "f64": CoreTraits(in_c="f32", takes_gaps=False),
 }

@@ -23,7 +23,7 @@ from scipy.signal import savgol_filter, welch
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
 from pvid.core.native import Native
-from pvid.link.frames import Estimate, Hello
+from pvid.link.frames import Hello
 from pvid.log.reader import LogReader
 from pvid.log.rig import run_of_log
 from pvid.log.rig_settings import rig_for
@@ -35,7 +35,6 @@ from pvid.rig.run import Run, is_run, read_run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advised import identified
 from pvid.run.residuals import Residuals, residuals_of
-from pvid.run.survey import fitted
 from pvid.settings.enums import Reason
 from pvid.show.axis_limits import interesting
 from pvid.sim.simulated_angle import simulated_angle
@@ -111,15 +110,10 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
     reader, values, model = LogReader(path), Values(rig.mechanism), rig.mechanism.model
     columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason")}
     columns |= {name: [] for one in model.answers for name in (one.name, f"{one.name}_se")}
-    # the board's tables are those of its rig file, not of the run
-    rig = replace(rig, identifier=replace(rig.identifier, survey=False))
     hello, began = None, None
-    friction: tuple[float, ...] = ()
     for record in reader:
         if isinstance(record.item, Hello):
             hello = record.item
-        if isinstance(record.item, Estimate):
-            friction = record.item.p[len(model.published) : len(model.parameters)]
         for rows in values.rows(record):
             if rows.table == "samples" and began is None:
                 began = int(rows.columns["log_time"][0])
@@ -146,7 +140,7 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         physical=np.stack([series[name] for name in model.physical_names], axis=1),
         physical_se=np.stack([series[f"{name}_se"] for name in model.physical_names], axis=1),
         kappa=series["kappa"],
-        p=np.array([*(series[name][-1] for name in model.p_names[: rig.n_core]), *friction]),
+        p=np.array([series[name][-1] for name in model.p_names[: rig.n_core]]),
         estimate={
             name: (float(series[name][-1]), float(series[f"{name}_se"][-1]))
             for name in (*model.physical_names, *model.mapped_names)
@@ -173,13 +167,13 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
         title=f"{path.name}: {result.form} form, {result.law} law, core {result.core}, {run.sample_rate:g} samples per "
         "second",
         clock="of the run",
-        rig=fitted(rig, given),  # as it was identified
+        rig=resolved(rig, given),  # as it was identified
         run=whole,
         t=result.trajectory.t,
         physical=result.trajectory.physical,
         physical_se=result.trajectory.physical_se,
         kappa=result.trajectory.kappa,
-        p=np.array([*(result.value[name] for name in names), *result.friction]),
+        p=np.array([result.value[name] for name in names]),
         estimate={name: (result.value[name], result.se[name]) for name in result.value if result.identified},
         reasons={},
         state=_with_words(result.status) if result.identified else result.verdict,
@@ -255,10 +249,8 @@ def _last(recording: Recording) -> list[str]:
 
 def _overlay(recording: Recording, angle: Axes, difference: Axes) -> None:
     """Measured against simulated angle, and their difference, over the last seconds of the run."""
-    n_core = recording.rig.n_core
-    p, friction = recording.p[:n_core], tuple(map(float, recording.p[n_core:]))
     run = recording.run
-    simulated = simulated_angle(run, p, recording.rig.l1, friction) if recording.estimate else None
+    simulated = simulated_angle(run, recording.p, recording.rig.l1) if recording.estimate else None
     end = run.t[-1] if simulated is None else simulated.t[-1]
     shown = (run.t >= end - _SHOWN_S) & (run.t <= end)
     angle.plot(run.t[shown], run.phi[shown], color="0.6", linewidth=2.5, label="measured")
