@@ -21,7 +21,8 @@ from pvid.rig.sensor_steps import resolved
 from pvid.run.advice import advice, advice_on_refusal, suspected_unit
 from pvid.run.advised import answered
 from pvid.run.excitation import excitation_of
-from pvid.run.identify import Identification, identify
+from pvid.run.identify import Identification
+from pvid.run.skew import aligned
 from pvid.settings.enums import Reason
 from pvid.sim.pendulum import STANDARD_DRIVE, Pendulum, Tone, simulate, standard_sensors
 
@@ -52,13 +53,11 @@ def with_identifier(**changed: object) -> RigFile:
 
 def advised(run: Run, rig: RigFile, native: Native) -> tuple[Identification | None, tuple[str, ...]]:
     """What `identify` gives and the advice on it, as the command has it."""
-    if rig.l1 > 3:  # the design for a rod this long takes the command some seconds, and the advice needs none
-        return None, advice_on_refusal(run, rig, native)
     try:
-        result = identify(run, rig, native)
+        result = answered(run, rig, native, refine=False)
     except PvidError:
-        return None, advice_on_refusal(run, rig, native)
-    return result, advice(run, rig, result, native)
+        return None, advice_on_refusal(run, rig)
+    return result, advice(run, rig, result)
 
 
 @dataclass(frozen=True)
@@ -224,6 +223,15 @@ def test_swapped_columns_are_reported(native: Native) -> None:
     for rig in (RIG, without_a_rig_file(replace(run, phi=run.y))):
         _, said = advised(replace(run, phi=run.y, y=run.phi), rig, native)
         assert len(said) == 1 and said[0].startswith("phi and y are exchanged") and "--columns phi=y,y=phi" in said[0]
+
+
+def test_sensors_that_are_not_sampled_at_one_instant_are_told_by_how_much(native: Native) -> None:
+    """y is recorded 4 ms late: moved back by y_delay it is that of the instants of phi."""
+    late = replace(aligned(run_of(), -4e-3), notes=())
+    result = answered(late, RIG, native)
+    said = advice(late, RIG, result)
+    assert len(said) == 1 and said[0].startswith("phi and y are not sampled at one instant")
+    assert float(said[0].rpartition("=")[2]) == pytest.approx(4e-3, rel=0.05)
 
 
 def test_wrapping_degrees_are_reported(native: Native) -> None:

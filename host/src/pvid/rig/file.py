@@ -333,6 +333,8 @@ def check_setting(table: str, key: str, value: Any) -> Any:
         raise PvidError(f"{name!a}: a rig file has no table {table!a}; it has {', '.join(_TABLES)}")
     owner = _TABLES[table] if table else RigFile
     keys = [one.name for one in fields(owner) if one.name not in _TABLES]
+    if table == "identifier" and key in _GONE:
+        raise PvidError(f"{name} is no key any more: {_GONE[key]}")
     if key not in keys:
         within = [f"{other}.{key}" for other, one in _TABLES.items() if key in (f.name for f in fields(one))]
         hint = f"it is {within[0]}" if within and not table else f"known are {', '.join(keys)}"

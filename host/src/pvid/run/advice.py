@@ -20,7 +20,7 @@ from pvid.rig.sensor_steps import resolution_of
 from pvid.rig.turns import joined
 from pvid.run.excitation import excitation_of
 from pvid.run.identify import VALID_ANGLE, Identification
-from pvid.run.trial import Trial, trial_of
+from pvid.run.trial import Trial, dominant_hz, trial_of
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start
 from pvid.setup.ranges_q31 import pivot_acceleration, reach
@@ -65,8 +65,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Cure:
-    """A sentence that names a mistake and the option that corrects it, and the case without the mistake; "": there is
-    nothing to correct for a user."""
+    """A sentence that names a mistake and the option that corrects it, and the case without the mistake."""
 
     sentence: str
     case: Case
@@ -110,9 +109,9 @@ def _skew_of(result: Identification) -> float | None:
     refined = result.refinement
     if refined is None or not refined.adopted or "tau" not in refined.outcome.extras:
         return None
-    tau, se = refined.outcome.extras["tau"]
+    tau, se = refined.outcome.extras["tau"]  # how much later phi is sampled than y
     least = _SKEW_TOLD / refined.outcome.problem.measured.rate
-    return float(tau) if abs(tau) > max(_SKEWED * se, least) else None
+    return -float(tau) if abs(tau) > max(_SKEWED * se, least) else None
 
 
 def suspected_unit(run: Run, rig: RigFile) -> str | None:
@@ -411,7 +410,7 @@ def _clock(case: Case) -> Cure | None:
     dominant frequency of phi to the nominal slow mode; from its gravity follows the right clock."""
     modes = case.rig.mechanism.model.modes_hz(nominal_start(case.rig))
     slow = (modes or (math.sqrt(GRAVITY / case.rig.l1) / _FULL_TURN,))[0]
-    tried = slow / _dominant_hz(case.run)
+    tried = slow / dominant_hz(case.run)
     if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
         return None
     trial = _trial(_at_rate(case, tried))
@@ -427,13 +426,6 @@ def _clock(case: Case) -> Cure | None:
         f"if so, use --columns t=t:{1 / factor:.3g}",
         right,
     )
-
-
-def _dominant_hz(run: Run) -> float:
-    """Frequency of the largest value of phi's spectrum [Hz]; at least two periods per run."""
-    phi = np.where(np.isfinite(run.phi), run.phi, np.nanmedian(run.phi))
-    power = np.abs(np.fft.rfft((phi - phi.mean()) * np.hanning(len(phi)))) ** 2
-    return float(max(2, int(np.argmax(power[2:])) + 2)) * run.sample_rate / len(phi)
 
 
 def _size(ratio: float) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.oracle.fourier.choice import MODEL_ERROR
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.described import described
@@ -192,7 +193,8 @@ def _identification(run: Run, rig: RigFile, answer: MechanismAnswer, core: _Core
     parts = parts_of(noise, p, rig) if core.published else {}
     status = core.reason.text
     if not core.published:
-        status = _why_not(run, rig, core.reason, min(found.r2.values()))
+        fits = min(found.r2.values()) > _EXPLAINED and found.chi2 <= MODEL_ERROR
+        status = _why_not(run, rig, core.reason, fits)
     end = core.publications.t if len(core.publications.t) else core.t
     n_mapped = slice(0, n)
     published = core.publications
@@ -234,11 +236,11 @@ def _start(rig: RigFile, answer: MechanismAnswer) -> Float:
     return found if near and model.is_plausible(found) else guess
 
 
-def _why_not(run: Run, rig: RigFile, reason: Reason, r2: float) -> str:
-    """The status of a run that is not identified."""
+def _why_not(run: Run, rig: RigFile, reason: Reason, fits: bool) -> str:
+    """The status of a run that is not identified; fits: the residuals are about those of the sensors."""
     if reason in (Reason.UPDATED, Reason.MISFIT):  # the analysis refused it
         reason = Reason.HELD_UNCERTAIN
-    if reason == Reason.HELD_NOT_EXCITED or not r2 > _EXPLAINED:
+    if reason == Reason.HELD_NOT_EXCITED or not fits:
         try:
             if not excitation_of(run, rig).weak:
                 return UNEXPLAINED

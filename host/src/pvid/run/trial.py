@@ -1,7 +1,7 @@
 """A quick identification of a pendulum's run, to see whether a suspected mistake in it explains the run better.
 
-The rows of the weak form in float64, with windows of a few lengths and two filters: some tenths of a second. `identify`
-tries more designs and judges the answer.
+The rows of the weak form in float64, with windows of a few lengths about a period of the motion and two filters: some
+tenths of a second. `identify` tries more designs and judges the answer.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
 from pvid.run.mechanism import model_of
 
-_LENGTHS = 3  # of windows, the longest ones
+_LENGTHS = 3  # of windows
+_PERIODS = 1.0  # of the dominant motion, in the middle one
 _FILTERS = ((101, 6), (41, 4))  # samples and degree of the derivatives' polynomials
 _FEWEST = 8  # windows
 _MISFIT = 4.0  # chi^2 above which the answer is doubted
@@ -92,11 +93,13 @@ def _signals(run: Run) -> dict[str, Float]:
 
 
 def _designs(model: Compiled, run: Run) -> list[FourierDesign]:
+    """Windows of about a period of the motion; in a long run the longest ones would not see it."""
+    wanted = np.log(_PERIODS / dominant_hz(run))
+    possible = lengths(len(run.t), run.sample_rate)
+    near = sorted(sorted(possible, key=lambda one: abs(np.log(one) - wanted))[:_LENGTHS], reverse=True)
     basis = FourierDesign(run.sample_rate, 64 / run.sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
     return [
-        made(basis, window_s=length, rate_taps=taps, rate_degree=degree)
-        for taps, degree in _FILTERS
-        for length in lengths(len(run.t), run.sample_rate)[:_LENGTHS]
+        made(basis, window_s=length, rate_taps=taps, rate_degree=degree) for taps, degree in _FILTERS for length in near
     ]
 
 
@@ -117,3 +120,10 @@ def _scored(
         one = score_of(model, signals, design, start, False, _FEWEST)
         if one is not None:
             yield one
+
+
+def dominant_hz(run: Run) -> float:
+    """Frequency of the largest value of phi's spectrum [Hz]; at least two periods per run."""
+    phi = np.where(np.isfinite(run.phi), run.phi, np.nanmedian(run.phi))
+    power = np.abs(np.fft.rfft((phi - phi.mean()) * np.hanning(len(phi)))) ** 2
+    return float(max(2, int(np.argmax(power[2:])) + 2)) * run.sample_rate / len(phi)
