@@ -13,21 +13,21 @@ import time
 import tty
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from linear_rig import LINEAR_RIG
 
+from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import stream_rig
-from pvid.core.native import Native
+from pvid.codegen.fourier_library import fourier_native
+from pvid.core.fourier_native import FourierIdentifier
 from pvid.link import frames as link
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.settings.enums import Reason
-from pvid.settings.f32 import WeakConfig
-from pvid.sim.pendulum import simulate, standard_sensors, standard_start
+from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.twin import fnv
 
 SAMPLES_A_FRAME = 16
@@ -54,71 +54,95 @@ class Field:
 
 def rig() -> RigFile:
     """The rig file that goes with it."""
-    sensors = standard_sensors(14)
+    sensors, standard = standard_sensors(14), RigFile.standard()
     return replace(
-        LINEAR_RIG,
+        standard,
         sample_rate=1000.0,
-        sensor=replace(LINEAR_RIG.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
     )
 
 
-def messages(field: Field, native: Native, session: int = 7) -> Iterator[tuple[int, link.Message]]:
-    """(tick, message) in the order in which a board sends them."""
-    run = field.run
-    board = stream_rig(rig(), run.sample_rate, start=standard_start(field.seed))
-    assert isinstance(board.config, WeakConfig)
-    settings = settings_number(board)
-    configure = board.configure(settings, field.hash_every, field.estimate_every, first_tick=field.first_tick)
-    configure = replace(configure, session=session)
-    hello = link.Hello(
-        form=int(board.form),
-        core=int(board.core),
-        n_p=board.n_p,
-        window=256,
-        settings=settings,
+@cache
+def board() -> MechanismBoard:
+    """The board for it, with the weak engine."""
+    return MechanismBoard.of_rig_file(rig())
+
+
+@cache
+def text() -> str:
+    """Of its log."""
+    return board().text()
+
+
+@cache
+def _settings() -> int:
+    return settings_number(board())
+
+
+def hello(session: int = 7, **values: Any) -> link.Hello:
+    """Who it is."""
+    own, n_p = rig().sensor, len(board().p_names)
+    said: dict[str, Any] = {
+        "form": int(link.Form.FOURIER),
+        "core": int(link.Core.F32),
+        "n_p": n_p,
+        "window": 256,
+        "settings": _settings(),
+        "session": session,
+        "sample_rate": board().sample_rate,
+        "phi_lsb": own.phi_lsb,
+        "y_lsb": own.y_lsb,
+        "p_unit": (*[1.0] * n_p, *[0.0] * (link.MAX_P - n_p)),
+        "board": "field",
+    }
+    return link.Hello(**{**said, **values})
+
+
+def estimate_of(identifier: FourierIdentifier, session: int, reason: int) -> link.Estimate:
+    """What a board reports of it."""
+    published = identifier.estimate
+    return link.Estimate(
         session=session,
-        sample_rate=board.sample_rate,
-        phi_lsb=board.phi_lsb,
-        y_lsb=board.y_lsb,
-        p_unit=board.p_unit,
-        board="field",
+        updates=identifier.counters["updates"],
+        p=(*map(float, published["p"]), *[0.0] * (link.MAX_P - len(published["p"]))),
+        covariance=link.upper_triangle(published["covariance"]),
+        kappa=float(published["kappa"]),
+        residual_sd=float(published["residual_sd"]),
+        weight=float(published["weight"]),
+        reason=reason,
     )
-    identifier = native.identifier(board.config)
-    phi, y = run.phi.astype(np.float32)[: field.ticks], run.y.astype(np.float32)[: field.ticks]
+
+
+def messages(field: Field, session: int = 7) -> Iterator[tuple[int, link.Message]]:
+    """(tick, message) in the order in which a board sends them."""
+    run, own = field.run, board()
+    settings = _settings()
+    configure = own.configure(settings, field.hash_every, field.estimate_every, first_tick=field.first_tick)
+    configure = replace(configure, session=session)
+    identifier = fourier_native(own.compiled, own.config.design).identifier_of(own.config)
+    samples = own.readings(run.y[: field.ticks], run.phi[: field.ticks])
     verdict = int(Reason.WARMING_UP)
     sample_hash = fnv.START
     for first in range(0, field.ticks, SAMPLES_A_FRAME):
         at = field.first_tick + first
         if first % field.hello_every < SAMPLES_A_FRAME:
-            yield at, hello
+            yield at, hello(session)
             yield at, link.Schema(link.SCHEMA_TEXT.encode())
+            yield at, link.Names(own.names.text.encode())
             yield at, configure
             yield at, link.Status(session, link.Code.RUNNING, 0, identifier.counters["updates"], *[0] * 7)
         last = min(first + SAMPLES_A_FRAME, field.ticks)
-        raw = replace(link.Raw.of_values(phi[first:last], y[first:last]), session=session)
+        raw = replace(link.Raw.of_values(*samples[first:last].T), session=session)
         sample_hash = fnv.fold_bytes(sample_hash, raw.data)
         yield at, raw
         for tick in range(first, last):
-            reason = int(identifier.run(phi[tick : tick + 1], y[tick : tick + 1], sums=False).reason[0])
+            reason = int(identifier.run_samples(samples[tick : tick + 1], sums=False).reason[0])
             verdict = verdict if reason == Reason.ACCUMULATED else reason
             done = field.first_tick + tick + 1
             if field.estimate_every and (tick + 1) % field.estimate_every == 0:
-                yield done, _estimate(session, identifier.counters["updates"], identifier.assess(), verdict)
+                yield done, estimate_of(identifier, session, verdict)
             if field.hash_every and (tick + 1) % field.hash_every == 0:
                 yield done, link.Hash(session, hash=identifier.running_hash, sample_hash=sample_hash)
-
-
-def _estimate(session: int, updates: int, assessed: npt.NDArray[np.void], reason: int) -> link.Estimate:
-    return link.Estimate(
-        session=session,
-        updates=updates,
-        p=(*map(float, assessed["p"]), *[0.0] * (link.MAX_P - len(assessed["p"]))),
-        covariance=link.upper_triangle(assessed["covariance"]),
-        kappa=float(assessed["kappa"]),
-        residual_sd=float(assessed["residual_sd"]),
-        weight=float(assessed["weight"]),
-        reason=reason,
-    )
 
 
 def in_time(sent: Iterable[tuple[int, link.Message]], per_second: int) -> Iterator[tuple[int, link.Message]]:
@@ -167,12 +191,13 @@ class PtyLine:
 def main() -> None:
     """See the module."""
     place, settings = Path(sys.argv[1]), json.loads(sys.argv[2])
-    line = PtyLine(place)
     if "cheap" in settings:
         sent = cheap_frames(settings["cheap"])
     else:
         field = Field(settings["ticks"], settings.get("seed", 1), settings.get("estimate_every", 500))
-        sent = frames(in_time(messages(field, Native()), settings.get("per_second", 0)))
+        computed = list(messages(field))  # before anybody waits
+        sent = frames(in_time(computed, settings.get("per_second", 0)))
+    line = PtyLine(place)
     line.await_word()
     for frame in sent:
         line.write(frame)

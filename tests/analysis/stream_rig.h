@@ -33,6 +33,9 @@
 #define STREAM_SAMPLE_RATE 1000.0f
 #define STREAM_PHI_LSB 3.8e-4f
 #define STREAM_Y_LSB 5.0e-6f
+#define STREAM_PHI 0u
+#define STREAM_Y 1u
+#define STREAM_LSB {STREAM_PHI_LSB, STREAM_Y_LSB}
 #define STREAM_P_UNIT {1.0f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f}
 #define STREAM_SENSOR_CONSTANTS                                                                                        \
     {                                                                                                                  \

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,27 +15,52 @@ from test_stream import KINDS, SHORT, rig_of
 
 from pvid.base.errors import PvidError
 from pvid.board.field import FieldRecord, collect
+from pvid.board.mechanism_board import MechanismBoard, board_of_rig_file
+from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.replay_image import standard_run
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig
 from pvid.board.target import HOST_TARGET, Target, open_target
+from pvid.codegen.fourier_library import fourier_native
 from pvid.core.native import Native
-from pvid.link.frames import SCHEMA_TEXT, Source, encode
+from pvid.link.frames import SCHEMA_TEXT, Core, Source, encode
 from pvid.link.port import Port
+from pvid.rig.file import RigFile
 from pvid.twin.sensor import SensorConstants, counts
 
 TICKS = 9000  # two announcements more in the weak form's 1 kHz
+RIG = RigFile.standard()
+Simulated = StreamRig | MechanismBoard | MechanismBoardQ31
 
 
-def standard_rig(form: str, core: str = "f32") -> StreamRig:
+@cache
+def standard_rig(form: str, core: str = "f32") -> Simulated:
     """Of a board that simulates a sensor."""
-    return rig_of(standard_run(form, 5000, core))
+    if form == "strong":
+        return rig_of(standard_run("strong", 5000, core))
+    rig = RigFile.standard()
+    return board_of_rig_file(replace(rig, identifier=replace(rig.identifier, core=core)))  # type: ignore[arg-type]
 
 
 @cache
 def sensed(form: str) -> npt.NDArray[np.int32]:
+    """Counts of phi and y."""
     rig = standard_rig(form)
-    return counts(SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb), TICKS)
+    if isinstance(rig, StreamRig):
+        constants = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
+    else:
+        constants = SensorConstants.standard(RIG.l1, rig.sample_rate, RIG.sensor.phi_lsb, RIG.sensor.y_lsb)
+    return counts(constants, TICKS)
+
+
+def from_counts(rig: Simulated, read: npt.NDArray[np.int32]) -> tuple[npt.NDArray[Any], ...]:
+    """The samples as the identifier takes them, in its order, from counts of phi and y."""
+    if isinstance(rig, StreamRig):
+        return rig.from_counts(read)
+    if isinstance(rig, MechanismBoardQ31):
+        return read[:, 1], read[:, 0]
+    values = read.astype(np.float32) * np.array([RIG.sensor.phi_lsb, RIG.sensor.y_lsb], np.float32)
+    return values[:, 1], values[:, 0]
 
 
 @pytest.fixture
@@ -44,12 +70,12 @@ def host_target() -> Iterator[Target]:
     target.close()
 
 
-def assert_replays(record: FieldRecord, rig: StreamRig, form: str, native: Native) -> None:
+def assert_replays(record: FieldRecord, rig: Simulated, form: str, native: Native) -> None:
     """The samples are the twin's, the hashes and estimates those of the host's core on them."""
-    phi, y = record.samples(0, record.ticks)
-    expected = rig.from_counts(sensed(form)[: record.ticks])
-    assert all(np.array_equal(a.view(np.uint32), b.view(np.uint32)) for a, b in zip((phi, y), expected, strict=True))
-    hashes = rig.hashes(native, phi, y)
+    samples = record.samples(0, record.ticks)
+    expected = from_counts(rig, sensed(form)[: record.ticks])
+    assert all(np.array_equal(a.view(np.uint32), b.view(np.uint32)) for a, b in zip(samples, expected, strict=True))
+    hashes = rig.hashes(native, *samples)
     assert len(record.hashes) >= record.ticks // 500 - 1
     assert all(hashes[tick - 1] == value for tick, value in record.hashes.items())
 
@@ -75,18 +101,22 @@ def test_a_board_samples_by_itself(name: str, form: str, core: str, native: Nati
     assert record.schema == SCHEMA_TEXT
     assert record.configuration is not None and record.configuration.settings == settings_number(rig)
     assert record.hello is not None and record.status is not None
-    assert record.hello.p_unit == tuple(np.asarray(rig.p_unit, np.float32).tolist())
-    assert (record.hello.sample_rate, record.hello.core, record.hello.form) == (rig.sample_rate, rig.core, rig.form)
+    assert (record.hello.sample_rate, Core(record.hello.core).name) == (rig.sample_rate, core.upper())
+    assert record.hello.form_name == form
+    if isinstance(rig, StreamRig):
+        assert record.hello.p_unit == tuple(np.asarray(rig.p_unit, np.float32).tolist())
     assert sorted(record.estimates) == list(range(500, max(record.estimates) + 1, 500))
 
 
-def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target, native: Native) -> None:
-    rig = standard_rig("weak")
-    record = collect(host_target, TICKS, begin=rig)
+def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target) -> None:
+    board = standard_rig("weak")
+    assert isinstance(board, MechanismBoard)
+    record = collect(host_target, TICKS, begin=board)
     tick = max(record.estimates)
-    identifier = native.identifier(rig.config)
-    identifier.run(*record.samples(0, tick))
-    last, estimate = identifier.assess(), record.estimates[tick]
+    identifier = fourier_native(board.compiled, board.config.design).identifier_of(board.config)
+    identifier.run_samples(board.readings(*record.samples(0, tick)))
+    last, estimate = identifier.published, record.estimates[tick]
+    assert last is not None
     assert np.array_equal(np.array(estimate.p[: len(last["p"])], np.float32), last["p"])
     truth = np.array([31.6667, 8.875, 5.625])
     assert np.abs(last["p"][:3] / truth - 1).max() < 0.02  # a plausible run of the rig
@@ -99,9 +129,8 @@ def test_late_client_receives_the_current_state(host_target: Target, native: Nat
     assert late.first >= 600
     assert late.hello is not None and late.schema == SCHEMA_TEXT and late.configuration is not None
     assert late.hello.session == late.configuration.session
-    phi, y = late.samples(late.first, late.ticks)
-    expected = rig.from_counts(sensed("weak")[late.first : late.ticks])
-    assert np.array_equal(phi, expected[0]) and np.array_equal(y, expected[1])
+    expected = from_counts(rig, sensed("weak")[late.first : late.ticks])
+    assert np.array_equal(late.samples(late.first, late.ticks), expected)
 
 
 def test_in_time_a_sample_takes_its_time(host_target: Target, native: Native) -> None:
@@ -147,9 +176,8 @@ def test_losses_of_the_line_are_named(native: Native) -> None:
     assert 64 <= gap[1] - gap[0] <= 160
     with pytest.raises(PvidError, match=f"ticks {gap[0]} to {gap[1] - 1} are missing"):
         record.samples(0, record.ticks)
-    phi, y = record.samples(gap[1], record.ticks)  # what came after it is good
-    expected = rig.from_counts(sensed("weak")[gap[1] : record.ticks])
-    assert np.array_equal(phi, expected[0]) and np.array_equal(y, expected[1])
+    expected = from_counts(rig, sensed("weak")[gap[1] : record.ticks])
+    assert np.array_equal(record.samples(gap[1], record.ticks), expected)  # what came after it is good
 
 
 def test_an_unknown_source_is_refused(host_target: Target) -> None:
@@ -163,14 +191,13 @@ def test_samples_from_the_pc_are_not_mixed_in(host_target: Target, native: Nativ
     collect(host_target, 100, begin=rig)
     host_target.port.write(encode(rig.frame(np.ones((64, 2), np.float32)), 9, tick=0))
     record = collect(host_target, 3000)
-    phi, _ = record.samples(record.first, record.ticks)
-    assert np.array_equal(phi, rig.from_counts(sensed("weak")[record.first : record.ticks])[0])
+    expected = from_counts(rig, sensed("weak")[record.first : record.ticks])
+    assert np.array_equal(record.samples(record.first, record.ticks), expected)
 
 
 def test_the_sensors_motion_stays_what_it_was() -> None:
-    rig = standard_rig("weak")
-    constants = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
-    long = counts(constants, 600_000) * np.array([rig.phi_lsb, rig.y_lsb])
+    lsb = RIG.sensor.phi_lsb, RIG.sensor.y_lsb
+    long = counts(SensorConstants.standard(RIG.l1, 1000.0, *lsb), 600_000) * np.array(lsb)
     first, last = np.abs(long[:60_000]).max(axis=0), np.abs(long[-60_000:]).max(axis=0)
     assert np.allclose(first, last, rtol=0.1)  # after 10 minutes neither grown nor died away
     assert 0.05 < first[0] < 0.15 and 0.005 < first[1] < 0.015

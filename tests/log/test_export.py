@@ -20,7 +20,6 @@ from mcap.reader import make_reader
 from program import pvid
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.export import FORMATS, export_log
 from pvid.log.file import LogWriter
@@ -38,9 +37,9 @@ TABLES = tables_of(MECHANISM.model)
 
 
 @pytest.fixture(scope="module")
-def sent(native: Native) -> list[tuple[int, link.Message]]:
+def sent() -> list[tuple[int, link.Message]]:
     """(tick, message) of a run of TICKS."""
-    return list(field_board.messages(field_board.Field(TICKS), native))
+    return list(field_board.messages(field_board.Field(TICKS)))
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +47,7 @@ def log(tmp_path_factory: pytest.TempPathFactory, sent: list[tuple[int, link.Mes
     """A log of two segments; the second lacks a frame of samples, and the board has begun anew."""
     path = tmp_path_factory.mktemp("log") / "field.pvlog"
     frames = list(field_board.frames(sent))
-    writer = LogWriter(path, rig=field_board.rig().text())
+    writer = LogWriter(path, rig=field_board.text())
     for data in (b"".join(frames), b"".join([*frames[:60], *frames[61:100]])):
         writer.begin("a port", None)
         writer.take(data)

@@ -35,13 +35,13 @@ MECHANISMS = [PENDULUM, Mechanism(MODELS[DEFAULT]), mechanism_of(MOTOR)]
 @pytest.fixture(scope="module")
 def frames(native: Native) -> list[bytes]:
     """Of a run of 4 s, with estimates."""
-    return list(field_board.frames(list(field_board.messages(field_board.Field(4000), native))))
+    return list(field_board.frames(list(field_board.messages(field_board.Field(4000)))))
 
 
 @pytest.fixture(scope="module")
 def log(frames: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "field.pvlog"
-    writer = LogWriter(path, rig=field_board.rig().text())
+    writer = LogWriter(path, rig=field_board.text())
     writer.begin("a port", None)
     writer.take(b"".join(frames))
     writer.end("the end")

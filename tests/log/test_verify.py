@@ -14,37 +14,39 @@ import pytest
 from program import pvid
 
 from pvid.base.errors import PvidError
+from pvid.board.mechanism_board import MechanismBoard, board_of
+from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.target import HOST_TARGET
-from pvid.core.native import Native
+from pvid.cli.verify import command as verify
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogReader
-from pvid.log.rig import rig_of_log
+from pvid.log.rig import engine_text_of_log, rig_of_log
 from pvid.log.values import Values
-from pvid.log.verify import Stretch, Verdict, Verifier
+from pvid.log.verify import EngineBoard, Stretch, Verdict, Verifier
 from pvid.rig.file import RigFile
 
-TICKS = 4000
+TICKS = 6400
 LONG = pytest.mark.long
 Sent = list[tuple[int, link.Message]]
 
 
 @pytest.fixture(scope="module")
-def sent(native: Native) -> Sent:
+def sent() -> Sent:
     """(tick, message) of a run of TICKS."""
-    return list(field_board.messages(field_board.Field(TICKS), native))
+    return list(field_board.messages(field_board.Field(TICKS)))
 
 
-def verified(path: Path, *segments: Sequence[bytes], rig: RigFile | None = None) -> list[Stretch]:
+def verified(path: Path, *segments: Sequence[bytes], board: EngineBoard | None = None) -> list[Stretch]:
     """The stretches of a log of these segments."""
-    rig = field_board.rig() if rig is None else rig
-    writer = LogWriter(path, rig=rig.text())
+    board = board or field_board.board()
+    writer = LogWriter(path, rig=field_board.text())
     for frames in segments:
         writer.begin("a port", None)
         writer.take(b"".join(frames))
         writer.end("the end")
     writer.close()
-    return list(Verifier(rig).stretches(LogReader(path)))
+    return list(Verifier(board).stretches(LogReader(path)))
 
 
 def checks(sent: Sent) -> int:
@@ -111,7 +113,7 @@ def test_one_wrong_sample_is_found_by_the_hash(tmp_path: Path, sent: Sent) -> No
     )
     assert isinstance(message, link.Raw)
     values = message.values.copy()
-    values[3, 0] += np.float32(field_board.rig().sensor.phi_lsb)  # one step of the encoder, once
+    values[3, 1] += np.float32(field_board.rig().sensor.phi_lsb)  # one step of the encoder, once
     wrong = [*sent[:place], (tick, replace(message, data=values.tobytes())), *sent[place + 1 :]]
     (stretch,) = verified(tmp_path / "a.pvlog", list(field_board.frames(wrong)))
     found = stretch.difference
@@ -185,17 +187,17 @@ def test_board_without_sample_hash_confirms_processed_samples(tmp_path: Path, se
     tick, message = older[at]
     assert isinstance(message, link.Raw)
     values = message.values.copy()
-    values[:, 0] += np.float32(0.01)
+    values[:, 1] += np.float32(0.01)
     wrong = [*older[:at], (tick, replace(message, data=values.tobytes())), *older[at + 1 :]]
     (changed,) = verified(tmp_path / "b", list(field_board.frames(wrong)))
     assert changed.difference is not None
 
 
 @pytest.mark.parametrize("counted", [True, False], ids=["48 bits", "32 bits"])
-def test_a_count_that_passes_2_to_the_32_is_no_restart(tmp_path: Path, native: Native, counted: bool) -> None:
+def test_a_count_that_passes_2_to_the_32_is_no_restart(tmp_path: Path, counted: bool) -> None:
     """Also of a board that sends no more than the low 32 bits."""
     first = 7 * 2**32 + 2**32 - 1600 if counted else 2**32 - 1600
-    run = list(field_board.messages(field_board.Field(3200, first_tick=first), native))
+    run = list(field_board.messages(field_board.Field(3200, first_tick=first)))
     frames = list(field_board.frames(run))
     if not counted:
         frames = [
@@ -210,11 +212,11 @@ def test_a_count_that_passes_2_to_the_32_is_no_restart(tmp_path: Path, native: N
     assert (reader.account.restarts, reader.account.missing_samples) == (0, 0)
 
 
-def test_restart_beyond_2_to_the_31_is_found_by_the_session(tmp_path: Path, native: Native) -> None:
+def test_restart_beyond_2_to_the_31_is_found_by_the_session(tmp_path: Path) -> None:
     """The ticks alone look like a counter that has wrapped and a gap of 2^30 samples."""
     first = 2**32 - 2**30
-    before = list(field_board.messages(field_board.Field(800, first_tick=first), native))
-    after = list(field_board.messages(field_board.Field(800), native, session=8))
+    before = list(field_board.messages(field_board.Field(800, first_tick=first)))
+    after = list(field_board.messages(field_board.Field(800), session=8))
     joined = [*before, *after[4:]]  # without the words of the start, which were lost
     stretches = verified(tmp_path / "a.pvlog", list(field_board.frames([*before, *after])))
     assert [(one.first, one.ticks, one.verified) for one in stretches] == [(first, 800, 800), (0, 800, 800)]
@@ -225,11 +227,11 @@ def test_restart_beyond_2_to_the_31_is_found_by_the_session(tmp_path: Path, nati
         assert (reader.account.restarts, reader.account.missing_samples) == (1, 0)
 
 
-def test_unconfigured_board_is_at_tick_0(tmp_path: Path, native: Native) -> None:
+def test_unconfigured_board_is_at_tick_0(tmp_path: Path) -> None:
     """Whatever was counted before it was switched off, and though the next session counts on from far beyond it."""
     first, second = 2**32 - 800, 2 * 2**32 - 800
     runs = [
-        list(field_board.messages(field_board.Field(1600, first_tick=tick), native, session=session))
+        list(field_board.messages(field_board.Field(1600, first_tick=tick), session=session))
         for tick, session in ((first, 7), (second, 8))
     ]
     words = [(0, link.Status(0, link.Code.WAITING, *[0] * 9)), (0, link.Credit(0, 256, 1, 0))]
@@ -270,8 +272,8 @@ def test_a_link_that_broke_without_costing_a_sample_breaks_nothing(tmp_path: Pat
 
 
 def test_unverifiable_segment_has_its_reason(tmp_path: Path, sent: Sent) -> None:
-    def reason(name: str, frames: list[tuple[int, link.Message]], rig: RigFile | None = None) -> str | None:
-        (stretch,) = verified(tmp_path / name, list(field_board.frames(frames)), rig=rig)
+    def reason(name: str, frames: list[tuple[int, link.Message]], board: EngineBoard | None = None) -> str | None:
+        (stretch,) = verified(tmp_path / name, list(field_board.frames(frames)), board=board)
         assert not stretch.verified
         return stretch.why_not
 
@@ -282,10 +284,13 @@ def test_unverifiable_segment_has_its_reason(tmp_path: Path, sent: Sent) -> None
     assert reason("c", [one for one in sent if one[0] >= 160]) == (
         "its session began before this segment did, and the samples before tick 160 are not in it"
     )
-    other = replace(field_board.rig(), l1=0.31)
-    assert reason("d", sent, other) == "the board's image was made for other settings than the rig file's"
-    fixed = replace(field_board.rig(), identifier=replace(field_board.rig().identifier, core="q31"))
-    assert reason("e", sent, fixed) == "the board's image was made for other settings than the rig file's"
+    other = MechanismBoard.of_rig_file(replace(field_board.rig(), l1=0.31))
+    refused = "the board's image was made for other settings than the log's, or by another version"
+    assert reason("d", sent, other) == refused
+    assert reason("e", sent, MechanismBoardQ31.of_rig_file(field_board.rig())) == refused
+    former = "the log has no settings of the weak engine: a version before it recorded the log"
+    (stretch,) = Verifier(field_board.rig()).stretches(LogReader(tmp_path / "d"))
+    assert stretch.why_not == former
     (stretch,) = Verifier(None).stretches(LogReader(tmp_path / "d"))
     assert stretch.why_not == "the log holds no rig file: name it with --rig"
 
@@ -370,26 +375,10 @@ def _wrong_sample(message: link.Message) -> link.Message | None:
 @pytest.mark.parametrize(
     ("target", "identifier", "samples", "change"),
     [
-        (HOST_TARGET, {"form": "weak", "core": "f32"}, 3000, _wrong_sample),
-        pytest.param(
-            HOST_TARGET, {"form": "weak", "core": "f32", "law": "pseudovelocity"}, 3000, _wrong_d1, marks=LONG
-        ),
-        pytest.param(
-            HOST_TARGET,
-            {"form": "weak", "core": "f32", "full_angle": True, "damping": True},
-            3000,
-            _wrong_hash,
-            marks=LONG,
-        ),
-        pytest.param(
-            HOST_TARGET,
-            {"form": "weak", "core": "f32", "outlier_gate": 4.0, "forgetting_s": 10.0},
-            3000,
-            _wrong_hash,
-            marks=LONG,
-        ),
-        (HOST_TARGET, {"form": "weak", "core": "q31"}, 3000, _wrong_d1),
-        pytest.param(HOST_TARGET, {"form": "weak", "core": "q31", "outlier_gate": 4.0}, 3000, _wrong_hash, marks=LONG),
+        (HOST_TARGET, {"form": "weak", "core": "f32"}, 6000, _wrong_d1),
+        pytest.param(HOST_TARGET, {"form": "weak", "core": "f32", "forgetting_s": 10.0}, 3000, _wrong_hash, marks=LONG),
+        (HOST_TARGET, {"form": "weak", "core": "q31"}, 3000, _wrong_sample),
+        pytest.param(HOST_TARGET, {"form": "weak", "core": "q31", "forgetting_s": 10.0}, 6000, _wrong_d1, marks=LONG),
         (HOST_TARGET, {"form": "strong", "core": "f32"}, 1000, _wrong_d1),
         pytest.param(
             HOST_TARGET, {"form": "strong", "core": "f32", "law": "pseudovelocity"}, 1000, _wrong_hash, marks=LONG
@@ -417,7 +406,9 @@ def test_a_field_log_of_the_firmware_verifies_and_an_altered_bit_is_named(
     assert "estimates and hashes equal in every bit" in checked.stdout
     assert "lost 0 frames, 0 samples" in checked.stdout
     tick = altered(tmp_path / "a.pvlog", tmp_path / "b.pvlog", change, samples // 2)
-    (wrong,) = Verifier(rig_of_log(tmp_path / "b.pvlog")).stretches(LogReader(tmp_path / "b.pvlog"))
+    text = engine_text_of_log(tmp_path / "b.pvlog")
+    board = rig_of_log(tmp_path / "b.pvlog") if text is None else board_of(text)
+    (wrong,) = Verifier(board).stretches(LogReader(tmp_path / "b.pvlog"))
     found = wrong.difference
     assert found is not None and wrong.checked > 2, wrong.text
     if change is _wrong_sample:
@@ -431,8 +422,7 @@ def test_a_field_log_of_the_firmware_verifies_and_an_altered_bit_is_named(
 def test_a_field_log_is_drawn_and_identified_with_its_own_settings(tmp_path: Path, core: str) -> None:
     """The settings that a log is drawn and identified with are those of the rig file in it."""
     rig = RigFile.standard()
-    own = {"full_angle": True, "damping": True} if core == "f32" else {"forgetting_s": 20.0}
-    asked: dict[str, Any] = {"core": core, **own}
+    asked: dict[str, Any] = {"core": core, "forgetting_s": 20.0}
     replace(rig, identifier=replace(rig.identifier, **asked)).write(tmp_path / "rig.toml")
     done = pvid(tmp_path, "log", HOST_TARGET, "a.pvlog", "--rig", "rig.toml", "--samples", "12000", "--paced")
     assert done.returncode == 0, done.stderr
@@ -443,10 +433,20 @@ def test_a_field_log_is_drawn_and_identified_with_its_own_settings(tmp_path: Pat
     stream = LogReader(tmp_path / "a.pvlog")
     ticks = sum(record.item.count for record in stream if isinstance(record.item, link.Raw | link.RawCount))
     assert (found["core"], found["ticks"]) == (core, ticks)
-    assert found["w"]["value"] == pytest.approx(31.67, rel=0.01)  # the rig is linear: correcting it errs by 0.4 %
+    assert found["w"]["value"] == pytest.approx(31.67, rel=0.01)
+    assert found["l2"]["value"] == pytest.approx(0.12, rel=0.02)
+    exported = pvid(tmp_path, "export", "a.pvlog", "--to", "csv", "--out", "a")
+    assert exported.returncode == 0, exported.stderr
+    samples = np.genfromtxt(tmp_path / "a-samples.csv", delimiter=",", names=True)
+    assert np.abs(samples["phi"]).max() > 0.05 > 0.02 > np.abs(samples["y"]).max()
 
 
-def test_verify_exit_codes(tmp_path: Path, sent: Sent) -> None:
+def test_verify_exit_codes(tmp_path: Path, sent: Sent, capfd: pytest.CaptureFixture[str]) -> None:
+    def run(log: str, *options: str) -> tuple[int, str]:
+        """In this process: the model is derived once."""
+        code = verify.main([str(tmp_path / log), *options], standalone_mode=False)
+        return code, capfd.readouterr().out
+
     frames = list(field_board.frames(sent[:200]))
     verified(tmp_path / "right.pvlog", frames)
     wrong = [
@@ -456,14 +456,14 @@ def test_verify_exit_codes(tmp_path: Path, sent: Sent) -> None:
     verified(tmp_path / "wrong.pvlog", list(field_board.frames(wrong)))
     verified(tmp_path / "none.pvlog", frames[30:])
     (tmp_path / "noise").write_bytes(b"noise")
-    assert pvid(tmp_path, "verify", "right.pvlog").returncode == 0
+    assert run("right.pvlog")[0] == 0
     verified(tmp_path / "part.pvlog", [*frames[:120], *frames[121:]])
-    part = pvid(tmp_path, "verify", "part.pvlog")
-    assert part.returncode == 1 and "DIFFERENT" not in part.stdout and "samples not verified" in part.stdout
-    assert pvid(tmp_path, "verify", "part.pvlog", "--partial").returncode == 0
-    different = pvid(tmp_path, "verify", "wrong.pvlog")
-    assert different.returncode == 1 and "DIFFERENT at tick 160, hash: log" in different.stdout
-    assert "1 of 1 stretches DIFFERENT" in different.stdout
-    assert pvid(tmp_path, "verify", "none.pvlog").returncode == 3
+    code, text = run("part.pvlog")
+    assert code == 1 and "DIFFERENT" not in text and "samples not verified" in text
+    assert run("part.pvlog", "--partial")[0] == 0
+    code, text = run("wrong.pvlog")
+    assert code == 1 and "DIFFERENT at tick 160, hash: log" in text
+    assert "1 of 1 stretches DIFFERENT" in text
+    assert run("none.pvlog")[0] == 3
     noise = pvid(tmp_path, "verify", "noise")
     assert (noise.returncode, noise.stderr) == (2, "pvid: noise is not a log of pvid: not one frame in 5 bytes\n")

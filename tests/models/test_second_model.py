@@ -140,7 +140,7 @@ def records(native: Native, stream: LogStream, tmp_path_factory: pytest.TempPath
     path = tmp_path_factory.mktemp("log") / "a.pvlog"
     writer = LogWriter(path)
     writer.begin("a port", None)
-    writer.take(b"".join(field_board.frames(field_board.messages(field_board.Field(4000), native))))
+    writer.take(b"".join(field_board.frames(field_board.messages(field_board.Field(4000)))))
     writer.close()
     return list(stream.feed(path.read_bytes()))
 

@@ -25,7 +25,6 @@ from selenium import webdriver
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.core.native import Native
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogReader
 from pvid.show.page import is_local, listen, page
@@ -36,9 +35,9 @@ PLOTS = ("parameter0", "parameter1", "parameter2", "residualPlot", "kappaPlot", 
 
 
 @pytest.fixture(scope="module")
-def sent(native: Native) -> list[bytes]:
+def sent() -> list[bytes]:
     """The frames of a run of TICKS with ten estimates a second."""
-    return list(field_board.frames(field_board.messages(field_board.Field(TICKS, estimate_every=100), native)))
+    return list(field_board.frames(field_board.messages(field_board.Field(TICKS, estimate_every=100))))
 
 
 def get(address: str, path: str = "", host: str | None = None) -> bytes:
@@ -144,14 +143,14 @@ def test_log_refuses_an_address_before_it_records(tmp_path: Path) -> None:
 
 
 def test_the_state_is_that_of_the_log_and_bounded(sent: list[bytes], tmp_path: Path) -> None:
-    writer = LogWriter(tmp_path / "a.pvlog", rig=field_board.rig().text())
+    writer = LogWriter(tmp_path / "a.pvlog", rig=field_board.text())
     writer.begin("a port", None)
     writer.take(b"".join(sent))
     writer.close()
     log = (tmp_path / "a.pvlog").read_bytes()
     state = state_of(log, "a title")
     assert state["title"] == "a title" and state["up"] and state["lost"] == ""
-    assert f"{TICKS} samples" in state["received"] and "weak form, core f32" in state["board"]
+    assert f"{TICKS} samples" in state["received"] and "weak form of kapitza, core f32" in state["board"]
     assert state["reason"] == "updated" and state["kappa"].endswith("good: parameters identifiable")
     assert [row["symbol"] for row in state["parameters"]] == ["g*", "l2", "rho2", "w", "d1", "d2", "c"]
     estimates = state["estimates"]
@@ -277,7 +276,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
 def finished(sent: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log whose recording has ended."""
     path = tmp_path_factory.mktemp("finished") / "a.pvlog"
-    writer = LogWriter(path, rig=field_board.rig().text())
+    writer = LogWriter(path, rig=field_board.text())
     writer.begin("a port", None)
     writer.take(b"".join(sent))
     writer.close()
@@ -316,7 +315,7 @@ def test_state_of_a_log_names_withheld_windows_and_what_the_estimate_predicts(fi
     first = json.loads(state.as_json())
     assert "modelled" not in first["motion"][0] and first["modelled"] == ""
     assert first["marks"]["t"] and not any(first["marks"]["rejected"])
-    assert all(t < 6 for t in first["marks"]["t"])
+    assert all(t < 11 for t in first["marks"]["t"])
     assert [row["symbol"] for row in first["parameters"] if row["large"]] == ["g*", "l2", "rho2"]
     then = until(lambda: (now := json.loads(state.as_json())) and now["modelled"] and now)
     assert then["modelled"].startswith("R² 0.99")

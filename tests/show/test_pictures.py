@@ -16,7 +16,6 @@ from browser import chromium
 from rich.console import Console
 from selenium import webdriver
 
-from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
@@ -30,16 +29,16 @@ TICKS = 20_000
 
 
 @pytest.fixture(scope="module")
-def sent(native: Native) -> list[tuple[int, link.Message]]:
+def sent() -> list[tuple[int, link.Message]]:
     """(tick, message) of a run of TICKS with ten estimates a second."""
-    return list(field_board.messages(field_board.Field(TICKS, estimate_every=100), native))
+    return list(field_board.messages(field_board.Field(TICKS, estimate_every=100)))
 
 
 @pytest.fixture(scope="module")
 def log(sent: list[tuple[int, link.Message]], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of that run, its rig file in it."""
     path = tmp_path_factory.mktemp("pictures") / "run.pvlog"
-    writer = LogWriter(path, rig=field_board.rig().text())
+    writer = LogWriter(path, rig=field_board.text())
     writer.begin("/dev/ttyACM0", None)
     writer.take(b"".join(field_board.frames(sent)))
     writer.end("ended by SIGINT")

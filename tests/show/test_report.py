@@ -40,10 +40,10 @@ SENSORS = replace(standard_sensors(14), random_offset=False)  # so that P is the
 def log(native: Native, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of a run of TICKS with ten estimates a second, its rig file in it."""
     path = tmp_path_factory.mktemp("report") / "field.pvlog"
-    writer = LogWriter(path, rig=field_board.rig().text())
+    writer = LogWriter(path, rig=field_board.text())
     writer.begin("a port", None)
     field = field_board.Field(TICKS, estimate_every=100)
-    writer.take(b"".join(field_board.frames(field_board.messages(field, native))))
+    writer.take(b"".join(field_board.frames(field_board.messages(field))))
     writer.end("the end")
     writer.close()
     return path
@@ -180,10 +180,10 @@ def test_plot_of_a_run_identifies_it_first(tmp_path: Path) -> None:
 
 
 def test_plot_of_a_log_without_estimates_identifies_it_first(native: Native, tmp_path: Path) -> None:
-    writer = LogWriter(tmp_path / "raw.pvlog", rig=field_board.rig().text())
+    writer = LogWriter(tmp_path / "raw.pvlog", rig=field_board.text())
     writer.begin("a port", None)
     field = field_board.Field(15_000, estimate_every=0)
-    writer.take(b"".join(field_board.frames(field_board.messages(field, native))))
+    writer.take(b"".join(field_board.frames(field_board.messages(field))))
     writer.close()
     recording = recording_of(tmp_path / "raw.pvlog", None)
     assert "weak form, stationary law, core f32" in recording.title
@@ -277,9 +277,9 @@ def test_impossible_simulation_is_refused() -> None:
 
 
 def test_restarted_board_is_marked(native: Native, tmp_path: Path) -> None:
-    writer = LogWriter(tmp_path / "two.pvlog", rig=field_board.rig().text())
+    writer = LogWriter(tmp_path / "two.pvlog", rig=field_board.text())
     writer.begin("a port", None)
-    sent = b"".join(field_board.frames(field_board.messages(field_board.Field(6000, estimate_every=100), native)))
+    sent = b"".join(field_board.frames(field_board.messages(field_board.Field(6000, estimate_every=100))))
     writer.take(sent + sent)
     writer.close()
     recording = recording_of(tmp_path / "two.pvlog", None)
@@ -298,9 +298,9 @@ def test_undrawable_input_is_refused_in_a_sentence(log: Path, native: Native, tm
     with pytest.raises(PvidError, match="cannot write the figure .*taken.png: Is a directory"):
         write_report(recording, tmp_path / "taken.png")
     assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]  # nothing half written is left
-    writer = LogWriter(tmp_path / "short.pvlog", rig=field_board.rig().text())
+    writer = LogWriter(tmp_path / "short.pvlog", rig=field_board.text())
     writer.begin("a port", None)
-    sent = field_board.messages(field_board.Field(320, estimate_every=100), native)
+    sent = field_board.messages(field_board.Field(320, estimate_every=100))
     writer.take(b"".join(field_board.frames(sent)))
     writer.close()
     with pytest.raises(PvidError, match="record longer"):

@@ -17,8 +17,8 @@ import numpy as np
 import serial
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import StreamRig, stream_rig
+from pvid.board.mechanism_board import MechanismBoard
+from pvid.board.stream_image import Streamed, settings_number
 from pvid.board.target import Target, open_target
 from pvid.link.frames import Raw, Source, Status, encode_raw
 from pvid.link.port import Port, open_port
@@ -150,7 +150,7 @@ class ShakyEmulator:
     """A source (pvid.log.recorder): an emulator that can be killed, and its line closed, while it is read."""
 
     name: str
-    rig: StreamRig
+    rig: Streamed
     usb: None = None
     _target: Target | None = None
     _place: str = ""
@@ -245,15 +245,14 @@ def field_log(
     least, is recorded before and after each accident: it is killed, its line is closed, it is killed again.
     """
     rig = RigFile.standard()
-    assert rig.sample_rate is not None
-    board = stream_rig(rig, rig.sample_rate)
+    board = MechanismBoard.of_rig_file(rig)
     settings = settings_number(board)
-    every = round(rig.sample_rate)
+    every = round(board.sample_rate)
     source = ShakyEmulator(name, board)
     logger = Logger(
         source=source,
         out=log,
-        rig=rig.text(),
+        rig=board.text(),
         begin=lambda: board.configure(settings, every, every, Source.SENSOR_PACED),
         restart=True,
     )
@@ -263,5 +262,5 @@ def field_log(
     finally:
         source.end()
     reader = LogReader(log)
-    stretches = list(Verifier(rig, progress).stretches(reader))
+    stretches = list(Verifier(board, progress).stretches(reader))
     return reader.account, stretches

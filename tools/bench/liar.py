@@ -28,6 +28,7 @@ import serial
 from rich.console import Console
 
 from bench.liar_board import TICKS, Flood, HangUp, LyingBoard, Pause, Step, honest_samples, rig
+from bench.liar_board import board as honest_board
 from bench.lies import BEHAVIOURS, Behaviour
 from pvid.base.errors import PvidError
 from pvid.board.target import Target
@@ -112,7 +113,7 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
         LiveStream("udp://127.0.0.1:9"),
         LiveStream("teleplot://[::1]:9"),
     ]
-    source.logger = Logger(source=source, out=log, observers=views, rig=rig().text())
+    source.logger = Logger(source=source, out=log, observers=views, rig=honest_board().text())
     faults: list[str] = []
     with warnings.catch_warnings(), redirect_stdout(said), redirect_stderr(said):
         warnings.simplefilter("error")

@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import StreamRig, stream_rig
-from pvid.core.native import Native
+from pvid.codegen.fourier_library import fourier_native
 from pvid.link import frames as link
 from pvid.link.frames import (
     MAX_P,
@@ -25,12 +25,12 @@ from pvid.link.frames import (
     Hash,
     Hello,
     Message,
+    Names,
     Raw,
     Schema,
     Status,
 )
 from pvid.rig.file import RigFile
-from pvid.settings.f32 import WeakConfig
 from pvid.twin import fnv
 
 SESSION = 7
@@ -83,33 +83,34 @@ def rig() -> RigFile:
 
 
 @cache
-def _stream_rig() -> StreamRig:
-    return stream_rig(rig(), RATE)
+def board() -> MechanismBoard:
+    """The honest board."""
+    return MechanismBoard.of_rig_file(rig())
 
 
 @cache
 def _settings() -> int:
-    return settings_number(_stream_rig())
+    return settings_number(board())
 
 
 @cache
 def _honest_run() -> tuple[tuple[int, Message], ...]:
     """(tick, message) of a board that does what it should, with the bits of the core on this machine."""
-    board = _stream_rig()
-    assert isinstance(board.config, WeakConfig)
-    identifier = Native().identifier(board.config)
+    own = board()
+    identifier = fourier_native(own.compiled, own.config.design).identifier_of(own.config)
     t = np.arange(TICKS) / RATE
     phi = (0.05 * np.sin(9.0 * t)).astype(np.float32)
     y = (0.004 * np.sin(13.0 * t) + 0.002 * np.sin(31.0 * t)).astype(np.float32)
-    of_samples = fnv.sample_hashes(np.stack([phi, y], axis=1))
+    samples = own.readings(y, phi)
+    of_samples = fnv.sample_hashes(samples)
     sent: list[tuple[int, Message]] = []
     for first in range(0, TICKS, CHECK_EVERY):
         part = slice(first, first + CHECK_EVERY)
-        record = identifier.run(phi[part], y[part], sums=False)
+        record = identifier.run_samples(samples[part], sums=False)
         for tick in range(first, first + CHECK_EVERY, PER_FRAME):
-            samples = Raw.of_values(phi[tick : tick + PER_FRAME], y[tick : tick + PER_FRAME])
-            sent.append((tick, replace(samples, session=SESSION)))
-        assessed = identifier.assess()
+            raw = Raw.of_values(*samples[tick : tick + PER_FRAME].T)
+            sent.append((tick, replace(raw, session=SESSION)))
+        assessed = identifier.estimate
         estimate = message(
             Estimate,
             session=SESSION,
@@ -130,13 +131,13 @@ def _honest_run() -> tuple[tuple[int, Message], ...]:
 
 
 def honest_samples() -> npt.NDArray[np.float32]:
-    """phi, y of the honest run, [TICKS, 2]."""
+    """y, phi of the honest run, [TICKS, 2]."""
     return np.concatenate([what.values for _, what in _honest_run() if isinstance(what, Raw)])
 
 
 @cache
 def _configuration() -> Configure:
-    made = _stream_rig().configure(_settings(), CHECK_EVERY, CHECK_EVERY)
+    made = board().configure(_settings(), CHECK_EVERY, CHECK_EVERY)
     assert isinstance(made, Configure)
     return made
 
@@ -158,18 +159,18 @@ class LyingBoard:
 
     def hello(self, **values: Any) -> Hello:
         """Who the honest board is, but for these values."""
-        board = _stream_rig()
+        own, n_p = board(), len(board().p_names)
         honest: dict[str, Any] = {
-            "form": int(board.form),
-            "core": int(board.core),
-            "n_p": board.n_p,
+            "form": int(link.Form.FOURIER),
+            "core": int(link.Core.F32),
+            "n_p": n_p,
             "window": 64,
             "settings": _settings(),
             "session": SESSION,
-            "sample_rate": board.sample_rate,
-            "phi_lsb": board.phi_lsb,
-            "y_lsb": board.y_lsb,
-            "p_unit": board.p_unit,
+            "sample_rate": own.sample_rate,
+            "phi_lsb": float(rig().sensor.phi_lsb),
+            "y_lsb": rig().sensor.y_lsb,
+            "p_unit": (*[1.0] * n_p, *[0.0] * (MAX_P - n_p)),
             "board": "liar",
             "samples": 2,
         }
@@ -199,7 +200,7 @@ class LyingBoard:
 
     def samples(self, phi: float = 0.01, y: float = 0.001, count: int = PER_FRAME) -> Raw:
         """Samples that are all the same."""
-        return replace(Raw.of_values([phi] * count, [y] * count), session=SESSION)
+        return replace(Raw.of_values([y] * count, [phi] * count), session=SESSION)
 
     def schema(self, text: bytes, *frames: tuple[int, bytes]) -> bytes:
         """A schema text under its own number, and frames of it."""
@@ -210,6 +211,7 @@ class LyingBoard:
         """The frames before the samples."""
         yield self.say(hello or self.hello())
         yield self.say(message(Schema, text=SCHEMA_TEXT.encode()))
+        yield self.say(message(Names, text=board().names.text.encode()))
         yield self.say(configure or self.configure())
         yield self.say(self.status())
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bench.liar_board import LyingBoard, rig
+from bench.liar_board import LyingBoard, board, rig
 from pvid.link import frames as link
 from pvid.link.frames import LAYOUTS, MAX_PAYLOAD, Frame
 from pvid.log.file import LOG_SCHEMA, LogWriter
@@ -105,7 +105,7 @@ def mutate(count: int, folder: Path, seed: int = 1, progress: Callable[[int], No
     while tally.mutants < count:
         log = folder / "mutants.pvlog"
         log.unlink(missing_ok=True)
-        writer = LogWriter(log, rig=rig().text())
+        writer = LogWriter(log, rig=board().text())
         writer.begin("a port", None)
         writer.take(_log_of(frames, chance))
         writer.end("the end")
@@ -144,7 +144,7 @@ def _read(log: Path) -> Iterator[str]:
             yield f"page: {shown}"
         if reader.account.begun != 1:
             yield f"{reader.account.begun} segments"
-        for stretch in Verifier(rig()).stretches(LogReader(log)):
+        for stretch in Verifier(board()).stretches(LogReader(log)):
             if not stretch.text.isprintable():
                 yield f"verify: {stretch.text!r}"
     except Exception:

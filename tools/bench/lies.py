@@ -275,7 +275,7 @@ def _forms_and_cores_that_there_are_not(board: LyingBoard) -> Steps:
 
 @_lie(honest_first=False)
 def _the_other_form_and_the_other_core(board: LyingBoard) -> Steps:
-    yield from _hellos(board, "form", (0, 2))
+    yield from _hellos(board, "form", (0, 1))
     yield from _hellos(board, "core", (1,))
 
 

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from pvid.base.errors import PvidError
+from pvid.board.mechanism_board import board_of_rig_file
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import stream_rig
+from pvid.board.stream_rig import StreamRig, stream_rig
 from pvid.board.target import HOST_TARGET, open_target
 from pvid.link.frames import Configuration, Raw, RawCount, Source
 from pvid.log.export import FORMATS, export_log
@@ -80,7 +81,8 @@ def emulated_year(
     """
     if rig.sample_rate is None:
         raise PvidError("the rig file has no sample_rate")
-    board = stream_rig(rig, rig.sample_rate)
+    board = board_of_rig_file(rig) if rig.identifier.form_traits.publishes else stream_rig(rig, rig.sample_rate)
+    kept = rig if isinstance(board, StreamRig) else board
     settings = settings_number(board)
     every = max(1, round(rig.sample_rate / 10))
     source = Source.SENSOR if name == HOST_TARGET else Source.SENSOR_PACED  # this machine sends a hundred times as many
@@ -92,7 +94,7 @@ def emulated_year(
         Logger(
             source=EmulatorSource(name, lambda: open_target(name, board)),
             out=log,
-            rig=rig.text(),
+            rig=kept.text(),
             append=True,
             samples=samples,
             begin=lambda passage=passage: configure(passage),  # type: ignore[misc]
@@ -100,7 +102,7 @@ def emulated_year(
         ).run()
     verdict = Verdict()
     reader = LogReader(log)
-    for stretch in Verifier(rig, progress).stretches(reader):
+    for stretch in Verifier(kept, progress).stretches(reader):
         verdict.add(stretch)
     crossed = [*_crossed(log)]
     faults = [] if crossed == [*passages] else [f"passages {crossed} of {[*passages]} are in the log"]

@@ -80,8 +80,8 @@ bool sensor_read(uint8_t sample[SAMPLE_BYTES])
     for (uint32_t k = 0; k < TONES; k++) {
         y = y + rig.position[k];
     }
-    counts[0] = read(rig.phi, constants.counts_per_rad);
-    counts[1] = read(y, constants.counts_per_m);
+    counts[STREAM_PHI] = read(rig.phi, constants.counts_per_rad);
+    counts[STREAM_Y] = read(y, constants.counts_per_m);
     for (uint16_t step = 0; step < constants.steps; step++) {
         advance();
     }

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from pvid.board.stream_rig import played_samples, stream_rig
-from pvid.board.target import verify
+from pvid.board.target import Verdict, verify
 from pvid.core.native import Native
+from pvid.rig.described import described
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import compare_rig
@@ -35,6 +36,23 @@ class Outcome:
         return self.target, self.core, self.form, self.law, str(self.ticks), hashed, self.verdict
 
 
+def verify_run(target: str, rig: RigFile, run: Run, native: Native, progress: Progress | None = None) -> Verdict:
+    """Plays a run on a target by the rig file's form, in its core; every hash is compared with that of this machine.
+
+    Raises
+    ------
+    PvidError
+        When the target cannot be started or refuses.
+    """
+    if rig.identifier.form_traits.publishes:
+        from pvid.board.engine_board import verify_recording  # loads SymPy
+
+        core = rig.identifier.core_traits.in_c
+        return verify_recording(target, described(rig), run.whole().recording, core, progress)
+    image = stream_rig(rig, run.sample_rate, run)
+    return verify(target, image, native, *played_samples(rig, run), progress=progress)
+
+
 def compare_here(rig: RigFile, run: Run, native: Native, progress: Progress | None = None) -> Outcome:
     """The rig file's core, form and law on this machine against the twin, in every bit."""
     found = compare_rig(native, rig, run, progress=progress)
@@ -58,8 +76,7 @@ def compare_there(target: str, rig: RigFile, run: Run, native: Native, progress:
     PvidError
         When the target cannot be started or refuses.
     """
-    image = stream_rig(rig, run.sample_rate, run)
-    verdict = verify(target, image, native, *played_samples(rig, run), progress=progress)
+    verdict = verify_run(target, rig, run, native, progress)
     return Outcome(
         target=target,
         core=rig.identifier.core,

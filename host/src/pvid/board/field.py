@@ -2,7 +2,7 @@
 
     target = open_target("mps2-an386", rig)
     record = collect(target, 5000, begin=rig)          # starts the board over; without begin: joins in
-    phi, y = record.samples(0, 5000)                   # exactly the identifier's input
+    y, phi = record.samples(0, 5000)                   # exactly the identifier's input, in its order
 
 link.py describes the frames. The image's settings, the configuration and every sample from the session's first tick on
 are enough to compute every bit again.
@@ -80,8 +80,8 @@ class FieldRecord:
             at = max(at, first + len(self.raw[first]))
         return found
 
-    def samples(self, begin: int, end: int) -> tuple[Samples, Samples]:
-        """phi and y [end - begin] of ticks begin..end - 1.
+    def samples(self, begin: int, end: int) -> tuple[Samples, ...]:
+        """Each sample of ticks begin..end - 1 [end - begin], in the order in which the identifier takes them.
 
         Raises
         ------
@@ -94,7 +94,7 @@ class FieldRecord:
             raise PvidError(f"the samples of ticks {place[0]} to {place[1] - 1} are missing")
         parts = [self.raw[first][max(0, begin - first) : max(0, end - first)] for first in sorted(self.raw)]
         joined: Samples = np.concatenate(parts)
-        return joined[:, 0], joined[:, 1]
+        return tuple(joined.T)
 
     def take(self, tick: int, message: Message) -> None:
         """Takes a frame in."""

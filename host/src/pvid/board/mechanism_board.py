@@ -1,4 +1,4 @@
-"""A board that identifies a described mechanism by the weak engine: settings, generated C, its text in a log."""
+"""A board that identifies a mechanism by the weak engine: settings, generated C, its text in a log."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
+from pvid.board.simulated_sensors import sensor_macros
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_design, files_fourier
@@ -29,10 +30,19 @@ from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.described import rig_of_document
+from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, config_to_identify, samples_of
+from pvid.run.engine_design import (
+    config_for_recording,
+    config_for_simulated_rig,
+    config_to_identify,
+    engine_config,
+    samples_of,
+)
 from pvid.run.mechanism import model_of
+from pvid.run.nominal_run import model_of_rig_file, nominal_run
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
@@ -55,15 +65,17 @@ class MechanismBoard:
 
     Attributes
     ----------
-    rig : of the mechanism
+    rig : of the mechanism; the pendulum has a rig file of its own
     compiled : the model with the values of the rig
     config : settings and tables of the engine
-    recording : what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
+    recording
+        what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own, or
+        simulates those of a pendulum's rig file
     """
 
     configure_frame = Configure
     matrix = "covariance"  # of an estimate
-    rig: MechanismRig
+    rig: MechanismRig | RigFile
     compiled: CompiledModel
     config: FourierConfig
     recording: npt.NDArray[np.float32]
@@ -102,6 +114,22 @@ class MechanismBoard:
         config = config_for_simulated_rig(compiled)
         return cls(rig, compiled, config, samples_of(config, RigSimulation.of(compiled, simulated).run()))
 
+    @classmethod
+    def of_rig_file(cls, rig: RigFile) -> MechanismBoard:
+        """With a design for the guess of a pendulum's rig file; the board simulates the sensors.
+
+        Raises
+        ------
+        PvidError
+            Where the rig file has no sample rate, a guess without modes below it, or another law than the weak form's.
+        """
+        made = nominal_run(rig)
+        config = engine_config(made.compiled, made.run, made.design, made.p)
+        own = replace(config.estimator, forgetting_s=rig.identifier.forgetting_s)
+        # What the rig really reads is not known: a height from the floor is no fault.
+        config = replace(config, estimator=own, range=None)
+        return cls(rig, made.compiled, config, _nothing(config))
+
     def __post_init__(self) -> None:
         if not self.config.sample_rate >= SLOWEST:
             raise PvidError(f"the sample rate is {self.config.sample_rate:g} Hz, and a board streams at 1 Hz and more")
@@ -127,6 +155,11 @@ class MechanismBoard:
         return self.config.sample_rate
 
     @property
+    def _lsb(self) -> dict[str, float]:
+        """Value of a count of each sample."""
+        return {name: self.compiled.signal(name).resolution for name in self.config.design.model.sample_names}
+
+    @property
     def _shared(self) -> FourierConfig:
         """The settings of an image: neutral values for what a Configure frame brings."""
         ones = np.ones(len(self.compiled.unknowns), np.float32)
@@ -148,6 +181,7 @@ class MechanismBoard:
             ),
         }
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
+        simulated = isinstance(self.rig, RigFile) and not len(self.recording)
         macros = [
             f"#define STREAM_CORE {int(Core.F32)}",
             f"#define STREAM_FORM {int(Form.FOURIER)}",
@@ -155,19 +189,18 @@ class MechanismBoard:
             f"#define STREAM_N_P {len(self.compiled.unknowns)}u",
             f"#define STREAM_SAMPLES {model.samples}u",
             f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
-            "#define STREAM_PHI_LSB 0.0f",
-            "#define STREAM_Y_LSB 0.0f",
+            *sensor_macros(self.rig, self._lsb, self.sample_rate),
             f"#define STREAM_P_UNIT {{{units}}}",
             f"#define STREAM_NAMES {c_string(self.names.text)}",
         ]
         return StreamImage(
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
             macros=macros,
-            files={**code, "stream_recording.h": _recording(self.recording)},
+            files={**code, **({} if simulated else {"stream_recording.h": _recording(self.recording)})},
             form="fourier",
             core="f32",
             identifier="fourier_f32",
-            sensor="sensor_recording.c",
+            sensor="sensor.c" if simulated else "sensor_recording.c",
             sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
         )
 
@@ -239,7 +272,7 @@ class MechanismBoard:
         return "\n".join([self.rig.text(), f"[{_TABLE}]", *lines, ""])
 
     @classmethod
-    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoard:
+    def of_tables(cls, rig: MechanismRig | RigFile, engine: Mapping[str, Any]) -> MechanismBoard:
         """From the rig and the table `engine` of the text of a log.
 
         Raises
@@ -247,9 +280,22 @@ class MechanismBoard:
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
-        compiled = model_of(rig)
+        compiled = model_of_rig_file(rig) if isinstance(rig, RigFile) else model_of(rig)
         config = _config(compiled, engine)
-        return cls(rig, compiled, config, np.zeros((0, config.design.model.samples), np.float32))
+        return cls(rig, compiled, config, _nothing(config))
+
+
+def _nothing(config: FourierConfig) -> npt.NDArray[np.float32]:
+    """No recording."""
+    return np.zeros((0, config.design.model.samples), np.float32)
+
+
+def board_of_rig_file(rig: RigFile) -> MechanismBoard | MechanismBoardQ31:
+    """In the arithmetic of a pendulum's rig file; raises as MechanismBoard.of_rig_file, and for core f64."""
+    made = BOARDS.get(rig.identifier.core)
+    if made is None:
+        raise PvidError(f"targets hold the cores f32 and q31, not {rig.identifier.core}")
+    return made.of_rig_file(rig)
 
 
 _KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismBoard, MechanismBoardQ31)
@@ -268,8 +314,8 @@ def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
     engine = document.pop(_TABLE, None)
     if not isinstance(engine, dict):
         return None
-    rig = MechanismRig.of_document(document)
-    if rig.model not in shipped():
+    rig = rig_of_document(document)
+    if isinstance(rig, MechanismRig) and rig.model not in shipped():
         raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
     try:
         return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)

@@ -1,4 +1,4 @@
-"""A board that identifies a described mechanism by the weak engine in fixed point; as mechanism_board."""
+"""A board that identifies a mechanism by the weak engine in fixed point; as mechanism_board."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.board.simulated_sensors import sensor_macros
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
 from pvid.codegen import files_fourier_q31
@@ -25,6 +26,7 @@ from pvid.design.fourier_q31 import circle_of
 from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
 from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.engine_design_q31 import (
@@ -33,8 +35,10 @@ from pvid.run.engine_design_q31 import (
     engine_for_simulated_rig,
     engine_of_parts,
     engine_to_identify,
+    fixed_engine,
 )
 from pvid.run.mechanism import model_of
+from pvid.run.nominal_run import model_of_rig_file, nominal_run
 from pvid.settings.fourier_q31 import (
     FourierConfigQ31,
     FourierDesignQ31,
@@ -45,6 +49,7 @@ from pvid.settings.fourier_q31 import (
 )
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.setup.fourier_sizes import sizes_of_q31
+from pvid.setup.q31 import forgetting_groups_q31
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.fourier_q31 import FourierTwinQ31
 
@@ -61,14 +66,14 @@ class MechanismBoardQ31:
 
     Attributes
     ----------
-    rig : of the mechanism
+    rig : of the mechanism; the pendulum has a rig file of its own
     engine : functions, settings and tables
-    recording : what the board's sensors count, int32 [ticks, samples]; empty where the board has sensors of its own
+    recording : what the board's sensors count, int32 [ticks, samples]; empty as of MechanismBoard
     """
 
     configure_frame = ConfigureQ31
     matrix = "correlation"  # of an estimate
-    rig: MechanismRig
+    rig: MechanismRig | RigFile
     engine: FixedEngine
     recording: npt.NDArray[np.int32]
 
@@ -88,6 +93,16 @@ class MechanismBoardQ31:
         compiled = model_of(rig)
         engine = engine_for_simulated_rig(compiled)
         return cls(rig, engine, engine.counts_of(RigSimulation.of(compiled, simulated).run()))
+
+    @classmethod
+    def of_rig_file(cls, rig: RigFile) -> MechanismBoardQ31:
+        """As MechanismBoard.of_rig_file."""
+        made = nominal_run(rig)
+        engine = fixed_engine(made.compiled, made.run, made.design, made.p)
+        groups = forgetting_groups_q31(rig.identifier.forgetting_s, 1.0 / engine.hop_s)
+        own = replace(engine.config.estimator, forgetting_groups=groups)
+        engine = replace(engine, config=replace(engine.config, estimator=own))
+        return cls(rig, engine, _nothing(len(engine.lsb)))
 
     def __post_init__(self) -> None:
         if not self.engine.sample_rate >= SLOWEST:
@@ -147,6 +162,7 @@ class MechanismBoardQ31:
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         engine, name, sizes = self.engine, self.engine.name, self._sizes
+        simulated = isinstance(self.rig, RigFile) and not len(self.recording)
         code = {
             f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, _COMMAND),
             f"{name}_weak_q31.c": files_fourier_q31.source(engine.made, engine.parameters, _COMMAND),
@@ -160,19 +176,18 @@ class MechanismBoardQ31:
             f"#define STREAM_N_P {len(engine.parameters.p_bits)}u",
             f"#define STREAM_SAMPLES {self.config.design.model.samples}u",
             f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
-            "#define STREAM_PHI_LSB 0.0f",
-            "#define STREAM_Y_LSB 0.0f",
+            *sensor_macros(self.rig, dict(zip(engine.sample_names, engine.lsb, strict=True)), self.sample_rate),
             f"#define STREAM_P_UNIT {{{units}}}",
             f"#define STREAM_NAMES {c_string(self.names.text)}",
         ]
         return StreamImage(
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
             macros=macros,
-            files={**code, "stream_recording.h": _recording(self.recording)},
+            files={**code, **({} if simulated else {"stream_recording.h": _recording(self.recording)})},
             core="q31",
             form="fourier",
             identifier="fourier_q31",
-            sensor="sensor_recording.c",
+            sensor="sensor.c" if simulated else "sensor_recording.c",
             sizes={macro: str(value) for macro, value in raised(sizes).items()},
         )
 
@@ -220,7 +235,7 @@ class MechanismBoardQ31:
         return "\n".join([self.rig.text(), "[engine]", *lines, ""])
 
     @classmethod
-    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoardQ31:
+    def of_tables(cls, rig: MechanismRig | RigFile, engine: Mapping[str, Any]) -> MechanismBoardQ31:
         """From the rig and the table `engine` of the text of a log.
 
         Raises
@@ -228,7 +243,7 @@ class MechanismBoardQ31:
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
-        compiled = model_of(rig)
+        compiled = model_of_rig_file(rig) if isinstance(rig, RigFile) else model_of(rig)
         functions = fourier_functions_of(compiled)
         of_jets = dict(zip(functions.jet_names, map(float, engine["jet_reach"]), strict=True))
         made = fixed_fourier(functions, JetReaches(run_s=float(engine["run_s"]), of=of_jets))
@@ -253,7 +268,12 @@ class MechanismBoardQ31:
             },
         )
         own = engine_of_parts(compiled, made, config, float(engine["sample_rate"]))
-        return cls(rig, own, np.zeros((0, tables.model.samples), np.int32))
+        return cls(rig, own, _nothing(tables.model.samples))
+
+
+def _nothing(samples: int) -> npt.NDArray[np.int32]:
+    """No recording."""
+    return np.zeros((0, samples), np.int32)
 
 
 def _recording(counts: npt.NDArray[np.int32]) -> str:

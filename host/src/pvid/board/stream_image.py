@@ -59,6 +59,8 @@ def _described(rig: StreamRig) -> list[str]:
         f"#define STREAM_ASSESS {assess}",
         f"#define STREAM_ASSESSED {assessed}",
         f"#define STREAM_SAMPLES {len(model.channels)}u",
+        "#define STREAM_PHI 0u",
+        "#define STREAM_Y 1u",
         f"#define STREAM_NAMES {c_string(names_of(model).text)}",
     ]
 
@@ -158,6 +160,7 @@ def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
         with one_at_a_time(tree):
             return _build_for_host(image, folder, tree)
     options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": image.identifier, **image.sizes}
+    options["PVID_STREAM_SENSOR"] = image.sensor
     options["PVID_LEAVE_OUT"] = left_out(image.form, image.core)
     tree = build(board, BUILD / f"{board.name}-{name}", options)
     return tree / "apps" / "stream" / "stream.elf"

@@ -71,7 +71,7 @@ def command(
     signals against the simulated.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
-    reported tick and at the end. It is then the answer of the image's own form, without the refinement.
+    reported tick and at the end. It is then the answer of the target's form, without the refinement.
     """
     if refine and target is not None:
         raise PvidError("--refine is in float64 on this computer: omit --on")
@@ -93,20 +93,20 @@ def command(
     if weights is not None:
         raise PvidError(f"--weights {weights} is for a described mechanism, --model; the pendulum has its own weights")
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
+    if target is not None and rig.identifier.core == "f64":
+        raise PvidError("targets hold the cores f32 and q31, not f64: use --core f32")
     run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)
     given, rig = rig, resolved(rig, run)
     notes = resolution_note(given, rig)
     print_notes(notes)
     native = Native()
     noted = replace(run, notes=(*run.notes, *notes))
-    result = identified(noted, rig, native, refine=refine, of_image=target is not None)
+    result = identified(noted, rig, native, refine=refine, streamed=target is not None)
     if target is not None:
-        from pvid.board.stream_rig import played_samples, stream_rig
-        from pvid.board.target import verify
+        from pvid.board.compare_on import verify_run
 
-        image = stream_rig(rig, run.sample_rate, run)
         with progress_bar(f"streaming to {target}", len(run.t)) as advance:
-            verdict = verify(target, image, native, *played_samples(rig, run), progress=advance)
+            verdict = verify_run(target, rig, run, native, advance)
         write_stderr(f"{target}: {verdict.playback.account}")
         if not verdict.equal:
             write_stderr(f"pvid: {target}: {verdict.text}")

@@ -120,10 +120,11 @@ def command(
         rig = RigFile.standard()
     if restart and rig is None and described is None:
         raise PvidError("--restart needs --rig: the board is restarted with its settings")
-    text = described.text() if described is not None else rig.text() if rig is not None else None
-    if append:
-        refuse_to_append(out, rig if described is None else text)
     board = described or (None if rig is None else _board(rig))
+    kept = rig if board is None or isinstance(board, StreamRig) else board
+    text = None if kept is None else kept.text()
+    if append:
+        refuse_to_append(out, rig if kept is rig else text)
     if described is not None and emulated and samples is None:
         samples = len(described.recording)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
@@ -193,7 +194,12 @@ def _described(
     return made.of_recording(described, read_recording(run_path, described.sample_rate, columns))
 
 
-def _board(rig: RigFile) -> StreamRig:
+def _board(rig: RigFile) -> StreamRig | MechanismBoard | MechanismBoardQ31:
+    """Of the weak form by the engine, whose design is made for the guess of the rig file."""
+    if rig.identifier.form_traits.publishes:
+        from pvid.board.mechanism_board import board_of_rig_file  # loads SymPy
+
+        return board_of_rig_file(rig)
     if rig.sample_rate is None:
         raise PvidError("sample_rate is required in the rig file: the board samples on its own clock")
     return stream_rig(rig, rig.sample_rate)

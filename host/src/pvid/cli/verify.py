@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import click
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar
 from pvid.cli.input import log_argument, log_rig
 from pvid.log.reader import LogReader
-from pvid.log.rig import engine_text_of_log, rig_of_log
+from pvid.log.rig import engine_text_of_log, hello_of_log, rig_of_log
 from pvid.rig.file import RigFile, load
 
 if TYPE_CHECKING:
@@ -19,13 +20,24 @@ if TYPE_CHECKING:
 _MOST_STRETCHES = 100  # that are printed
 
 
-def _rig_of(log: Path) -> RigFile | EngineBoard | None:
-    text = engine_text_of_log(log)
-    if text is None:
-        return rig_of_log(log)
-    from pvid.board.mechanism_board import board_of  # loads SymPy
+def _rig_of(log: Path, rig_path: Path | None) -> RigFile | EngineBoard | None:
+    """Of the strong form the rig file; of the weak form the board, whose settings are in the log or follow from the
+    rig file."""
+    text = None if rig_path is not None else engine_text_of_log(log)
+    if text is not None:
+        from pvid.board.mechanism_board import board_of  # loads SymPy
 
-    return board_of(text)
+        return board_of(text)
+    if rig_path is None:
+        return rig_of_log(log)
+    rig = load(rig_path)
+    if not rig.identifier.form_traits.publishes:
+        return rig
+    from pvid.board.mechanism_board import board_of_rig_file
+
+    hello = hello_of_log(log)
+    rate = rig.sample_rate or (None if hello is None else hello.sample_rate)
+    return board_of_rig_file(replace(rig, sample_rate=rate))
 
 
 @click.command(name="verify")
@@ -43,7 +55,7 @@ def command(log: Path, rig_path: Path | None, partial: bool) -> int:
     """
     from pvid.log.verify import Verdict, Verifier  # the twins, which other commands do not need
 
-    rig = load(rig_path) if rig_path is not None else _rig_of(log)
+    rig = _rig_of(log, rig_path)
     reader = LogReader(log)
     verdict = Verdict()
     with progress_bar("verifying", None) as advance:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -29,13 +28,20 @@ def mechanism_of(text: bytes) -> Mechanism:
     """
     names = BoardNames.parse(text)
     known = MODELS.get(names.mechanism)
-    if known is not None and replace(names, counts=()) == names_of(known):
+    if known is not None and _is(names, names_of(known)):
         return Mechanism(known)
     for columns in (names.samples, (*names.parameters, *((f"{name}_se", "") for name, _ in names.parameters))):
         called = [name for name, _ in columns]
         if len(set(called)) < len(called) or not TAKEN.isdisjoint(called):
             raise PvidError(f"{names.mechanism}: a sample or a parameter has the name of another column")
     return Mechanism(_model(names))
+
+
+def _is(names: BoardNames, known: BoardNames) -> bool:
+    """Whether a board has the samples of a mechanism, in any order, and its first parameters."""
+    return sorted(names.samples) == sorted(known.samples) and (
+        names.parameters == known.parameters[: len(names.parameters)]
+    )
 
 
 def _model(names: BoardNames) -> Model:

@@ -18,7 +18,8 @@ from pvid.log.reader import LogReader, LogStream
 from pvid.log.values import UNKNOWN_RIG, Values, is_rate
 from pvid.models.model import Mechanism
 from pvid.rig.columns import Columns
-from pvid.rig.file import RigFile
+from pvid.rig.described import rig_of_document
+from pvid.rig.file import RigFile, without_former_keys
 from pvid.rig.run import MIN_ROWS, Recording, Run
 
 LOG_SUFFIX = ".pvlog"
@@ -33,41 +34,55 @@ def rig_of_log(path: Path) -> RigFile | None:
     PvidError
         When the log cannot be read, is that of a described mechanism, or the rig file in it is none.
     """
-    reader = LogReader(path)
-    for _ in reader:
-        if reader.rig is not None:
-            if is_engine_text(reader.rig):
-                raise PvidError(f"{path} is the log of a described mechanism: name it with --model")
-            return RigFile.parse(reader.rig)
-        if reader.account.frames:
-            break  # it stands in front of all that the board said
-    return None
+    text = _text_of_log(path)
+    if text is None:
+        return None
+    rig = rig_in(text)
+    if rig is None:
+        raise PvidError(f"{path} is the log of a described mechanism: name it with --model")
+    return rig
 
 
 def engine_text_of_log(path: Path) -> str | None:
-    """The rig of a log of a described mechanism with the settings of its engine (board.mechanism_board); None: it is a
-    log of something else.
+    """The rig of a log with the settings of the weak engine (board.mechanism_board); None: the log has none.
 
     Raises
     ------
     PvidError
         When the log cannot be read.
     """
+    text = _text_of_log(path)
+    return text if text is not None and is_engine_text(text) else None
+
+
+def _text_of_log(path: Path) -> str | None:
     reader = LogReader(path)
     for _ in reader:
-        if reader.rig is not None:
-            return reader.rig if is_engine_text(reader.rig) else None
-        if reader.account.frames:
+        if reader.rig is not None or reader.account.frames:  # it stands in front of all that the board said
             break
-    return None
+    return reader.rig
 
 
 def is_engine_text(text: str) -> bool:
-    """Whether the rig of a log is that of a described mechanism."""
+    """Whether the rig of a log has the settings of the weak engine."""
     try:
         return isinstance(toml_document(text).get("engine"), dict)
     except PvidError:
         return False
+
+
+def rig_in(text: str) -> RigFile | None:
+    """The pendulum's rig file in the text of a log; None: it is that of a described mechanism.
+
+    Raises
+    ------
+    PvidError
+        Where it is none.
+    """
+    document = without_former_keys(toml_document(text))
+    engine = document.pop("engine", None)
+    rig = rig_of_document(document) if isinstance(engine, dict) else RigFile.of_document(document)
+    return rig if isinstance(rig, RigFile) else None
 
 
 def mechanism_of_log(path: Path) -> Mechanism:
@@ -78,7 +93,8 @@ def mechanism_of_log(path: Path) -> Mechanism:
     PvidError
         When the log cannot be read, or the rig file in it is none.
     """
-    rig = None if engine_text_of_log(path) is not None else rig_of_log(path)
+    text = _text_of_log(path)
+    rig = None if text is None else rig_in(text)
     if rig is not None:
         return rig.mechanism
     for record in LogReader(path):
@@ -89,8 +105,8 @@ def mechanism_of_log(path: Path) -> Mechanism:
 
 
 def refuse_to_append(path: Path, rig: RigFile | str | None) -> None:
-    """A log has one rig file: verify, identify and export take it for all of its segments. `rig` of a described
-    mechanism is the text.
+    """A log has one rig file: verify, identify and export take it for all of its segments. `rig` of the weak engine is
+    the text.
 
     Raises
     ------
@@ -112,7 +128,7 @@ def refuse_to_append(path: Path, rig: RigFile | str | None) -> None:
     if rig is None or stream.rig is None:
         return
     of_engine = isinstance(rig, str) or is_engine_text(stream.rig)
-    if stream.rig != rig if of_engine else RigFile.parse(stream.rig) != rig:
+    if stream.rig != rig if of_engine else rig_in(stream.rig) != rig:
         raise PvidError(f"{path} was recorded with another rig file: record to a new log")
 
 

@@ -28,6 +28,7 @@ from pvid.link.frames import (
     ConfigureQ31,
     Estimate,
     EstimateQ31,
+    Form,
     Hello,
     Loss,
     Message,
@@ -142,7 +143,8 @@ class Values:
         self._hello = hello
         self._row_sd = math.nan
         self._offset = 0.0  # of the angle in fixed point [rad]
-        self._counts: tuple[float, ...] = ()  # value of a count of each sample, if the board named them
+        self._named: tuple[str, ...] = ()  # the samples of a tick, if the board named them
+        self._counts: tuple[float, ...] = ()  # value of a count of each, likewise
         self._anchor: tuple[int, int] | None = None  # tick and log time
         self._latest = 0
         self._runs = 0
@@ -174,7 +176,8 @@ class Values:
                 self._hello = item
             case Names():
                 with suppress(PvidError):  # a board that names nothing that there can be
-                    self._counts = BoardNames.parse(item.text).counts
+                    names = BoardNames.parse(item.text)
+                    self._named, self._counts = tuple(name for name, _ in names.samples), names.counts
                     self.mechanism = mechanism_of(item.text) if self.follows else self.mechanism
             case Configure() | ConfigureQ31():
                 self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
@@ -245,10 +248,13 @@ class Values:
         of_two = [np.nan, np.nan] if hello is None else [hello.phi_lsb, hello.y_lsb]
         measured = item.in_si(np.array(self._counts or of_two))
         columns = self._where(record, record.tick + np.arange(len(measured), dtype=np.int64))
-        channels = self.mechanism.model.channels
+        channels = [one.name for one in self.mechanism.model.channels]
         if measured.shape[1] != len(channels):  # samples of something else
             measured = np.full((len(measured), len(channels)), np.nan)
-        return Rows("samples", {**columns, **dict(zip((one.name for one in channels), measured.T, strict=True))})
+        order = self._named if sorted(self._named) == sorted(channels) else channels
+        if not self._named and hello is not None and hello.form == Form.FOURIER:  # not named yet
+            measured = np.full(measured.shape, np.nan)
+        return Rows("samples", {**columns, **dict(zip(order, measured.T, strict=True))})
 
     @np.errstate(all="ignore")
     def _estimate(self, record: Record, item: Estimate | EstimateQ31) -> Rows:

@@ -53,7 +53,7 @@ Check = Estimate | EstimateQ31 | Hash | Credit
 
 
 class EngineBoard(Protocol):
-    """A board that identifies a described mechanism: MechanismBoard of pvid.board, and that in fixed point."""
+    """A board that identifies by the weak engine: MechanismBoard of pvid.board, and that in fixed point."""
 
     @property
     def stream_image(self) -> StreamImage: ...
@@ -202,7 +202,7 @@ class Verifier:
     Parameters
     ----------
     rig
-        The board's rig file, or the board of a described mechanism; None: nothing can be verified.
+        The board's rig file of the strong form, or its board with the weak engine; None: nothing can be verified.
     progress
         Called with the number of ticks computed so far.
 
@@ -335,7 +335,7 @@ class Verifier:
         if self.rig is None:
             raise PvidError("the log holds no rig file: name it with --rig")
         if isinstance(self.rig, RigFile):
-            return _PendulumTwin(self._config(self.rig, configuration)), P_NAMES
+            return _StrongTwin(self._config(self.rig, configuration)), P_NAMES
         if self._number is None:
             self._number = self.rig.stream_image.number
         if configuration.settings != self._number:
@@ -344,6 +344,8 @@ class Verifier:
 
     def _config(self, rig: RigFile, configuration: Configuration) -> Settings:
         """The identifier's settings: those of the rig file, with the values of the configuration."""
+        if rig.identifier.form_traits.publishes:
+            raise PvidError("the log has no settings of the weak engine: a version before it recorded the log")
         if self._hello is None:
             raise PvidError("the board has not sent its identity (a Hello frame)")
         rate = float(self._hello.sample_rate)
@@ -376,8 +378,8 @@ class _Twin(Protocol):
         """What the board says at present."""
 
 
-class _PendulumTwin:
-    """Of the rig file's form and core."""
+class _StrongTwin:
+    """The strong form, in the rig file's core."""
 
     samples = 2
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
+from pvid.base.errors import PvidError
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 
@@ -31,3 +35,14 @@ def described(rig: RigFile) -> MechanismRig:
         nominal=nominal,
         known_sd=known_sd,
     )
+
+
+def refuse_other_laws(rig: RigFile) -> None:
+    """PvidError where a rig file asks for a law that the description's weak form does not have."""
+    if rig.identifier.law != "stationary":
+        raise PvidError(f"the weak form has the stationary law alone, not {rig.identifier.law}: use --form strong")
+
+
+def rig_of_document(document: Mapping[str, Any]) -> MechanismRig | RigFile:
+    """The rig of a log: of a file that has a table `identifier` it is a pendulum's."""
+    return RigFile.of_document(document) if "identifier" in document else MechanismRig.of_document(document)

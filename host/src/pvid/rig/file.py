@@ -257,7 +257,12 @@ class RigFile:
         settings
             Keys and tables that come before those of the text.
         """
-        top = _known(cls, _merged(toml_document(text), settings or {}), "")
+        return cls.of_document(_merged(toml_document(text), settings or {}))
+
+    @classmethod
+    def of_document(cls, document: Mapping[str, Any]) -> RigFile:
+        """From the tables of a file; raises as `parse`."""
+        top = _known(cls, document, "")
         model = ModelTable(**_table(top.pop("model", {}), "model"))
         for one in MODELS[model.name].constants:
             if one.name not in top:
@@ -376,6 +381,14 @@ _GONE = {
     **dict.fromkeys(("full_angle", "damping"), _REFINED),
     "zero": "the weak form estimates the zero of the encoder always; leave it out",
 }
+
+
+def without_former_keys(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of a file that an older version wrote, as in a log, without the keys that there are no more."""
+    table = document.get("identifier")
+    if not isinstance(table, Mapping):
+        return dict(document)
+    return {**document, "identifier": {key: value for key, value in table.items() if key not in _GONE}}
 
 
 def _known(owner: type, given: Mapping[str, Any], place: str) -> dict[str, Any]:

@@ -12,17 +12,15 @@ from pvid.run.identify import Identification, identify
 
 
 def answered(
-    run: Run, rig: RigFile, native: Native, *, refine: bool | None = None, of_image: bool = False
+    run: Run, rig: RigFile, native: Native, *, refine: bool | None = None, streamed: bool = False
 ) -> Identification:
     """The answer of the rig file's form: the weak engine's, refined, or the strong form's.
 
     Parameters
     ----------
     refine : the full equations are fitted to the whole run, from the answer on; None: after the weak form
-    of_image : by the form that the streamed image of the pendulum contains, so that its bits can be compared
+    streamed : the run is streamed to a target as well, whose answer is not refined
     """
-    if of_image:
-        return identify(run, rig, native)
     from pvid.run.engine_identify import held_if_wide, identify_by_engine  # loads SymPy
     from pvid.run.refined_identify import RefinementVerdict, refined_identification
 
@@ -30,9 +28,9 @@ def answered(
         found = identify(run, rig, native)
         return refined_identification(run, rig, found) if refine else found
     found = identify_by_engine(run, rig)
-    if refine is None and (unit := _wrong_unit(run, rig, held_if_wide(found))) is not None:
+    if refine is None and not streamed and (unit := _wrong_unit(run, rig, held_if_wide(found))) is not None:
         found = replace(found, refinement=RefinementVerdict(False, f"not refined: {unit}"))
-    elif refine is not False:
+    elif refine is not False and not streamed:
         found = refined_identification(run, rig, found)
     return held_if_wide(found)
 
@@ -45,13 +43,13 @@ def _wrong_unit(run: Run, rig: RigFile, found: Identification) -> str | None:
 
 
 def identified(
-    run: Run, rig: RigFile, native: Native, *, refine: bool | None = None, of_image: bool = False
+    run: Run, rig: RigFile, native: Native, *, refine: bool | None = None, streamed: bool = False
 ) -> Identification:
     """The answer with advice, as of `answered`; a refusal has the advice in front of its sentence."""
     from pvid.run.advice import advice, advice_on_refusal, behind
 
     try:
-        result = answered(run, rig, native, refine=refine, of_image=of_image)
+        result = answered(run, rig, native, refine=refine, streamed=streamed)
     except PvidError as error:
         raise behind(advice_on_refusal(run, rig), error) from error
     return replace(result, notes=run.notes, advice=advice(run, rig, result))

@@ -15,7 +15,7 @@ from pvid.base.errors import PvidError
 from pvid.oracle.fourier.choice import MODEL_ERROR
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import UNKNOWN
-from pvid.rig.described import described
+from pvid.rig.described import described, refuse_other_laws
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
@@ -72,8 +72,7 @@ def identify_by_engine(run: Run, rig: RigFile) -> Identification:
     PvidError
         When the recording is too short, or holds a signal beyond all reason.
     """
-    if rig.identifier.law != "stationary":
-        raise PvidError(f"the weak form has the stationary law alone, not {rig.identifier.law}: use --form strong")
+    refuse_other_laws(rig)
     run, rig = run.whole(), resolved(rig, run)
     _refuse_slow(run, rig)
     answer = identify_mechanism(run.recording, model_of(described(rig)))

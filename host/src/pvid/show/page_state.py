@@ -6,6 +6,7 @@ import json
 import math
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.log.history import History, Rates, envelope
 from pvid.log.reader import LogStream
+from pvid.log.rig import rig_in
 from pvid.log.tail import LogTail
 from pvid.log.words import (
     board_words,
@@ -28,7 +30,6 @@ from pvid.log.words import (
     residual_words,
 )
 from pvid.models.model import Parameter, Quantity
-from pvid.rig.file import RigFile
 from pvid.show.axis_limits import interesting
 from pvid.show.live_simulation import LiveSimulation
 
@@ -82,11 +83,11 @@ class LiveState(threading.Thread):
                     self._failed += 1
 
     def _load_rig(self) -> None:
-        if self._rig is not None:
-            try:
-                self._history.know(RigFile.parse(self._rig).mechanism)
-            except PvidError:
-                return  # of another version: the page does without physical parameters
+        """Of another version, or a described mechanism: the page does without physical parameters."""
+        with suppress(PvidError):
+            rig = None if self._rig is None else rig_in(self._rig)
+            if rig is not None:
+                self._history.know(rig.mechanism)
 
     def as_json(self) -> bytes:
         """The present state; page.js draws it."""
