@@ -18,7 +18,6 @@ from typing import Any
 import configurations
 import numpy as np
 import numpy.typing as npt
-from linear_rig import LINEAR_RIG
 
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
@@ -34,7 +33,7 @@ Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]
 
 UNIT = Path(__file__).resolve().parent / "unit"
 RATE = 1000.0
-RIG = LINEAR_RIG
+RIG = RigFile.standard()
 FINE = replace(RIG, sensor=replace(RIG.sensor, phi_lsb=standard_sensors(20).phi_lsb))
 STRONG_TICKS = 2600
 PIECE = 650  # ticks between two looks at everything

@@ -181,7 +181,7 @@ PROOFS = (
     ),
     Proof(
         "estimator_q31",
-        "start and rows of models with any theta and C, of one kind and of three: any configuration, any row, any state",
+        "start and rows of models with any theta and C, of one kind and of three: any configuration, any row",
         ESTIMATOR,
         (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),

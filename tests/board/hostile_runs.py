@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from linear_rig import LINEAR_RIG
 
 from pvid.core import snapshot
 from pvid.core.native import Identifier, Native
@@ -49,7 +48,7 @@ FLOAT_ALONE: tuple[dict[str, Any], ...] = (
 
 def rig_of(**identifier: Any) -> RigFile:
     """The standard rig, an encoder of 14 bits for the weak form and of 20 for the strong."""
-    rig = LINEAR_RIG
+    rig = RigFile.standard()
     sensor = replace(rig.sensor, phi_lsb=standard_sensors(20 if identifier["form"] == "strong" else 14).phi_lsb)
     return replace(rig, identifier=replace(rig.identifier, **identifier), sensor=sensor)
 

@@ -8,19 +8,15 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT
-from linear_rig import LINEAR_RIG
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, source
-from pvid.design.weak_q31 import weak_tables_q31
 from pvid.rig.file import RigFile
 from pvid.rig.run import write_run
-from pvid.setup.f32 import weak_design_of
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 FIRMWARE = ROOT / "firmware"
@@ -45,8 +41,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("q31")
     run = simulate(sensors=standard_sensors(14), truth="full", duration=10.0, seed=2).run
     write_run(folder / "run.csv", run)
-    exact = replace(LINEAR_RIG.sensor, y_gain_sd=0.0)  # else the errors are those of the gain and of l1
-    replace(LINEAR_RIG, l1_sd=0.0, sensor=exact).write(folder / "rig.toml")
+    exact = replace(RigFile.standard().sensor, y_gain_sd=0.0)  # else the errors are those of the gain and of l1
+    replace(RigFile.standard(), l1_sd=0.0, sensor=exact).write(folder / "rig.toml")
     return folder / "run.csv", folder / "rig.toml"
 
 
@@ -86,7 +82,7 @@ def pvid_text(header: str) -> str:
 
 def test_public_headers_contain_no_floating_point_type() -> None:
     floating = re.compile(r"\b(?:float|double)\b")
-    assert "pvid_weak_step_q31" in pvid_text("pvid_q31.h") and not floating.search(pvid_text("pvid_q31.h"))
+    assert "pvid_fourier_step_q31" in pvid_text("pvid_q31.h") and not floating.search(pvid_text("pvid_q31.h"))
     assert floating.search(pvid_text("pvid.h")) and not re.search(r"_q31(?!theta|moments|c\d)", pvid_text("pvid.h"))
 
 
@@ -133,18 +129,3 @@ def test_a_guess_beyond_the_fixed_point_format_is_refused(tmp_path: Path) -> Non
     command = ["tables", "--core", "q31", "--rig", str(path)]
     with pytest.raises(PvidError, match="beyond the fixed-point format .integer .* guess of the rig"):
         CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False)
-
-
-def test_margins_are_positive_or_the_design_is_refused() -> None:
-    design = weak_design_of(RigFile.standard(), 1000.0)
-    tables = weak_tables_q31(design, 2 * np.pi / 2**14, 5e-6, 0.5, 0.03, 39.2)
-    assert min(tables.margins.values()) >= 0
-    # by what the proof says: the worst sum of any function, computed from the tables themselves
-    chi = np.abs(tables.chi[:, 2].astype(np.int64)).sum(axis=0).max()
-    largest_f = (tables.phi_max * (2**tables.smooth_bits + 4 * int(np.abs(tables.smooth.astype(np.int64)).sum()))) >> (
-        tables.phi_shift
-    )
-    assert largest_f < 2**20
-    assert (chi * largest_f) >> tables.sum_shift < 2**31
-    with pytest.raises(PvidError, match="fixed-point core"):
-        weak_tables_q31(design, 1e-9, 5e-6, 0.5, 0.03, 39.2)

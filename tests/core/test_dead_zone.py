@@ -11,7 +11,6 @@ import numpy.typing as npt
 import pytest
 from fourier_rig import engine_rig
 from lanes import assert_lanes_equal
-from linear_rig import LINEAR_RIG
 
 from pvid.base.errors import PvidError
 from pvid.cases import CASES, Case
@@ -24,7 +23,7 @@ from pvid.run.engine_design_q31 import engine_for_simulated_rig
 from pvid.sim.pendulum import simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
-RIG = LINEAR_RIG
+RIG = RigFile.standard()
 every_case = pytest.mark.parametrize("case", CASES.values(), ids=lambda case: f"{case.form}-{case.core}")
 LAWS: dict[str, dict[str, Any]] = {
     "gauss-newton": {"feedback_hz": 0.0},

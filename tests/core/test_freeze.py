@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from linear_rig import LINEAR_RIG
 
 from pvid.cases import CASES, Case
 from pvid.core.native import Identifier, Native
@@ -36,8 +35,8 @@ def run() -> Run:
 
 def rig_of(case: Case) -> RigFile:
     """The rig with an identifier that forgets."""
-    own = replace(LINEAR_RIG.identifier, form=case.form, stride=8, forgetting_s=5.0)
-    return replace(LINEAR_RIG, identifier=own)
+    own = replace(RigFile.standard().identifier, form=case.form, stride=8, forgetting_s=5.0)
+    return replace(RigFile.standard(), identifier=own)
 
 
 def identifier_of(native: Native, case: Case) -> Identifier:

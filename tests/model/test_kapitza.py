@@ -1,4 +1,4 @@
-"""The compiled pendulum has the rows, theta and Jacobian of the hand-made one, and the paper's strong form."""
+"""The compiled pendulum has the theta of the paper's constraints, and the paper's strong form."""
 
 from __future__ import annotations
 
@@ -6,17 +6,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from pvid.design.weak import WeakDesign, design
 from pvid.model import Model
-from pvid.model.compiled import CompiledModel, Part
-from pvid.model.signals import TIME, Integral, Jet
+from pvid.model.compiled import CompiledModel
 from pvid.model.strong import strong_form
 from pvid.models.mechanisms import compiled_of
-from pvid.oracle import weak
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate
 
-Float = np.ndarray
-ORDER = ("d1", "d1*w", "d2", "d2*w", "d2*w**2", "c*d2", "c*d2*w", "c*d2*w**2")  # of the hand-made theta
+ORDER = ("d1", "d1*w", "d2", "d2*w", "d2*w**2", "c*d2", "c*d2*w", "c*d2*w**2")
 
 
 @pytest.fixture(scope="module")
@@ -24,84 +19,19 @@ def compiled() -> CompiledModel:
     return compiled_of("kapitza")
 
 
-@pytest.fixture(scope="module")
-def tables() -> WeakDesign:
-    return design(0.3, 1000.0, STANDARD_PENDULUM.linear)
-
-
-def column(part: Part, signals: dict[sp.Expr, Float], tables: WeakDesign) -> Float:
-    """int chi sum D^m[psi] of every window [windows, K], terms of the highest order first as the hand-made columns."""
-    one = np.ones_like(next(iter(signals.values())))
-
-    def value(psi: sp.Expr) -> Float:
-        out = one
-        for factor in sp.Mul.make_args(psi):
-            if isinstance(factor, Integral):
-                assert factor.args[1] == 2
-                out = out * weak.integrated_twice(value(factor.args[0]), tables.dt)
-            elif factor.has(TIME):
-                out = out * (tables.dt * np.arange(tables.window)) ** int(factor.as_base_exp()[1])
-            elif factor != 1:
-                out = out * signals[factor]
-        return out
-
-    total = None
-    for m in sorted(part, reverse=True):
-        for term in sp.Add.make_args(part[m]):
-            number, rest = term.as_coeff_Mul()
-            new = float(number) * (value(rest) @ tables.chi[:, m // 2])
-            total = new if total is None else total + new
-    assert total is not None
-    return total
-
-
-@pytest.fixture(scope="module")
-def both(compiled: CompiledModel, tables: WeakDesign) -> tuple[Float, Float, Float]:
-    """Columns Y, N1..N8 by the compiler and by hand [9, windows, K], and nuisances by the compiler."""
-    run = simulate(seed=1).run
-    phi, u = weak.front_end(run.phi, run.y, tables)
-    signals = {Jet("phi"): weak.frames(phi, tables), Jet("u"): weak.frames(u, tables)}
-    (row,) = compiled.rows
-    parts = dict(zip(map(str, row.theta), row.regressors, strict=True))
-    mine = [column(part, signals, tables) for part in (row.known, *(parts[name] for name in ORDER))]
-    hand = np.moveaxis(weak.columns(signals[Jet("phi")], signals[Jet("u")], tables), 1, 0)
-    t = tables.dt * np.arange(tables.window)
-    free = [-(signals[Jet("u")] * (t if part[2].has(TIME) else 1.0)) @ tables.chi[:, 1] for part in row.nuisances]
-    return np.array(mine), hand, np.array(free)
-
-
-def test_theta_is_that_of_the_hand_made_rows(compiled: CompiledModel) -> None:
+def test_theta_is_that_of_the_constraints(compiled: CompiledModel) -> None:
     (row,) = compiled.rows
     assert sorted(map(str, row.theta)) == sorted(ORDER)
     assert row.top == 4
     assert len(row.nuisances) == 2
 
 
-def test_rows_equal_the_oracles_in_every_bit_but_where_the_integral_of_a_constant_is_exact(
-    both: tuple[Float, Float, Float],
-) -> None:
-    mine, hand, _ = both
-    for k in (0, 1, 2, 3, 4, 5, 6, 8):
-        np.testing.assert_array_equal(mine[k], hand[k], err_msg=f"column {k}")
-    # t^2/2 against a trapezoid of 1, whose terms linear in time the nuisance columns take
-    np.testing.assert_allclose(mine[7], hand[7], atol=1e-4 * np.abs(hand[7]).max())
-
-
-def test_nuisances_span_the_oracles(both: tuple[Float, Float, Float]) -> None:
-    _, hand, free = both
-    for window in range(hand.shape[1]):
-        stacked = np.concatenate([hand[9:, window], free[:, window]])
-        sizes = np.linalg.svd(stacked / np.linalg.norm(stacked, axis=1, keepdims=True), compute_uv=False)
-        assert sizes[2] < 1e-12
-
-
-def test_jacobian_equals_the_oracles(compiled: CompiledModel) -> None:
+def test_jacobian_has_sixteen_entries(compiled: CompiledModel) -> None:
     (row,) = compiled.rows
     p = np.array([31.7, 8.9, 5.6, 0.01])
     by_name = {str(theta): theta for theta in row.theta}
     jacobian = sp.Matrix([by_name[name] for name in ORDER]).jacobian(list(compiled.p))
     mine = np.array(jacobian.subs(dict(zip(compiled.p, p, strict=True))), np.float64)
-    np.testing.assert_allclose(mine, weak.jacobian(p), rtol=1e-14)
     assert np.count_nonzero(mine) == 16
 
 

@@ -45,7 +45,6 @@ def test_the_example_of_the_design_is_the_standard_rig() -> None:
 
 
 def test_the_window_is_the_forms_own_unless_given() -> None:
-    assert Identifier().window_s == 0.0, "the weak form's follows the modes"
     assert Identifier(form="strong").strong_window_s == 0.241
     assert Identifier(form="strong", window_s=0.2).strong_window_s == 0.2
 
@@ -125,8 +124,6 @@ def zero_to(high: float) -> st.SearchStrategy[float]:
         stride=st.integers(1, 65535),
         forgetting_s=zero_to(1e12),
         divider=st.integers(1, 65535),
-        full_angle=st.booleans(),
-        zero=st.booleans(),
         kappa_min=zero_to(0.999),
         outlier_gate=st.none() | zero_to(1e3),
         outlier_patience_s=st.none() | zero_to(1e12),
@@ -214,22 +211,20 @@ def test_the_published_defaults() -> None:
         differentiator="savitzky-golay",
         degree=12,
         stride=1,
-        test_functions=0,
-        decimation=0,
-        smoothing_s=0.0,
-        pass_hz=0.0,
         forgetting_s=0.0,
         feedback_hz=10.0,
         divider=1,
-        survey=True,
-        full_angle=True,
-        damping=False,
-        zero=True,
         kappa_min=1e-5,
         outlier_gate=None,
         outlier_patience_s=None,
         dead_zone=0.0,
     )
+
+
+@pytest.mark.parametrize("key", ["full_angle = false", "test_functions = 9", "zero = true"])
+def test_a_key_of_the_form_before_says_what_does_it_now(key: str) -> None:
+    with pytest.raises(PvidError, match=f"{key.split()[0]} is no key any more: .*leave it out"):
+        RigFile.parse(f"l1 = 0.3\n[identifier]\n{key}\n")
 
 
 def test_the_gate_where_the_file_does_not_say() -> None:

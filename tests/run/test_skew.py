@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from linear_rig import LINEAR_RIG
 
 from bench.campaign.judge import identify_rig
 from bench.campaign.population import shipped
 from bench.campaign.truth import simulate_rig
 from pvid.core.native import Native
 from pvid.rig.run import Run
-from pvid.run.identify import identify
 from pvid.run.skew import aligned
-from pvid.sim.pendulum import simulate, standard_sensors
-
-RIG = LINEAR_RIG
-TRUTH = simulate(sensors=standard_sensors(16), duration=30.0, truth="linear", seed=2)
-
-
-def late(delay: float) -> Run:
-    """The standard rig's run with y sampled so much later [s]."""
-    return replace(aligned(TRUTH.run, -delay), notes=())
 
 
 def test_a_shift_and_its_opposite_leave_a_straight_line_as_it_was() -> None:
@@ -32,18 +19,6 @@ def test_a_shift_and_its_opposite_leave_a_straight_line_as_it_was() -> None:
     assert np.allclose(aligned(run, 0.0013).y[2:-2], 3 * (t - 0.0013)[2:-2])
     assert aligned(run, 0.0) is run
     assert "1.3 ms" in aligned(run, 0.0013).notes[0]
-
-
-@pytest.mark.parametrize("delay", [0.0021, -0.0014])
-def test_a_delay_of_y_is_found(native: Native, delay: float) -> None:
-    result = identify(late(delay), RIG, native)
-    assert result.identified
-    assert result.skew == pytest.approx(delay, abs=1e-4)
-
-
-def test_without_a_delay_none_is_found(native: Native) -> None:
-    result = identify(TRUTH.run, RIG, native)
-    assert result.skew == 0.0 and result.warning is None
 
 
 def test_delay_that_moves_the_estimate_is_estimated(native: Native) -> None:

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lanes import assert_lanes_equal
-from linear_rig import LINEAR_RIG
 
 from pvid.base.errors import PvidError
 from pvid.cases import CASES, case_of
@@ -22,13 +21,13 @@ from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
 from pvid.settings.q31 import GateConfigQ31
 from pvid.setup.f32 import strong_config
-from pvid.setup.q31 import gate_config_q31, strong_config_q31, weak_config_q31
+from pvid.setup.q31 import gate_config_q31, strong_config_q31
 from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.twin.f32.gate import Gate
 from pvid.twin.q31.gate import GateQ31
 from pvid.twin.q31.scaled import Scaled, scaled
 
-RIG = LINEAR_RIG
+RIG = RigFile.standard()
 OUTLIER = Reason.REJECTED_OUTLIER
 CORES = ("f32", "q31")
 
@@ -198,25 +197,20 @@ def test_rows_that_do_not_fit_are_refused_as_such(native: Native) -> None:
 @pytest.mark.parametrize("core", CORES)
 def test_gate_is_enabled_in_the_stationary_law_and_can_be_disabled(core: str, jolted: Run) -> None:
     kind, one = (GateConfig, 1) if core == "f32" else (GateConfigQ31, 1 << 16)
-    for form, sigmas in (("weak", 4), ("strong", 6)):
-        for chosen, expected in (({}, sigmas), ({"law": "pseudovelocity"}, 0), ({"outlier_gate": 0.0}, 0)):
-            config = CASES[form, core].settings_for_run(rig_with(form=form, stride=8, **chosen), jolted)
-            assert config.gate == kind(expected * one, 0)
+    for chosen, expected in (({}, 6), ({"law": "pseudovelocity"}, 0), ({"outlier_gate": 0.0}, 0)):
+        config = CASES["strong", core].settings_for_run(rig_with(form="strong", stride=8, **chosen), jolted)
+        assert config.gate == kind(expected * one, 0)
 
 
 # ---- settings ----
 
 
-def test_a_rig_file_s_gate_reaches_the_core_and_the_board(jolted: Run) -> None:
+def test_a_rig_file_s_gate_reaches_the_core_and_the_board() -> None:
     settings = {"outlier_gate": 4.5, "outlier_patience_s": 60.0}
-    weak = weak_config_q31(rig_with(**settings), 1000.0)
-    windows = 60.0 * 1000.0 / (weak.design.decimation * weak.hop)
-    assert weak.gate == GateConfigQ31(round(4.5 * 2**16), round(windows))
-    strong = strong_config_q31(rig_with(form="strong", stride=8, **settings), 1000.0)
-    assert strong.gate == GateConfigQ31(round(4.5 * 2**16), 60_000)
-    for config, groups in ((strong, 60_000), (weak, round(windows))):
-        header = " ".join(case_of(config).header(config, RIG.l1, config.form, "a test").split())
-        assert f".gate = {{ .sigmas = 294912u, .patience_groups = {groups}u, }}," in header
+    config = strong_config_q31(rig_with(form="strong", stride=8, **settings), 1000.0)
+    assert config.gate == GateConfigQ31(round(4.5 * 2**16), 60_000)
+    header = " ".join(case_of(config).header(config, RIG.l1, config.form, "a test").split())
+    assert ".gate = { .sigmas = 294912u, .patience_groups = 60000u, }," in header
 
 
 def test_a_patience_that_cannot_be_counted_is_refused() -> None:
@@ -226,11 +220,9 @@ def test_a_patience_that_cannot_be_counted_is_refused() -> None:
         strong_config_q31(rig_with(form="strong", stride=8, outlier_gate=4.0, outlier_patience_s=2e6), 1000.0)
 
 
-@pytest.mark.parametrize("form", ["weak", "strong"])
 @pytest.mark.parametrize(("forgetting_s", "sentence"), [(1e-9, "1e-09 is too short"), (1e9, "1e+09 is too long")])
 def test_a_forgetting_that_cannot_be_counted_is_refused_before_the_patience_that_follows_it(
-    form: str, forgetting_s: float, sentence: str
+    forgetting_s: float, sentence: str
 ) -> None:
-    config = {"weak": weak_config_q31, "strong": strong_config_q31}[form]
     with pytest.raises(PvidError, match=re.escape(f"forgetting_s = {sentence} for core q31")):
-        config(rig_with(form=form, forgetting_s=forgetting_s), 1000.0)
+        strong_config_q31(rig_with(form="strong", forgetting_s=forgetting_s), 1000.0)

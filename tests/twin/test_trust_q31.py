@@ -10,7 +10,6 @@ from itertools import groupby
 import numpy as np
 import numpy.typing as npt
 import pytest
-from linear_rig import LINEAR_RIG
 
 from bench.hard import CASES, Case
 from pvid.core.native import Identifier, Native
@@ -94,7 +93,7 @@ def test_another_mechanism_raises_the_alarm(label: str) -> None:
 def test_the_verdicts_are_those_of_float32(native: Native, truth: str) -> None:
     # rows that neither core corrects; a full scale five times the drive's 4 m/s^2: ten make u's rounding a third of
     # the noise
-    rig = replace(LINEAR_RIG, sensor=replace(LINEAR_RIG.sensor, acceleration_range=20.0))
+    rig = replace(RigFile.standard(), sensor=replace(RigFile.standard().sensor, acceleration_range=20.0))
     for seed in range(SEEDS):
         run = simulate(sensors=standard_sensors(14), truth=truth, duration=DURATION_S, seed=seed).run  # type: ignore[arg-type]
         start = standard_start(seed)
