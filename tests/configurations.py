@@ -317,7 +317,7 @@ def estimator_of_rows(native: Native) -> Stepper:
     owner = EstimatorInC(native, BlockModel.random(np.random.default_rng(1), (8,), 4), accepted, OWN_RATE)
     owner.model.positive = 7
     stepper = Stepper(native, "estimator", "f32", config, replay="rows", model=owner.model, update_rate_hz=OWN_RATE)
-    stepper.owner = owner  # type: ignore[attr-defined]  # of the model in C
+    stepper.owner = owner  # type: ignore[attr-defined]
     return stepper
 
 

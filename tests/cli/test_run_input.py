@@ -84,10 +84,10 @@ def test_settings_come_before_what_the_file_holds(tmp_path: Path) -> None:
     file.write_text("sample_rate = 500\n[sensor]\nphi_lsb = 1e-3\ny_lsb = 2e-5\n[identifier]\nlaw = 'stationary'\n")
     with pytest.raises(PvidError, match="rig.toml: l1 is missing"):
         rig_for(None, file)
-    given = ["l1=0.25", "sensor.phi_lsb = 0.0015", "identifier.zero=false", "identifier.core=q31", "nominal.l2=1"]
+    given = ["l1=0.25", "sensor.phi_lsb = 0.0015", "identifier.form=strong", "identifier.core=q31", "nominal.l2=1"]
     rig = rig_for(None, file, given)
     assert (rig.l1, rig.sample_rate, rig.sensor.phi_lsb, rig.sensor.y_lsb) == (0.25, 500.0, 0.0015, 2e-5)
-    assert (rig.identifier.zero, rig.identifier.core, rig.nominal.l2) == (False, "q31", 1.0)
+    assert (rig.identifier.form, rig.identifier.core, rig.nominal.l2) == ("strong", "q31", 1.0)
     assert rig_for(None, None, given).sample_rate is None
     assert rig_for(None, None, ["l1=0.25", "identifier.core='f64'"]).identifier.core == "f64"
     file.write_text("l1 = 0.3\nsensor = 3\n")
@@ -113,7 +113,7 @@ def test_settings_come_before_what_the_file_holds(tmp_path: Path) -> None:
         ("motor.torque=1", "--set 'motor.torque': a rig file has no table 'motor'; it has sensor, nominal, identifier"),
         ("sensor.phi_lsb=2", "--set sensor.phi_lsb must be from 0 to 1 rad, not 2"),
         ("identifier.law=round", '--set identifier.law must be "stationary" or'),
-        ("identifier.zero=1", "--set identifier.zero must be true or false, not 1"),
+        ("identifier.zero=true", "identifier.zero is no key any more"),
         ("identifier.divider=1.5", "--set identifier.divider must be a whole number"),
     ],
 )

@@ -127,5 +127,5 @@ def test_a_guess_beyond_the_fixed_point_format_is_refused(tmp_path: Path) -> Non
     path = tmp_path / "rig.toml"
     path.write_text("l1 = 0.3\nsample_rate = 1000\n[nominal]\nl2 = 1e6\nrho2 = 0.0132\n", encoding="utf-8")
     command = ["tables", "--core", "q31", "--rig", str(path)]
-    with pytest.raises(PvidError, match="beyond the fixed-point format .integer .* guess of the rig"):
+    with pytest.raises(PvidError, match="the fixed-point core cannot hold a row of the strong form"):
         CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False)

@@ -38,7 +38,7 @@ from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
 from pvid.settings.fourier import FourierConfig
 from pvid.setup.f32 import config_of, strong_config
-from pvid.setup.q31 import ConfigQ31, config_of_q31, counts_of_samples, p_of, se_of
+from pvid.setup.q31 import counts_of_samples, p_of, se_of, strong_config_q31
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Tone
 
 Float = npt.NDArray[np.float64]
@@ -149,14 +149,10 @@ class Outcome:
 
 
 def rig_of(lane: Lane) -> RigFile:
-    """The standard rig with the settings of a lane of the strong form; its filter is cheap enough for 10^7 ticks.
-
-    The signals are those of linear equations: no sines are corrected.
-    """
+    """The standard rig with the settings of a lane of the strong form; its filter is cheap enough for 10^7 ticks."""
     rig = RigFile.standard()
     settings = replace(
         rig.identifier,
-        full_angle=False,
         forgetting_s=lane.forgetting_s,
         outlier_gate=None if lane.gated else 0.0,
         core=lane.core,  # type: ignore[arg-type]
@@ -166,9 +162,9 @@ def rig_of(lane: Lane) -> RigFile:
 
 
 @cache
-def config_q31_of(lane: Lane) -> ConfigQ31:
+def config_q31_of(lane: Lane) -> StrongConfigQ31:
     """Settings of a lane of the strong form in fixed point, of which the design takes a second."""
-    return config_of_q31(rig_of(lane), RATE_HZ)
+    return strong_config_q31(rig_of(lane), RATE_HZ)
 
 
 class _Ours(ABC):
