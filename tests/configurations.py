@@ -313,7 +313,7 @@ def estimator_of_rows(native: Native) -> Stepper:
     lower = np.array([1.5, 0.4, 0.25, -1.0], np.float32)
     config = EstimatorConfig(start, np.full(4, 2.0, np.float32), lower, bounds, row_sd=1e-3)
     ones = np.ones(4, np.float32)
-    accepted = replace(config, start=ones, lower=ones / 2, upper=2 * ones)
+    accepted = replace(config, start=ones, lower=ones * np.float32(0.5), upper=ones * np.float32(2))
     owner = EstimatorInC(native, BlockModel.random(np.random.default_rng(1), (8,), 4), accepted, OWN_RATE)
     owner.model.positive = 7
     stepper = Stepper(native, "estimator", "f32", config, replay="rows", model=owner.model, update_rate_hz=OWN_RATE)

@@ -37,7 +37,8 @@ from pvid.settings.bounds import SIZES
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
 from pvid.settings.fourier import FourierConfig
-from pvid.setup.f32 import config_of, strong_config
+from pvid.settings.q31 import StrongConfigQ31
+from pvid.setup.f32 import strong_config
 from pvid.setup.q31 import counts_of_samples, p_of, se_of, strong_config_q31
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Tone
 
@@ -222,7 +223,7 @@ class _StrongInFloat(_Ours):
 
     def __init__(self, native: Native, lane: Lane) -> None:
         super().__init__(lane)
-        self.identifier = native.identifier(config_of(rig_of(lane), RATE_HZ))
+        self.identifier = native.identifier(strong_config(rig_of(lane), RATE_HZ))
 
     def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
         record = self.identifier.run(phi, y, sums=False, hashes=False)
