@@ -243,7 +243,7 @@ def bench_tick_methods(update: Path | None) -> int:
 @bench.command(name="strong-bytes")
 @UPDATE
 def bench_strong_bytes(update: Path | None) -> int:
-    """Where the bytes of code and state of the strong form in float32 go on a Cortex-M4F."""
+    """Where the bytes of code and state of the strong form go on a Cortex-M4F."""
     from bench import strong_bytes
 
     put_table(update, "strong-text", markdown(strong_bytes.TEXT_HEADER, strong_bytes.text_rows()))

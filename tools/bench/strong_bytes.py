@@ -1,17 +1,19 @@
-"""Where the bytes of the strong form in float32 go: code by function, state by member, on a Cortex-M4F."""
+"""Where the bytes of the strong form go: code by part in each build, state by member, on a Cortex-M4F."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from typing import NamedTuple
 
 from bench.struct_sizes import state_table
 from pvid.board.boards import BOARDS
-from pvid.board.replay_image import build_image, standard_run
-from pvid.board.sizes import CODE, CORE, TICKS, sections
+from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
+from pvid.board.sizes import ARITHMETIC, CODE, CORE, TICKS, TIMEOUT_S, sections
+from pvid.settings.enums import Core
 
 BOARD = "mps2-an386"
-TEXT_HEADER = ("code", "bytes")
+TEXT_HEADER = ("code", "float32", "float32, PVID_SMALL", "fixed point")
 STATE_HEADER = ("state", "bytes")
 
 # What a function belongs to, by its source and its name; the first that fits.
@@ -19,16 +21,17 @@ _PARTS = (
     (
         "checks of a configuration, init",
         r"",
-        r"init|valid|settings_of|take_bank|places|refuse|defaults|sized|gain|decay",
+        r"init|valid|settings_of|take_bank|places|refuse|defaults|sized|gain|decay|retention|ranges",
     ),
     ("check of the arithmetic", r"arithmetic", r""),
     ("58 sums: a block of four rows added, folded", r"kapitza_sums", r""),
-    ("58 sums: joined and shifted to p, C^T M C", r"kapitza_estimator", r"gather|project"),
-    ("a step within a dead zone", r"", r"in_zone"),
-    ("solve, limits, standard errors, residuals", r"kapitza_(estimator|solve|assess|residual)|assess", r""),
-    ("the tick: derivatives, row, innovation, solve in line", r"strong_f32", r""),
-    ("derivatives of other banks", r"derivatives|differentiator", r""),
+    ("58 sums: joined and shifted to p, C^T M C", r"kapitza_project", r""),
+    ("58 sums: joined and shifted to p, C^T M C", r"kapitza_estimator_f32", r"gather|project|triple|pair"),
+    ("solve, limits, residuals", r"kapitza_(estimator|solve|assess|residual)|assess|cholesky|system", r""),
+    ("the tick: five points, row, innovation (float32: the solve)", r"strong_(f32|q31)|kapitza_row", r""),
+    ("derivatives of any bank", r"derivatives|differentiator", r""),
     ("gate and verdict", r"gate|misfit", r""),
+    ("numbers with a scale", r"scaled|integer", r""),
 )
 _OTHERS = "hash, text, the rest"
 
@@ -48,15 +51,45 @@ _STATE = (
 )
 
 
-def text_rows() -> list[tuple[str, ...]]:
-    """Bytes of code by part, as in TEXT_HEADER."""
-    image, _ = build_image(BOARDS[BOARD], standard_run("strong", TICKS))
+class Build(NamedTuple):
+    """Bytes of an image by part, and its run."""
+
+    parts: Counter[str]
+    compiler: int
+    application: int
+    report: ReplayReport
+
+
+def measured(core: Core, macros: dict[str, str] | None = None) -> Build:
+    """Builds and runs the standard image of the strong form, without a dead zone."""
+    image, _ = build_image(BOARDS[BOARD], standard_run("strong", TICKS, core), macros)
     parts: Counter[str] = Counter()
+    compiler = application = 0
     for section, size, file in sections(image.with_suffix(".map").read_text(encoding="utf-8")):
-        if re.match(CODE, section) and re.search(CORE, file):
+        if not re.match(CODE, section) or "replay_samples" in section:
+            continue
+        if re.search(CORE, file):
             parts[_part_of(section, file)] += size
-    titles = [title for title, _, _ in _PARTS] + [_OTHERS]
-    return [*((title, str(parts[title])) for title in titles), ("**all**", str(parts.total()))]
+        elif re.search(ARITHMETIC, file):
+            compiler += size
+        else:
+            application += size
+    return Build(parts, compiler, application, play(BOARDS[BOARD], image, TIMEOUT_S))
+
+
+def text_rows() -> list[tuple[str, ...]]:
+    """Bytes of code and constants by part, and instructions a tick, as in TEXT_HEADER."""
+    builds = (measured("f32"), measured("f32", {"PVID_SMALL": "1"}), measured("q31"))
+    titles = [*dict.fromkeys(title for title, _, _ in _PARTS), _OTHERS]
+    rows = [(title, *(str(build.parts[title]) for build in builds)) for title in titles]
+    return [
+        *rows,
+        ("**all of the core**", *(str(build.parts.total()) for build in builds)),
+        ("the compiler's: division, `memset`", *(str(build.compiler) for build in builds)),
+        ("the application: replay, its settings and texts, start, UART", *(str(build.application) for build in builds)),
+        ("instructions a tick, mean", *(f"{build.report.instructions_mean:.0f}" for build in builds)),
+        ("instructions, longest tick", *(f"{build.report.instructions_longest:.0f}" for build in builds)),
+    ]
 
 
 def _part_of(section: str, file: str) -> str:

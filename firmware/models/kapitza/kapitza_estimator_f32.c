@@ -8,6 +8,7 @@
 #include "kapitza_project_f32.h"
 #include "kapitza_row_f32.h"
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 #include "solve/assess_f32.h"
 #include "solve/settings_f32.h"
 
@@ -53,7 +54,8 @@ static uint8_t exact_every_of(const pvid_strong_config_f32 *config)
     return (estimator->law == PVID_LAW_PSEUDOVELOCITY) ? 1u : EXACT_EVERY;
 }
 
-pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self, const pvid_strong_config_f32 *config)
+PVID_COLD pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self,
+                                                      const pvid_strong_config_f32 *config)
 {
     const pvid_estimator_config_f32 *estimator = &config->estimator;
     const pvid_status status = pvid_settings_are_valid_f32(estimator, PVID_KAPITZA_P, 7u, config->sample_rate_hz);
@@ -96,7 +98,7 @@ pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self, con
 /* ---- the equations from all rows ---- */
 
 /* Completes theta^T M theta - 2 theta^T B to the residuals of all rows. */
-static PVID_SELDOM void add_residuals(const pvid_strong_estimator_f32 *self, pvid_kapitza_residual_f32 *residual)
+static PVID_COLD void add_residuals(const pvid_strong_estimator_f32 *self, pvid_kapitza_residual_f32 *residual)
 {
     const float yy = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_YY);
     float squares = 0.0f;
@@ -160,7 +162,7 @@ static void system_of(const pvid_kapitza_residual_f32 *residual, pvid_system_f32
     system->weight = residual->weight;
 }
 
-void pvid_kapitza_assess_f32(const pvid_strong_estimator_f32 *self, pvid_estimate_f32 *estimate)
+PVID_COLD void pvid_kapitza_assess_f32(const pvid_strong_estimator_f32 *self, pvid_estimate_f32 *estimate)
 {
     float s[6];
     pvid_kapitza_residual_f32 residual;
@@ -181,8 +183,8 @@ void pvid_kapitza_assess_f32(const pvid_strong_estimator_f32 *self, pvid_estimat
     pvid_assess_f32(&system, &settings, estimate);
 }
 
-bool pvid_kapitza_is_at_rest_f32(const pvid_strong_estimator_f32 *self, float square,
-                                 const pvid_kapitza_residual_f32 *residual)
+PVID_COLD bool pvid_kapitza_is_at_rest_f32(const pvid_strong_estimator_f32 *self, float square,
+                                           const pvid_kapitza_residual_f32 *residual)
 {
     pvid_system_f32 system;
     pvid_solve_settings_f32 settings;

@@ -40,7 +40,7 @@ typedef struct {
 } pvid_shifted_triple;
 
 /* r = 2: A, E or Y times -G^2 phi'' and -G^3 phi''. */
-PVID_ALWAYS_INLINE pvid_shifted_pair pvid_kapitza_pair_2_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
+PVID_INLINE_IF_FAST pvid_shifted_pair pvid_kapitza_pair_2_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
 {
     float m[4];
     pvid_kapitza_family_f32(self, first, 4, m);
@@ -52,7 +52,7 @@ PVID_ALWAYS_INLINE pvid_shifted_pair pvid_kapitza_pair_2_f32(const pvid_strong_s
 }
 
 /* r = 3: A, E or Y times -G^3 phi and -G^4 phi. */
-PVID_ALWAYS_INLINE pvid_shifted_pair pvid_kapitza_pair_0_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
+PVID_INLINE_IF_FAST pvid_shifted_pair pvid_kapitza_pair_0_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
 {
     float m[5];
     pvid_kapitza_family_f32(self, first, 5, m);
@@ -65,58 +65,28 @@ PVID_ALWAYS_INLINE pvid_shifted_pair pvid_kapitza_pair_0_f32(const pvid_strong_s
     return pair;
 }
 
-PVID_ALWAYS_INLINE pvid_shifted_triple pvid_kapitza_triple_f32(float s0, float s1, float s2, float w)
+/* The triple with the coefficients c[i] = binom(n, i + 1) w^(i + 1) of its lowest power, n = 4 .. 6, from the n + 3
+ * sums at `first`. */
+PVID_INLINE_IF_FAST pvid_shifted_triple pvid_kapitza_triple_f32(const pvid_strong_sums_f32 *self, size_t first,
+                                                                const float c[], size_t n, float w)
 {
+    float s2 = pvid_kapitza_sum_f32(self, first);
+    float s1 = pvid_kapitza_sum_f32(self, first + 1u);
+    float s0 = pvid_kapitza_sum_f32(self, first + 2u);
+    float m1 = s1;
+    float m2 = s0;
+    PVID_UNROLL_IF_FAST
+    for (size_t i = 0; i < n; i++) {
+        const float m3 = pvid_kapitza_sum_f32(self, first + i + 3u);
+        s2 += c[i] * m1;
+        s1 += c[i] * m2;
+        s0 += c[i] * m3;
+        m1 = m2;
+        m2 = m3;
+    }
     const float mid = s1 + (w * s0);
     const pvid_shifted_triple triple = {s0, mid, (s2 + (w * s1)) + (w * mid)};
     return triple;
-}
-
-/* m[0] + sum of c[i] m[i + 1] over n coefficients. */
-PVID_ALWAYS_INLINE float pvid_kapitza_along_f32(const float m[], const float c[], size_t n)
-{
-    float sum = m[0];
-    PVID_UNROLL
-    for (size_t i = 0; i < n; i++) {
-        sum += c[i] * m[i + 1u];
-    }
-    return sum;
-}
-
-/* phi''^2 G^4, G^5, G^6 */
-PVID_ALWAYS_INLINE pvid_shifted_triple pvid_kapitza_k22_f32(const pvid_strong_sums_f32 *self, float w)
-{
-    const float w2 = w * w;
-    const float c[4] = {4.0f * w, 6.0f * w2, 4.0f * (w2 * w), w2 * w2};
-    float m[7];
-    pvid_kapitza_family_f32(self, PVID_SUM_K22, 7, m);
-    return pvid_kapitza_triple_f32(pvid_kapitza_along_f32(&m[2], c, 4), pvid_kapitza_along_f32(&m[1], c, 4),
-                                   pvid_kapitza_along_f32(m, c, 4), w);
-}
-
-/* phi'' phi G^5, G^6, G^7 */
-PVID_ALWAYS_INLINE pvid_shifted_triple pvid_kapitza_k20_f32(const pvid_strong_sums_f32 *self, float w)
-{
-    const float w2 = w * w;
-    const float w4 = w2 * w2;
-    const float c[5] = {5.0f * w, 10.0f * w2, 10.0f * (w2 * w), 5.0f * w4, w4 * w};
-    float m[8];
-    pvid_kapitza_family_f32(self, PVID_SUM_K20, 8, m);
-    return pvid_kapitza_triple_f32(pvid_kapitza_along_f32(&m[2], c, 5), pvid_kapitza_along_f32(&m[1], c, 5),
-                                   pvid_kapitza_along_f32(m, c, 5), w);
-}
-
-/* phi^2 G^6, G^7, G^8 */
-PVID_ALWAYS_INLINE pvid_shifted_triple pvid_kapitza_k00_f32(const pvid_strong_sums_f32 *self, float w)
-{
-    const float w2 = w * w;
-    const float w3 = w2 * w;
-    const float w4 = w2 * w2;
-    const float c[6] = {6.0f * w, 15.0f * w2, 20.0f * w3, 15.0f * w4, 6.0f * (w4 * w), w3 * w3};
-    float m[9];
-    pvid_kapitza_family_f32(self, PVID_SUM_K00, 9, m);
-    return pvid_kapitza_triple_f32(pvid_kapitza_along_f32(&m[2], c, 6), pvid_kapitza_along_f32(&m[1], c, 6),
-                                   pvid_kapitza_along_f32(m, c, 6), w);
 }
 
 /* s = C^T M C, upper triangle by rows, and force = C^T (B - M theta) at p. Writes *rss_minus_yy = theta^T M theta - 2
@@ -131,9 +101,14 @@ PVID_ALWAYS_INLINE void pvid_kapitza_project_f32(const pvid_strong_sums_f32 *sel
     const float two_w = 2.0f * w;
     const float three_d1 = 3.0f * d1;
     const float four_d2 = 4.0f * d2;
-    const pvid_shifted_triple k22 = pvid_kapitza_k22_f32(self, w);
-    const pvid_shifted_triple k20 = pvid_kapitza_k20_f32(self, w);
-    const pvid_shifted_triple k00 = pvid_kapitza_k00_f32(self, w);
+    const float w3 = w2 * w;
+    const float w4 = w2 * w2;
+    const float of_k22[4] = {4.0f * w, 6.0f * w2, 4.0f * w3, w4};                  /* phi''^2 G^4 .. G^6 */
+    const float of_k20[5] = {5.0f * w, 10.0f * w2, 10.0f * w3, 5.0f * w4, w4 * w}; /* phi'' phi G^5 .. */
+    const float of_k00[6] = {6.0f * w, 15.0f * w2, 20.0f * w3, 15.0f * w4, 6.0f * (w4 * w), w3 * w3}; /* phi^2 G^6 .. */
+    const pvid_shifted_triple k22 = pvid_kapitza_triple_f32(self, PVID_SUM_K22, of_k22, 4, w);
+    const pvid_shifted_triple k20 = pvid_kapitza_triple_f32(self, PVID_SUM_K20, of_k20, 5, w);
+    const pvid_shifted_triple k00 = pvid_kapitza_triple_f32(self, PVID_SUM_K00, of_k00, 6, w);
     const pvid_shifted_pair a2 = pvid_kapitza_pair_2_f32(self, PVID_SUM_A2, w);
     const pvid_shifted_pair e2 = pvid_kapitza_pair_2_f32(self, PVID_SUM_E2, w);
     const pvid_shifted_pair a0 = pvid_kapitza_pair_0_f32(self, PVID_SUM_A0, w);

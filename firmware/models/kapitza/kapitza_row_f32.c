@@ -6,9 +6,9 @@ void pvid_kapitza_strong_row_f32(const float phi[5], const float u[3], float *y,
 {
     pvid_strong_row_f32 row;
     pvid_kapitza_row_f32(phi, u, &row);
-    *y = row.y;
-    n[0] = row.a;
-    n[1] = row.e;
+    *y = row.x[PVID_ROW_Y];
+    n[0] = row.x[PVID_ROW_A];
+    n[1] = row.x[PVID_ROW_E];
     n[5] = row.f2;
     n[4] = row.u * n[5];
     n[3] = row.u * n[4];

@@ -10,9 +10,10 @@ static inline void pvid_kapitza_row_f32(const float phi[5], const float u[3], pv
 {
     const float two_u0 = 2.0f * u[0];
     const float two_u1 = 2.0f * u[1];
-    row->y = (((u[0] * u[0]) * phi[4]) - ((two_u0 * u[1]) * phi[3])) + (((two_u1 * u[1]) - (u[0] * u[2])) * phi[2]);
-    row->a = ((two_u1 * phi[3]) - (two_u0 * phi[4])) + (u[2] * phi[2]);
-    row->e = -phi[4];
+    row->x[PVID_ROW_Y] =
+        (((u[0] * u[0]) * phi[4]) - ((two_u0 * u[1]) * phi[3])) + (((two_u1 * u[1]) - (u[0] * u[2])) * phi[2]);
+    row->x[PVID_ROW_A] = ((two_u1 * phi[3]) - (two_u0 * phi[4])) + (u[2] * phi[2]);
+    row->x[PVID_ROW_E] = -phi[4];
     row->f2 = -phi[2];
     row->f0 = -phi[0];
     row->u = u[0];
@@ -29,10 +30,11 @@ static inline float pvid_kapitza_innovate_f32(const float p[3], const pvid_stron
     const float g3_f0 = g * (g2 * row->f0);
     const float n_1 = g * g2_f2;
     const float n_2 = g * g3_f0;
-    gradient[0] = (row->a + ((w + w) * row->e)) + (((3.0f * p[1]) * g2_f2) + ((4.0f * p[2]) * g3_f0));
+    gradient[0] =
+        (row->x[PVID_ROW_A] + ((w + w) * row->x[PVID_ROW_E])) + (((3.0f * p[1]) * g2_f2) + ((4.0f * p[2]) * g3_f0));
     gradient[1] = n_1;
     gradient[2] = n_2;
-    return (row->y - (w * (row->a + (w * row->e)))) - ((p[1] * n_1) + (p[2] * n_2));
+    return (row->x[PVID_ROW_Y] - (w * (row->x[PVID_ROW_A] + (w * row->x[PVID_ROW_E])))) - ((p[1] * n_1) + (p[2] * n_2));
 }
 
 /* s += g g^T, upper triangle by rows. */
@@ -60,7 +62,9 @@ static inline float pvid_kapitza_row_squares_f32(const pvid_strong_row_f32 *row)
     const float u2 = row->u * row->u;
     const float high2 = (row->u * u2) * row->f2;
     const float high0 = (u2 * u2) * row->f0;
-    return ((((((row->y * row->y) + (row->a * row->a)) + (row->e * row->e)) + (row->f2 * row->f2)) +
+    return ((((((row->x[PVID_ROW_Y] * row->x[PVID_ROW_Y]) + (row->x[PVID_ROW_A] * row->x[PVID_ROW_A])) +
+               (row->x[PVID_ROW_E] * row->x[PVID_ROW_E])) +
+              (row->f2 * row->f2)) +
              (row->f0 * row->f0)) +
             (high2 * high2)) +
            (high0 * high0);

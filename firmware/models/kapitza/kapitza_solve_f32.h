@@ -70,7 +70,7 @@ static inline float pvid_kapitza_slack_f32(const pvid_strong_estimator_f32 *self
 }
 
 /* Stops p at its bounds. */
-static PVID_SELDOM void pvid_kapitza_clamp_f32(pvid_strong_estimator_f32 *self)
+static PVID_COLD void pvid_kapitza_clamp_f32(pvid_strong_estimator_f32 *self)
 {
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
         self->p[a] = (self->p[a] > self->upper[a]) ? self->upper[a] : self->p[a];

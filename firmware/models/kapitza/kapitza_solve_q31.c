@@ -75,8 +75,9 @@ static pvid_status prepare(pvid_kapitza_estimator_q31 *self, const pvid_estimato
     return PVID_OK;
 }
 
-pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self, const pvid_estimator_config_q31 *config,
-                                            const pvid_strong_row_q31 *rows)
+PVID_COLD pvid_status pvid_kapitza_estimator_init_q31(pvid_kapitza_estimator_q31 *self,
+                                                      const pvid_estimator_config_q31 *config,
+                                                      const pvid_strong_row_q31 *rows)
 {
     const bool given = pvid_init_is_given(self, config) && (rows != NULL);
     const pvid_status status = given ? prepare(self, config, rows) : PVID_BAD_POINTER;
@@ -327,8 +328,8 @@ static pvid_scaled_q31 decrement_of(const pvid_kapitza_system_q31 *system, const
     return pvid_scaled_shifted_q31(sum, 2 * (system->scale_a + (2 * system->time)));
 }
 
-PVID_SELDOM static bool is_in_dead_zone(const pvid_kapitza_estimator_q31 *self, const pvid_kapitza_system_q31 *system,
-                                        const factors *factor)
+PVID_COLD static bool is_in_dead_zone(const pvid_kapitza_estimator_q31 *self, const pvid_kapitza_system_q31 *system,
+                                      const factors *factor)
 {
     solutions solution;
     const pvid_scaled_q31 unknown = {0, 0};
@@ -345,7 +346,7 @@ static int32_t reach_of(const pvid_kapitza_estimator_q31 *self, size_t a)
     return (int32_t)pvid_floor_shift_q31(pvid_product_q31(self->p[a], (int32_t)self->settings.step_limit), 16);
 }
 
-PVID_SELDOM static void take_long_step(pvid_kapitza_estimator_q31 *self, const int64_t dp[])
+PVID_COLD static void take_long_step(pvid_kapitza_estimator_q31 *self, const int64_t dp[])
 {
     pvid_solution_q31 solution = {.p = self->p};
     pvid_step_take_q31(&self->settings, self->p, dp, &solution);
@@ -401,7 +402,7 @@ PVID_APART static pvid_reason solve(pvid_kapitza_estimator_q31 *self)
     if (!is_excited(self, &factor)) {
         return pvid_count_held(&self->counters, PVID_HELD_NOT_EXCITED);
     }
-    if ((self->settings.dead_zone > 0u) && is_in_dead_zone(self, &system, &factor)) {
+    if ((PVID_DEAD_ZONE != 0) && (self->settings.dead_zone > 0u) && is_in_dead_zone(self, &system, &factor)) {
         pvid_count_up(&self->counters.at_rest);
         return PVID_UPDATED;
     }

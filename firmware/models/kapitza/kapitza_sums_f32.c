@@ -31,16 +31,20 @@ static inline float plus(float sum, four x)
     return (((sum + x.r0) + x.r1) + x.r2) + x.r3;
 }
 
-/* Adds x, x u, x u^2 .. to the n sums at `low`, the highest power first in memory. */
-PVID_ALWAYS_INLINE void add_powers(float low[], size_t n, four x, four u)
+/* Adds x, x u, x u^2 .. to the n sums that end with *end, the highest power first in memory; n is least .. most. */
+PVID_ALWAYS_INLINE void add_powers(float *end, size_t n, size_t least, size_t most, four x, four u)
 {
     four power = x;
+    *end = plus(*end, power);
     PVID_UNROLL
-    for (size_t i = n - 1u; i > 0u; i--) {
-        low[i] = plus(low[i], power);
+    for (size_t i = 1; i < most; i++) {
+        if ((i >= least) && (i == n)) {
+            break;
+        }
         power = times(power, u);
+        end--;
+        *end = plus(*end, power);
     }
-    low[0] = plus(low[0], power);
 }
 
 #define OF_ROWS(field) {rows[0].field, rows[1].field, rows[2].field, rows[3].field}
@@ -48,9 +52,9 @@ PVID_ALWAYS_INLINE void add_powers(float low[], size_t n, four x, four u)
 void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 rows[restrict], float low[restrict])
 {
     const four u = OF_ROWS(u);
-    const four a = OF_ROWS(a);
-    const four e = OF_ROWS(e);
-    const four y = OF_ROWS(y);
+    const four a = OF_ROWS(x[PVID_ROW_A]);
+    const four e = OF_ROWS(x[PVID_ROW_E]);
+    const four y = OF_ROWS(x[PVID_ROW_Y]);
     low[PVID_SUM_AA] = plus(low[PVID_SUM_AA], times(a, a));
     low[PVID_SUM_AE] = plus(low[PVID_SUM_AE], times(a, e));
     low[PVID_SUM_EE] = plus(low[PVID_SUM_EE], times(e, e));
@@ -59,16 +63,21 @@ void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 rows[restrict], float l
     low[PVID_SUM_YY] = plus(low[PVID_SUM_YY], times(y, y));
     low[PVID_SUM_WEIGHT] += (float)PVID_STRONG_ROWS;
     const four f2 = OF_ROWS(f2);
-    add_powers(&low[PVID_SUM_A2], 4, times(a, f2), u);
-    add_powers(&low[PVID_SUM_E2], 4, times(e, f2), u);
-    add_powers(&low[PVID_SUM_Y2], 4, times(y, f2), u);
     const four f0 = OF_ROWS(f0);
-    add_powers(&low[PVID_SUM_A0], 5, times(a, f0), u);
-    add_powers(&low[PVID_SUM_E0], 5, times(e, f0), u);
-    add_powers(&low[PVID_SUM_Y0], 5, times(y, f0), u);
-    add_powers(&low[PVID_SUM_K22], 7, times(f2, f2), u);
-    add_powers(&low[PVID_SUM_K20], 8, times(f2, f0), u);
-    add_powers(&low[PVID_SUM_K00], 9, times(f0, f0), u);
+    PVID_UNROLL_IF_FAST
+    for (size_t i = 0; i < 3u; i++) {
+        const four x = OF_ROWS(x[i]);
+        add_powers(&low[(PVID_SUM_A2 + 3u) + (4u * i)], 4, 4, 4, times(x, f2), u);
+        add_powers(&low[(PVID_SUM_A0 + 4u) + (5u * i)], 5, 5, 5, times(x, f0), u);
+    }
+    four x = times(f2, f2);
+    float *end = &low[PVID_SUM_K22 + 6u];
+    PVID_UNROLL_IF_FAST
+    for (size_t n = 7; n <= 9u; n++) {
+        add_powers(end, n, 7, 9, x, u);
+        x = (n == 7u) ? times(f2, f0) : times(f0, f0);
+        end = (n == 7u) ? &low[PVID_SUM_K20 + 7u] : &low[PVID_SUM_K00 + 8u];
+    }
 }
 
 /* Knuth's two-sum after forgetting: new high + new low = retention (high + low), but for the two products. */

@@ -3,6 +3,7 @@
 #include "strong_derivatives_f32.h"
 
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 
 /* Whether the bank has the weights of pvid_five_points_f32, wherever they are stored. */
 static bool is_five_points(const pvid_fir_bank_f32 *bank)
@@ -14,7 +15,7 @@ static bool is_five_points(const pvid_fir_bank_f32 *bank)
     return equal;
 }
 
-pvid_status pvid_strong_window_init_f32(pvid_strong_window_f32 *self, const pvid_strong_config_f32 *config)
+PVID_COLD pvid_status pvid_strong_window_init_f32(pvid_strong_window_f32 *self, const pvid_strong_config_f32 *config)
 {
     const pvid_status status = pvid_fir_bank_is_valid_f32(&config->bank, config->sample_rate_hz);
     if (status != PVID_OK) {
@@ -37,7 +38,7 @@ pvid_status pvid_strong_window_init_f32(pvid_strong_window_f32 *self, const pvid
     return PVID_OK;
 }
 
-void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self)
+PVID_COLD void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self)
 {
     const size_t places = (size_t)pvid_fir_places_f32(&self->bank);
     self->head = 0;
@@ -53,29 +54,26 @@ void pvid_strong_window_blocks_f32(pvid_strong_window_f32 *self, size_t head)
 {
     const size_t block = self->bank.block;
     float *tail = self->samples[self->length];
-    self->samples[head][0] = pvid_block_sum_f32(tail, 2, block, self->at, self->samples[head][0]);
-    self->samples[head][1] = pvid_block_sum_f32(&tail[1], 2, block, self->at, self->samples[head][1]);
+    for (size_t i = 0; i < 2u; i++) {
+        self->samples[head][i] = pvid_block_sum_f32(&tail[i], 2, block, self->at, self->samples[head][i]);
+    }
     self->at = pvid_block_next_f32(block, self->at);
 }
 
-void pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, pvid_strong_filters_f32 *phi,
-                                   pvid_strong_filters_f32 *y)
+/* Not inlined: one copy for both channels. */
+PVID_SELDOM pvid_strong_filters_f32 pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, size_t channel)
 {
     const size_t half = self->bank.half;
     const float *weight = self->bank.weights;
     pvid_fir_walk at = pvid_fir_centre_f32(self->bank.stride, self->length, self->head);
-    const float phi_middle = self->samples[at.newer][0];
-    const float y_middle = self->samples[at.newer][1];
+    const float middle = self->samples[at.newer][channel];
     pvid_fir_outwards(&at);
-    pvid_strong_filters_f32 of_phi =
-        pvid_strong_begin_f32(weight, half, phi_middle, self->samples[at.newer][0], self->samples[at.older][0]);
-    pvid_strong_filters_f32 of_y =
-        pvid_strong_begin_f32(weight, half, y_middle, self->samples[at.newer][1], self->samples[at.older][1]);
+    pvid_strong_filters_f32 sums =
+        pvid_strong_begin_f32(weight, half, middle, self->samples[at.newer][channel], self->samples[at.older][channel]);
     for (size_t i = 1; i < half; i++) {
         pvid_fir_outwards(&at);
-        pvid_strong_add_f32(&of_phi, &weight[i], half, self->samples[at.newer][0], self->samples[at.older][0]);
-        pvid_strong_add_f32(&of_y, &weight[i], half, self->samples[at.newer][1], self->samples[at.older][1]);
+        pvid_strong_add_f32(&sums, &weight[i], half, self->samples[at.newer][channel],
+                            self->samples[at.older][channel]);
     }
-    *phi = of_phi;
-    *y = of_y;
+    return sums;
 }

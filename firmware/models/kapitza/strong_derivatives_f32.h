@@ -57,9 +57,8 @@ static inline void pvid_strong_add_f32(pvid_strong_filters_f32 *self, const floa
     self->order4 += more.order4;
 }
 
-/* Both channels by the bank. */
-void pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, pvid_strong_filters_f32 *phi,
-                                   pvid_strong_filters_f32 *y);
+/* Channel 0, phi, or 1, y, by the bank. */
+pvid_strong_filters_f32 pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, size_t channel);
 
 /* Both channels by five points `stride` apart in a ring of `length` whose oldest sample is at head. */
 static inline void pvid_strong_five_points_f32(const pvid_strong_window_f32 *self, pvid_strong_filters_f32 *phi,
@@ -117,7 +116,8 @@ static inline bool pvid_strong_window_step_f32(pvid_strong_window_f32 *self, flo
         if (!pvid_strong_window_fills_f32(self)) {
             return false;
         }
-        pvid_strong_window_filter_f32(self, &of_phi, &of_y);
+        of_phi = pvid_strong_window_filter_f32(self, 0);
+        of_y = pvid_strong_window_filter_f32(self, 1);
         d_phi[0] = (of_phi.middle + of_phi.order0) * self->phi_scale[0];
     }
     d_phi[2] = of_phi.order2 * self->phi_scale[1];

@@ -53,7 +53,7 @@ static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *
                               GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
 }
 
-pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
+PVID_COLD pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
 {
     const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
@@ -94,11 +94,18 @@ void pvid_strong_read_sums_f32(const pvid_strong_f32 *self, float sums[])
 
 /* ---- the step of p ---- */
 
-/* Solves (S + H0) dp = rhs and moves p. */
-PVID_ALWAYS_INLINE pvid_reason solve(pvid_strong_estimator_f32 *self, const float s[6], const float rhs[3])
+/* What a row leads to. */
+typedef enum {
+    ROW_ALONE, /* a row in the sums */
+    AT_REST,   /* a solve within the dead zone */
+    SOLVE_DUE  /* a step of p from self->s and `rhs` */
+} due;
+
+/* Solves (S + H0) dp = rhs and moves p. In one place, for all schedules. */
+PVID_ALWAYS_INLINE pvid_reason solve(pvid_strong_estimator_f32 *self, const float rhs[3])
 {
     pvid_kapitza_factor_f32 factor;
-    pvid_reason reason = pvid_kapitza_factorise_f32(self, s, &factor);
+    pvid_reason reason = pvid_kapitza_factorise_f32(self, self->s, &factor);
     if (reason == PVID_UPDATED) {
         float dp[PVID_KAPITZA_P];
         pvid_kapitza_back_f32(&factor, rhs, dp);
@@ -107,70 +114,68 @@ PVID_ALWAYS_INLINE pvid_reason solve(pvid_strong_estimator_f32 *self, const floa
     return (reason == PVID_UPDATED) ? reason : pvid_count_held(&self->counters, reason);
 }
 
-/* The same as a function of its own, where it does not run at every row. */
-static PVID_SELDOM pvid_reason solve_apart(pvid_strong_estimator_f32 *self, const float s[6], const float rhs[3])
-{
-    return solve(self, s, rhs);
-}
-
-/* g F + (1 - g) sum C^T N e */
-static inline void mix(float gain, const float innovation[3], float force[3])
+/* to = g from + (1 - g) to: the forces of all rows, and those of the rows since the last projection */
+static inline void mix(float gain, const float from[3], float to[3])
 {
     const float rest = 1.0f - gain;
-    force[0] = (gain * force[0]) + (rest * innovation[0]);
-    force[1] = (gain * force[1]) + (rest * innovation[1]);
-    force[2] = (gain * force[2]) + (rest * innovation[2]);
+    to[0] = (gain * from[0]) + (rest * to[0]);
+    to[1] = (gain * from[1]) + (rest * to[1]);
+    to[2] = (gain * from[2]) + (rest * to[2]);
 }
 
-/* A solve with a dead zone is always exact and needs the residuals. */
-static PVID_SELDOM pvid_reason solve_in_zone(pvid_strong_estimator_f32 *self, const float g[3], float e,
-                                             const float innovation[3])
+/* A solve with a dead zone is always exact and needs the residuals. rhs: the innovation, which becomes the right-hand
+ * side. */
+static PVID_COLD due solve_in_zone(pvid_strong_estimator_f32 *self, const float g[3], float e, float rhs[3])
 {
-    float s[6];
     float force[PVID_KAPITZA_P];
-    float x[PVID_KAPITZA_P];
     pvid_kapitza_residual_f32 residual;
     pvid_kapitza_factor_f32 factor;
-    pvid_kapitza_gather_f32(self, s, force, &residual);
-    pvid_kapitza_add_squares_f32(g, s);
+    pvid_kapitza_gather_f32(self, self->s, force, &residual);
+    pvid_kapitza_add_squares_f32(g, self->s);
     pvid_kapitza_add_products_f32(g, e, force);
     residual.rss += e * e;
     residual.weight += 1.0f;
-    if (pvid_kapitza_factorise_f32(self, s, &factor) == PVID_UPDATED) {
+    if (pvid_kapitza_factorise_f32(self, self->s, &factor) == PVID_UPDATED) {
+        float x[PVID_KAPITZA_P];
         pvid_kapitza_back_f32(&factor, force, x);
         const float square = ((force[0] * x[0]) + (force[1] * x[1])) + (force[2] * x[2]);
         if (pvid_kapitza_is_at_rest_f32(self, square, &residual)) {
             pvid_count_up(&self->counters.at_rest);
-            return PVID_UPDATED;
+            return AT_REST;
         }
     }
-    mix(self->gain, innovation, force);
-    return solve_apart(self, s, force);
+    mix(self->gain, force, rhs);
+    return SOLVE_DUE;
 }
 
 /* A row with divider 1: a solve, from all sums at every exact_every-th row. */
-PVID_ALWAYS_INLINE pvid_reason step_at_every_row(pvid_strong_estimator_f32 *self, const float g[3], float e)
+PVID_ALWAYS_INLINE due step_at_every_row(pvid_strong_estimator_f32 *self, const float g[3], float e, float rhs[3])
 {
-    float rhs[PVID_KAPITZA_P] = {g[0] * e, g[1] * e, g[2] * e};
     uint32_t phase = self->phase;
+    rhs[0] = g[0] * e;
+    rhs[1] = g[1] * e;
+    rhs[2] = g[2] * e;
     if (phase == 0u) {
         phase = self->exact_every;
-        if (phase == 0u) {
-            const float innovation[PVID_KAPITZA_P] = {rhs[0], rhs[1], rhs[2]};
+        if ((PVID_DEAD_ZONE != 0) && (phase == 0u)) {
             const float gradient[PVID_KAPITZA_P] = {g[0], g[1], g[2]};
-            return solve_in_zone(self, gradient, e, innovation);
+            float zone[PVID_KAPITZA_P] = {rhs[0], rhs[1], rhs[2]};
+            const due next = solve_in_zone(self, gradient, e, zone);
+            rhs[0] = zone[0];
+            rhs[1] = zone[1];
+            rhs[2] = zone[2];
+            return next;
         }
         float force[PVID_KAPITZA_P];
         pvid_kapitza_gather_f32(self, self->s, force, NULL);
-        const float gain = self->gain;
-        const float rest = 1.0f - gain;
-        rhs[0] = (gain * (force[0] + rhs[0])) + (rest * rhs[0]);
-        rhs[1] = (gain * (force[1] + rhs[1])) + (rest * rhs[1]);
-        rhs[2] = (gain * (force[2] + rhs[2])) + (rest * rhs[2]);
+        force[0] += rhs[0];
+        force[1] += rhs[1];
+        force[2] += rhs[2];
+        mix(self->gain, force, rhs);
     }
     self->phase = (uint16_t)(phase - 1u);
     pvid_kapitza_add_squares_f32(g, self->s);
-    return solve(self, self->s, rhs);
+    return SOLVE_DUE;
 }
 
 /* Rows of a staged round, by their number from 1; the last has number 0. */
@@ -195,25 +200,26 @@ static PVID_SELDOM void fold_in_stages(pvid_strong_estimator_f32 *self)
     }
 }
 
-/* S and F from all rows at this row; the sum of C^T N e begins anew. With a dead zone the solve as well. */
-static PVID_SELDOM pvid_reason project(pvid_strong_estimator_f32 *self, const float g[3], float e)
+/* S and the right-hand side from all rows at this row; the sum of C^T N e begins anew. */
+static PVID_SELDOM due project(pvid_strong_estimator_f32 *self, const float g[3], float e)
 {
-    const float innovation[PVID_KAPITZA_P] = {self->innovation[0], self->innovation[1], self->innovation[2]};
-    self->innovation[0] = 0.0f;
-    self->innovation[1] = 0.0f;
-    self->innovation[2] = 0.0f;
-    if (self->dead_zone > 0.0f) {
-        return solve_in_zone(self, g, e, innovation);
+    float force[PVID_KAPITZA_P];
+    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
+        self->force[a] = self->innovation[a];
+        self->innovation[a] = 0.0f;
     }
-    pvid_kapitza_gather_f32(self, self->s, self->force, NULL);
+    if ((PVID_DEAD_ZONE != 0) && (self->dead_zone > 0.0f)) {
+        return solve_in_zone(self, g, e, self->force);
+    }
+    pvid_kapitza_gather_f32(self, self->s, force, NULL);
     pvid_kapitza_add_squares_f32(g, self->s);
-    pvid_kapitza_add_products_f32(g, e, self->force);
-    mix(self->gain, innovation, self->force);
-    return (self->staged != 0u) ? PVID_ACCUMULATED : solve_apart(self, self->s, self->force);
+    pvid_kapitza_add_products_f32(g, e, force);
+    mix(self->gain, force, self->force);
+    return (self->staged != 0u) ? ROW_ALONE : SOLVE_DUE;
 }
 
-/* A row with a divider above 1. */
-PVID_ALWAYS_INLINE pvid_reason step_at_divider(pvid_strong_estimator_f32 *self, const float g[3], float e)
+/* A row with a divider above 1; a right-hand side is in self->force. */
+PVID_ALWAYS_INLINE due step_at_divider(pvid_strong_estimator_f32 *self, const float g[3], float e)
 {
     const uint32_t next = (uint32_t)self->phase + 1u;
     const uint32_t phase = (next == self->divider) ? 0u : next;
@@ -226,12 +232,31 @@ PVID_ALWAYS_INLINE pvid_reason step_at_divider(pvid_strong_estimator_f32 *self, 
         return project(self, gradient, e);
     }
     if (phase == SOLUTION) {
-        return (self->staged != 0u) ? solve_apart(self, self->s, self->force) : PVID_ACCUMULATED;
+        return (self->staged != 0u) ? SOLVE_DUE : ROW_ALONE;
     }
     if ((phase - FIRST_FOLD) < FOLDS) {
         fold_in_stages(self);
     }
-    return PVID_ACCUMULATED;
+    return ROW_ALONE;
+}
+
+/* A row in either schedule. */
+PVID_ALWAYS_INLINE pvid_reason step(pvid_strong_estimator_f32 *self, const float g[3], float e)
+{
+    float rhs[PVID_KAPITZA_P];
+    due next;
+    if (self->divider == 1u) {
+        next = step_at_every_row(self, g, e, rhs);
+    } else {
+        next = step_at_divider(self, g, e);
+        if (next == ROW_ALONE) {
+            return PVID_ACCUMULATED;
+        }
+        rhs[0] = self->force[0];
+        rhs[1] = self->force[1];
+        rhs[2] = self->force[2];
+    }
+    return ((PVID_DEAD_ZONE != 0) && (next == AT_REST)) ? PVID_UPDATED : solve(self, rhs);
 }
 
 /* ---- rows ---- */
@@ -249,16 +274,17 @@ static inline void end_block(pvid_strong_estimator_f32 *self)
 }
 
 /* Why a row is refused whose squares exceed the limit; counts it. */
-static PVID_SELDOM pvid_reason refuse(pvid_counters *counters, const pvid_strong_row_f32 *row)
+static PVID_COLD pvid_reason refuse(pvid_counters *counters, const pvid_strong_row_f32 *row)
 {
-    const bool finite = pvid_finite_f32(row->y) && pvid_finite_f32(row->a) && pvid_finite_f32(row->e) &&
-                        pvid_finite_f32(row->f2) && pvid_finite_f32(row->f0) && pvid_finite_f32(row->u);
+    const bool finite = pvid_finite_f32(row->x[PVID_ROW_A]) && pvid_finite_f32(row->x[PVID_ROW_E]) &&
+                        pvid_finite_f32(row->x[PVID_ROW_Y]) && pvid_finite_f32(row->f2) && pvid_finite_f32(row->f0) &&
+                        pvid_finite_f32(row->u);
     pvid_count_up(finite ? &counters->rejected_saturated : &counters->rejected_not_finite);
     return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
 }
 
 /* Counts an update during the alarm. */
-static PVID_SELDOM pvid_reason misfit(pvid_counters *counters)
+static PVID_COLD pvid_reason misfit(pvid_counters *counters)
 {
     pvid_count_up(&counters->misfits);
     return PVID_MISFIT;
@@ -294,8 +320,7 @@ PVID_ALWAYS_INLINE pvid_reason take(pvid_strong_f32 *self, const float phi[PVID_
         return refuse(&estimator->counters, &estimator->block[place]);
     }
     pvid_count_up(&estimator->counters.rows);
-    const pvid_reason reason =
-        (estimator->divider == 1u) ? step_at_every_row(estimator, g, e) : step_at_divider(estimator, g, e);
+    const pvid_reason reason = step(estimator, g, e);
     if (place < (PVID_STRONG_ROWS - 1u)) {
         estimator->in_block = (uint8_t)(place + 1u);
         judge_misfit(self);

@@ -10,6 +10,7 @@
 #include "number/integer_q31.h"
 #include "judge/misfit_q31.h"
 #include "number/scaled_q31.h"
+#include "number/unroll.h"
 
 #define SHIFT_MAX 62u
 #define DERIVATIVE_LIMIT_BITS 30u /* of PVID_DERIVATIVE_LIMIT_Q31 */
@@ -90,7 +91,7 @@ static pvid_status prepare(pvid_strong_q31 *self, const pvid_strong_config_q31 *
                               gate_floor(&self->estimator));
 }
 
-pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
+PVID_COLD pvid_status pvid_strong_init_q31(pvid_strong_q31 *self, const pvid_strong_config_q31 *config)
 {
     const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);

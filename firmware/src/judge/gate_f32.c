@@ -5,12 +5,13 @@
 #include <stddef.h>
 
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 
 #define GROWTH 9.21034f /* ln 1e4: consecutive outliers multiply the scale by 1e4 within patience_s */
 #define WIDEST 1.0e3f   /* largest relative growth of the scale by one outlier */
 
-pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *config, float rate_hz, float memory,
-                               float floor)
+PVID_COLD pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *config, float rate_hz,
+                                         float memory, float floor)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
     if ((self == NULL) || (config == NULL)) {

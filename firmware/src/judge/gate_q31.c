@@ -4,6 +4,7 @@
 
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
+#include "number/unroll.h"
 
 #define SIGMAS_MIN ((uint32_t)2 << 16)
 #define SIGMAS_MAX ((uint32_t)1000 << 16)
@@ -14,8 +15,8 @@
 /* Largest scale, 2^100 [square of a residual]: far beyond any accepted row. */
 static const pvid_scaled_q31 scale_max = {(int32_t)1 << 29, 71};
 
-pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *config, uint32_t memory,
-                               pvid_scaled_q31 floor)
+PVID_COLD pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *config, uint32_t memory,
+                                         pvid_scaled_q31 floor)
 {
     PVID_ASSERT((self != NULL) && (config != NULL));
     if ((self == NULL) || (config == NULL)) {

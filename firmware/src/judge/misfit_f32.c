@@ -5,6 +5,7 @@
 #include <stddef.h>
 
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 #include "pvid/config.h"
 
 #define UNKNOWN 1.0e35f   /* least_rss and least_part before the first block: above any block's */
@@ -14,7 +15,7 @@
 /* least_rss and least_part are forgotten four times as slowly as the sums. */
 #define SLOWER 4.0f
 
-void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting_s)
+PVID_COLD void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting_s)
 {
     PVID_ASSERT(self != NULL);
     const float rows = PVID_MISFIT_BLOCK_S * rate_hz;
@@ -36,7 +37,7 @@ static float least_of(float least, float growth, float now)
     return (now < risen) ? now : risen;
 }
 
-bool pvid_misfit_judge_f32(pvid_misfit_f32 *self)
+PVID_COLD bool pvid_misfit_judge_f32(pvid_misfit_f32 *self)
 {
     PVID_ASSERT(self != NULL);
     bool misfit = false;

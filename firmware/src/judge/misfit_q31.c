@@ -5,6 +5,7 @@
 #include "number/integer_q31.h"
 #include "pvid/config.h"
 #include "number/scaled_q31.h"
+#include "number/unroll.h"
 
 #define BLOCK_S 4u           /* PVID_MISFIT_BLOCK_S */
 #define ROWS_MAX 65535u      /* of a block */
@@ -30,7 +31,7 @@ static void begin_block(pvid_misfit_q31 *self)
 
 /* The quietest block is forgotten four times as slowly as the sums: in a block of four seconds it grows by one
  * second over the time constant. */
-void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups)
+PVID_COLD void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups)
 {
     PVID_ASSERT(self != NULL);
     self->growth = pvid_scaled_of_q31(1, 0);

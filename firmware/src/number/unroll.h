@@ -1,6 +1,8 @@
-/* Loop unrolling, which gcc does at -O2 only on request. Changes no result. */
+/* Loop unrolling, which gcc does at -O2 only on request, and functions that are for little flash. Changes no result. */
 #ifndef PVID_UNROLL_H
 #define PVID_UNROLL_H
+
+#include "pvid/config.h"
 
 /* Before a loop of constant length: writes it out, where the loop's own bookkeeping costs more than the two
  * operations inside. */
@@ -22,6 +24,19 @@
 #define PVID_ALWAYS_INLINE static inline
 #endif
 
+/* Before a loop whose turns are long, and instead of `static inline` of a function with several callers: written out
+ * at every place, but with PVID_SMALL once. */
+#if !PVID_SMALL
+#define PVID_UNROLL_IF_FAST PVID_UNROLL
+#define PVID_INLINE_IF_FAST PVID_ALWAYS_INLINE
+#elif defined(__GNUC__) && (__GNUC__ >= 8) && !defined(__clang__)
+#define PVID_UNROLL_IF_FAST _Pragma("GCC unroll 1")
+#define PVID_INLINE_IF_FAST static __attribute__((noinline, unused))
+#else
+#define PVID_UNROLL_IF_FAST
+#define PVID_INLINE_IF_FAST static inline
+#endif
+
 /* Before a function whose results go through memory on purpose: inlined, gcc keeps 32-bit numbers as 64 and multiplies
  * them so. */
 #if defined(__GNUC__)
@@ -35,6 +50,13 @@
 #define PVID_SELDOM __attribute__((noinline))
 #else
 #define PVID_SELDOM
+#endif
+
+/* Before a function that runs once, or at one tick of hundreds: compiled for little flash. */
+#if defined(__GNUC__)
+#define PVID_COLD __attribute__((noinline, cold))
+#else
+#define PVID_COLD
 #endif
 
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "number/integer_q31.h"
+#include "number/unroll.h"
 
 #define BLOCK_MAX 64u
 #define SUM_LOW ((int64_t)1 << 54)
@@ -25,7 +26,7 @@ static int32_t decay(uint32_t block, uint32_t groups)
     return (int32_t)((sum > KEEP) ? KEEP : sum);
 }
 
-int32_t pvid_information_retention_q31(uint32_t forgetting_groups, uint16_t *block)
+PVID_COLD int32_t pvid_information_retention_q31(uint32_t forgetting_groups, uint16_t *block)
 {
     *block = BLOCK_MAX;
     if (forgetting_groups == 0u) {

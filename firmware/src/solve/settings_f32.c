@@ -6,6 +6,22 @@
 #include "solve/settings_f32.h"
 
 #include "number/finite_f32.h"
+#include "number/unroll.h"
+
+#define GROUPS_MIN 4.0f
+
+/* What a setting may be, in the order of `values` below. */
+static const struct {
+    float least;
+    float most;
+    pvid_status status;
+} ranges[] = {
+    {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD},  {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE},
+    {0.0f, 1.0e12f, PVID_BAD_FORGETTING},  {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING},
+    {0.0f, 1.0e12f, PVID_BAD_FEEDBACK},    {1.0f, 1.0e6f, PVID_BAD_CORRELATION},
+    {1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT},  {0.0f, 0.999f, PVID_BAD_KAPPA_MIN},
+    {0.0f, 1.0e6f, PVID_BAD_NOISE_MARGIN}, {0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f, PVID_BAD_DEAD_ZONE},
+};
 
 static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive)
 {
@@ -26,40 +42,22 @@ static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config,
     return PVID_OK;
 }
 
-pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive,
-                                        float update_rate_hz)
+PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config, size_t n_p,
+                                                  uint32_t positive, float update_rate_hz)
 {
     const pvid_status parameters = parameters_are_valid(config, n_p, positive);
     if (parameters != PVID_OK) {
         return parameters;
     }
-    if (!pvid_within_f32(config->row_sd, 1.0e-12f, 1.0e12f)) {
-        return PVID_BAD_ROW_SD;
-    }
-    if (!pvid_within_f32(update_rate_hz, 1.0e-6f, 1.0e6f)) {
-        return PVID_BAD_UPDATE_RATE;
-    }
-    const float groups = config->forgetting_s * update_rate_hz;
-    if (!pvid_within_f32(config->forgetting_s, 0.0f, 1.0e12f) || ((config->forgetting_s > 0.0f) && (groups < 4.0f))) {
-        return PVID_BAD_FORGETTING;
-    }
-    if (!pvid_within_f32(config->feedback_hz, 0.0f, 1.0e12f)) {
-        return PVID_BAD_FEEDBACK;
-    }
-    if (!pvid_within_f32(config->correlation, 1.0f, 1.0e6f)) {
-        return PVID_BAD_CORRELATION;
-    }
-    if (!pvid_within_f32(config->step_limit, 1.0e-6f, 0.9f)) {
-        return PVID_BAD_STEP_LIMIT;
-    }
-    if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
-        return PVID_BAD_KAPPA_MIN;
-    }
-    if (!pvid_within_f32(config->noise_margin, 0.0f, 1.0e6f)) {
-        return PVID_BAD_NOISE_MARGIN;
-    }
-    if (!pvid_within_f32(config->dead_zone, 0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f)) {
-        return PVID_BAD_DEAD_ZONE;
+    /* fewer than four groups in the time constant of forgetting are none */
+    const float groups = (config->forgetting_s > 0.0f) ? (config->forgetting_s * update_rate_hz) : GROUPS_MIN;
+    const float values[] = {config->row_sd,       update_rate_hz,      config->forgetting_s, groups,
+                            config->feedback_hz,  config->correlation, config->step_limit,   config->kappa_min,
+                            config->noise_margin, config->dead_zone};
+    for (size_t i = 0; i < (sizeof values / sizeof values[0]); i++) {
+        if (!pvid_within_f32(values[i], ranges[i].least, ranges[i].most)) {
+            return ranges[i].status;
+        }
     }
     if ((config->law != PVID_LAW_STATIONARY) && (config->law != PVID_LAW_PSEUDOVELOCITY)) {
         return PVID_BAD_LAW;
@@ -67,7 +65,7 @@ pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config,
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
 }
 
-float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float update_rate_hz, float interval)
+PVID_COLD float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float update_rate_hz, float interval)
 {
     if (config->law == PVID_LAW_PSEUDOVELOCITY) {
         return 0.0f;
@@ -78,7 +76,7 @@ float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float upda
 
 /* exp(-x), 0 <= x <= 4, by the series of exp(x): the core has no libm but sqrtf. Accurate to a few
  * ulp; called once, in init. */
-float pvid_settings_decay_f32(float x)
+PVID_COLD float pvid_settings_decay_f32(float x)
 {
     float sum = 1.0f;
     for (size_t k = 24; k > 0u; k--) {

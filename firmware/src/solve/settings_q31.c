@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "number/integer_q31.h"
+#include "number/unroll.h"
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
 
@@ -29,7 +30,8 @@ static pvid_status parameters_are_valid(const pvid_estimator_config_q31 *config,
     return PVID_OK;
 }
 
-pvid_status pvid_settings_are_valid_q31(const pvid_estimator_config_q31 *config, uint8_t n_p, uint32_t positive)
+PVID_COLD pvid_status pvid_settings_are_valid_q31(const pvid_estimator_config_q31 *config, uint8_t n_p,
+                                                  uint32_t positive)
 {
     const pvid_status parameters = parameters_are_valid(config, n_p, positive);
     if (parameters != PVID_OK) {
@@ -66,8 +68,8 @@ pvid_status pvid_settings_are_valid_q31(const pvid_estimator_config_q31 *config,
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
 }
 
-void pvid_settings_init_q31(pvid_solve_settings_q31 *self, const pvid_estimator_config_q31 *config, uint8_t n_p,
-                            uint32_t positive)
+PVID_COLD void pvid_settings_init_q31(pvid_solve_settings_q31 *self, const pvid_estimator_config_q31 *config,
+                                      uint8_t n_p, uint32_t positive)
 {
     memcpy(self->p_bits, config->p_bits, sizeof self->p_bits);
     for (size_t i = 0; i < n_p; i++) {

@@ -7,6 +7,7 @@
 #include "strong/differentiator_f32.h"
 #include "number/init.h"
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 #include "strong/fir_window.h"
 
 const float pvid_five_points_f32[PVID_ORDERS * 2] = {
@@ -17,13 +18,13 @@ const float pvid_five_points_f32[PVID_ORDERS * 2] = {
     -4.0f,         1.0f,          /* order 4 */
 };
 
-uint32_t pvid_fir_places_f32(const pvid_fir_bank_f32 *bank)
+PVID_COLD uint32_t pvid_fir_places_f32(const pvid_fir_bank_f32 *bank)
 {
     const uint32_t points = (2u * (uint32_t)bank->half * bank->stride) + 1u;
     return (bank->block > 1u) ? (points + bank->block + PVID_BLOCK_SUMS) : points;
 }
 
-pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, float sample_rate_hz)
+PVID_COLD pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, float sample_rate_hz)
 {
     const pvid_status window = pvid_fir_window(bank->half, bank->stride);
     if (window != PVID_OK) {
@@ -43,7 +44,7 @@ pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, float samp
     return pvid_within_f32(sample_rate_hz, 1.0e-3f, 1.0e6f) ? PVID_OK : PVID_BAD_SAMPLE_RATE;
 }
 
-void pvid_fir_take_bank_f32(pvid_fir_bank_f32 *own, const pvid_fir_bank_f32 *bank)
+PVID_COLD void pvid_fir_take_bank_f32(pvid_fir_bank_f32 *own, const pvid_fir_bank_f32 *bank)
 {
     /* One by one: the padding of a copied struct would be that of the caller's, and end in snapshots. */
     own->half = bank->half;
@@ -70,14 +71,14 @@ static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f3
     return PVID_OK;
 }
 
-pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
-                                         float sample_rate_hz)
+PVID_COLD pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
+                                                   float sample_rate_hz)
 {
     const pvid_status status = pvid_init_is_given(self, bank) ? prepare(self, bank, sample_rate_hz) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
 }
 
-void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
+PVID_COLD void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 {
     const size_t places = (size_t)pvid_fir_places_f32(&self->bank);
     self->head = 0;

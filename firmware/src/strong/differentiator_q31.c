@@ -157,13 +157,13 @@ static pvid_status prepare(pvid_differentiator_q31 *self, const pvid_fir_bank_q3
     return PVID_OK;
 }
 
-pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
+PVID_COLD pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
 {
     const pvid_status status = pvid_init_is_given(self, bank) ? prepare(self, bank) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
 }
 
-void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self)
+PVID_COLD void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self)
 {
     const size_t places = (size_t)places_of(&self->bank);
     self->head = 0;

@@ -277,8 +277,8 @@ def parse_report(text: str) -> ReplayReport:
 def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None = None) -> tuple[Path, Path]:
     """Builds the replay image of `run` for a board under build/targets; returns (image, build tree).
 
-    The strong form's windows are as long as its five points, so that its state is what a board would hold; `macros`
-    of pvid/config.h come on top.
+    The strong form's windows are as long as its five points, so that its state is what a board would hold, and it has
+    a dead zone only if the run has one; `macros` of pvid/config.h come on top.
     """
     samples = None
     if run.ticks >= MANY_TICKS:
@@ -295,6 +295,8 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
     keep_header(folder, "replay_run.h", text)
     options = {"PVID_REPLAY_RUN": str(folder), "PVID_LEAVE_OUT": left_out(run.form, run.core)}
     options |= case_of(run.config).sizes(run.config, exact=target.toolchain == "avr")
+    if run.form == "strong":
+        options["PVID_DEAD_ZONE"] = str(int(run.config.estimator.dead_zone > 0))
     options |= macros or {}
     suffix = "".join(f"-{macro}-{value}" for macro, value in (macros or {}).items())
     tree = build(target, BUILD / f"{target.name}-{name}{suffix}", options)

@@ -100,7 +100,7 @@ def _bytes_of(map_text: str, name: str, source: str) -> int:
 
 CORE = r"libpvid\.a\("  # in the linker's map: objects of the core
 _MODEL = r"_weak_(f32|q31)\.c"  # what is generated of a mechanism
-_ARITHMETIC = r"libgcc\.a\(|libm\.a\(|libc\.a\(|freestanding/"
+ARITHMETIC = r"libgcc\.a\(|libm\.a\(|libc\.a\(|freestanding/"
 CODE = r"\.text|\.s?rodata"  # sections
 
 
@@ -156,7 +156,7 @@ def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, R
     report = play(board, built.image, TIMEOUT_S)
     footprint = Footprint(
         text=sum(_bytes_of(map_text, *one) for one in built.code),
-        arithmetic=_bytes_of(map_text, CODE, _ARITHMETIC),
+        arithmetic=_bytes_of(map_text, CODE, ARITHMETIC),
         tables=sum(_bytes_of(map_text, *one) for one in built.tables),
         data=_bytes_of(map_text, r"\.s?data", CORE),
         bss=_bytes_of(map_text, r"\.s?bss|COMMON", CORE) + report.state_bytes,

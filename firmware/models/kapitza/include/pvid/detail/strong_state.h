@@ -7,13 +7,14 @@
 #define PVID_STRONG_SUMS 58 /* distinct entries of M, B, sum Y^2 and the weight */
 #define PVID_STRONG_ROWS 4  /* rows of a block */
 
+/* Places in pvid_strong_row_f32.x. */
+enum { PVID_ROW_A = 0, PVID_ROW_E = 1, PVID_ROW_Y = 2 };
+
 /* A row of the strong form by its factors (theory.md 2). */
 typedef struct {
-    float a;  /* N_1 */
-    float e;  /* N_2 = -phi'''' */
-    float y;  /* Y */
-    float f2; /* -phi'' */
-    float f0; /* -phi */
+    float x[3]; /* A = N_1, E = N_2 = -phi'''', Y */
+    float f2;   /* -phi'' */
+    float f0;   /* -phi */
     float u;
 } pvid_strong_row_f32;
 
