@@ -33,16 +33,16 @@ typedef enum {
     PVID_BAD_PUBLISH_KAPPA, /* kappa_min of trust.h not finite or outside [0, 1) */
     PVID_BAD_SE_MAX,        /* not finite or not positive */
     PVID_BAD_MISFIT_MAX,    /* not finite, or neither 0 nor at least 1 */
-    PVID_BAD_ANGLE_LIMIT,   /* not finite or negative */
+    PVID_BAD_ANGLE_LIMIT,   /* range of a signal: not finite or not positive */
     PVID_BAD_GATE_SIGMAS,   /* not finite, or neither 0 nor 2..1e3 */
     PVID_BAD_GATE_PATIENCE, /* not finite or outside 0..1e12 s */
     PVID_BAD_DEAD_ZONE,     /* not finite or outside 0..100 */
     PVID_BAD_HALF,          /* of a bank: below 2, or a window over PVID_MAX_WINDOW for every stride */
     PVID_BAD_STRIDE,        /* of a bank: 0, or a window with its block over PVID_MAX_WINDOW */
     PVID_BAD_CENTRE,        /* of a q31 bank: outside 1..2^30 */
-    PVID_BAD_TAPS,          /* of a design: even, or outside 5..PVID_MAX_TAPS */
+    PVID_BAD_TAPS,          /* filters of a design: longer than PVID_MAX_RING holds */
     PVID_BAD_DECIMATION,    /* of a design: outside 1..PVID_MAX_DECIMATION */
-    PVID_BAD_WINDOW,        /* of a design: even, or outside 9..PVID_MAX_WEAK_WINDOW */
+    PVID_BAD_WINDOW,        /* hop of a design: too short for its work, or too long */
     PVID_BAD_FUNCTIONS,     /* of a design: outside 4..PVID_MAX_FUNCTIONS */
     PVID_BAD_OVERLAP,       /* of a design: not finite or below 1 */
     PVID_BAD_FULL_SCALE,   /* phi_max, y_max or u_max of a q31 bank or design: not positive, too large, or too large for
