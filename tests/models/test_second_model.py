@@ -26,7 +26,8 @@ from pvid.log.values import Values, tables_of
 from pvid.models.model import Channel, Constant, Constants, Float, Mechanism, Model, Parameter, Quantity, Scale
 from pvid.rig.file import RigFile
 from pvid.run import answer
-from pvid.run.identify import ErrorParts, Identification, Publications, Trajectory, identify
+from pvid.run.engine_identify import identify_by_engine
+from pvid.run.identify import ErrorParts, Identification, Publications, Trajectory
 from pvid.show import figures
 from pvid.show.models_table import models_table
 from pvid.show.view import LiveView
@@ -70,7 +71,7 @@ NAMES = ["res", "ind", "a", "b", "i0"]
 
 
 @pytest.fixture
-def result(native: Native) -> Identification:
+def result() -> Identification:
     """What an identification of the motor would give."""
     p, covariance = np.array([200.0, 100.0]), np.diag([4.0, 1.0])
     names = (*MOTOR.physical_names, *MOTOR.p_names)
@@ -78,7 +79,7 @@ def result(native: Native) -> Identification:
     errors = [*MECHANISM.physical_errors(p, covariance), 2.0, 1.0, 0.01]
     t = np.linspace(0, 1, 5)
     made = replace(
-        identify(simulate(duration=8.0).run, RigFile.standard(), native),
+        identify_by_engine(simulate(duration=8.0).run, RigFile.standard()),
         model=MOTOR,
         value={name: float(one) for name, one in value.items()},
         se={name: float(one) for name, one in zip(names, errors, strict=True)},

@@ -10,14 +10,13 @@ import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native
 from pvid.design.second_derivative import second_derivative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.answer import as_json, refinement_line
-from pvid.run.identify import identify
+from pvid.run.engine_identify import identify_by_engine
 from pvid.run.refined import Cut, Prior
 from pvid.run.refined_identify import refined_identification
 from pvid.run.refined_kernel import kernel_of
@@ -122,8 +121,7 @@ def test_the_quantities_of_a_pass_are_exposed_and_agree_with_one_another() -> No
 
 @cache
 def answers() -> tuple[RigFile, object]:
-    native = Native()
-    return rig(), identify(run_of(), rig(), native)
+    return rig(), identify_by_engine(run_of(), rig())
 
 
 def test_identify_takes_the_refined_answer_where_the_weak_one_is_refused() -> None:
