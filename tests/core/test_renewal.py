@@ -2,48 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from pvid.core.native import Native
-from pvid.models.kapitza import MODEL
-from pvid.rig.file import RigFile
-from pvid.rig.run import Run
-from pvid.run.identify import identify
-from pvid.settings.f32 import TrustConfig
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+from bench.board_engine import BoardEngine, FixedBoard, FloatBoard, board_of
+from bench.pendulum import RIGS, design_for, model_for
+from pvid.sim.pendulum import STANDARD_PENDULUM
 
-RIG = RigFile.standard()
-POOR = STANDARD_PENDULUM.linear * np.array([0.6, 1.6, 0.6])
-
-
-@pytest.fixture(scope="module")
-def disturbed() -> Run:
-    """30 s of the standard rig at 14 bits whose encoder is off by a twentieth of the angle in the first 3 s."""
-    run = simulate(sensors=standard_sensors(14), truth="linear", duration=30.0, seed=3).run
-    phi = run.phi.copy()
-    phi[:3000] *= 1 + 0.05 * np.sin(2 * np.pi * 1.7 * run.t[:3000])
-    return replace(run, phi=phi)
+RIG = RIGS[1]
+TRUTH = STANDARD_PENDULUM.linear
+POOR = TRUTH * np.array([0.6, 1.6, 0.6])
+SECONDS = 30
+RENEWAL = 0.2
 
 
-def worst(native: Native, run: Run, core: str, renewal: float, monkeypatch: pytest.MonkeyPatch) -> float:
-    """Largest relative error of w, d1, d2 after a run from a poor start."""
-    monkeypatch.setattr("pvid.setup.f32.TrustConfig", lambda: TrustConfig(renewal=renewal))
-    rig = replace(RIG, identifier=replace(RIG.identifier, core=core, full_angle=False, survey=False))  # type: ignore[arg-type]
-    result = identify(run, rig, native, start=POOR)
-    assert result.identified
-    pairs = zip(MODEL.mapped_names, STANDARD_PENDULUM.linear, strict=True)
-    return max(float(abs(result.value[name] / p - 1)) for name, p in pairs)
+@lru_cache
+def float_board() -> FloatBoard:
+    board = board_of(model_for(RIG), RIG.signals(0), design_for(RIG), np.append(TRUTH, 0.0), "f32")
+    assert isinstance(board, FloatBoard)
+    return board
 
 
-@pytest.mark.parametrize("core", ["f32", "q31", "f64"])
-def test_rows_that_do_not_fit_where_p_went_are_forgotten(
-    native: Native, disturbed: Run, core: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    kept = worst(native, disturbed, core, 0.0, monkeypatch)
-    renewed = worst(native, disturbed, core, 0.2, monkeypatch)
+def in_float32(renewal: float) -> FloatBoard:
+    config = float_board().config
+    return replace(float_board(), config=replace(config, trust=replace(config.trust, renewal=renewal)))
+
+
+@lru_cache
+def fixed_board() -> FixedBoard:
+    board = board_of(model_for(RIG), RIG.signals(0), design_for(RIG), np.append(TRUTH, 0.0), "q31")
+    assert isinstance(board, FixedBoard)
+    return board
+
+
+def in_fixed_point(renewal: float) -> FixedBoard:
+    engine = fixed_board().engine
+    trust = replace(engine.config.trust, renewal=round(renewal * 2**16))
+    return replace(fixed_board(), engine=replace(engine, config=replace(engine.config, trust=trust)))
+
+
+@pytest.mark.parametrize("board_with", [in_float32, in_fixed_point])
+def test_rows_that_do_not_fit_where_p_went_are_forgotten(board_with: Callable[[float], BoardEngine]) -> None:
+    """30 s at 14 bits whose encoder is off by a twentieth of the angle in the first 3 s."""
+    run = {name: x[: 1000 * SECONDS] for name, x in RIG.signals(3).items()}
+    phi = run["phi"].copy()
+    phi[:3000] *= 1 + 0.05 * np.sin(2 * np.pi * 1.7 * np.arange(3000) / 1000)
+    found = [board_with(renewal).answer(run | {"phi": phi}, np.append(POOR, 0.0)) for renewal in (0.0, RENEWAL)]
+    kept, renewed = (float(np.abs(one.p[:3] / TRUTH - 1).max()) for one in found)
+    assert all(one.published for one in found)
     # what is left of the disturbed seconds is a hundredth; the run's own noise is good for 2e-4
     assert kept > 1e-3
     assert renewed < 4e-4

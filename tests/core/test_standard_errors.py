@@ -2,39 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from pvid.core.native import Native
-from pvid.rig.file import Nominal, RigFile
-from pvid.run.identify import identify
+from bench.board_engine import PUBLISHED, board_of
+from bench.pendulum import RIGS, cramer_rao, design_for, model_for
 from pvid.settings.enums import Core
-from pvid.sim.pendulum import Sensors, simulate
+from pvid.sim.pendulum import STANDARD_PENDULUM
 
-BITS = 17
+RIG = replace(RIGS[0], bits=17)
+TRUTH = STANDARD_PENDULUM.linear
+FAR = TRUTH * np.array([0.65, 0.5, 1.5])
 
 
 @pytest.mark.parametrize("core", ["f32", "q31"])
 def test_a_large_step_leaves_standard_errors(core: Core) -> None:
     """A fine encoder and a guess that is far off: after the first steps nothing is left of the residuals' sum of
-    squares in float32. Without a floor under it the core publishes standard errors of exactly 0.
-
-    The float64 oracle keeps the digits; its rows of the far start count more, so that its errors may be smaller.
-    """
-    sensors = Sensors(phi_lsb=2 * math.pi / 2**BITS, y_lsb=1e-7)
-    run = simulate(duration=20.0, sensors=sensors, seed=1).run
-    rig = RigFile.standard()
-    guess = Nominal(l2=0.5 * rig.nominal.l2, rho2=1.8 * rig.nominal.rho2, g=0.65 * rig.nominal.g)
-    fixed = replace(rig.identifier, core=core, survey=False, full_angle=False)
-    sensor = replace(rig.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb, y_gain_sd=0.0)
-    rig = replace(rig, sensor=sensor, l1_sd=0.0, nominal=guess, identifier=fixed)
-    found = identify(run, rig, Native())
-    known = replace(rig, nominal=RigFile.standard().nominal, identifier=replace(fixed, core="f64", survey=True))
-    best = identify(run, known, Native())
-    published = found.publications
-    assert found.identified and len(published.t) > 0
-    assert (published.se > 0).all()
-    for name in ("w", "d1", "d2"):
-        assert found.se[name] > 0.5 * best.se[name]
+    squares in float32. Without a floor under it the core publishes standard errors of exactly 0."""
+    board = board_of(model_for(RIG), RIG.signals(0), design_for(RIG), np.append(TRUTH, 0.0), core)
+    found = board.answer(RIG.signals(1), np.append(FAR, 0.0))
+    of_publications = found.errors[np.isin(found.reasons, PUBLISHED)]
+    assert len(of_publications) and (of_publications > 0).all()
+    assert (found.se[:3] > 0.5 * cramer_rao(RIG) * TRUTH).all()

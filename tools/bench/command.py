@@ -70,8 +70,11 @@ def bench_pages(names: tuple[str, ...], docs: Path) -> int:
 TABLES = (
     ("laws", "laws", "Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."),
     ("strong", "strong", "Errors of the strong form by encoder resolution and differentiator."),
-    ("weak", "weak", "Errors of the weak form by encoder and zero, beside the Cramer-Rao bound."),
-    ("pendulum", "pendulum", "The pendulum through the weak engine, beside its own weak form: errors over 80 seeds."),
+    (
+        "pendulum",
+        "pendulum",
+        "The pendulum through the weak engine: errors over 80 seeds, beside the Cramer-Rao bound.",
+    ),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
 )
 

@@ -8,17 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from bench.board_engine import board_of
+from bench.pendulum import RIGS, design_for, model_for
 from bench.references import KalmanSettings, kalman, output_error, smoothed_drive
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.design.weak import design
 from pvid.models.kapitza.physical import physical
-from pvid.oracle.weak import WeakSettings, identify_weak, row_sd, sample_sd
+from pvid.oracle.fourier.errors import uncertainty
+from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.rows import WeakRows
+from pvid.oracle.fourier.solve import batch
 from pvid.rig.file import Identifier as Settings
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.identify import identify
-from pvid.setup.f32 import nominal_start
+from pvid.setup.fourier import for_engine
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, is_physical, simulate, standard_sensors, standard_start
 
 Float = npt.NDArray[np.float64]
@@ -107,16 +111,15 @@ def start_off(size: float) -> Callable[[int], Float]:
     return start
 
 
-def through_core(native: Native, **settings: object) -> Identifier:
-    """The C core with the given settings of the rig file's table [identifier], as `pvid identify` runs it from a start;
-    the equations of these runs are linear, so that there are no sines to correct."""
+def through_strong(native: Native, **settings: object) -> Identifier:
+    """The strong form with the given settings of the rig file's table [identifier], as `pvid identify` runs it from a
+    start."""
 
     def run_core(phi: Float, y: Float, sample_rate: float, start: Float) -> tuple[Float, Float]:
         rig = RigFile.standard()
-        chosen: Settings = replace(rig.identifier, full_angle=False, **settings)  # type: ignore[arg-type]
+        chosen: Settings = replace(rig.identifier, form="strong", **settings)  # type: ignore[arg-type]
         # without the pivot sensor's resolution the strong form refuses no row: it is shown at its best
-        sensor = replace(rig.sensor, y_lsb=0.0) if chosen.form == "strong" else rig.sensor
-        rig = replace(rig, identifier=chosen, sensor=sensor)
+        rig = replace(rig, identifier=chosen, sensor=replace(rig.sensor, y_lsb=0.0))
         run = Run(np.arange(len(phi)) / sample_rate, phi, y, sample_rate)
         result = identify(run, rig, native, start=start)
         names = ("w", "d1", "d2")
@@ -125,16 +128,28 @@ def through_core(native: Native, **settings: object) -> Identifier:
     return run_core
 
 
-def through_oracle(sensors: Sensors, zero_unknown: bool = True) -> Identifier:
-    """The float64 weak form with the standard rig file's tables."""
-    rig = RigFile.standard()
-    nominal = nominal_start(rig)
+def through_engine(bits: int) -> Identifier:
+    """The weak engine in float32 with settings for the standard rig; an error where it publishes nothing."""
+    rig = replace(RIGS[0], bits=bits)
+    board = board_of(model_for(rig), rig.signals(0), design_for(rig), np.append(TRUTH, 0.0), "f32")
 
-    def run_oracle(phi: Float, y: Float, sample_rate: float, start: Float) -> tuple[Float, Float]:
-        tables = design(rig.l1, sample_rate, nominal)
-        settings = WeakSettings(np.append(start, [0.0] * zero_unknown), row_sd(tables, sensors))
-        last = identify_weak(phi, y, tables, settings).last
-        return last.p[:3], last.se[:3]
+    def run_engine(phi: Float, y: Float, _sample_rate: float, start: Float) -> tuple[Float, Float]:
+        found = board.answer({"phi": phi, "y": y}, np.append(start, 0.0))
+        if not found.published:
+            raise PvidError(f"the engine publishes nothing: {found.last.text}")
+        return found.p[:3], found.se[:3]
+
+    return run_engine
+
+
+def through_oracle(bits: int) -> Identifier:
+    """The weak form in float64, with the engine's design."""
+    rig = replace(RIGS[0], bits=bits)
+    model, design = ready(model_for(rig)), for_engine(design_for(rig))
+
+    def run_oracle(phi: Float, y: Float, _sample_rate: float, start: Float) -> tuple[Float, Float]:
+        fit = batch(WeakRows.of(model, {"phi": phi, "y": y}, design), np.append(start, 0.0), equation_error=False)
+        return fit.p[:3], uncertainty(fit).se[:3]
 
     return run_oracle
 
@@ -166,10 +181,9 @@ def filtered(
         angles.append(run.phi[where])
     starts = np.array([start_off(size)(seed) for seed in range(seeds)])
     u, phi = np.array(drives).T, np.array(angles).T
-    angle_sd = sample_sd(sensors.phi_lsb, sensors.phi_noise_lsb)
     outcomes = []
     for rate_noise, wander in beliefs:
-        p, se = kalman(u, phi, 1 / RATE_HZ, starts, KalmanSettings(angle_sd, size, rate_noise, wander))
+        p, se = kalman(u, phi, 1 / RATE_HZ, starts, KalmanSettings(sensors.phi_sd, size, rate_noise, wander))
         outcomes.append(Outcome(p / TRUTH - 1, se / TRUTH))
     return min(outcomes, key=lambda outcome: (-outcome.near, float(np.nan_to_num(outcome.rms, nan=np.inf).max())))
 
@@ -209,9 +223,9 @@ def side_by_side(
     """
     cost = instructions or {}
     sensors = standard_sensors(bits)
-    savitzky_golay = through_core(native, form="strong", window_s=0.321, degree=10)
-    differences = through_core(native, form="strong", differentiator="finite-difference", stride=40)
-    weak = through_core(native, form="weak")
+    savitzky_golay = through_strong(native, window_s=0.321, degree=10)
+    differences = through_strong(native, differentiator="finite-difference", stride=40)
+    weak = through_engine(bits)
     half = "+-50 %"
     jobs: list[tuple[str, str, Callable[[], Outcome], str]] = [
         ("strong form, finite differences 40 ms apart", half, lambda: accuracy(differences, sensors, seeds), "tick"),
@@ -222,7 +236,7 @@ def side_by_side(
             "smoothing",
         ),
         ("weak form, C core, float32", half, lambda: accuracy(weak, sensors, seeds), "weak"),
-        ("weak form, numpy, float64", half, lambda: accuracy(through_oracle(sensors), sensors, seeds), ""),
+        ("weak form, numpy, float64", half, lambda: accuracy(through_oracle(bits), sensors, seeds), ""),
         ("extended Kalman filter, 7 states", "5 %", lambda: filtered(sensors, 0.05, seeds), "kalman"),
         ("extended Kalman filter, 7 states", "20 %", lambda: filtered(sensors, 0.20, seeds), "kalman"),
         ("offline output error (scipy)", "1 %", lambda: accuracy(fitted, sensors, seeds, start_off(0.01)), ""),

@@ -27,18 +27,25 @@ class FourierNativeQ31(Native):
         super().__init__(path)
         self.name, self.config = name, config
 
-    def identifier(self) -> FourierIdentifierQ31:  # type: ignore[override]
-        """An initialised identifier."""
-        return FourierIdentifierQ31(self)
+    def identifier(self, start: npt.ArrayLike | None = None) -> FourierIdentifierQ31:  # type: ignore[override]
+        """An initialised identifier.
+
+        Parameters
+        ----------
+        start : p in the core's formats [n_p]; None: that of the configuration
+        """
+        return FourierIdentifierQ31(self, start)
 
 
 class FourierIdentifierQ31(Publisher):
     """The identifier: readings of every tick in counts."""
 
-    def __init__(self, native: FourierNativeQ31) -> None:
+    def __init__(self, native: FourierNativeQ31, start: npt.ArrayLike | None = None) -> None:
         given = getattr(native.library, f"{native.name}_settings_q31")[0]  # a constant of the library
         self._owned = native.headers.ffi.new("pvid_fourier_config_q31 *", given)
         self._config = self._owned[0]
+        for place, one in enumerate([] if start is None else np.asarray(start, np.int32).tolist()):
+            self._config.estimator.start[place] = one
         super().__init__(native, "fourier", "q31", native.config, replay="fourier")
 
     def _filled_with(self, native: Native, kind: str, config: object) -> Filled:

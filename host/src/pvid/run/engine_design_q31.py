@@ -83,6 +83,10 @@ class FixedEngine:
         """Parameters, or standard errors, from their integers [..., n_p]."""
         return np.asarray(p, np.float64) * 2.0 ** -np.array(self.parameters.p_bits, np.float64)
 
+    def integers(self, p: npt.ArrayLike) -> npt.NDArray[np.int32]:
+        """The nearest integers of parameters [n_p]."""
+        return np.rint(np.asarray(p, np.float64) * 2.0 ** np.array(self.parameters.p_bits, np.float64)).astype(np.int32)
+
 
 def fixed_engine(
     compiled: CompiledModel,

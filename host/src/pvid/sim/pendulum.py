@@ -247,6 +247,11 @@ class Sensors:
         if not 0 <= self.outlier_fraction <= 1:
             raise PvidError(f"The sensors' outlier_fraction must be in 0..1, not {self.outlier_fraction:g}.")
 
+    @property
+    def phi_sd(self) -> float:
+        """Standard deviation of an angle's rounding and noise [rad]."""
+        return self.phi_lsb * math.sqrt(1 / 12 + self.phi_noise_lsb**2)
+
     def measure(self, phi: FloatArray, y: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:
         """Measured angle [rad] and pivot position [m] from the true ones, both of shape (n,).
 

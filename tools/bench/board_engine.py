@@ -1,0 +1,151 @@
+"""The weak engine as a board has it: its settings are made once for a rig, then it runs from any start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.core.fourier_native import FourierIdentifier, FourierNative
+from pvid.core.fourier_native_q31 import FourierIdentifierQ31, FourierNativeQ31
+from pvid.core.native import Publisher
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.fourier.design import FourierDesign
+from pvid.run.engine_design import engine_config, samples_of
+from pvid.run.engine_design_q31 import FixedEngine, fixed_engine
+from pvid.settings.enums import Core, Reason
+from pvid.settings.fourier import FourierConfig
+from pvid.settings.fourier_q31 import FourierConfigQ31
+from pvid.settings.record import Record
+
+Float = npt.NDArray[np.float64]
+Signals = Mapping[str, npt.ArrayLike]
+
+PUBLISHED = (Reason.UPDATED, Reason.MISFIT)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a run has led to.
+
+    Attributes
+    ----------
+    p, se : published; before the first publication those of the start [n_p]
+    history, errors : p and standard errors that are published after every tick [ticks, n_p]
+    reasons : of every tick, Reason [ticks]
+    """
+
+    p: Float
+    se: Float
+    history: Float
+    errors: Float
+    reasons: npt.NDArray[np.uint8]
+
+    @property
+    def published(self) -> bool:
+        """Whether anything was."""
+        return bool(np.isin(self.reasons, PUBLISHED).any())
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the last publication had residuals beyond the sensors' noise."""
+        of_publications = self.reasons[np.isin(self.reasons, PUBLISHED)]
+        return bool(of_publications.size and of_publications[-1] == Reason.MISFIT)
+
+    @property
+    def last(self) -> Reason:
+        """Of the last window."""
+        ends = self.reasons[~np.isin(self.reasons, (Reason.WARMING_UP, Reason.ACCUMULATED))]
+        return Reason(int(ends[-1])) if len(ends) else Reason.WARMING_UP
+
+
+class BoardEngine(Protocol):
+    """An arithmetic of the engine."""
+
+    def answer(self, run: Signals, start: Float) -> Answer:
+        """Steps through a run from a start [n_p]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FloatBoard:
+    """In float32."""
+
+    compiled: CompiledModel
+    config: FourierConfig
+
+    @cached_property
+    def library(self) -> FourierNative:
+        """Of the mechanism."""
+        return fourier_native(self.compiled, self.config.design)
+
+    def config_from(self, start: Float) -> FourierConfig:
+        """With another start [n_p]."""
+        return replace(self.config, estimator=replace(self.config.estimator, start=np.asarray(start, np.float32)))
+
+    def identifier(self, start: Float) -> FourierIdentifier:
+        """Initialised."""
+        return self.library.identifier_of(self.config_from(start))
+
+    def samples(self, run: Signals) -> npt.NDArray[np.float32]:
+        """As `step` takes them [ticks, samples]."""
+        return samples_of(self.config, run)
+
+    def answer(self, run: Signals, start: Float) -> Answer:
+        """Steps through a run from a start [n_p]."""
+        identifier = self.identifier(start)
+        record = identifier.run_samples(self.samples(run), sums=False, hashes=False)
+        p, se = _published(identifier, record)
+        history = (record.published.astype(np.float64), record.published_se.astype(np.float64))
+        return Answer(p.astype(np.float64), se.astype(np.float64), *history, record.reason)
+
+
+@dataclass(frozen=True, eq=False)
+class FixedBoard:
+    """In fixed point."""
+
+    engine: FixedEngine
+
+    @cached_property
+    def library(self) -> FourierNativeQ31:
+        """Of the mechanism with its settings."""
+        return fourier_native_q31(self.engine.made, self.engine.parameters, self.engine.config)
+
+    def config_from(self, start: Float) -> FourierConfigQ31:
+        """With another start [n_p]."""
+        config, integers = self.engine.config, tuple(self.engine.integers(start).tolist())
+        return replace(config, estimator=replace(config.estimator, start=integers))
+
+    def identifier(self, start: Float) -> FourierIdentifierQ31:
+        """Initialised."""
+        return self.library.identifier(self.config_from(start).estimator.start)
+
+    def samples(self, run: Signals) -> npt.NDArray[np.int32]:
+        """As `step` takes them [ticks, samples]."""
+        return self.engine.counts_of(run)
+
+    def answer(self, run: Signals, start: Float) -> Answer:
+        """Steps through a run from a start [n_p]."""
+        identifier = self.identifier(start)
+        record = identifier.run_samples(self.samples(run), sums=False, hashes=False)
+        p, se = map(self.engine.values, _published(identifier, record))
+        return Answer(p, se, *map(self.engine.values, (record.published, record.published_se)), record.reason)
+
+
+def _published(identifier: Publisher, record: Record) -> tuple[npt.NDArray[np.generic], npt.NDArray[np.generic]]:
+    n_p = record.published.shape[1]
+    return identifier.estimate["p"][:n_p], identifier.estimate["se"][:n_p]
+
+
+def board_of(
+    compiled: CompiledModel, run: Signals, design: FourierDesign, p: Float, core: Core
+) -> FloatBoard | FixedBoard:
+    """Settings from a run of the rig, at parameters near its own [n_p]."""
+    if core == "q31":
+        return FixedBoard(fixed_engine(compiled, run, design, p))
+    return FloatBoard(compiled, engine_config(compiled, run, design, p))
