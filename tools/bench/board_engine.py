@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -101,8 +101,8 @@ class FloatBoard:
         identifier = self.identifier(start)
         record = identifier.run_samples(self.samples(run), sums=False, hashes=False)
         p, se = _published(identifier, record)
-        history = (record.published.astype(np.float64), record.published_se.astype(np.float64))
-        return Answer(p.astype(np.float64), se.astype(np.float64), *history, record.reason)
+        p, se, history, errors = (x.astype(np.float64) for x in (p, se, record.published, record.published_se))
+        return Answer(p, se, history, errors, record.reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +134,11 @@ class FixedBoard:
         identifier = self.identifier(start)
         record = identifier.run_samples(self.samples(run), sums=False, hashes=False)
         p, se = map(self.engine.values, _published(identifier, record))
-        return Answer(p, se, *map(self.engine.values, (record.published, record.published_se)), record.reason)
+        values = self.engine.values
+        return Answer(p, se, values(record.published), values(record.published_se), record.reason)
 
 
-def _published(identifier: Publisher, record: Record) -> tuple[npt.NDArray[np.generic], npt.NDArray[np.generic]]:
+def _published(identifier: Publisher, record: Record) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     n_p = record.published.shape[1]
     return identifier.estimate["p"][:n_p], identifier.estimate["se"][:n_p]
 
