@@ -471,7 +471,7 @@ def _remaining(case: Case, result: Identification, now: Trial | None) -> Iterato
     if result.law != "stationary" and _is_good(now):
         yield "equation (5) does not arrive from this guess: use --law stationary, which explains this run"
         return
-    if result.core == "q31" and _answers(now):
+    if result.core == "q31" and not result.identified and _answers(now):
         yield "fixed point does not resolve this run: use --core f32, which answers it"
         return
     excitation = excitation_of(case.run, case.rig)
