@@ -12,7 +12,7 @@ from pvid.board.replay_image import standard_run
 from pvid.core.native import Native
 from pvid.settings.f32 import StrongConfig
 
-RUN = standard_run("strong", 1000)
+RUN = standard_run(1000)
 
 
 @pytest.mark.parametrize("name", [name for name, _ in BASELINES])

@@ -1,5 +1,6 @@
-"""Plays every form and core of the library that PVID_NATIVE_LIBRARY names, a good run first and then what no sensor
-sends; for a library whose compiler checks every access and every operation, which ends the program at the first fault.
+"""Plays the strong form of the library that PVID_NATIVE_LIBRARY names, and the weak engine as the compiler of CC makes
+it, in both cores: a good run first and then what no sensor sends; for a compiler that checks every access and every
+operation and ends the program at the first fault.
 
     python hostile_runs.py            all of it; prints how many ticks
     python hostile_runs.py --planted  reads one byte behind an array, to show that it would be seen
@@ -9,48 +10,50 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.core import snapshot
-from pvid.core.native import Identifier, Native
+from pvid.core.native import Identifier, Native, Publisher
+from pvid.models.mechanisms import compiled_of
+from pvid.models.registry import DEFAULT
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.settings.q31 import WeakConfigQ31
-from pvid.setup.f32 import config_of
-from pvid.setup.q31 import config_of_q31, counts_of
+from pvid.run.engine_design import config_for_simulated_rig
+from pvid.run.engine_design_q31 import engine_for_simulated_rig
+from pvid.setup.f32 import strong_config
+from pvid.setup.q31 import counts_of, strong_config_q31
 from pvid.sim.pendulum import simulate, standard_sensors, standard_start
 
 Samples = npt.NDArray[Any]
 
 TICKS = 3000  # past the work on the first two windows
 RANDOM = np.random.default_rng(7)
-SETTINGS: tuple[dict[str, Any], ...] = (
-    {"form": "weak"},
-    {"form": "weak", "zero": False, "forgetting_s": 5.0},
-    {"form": "weak", "decimation": 1, "window_s": 0.15, "test_functions": 4},
-    {"form": "weak", "test_functions": 16},
-    {"form": "strong"},
-    {"form": "strong", "differentiator": "finite-difference", "stride": 20, "law": "pseudovelocity"},
-    {"form": "strong", "differentiator": "finite-difference", "stride": 1, "forgetting_s": 0.1, "divider": 4},
-    {"form": "weak", "outlier_gate": 6.0},
-    {"form": "strong", "outlier_gate": 6.0, "outlier_patience_s": 0.5},
+STRONG: tuple[dict[str, Any], ...] = (
+    {},
+    {"differentiator": "finite-difference", "stride": 20, "law": "pseudovelocity"},
+    {"differentiator": "finite-difference", "stride": 1, "forgetting_s": 0.1, "divider": 4},
+    {"outlier_gate": 6.0, "outlier_patience_s": 0.5},
 )
-FLOAT_ALONE: tuple[dict[str, Any], ...] = (
-    {"form": "weak", "full_angle": True},
-    {"form": "weak", "full_angle": True, "damping": True},
+# Of the estimator, in float32 and in fixed point.
+WEAK: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
+    ({}, {}),
+    ({"forgetting_s": 5.0, "divider": 2}, {"forgetting_groups": 8, "divider": 2}),
+    ({"kappa_min": 0.0, "noise_margin": 0.0}, {"kappa_min": 0, "noise_margin": 0}),
 )
 
 
 def rig_of(**identifier: Any) -> RigFile:
-    """The standard rig, an encoder of 14 bits for the weak form and of 20 for the strong."""
+    """The standard rig with the strong form and an encoder of 20 bits."""
     rig = RigFile.standard()
-    sensor = replace(rig.sensor, phi_lsb=standard_sensors(20 if identifier["form"] == "strong" else 14).phi_lsb)
-    return replace(rig, identifier=replace(rig.identifier, **identifier), sensor=sensor)
+    sensor = replace(rig.sensor, phi_lsb=standard_sensors(20).phi_lsb)
+    return replace(rig, identifier=replace(rig.identifier, form="strong", **identifier), sensor=sensor)
 
 
 def float_samples(run: Run) -> Iterator[tuple[Samples, Samples]]:
@@ -86,7 +89,7 @@ def count_samples(phi: Samples, y: Samples, phi_max: int, y_max: int) -> Iterato
 
 
 def play(identifier: Identifier, samples: Iterator[tuple[Samples, Samples]]) -> int:
-    """One after the other through the same identifier, a snapshot and an assessment after each."""
+    """One after the other through the same identifier of the strong form, a snapshot and an assessment after each."""
     done = 0
     for phi, y in samples:
         identifier.run(phi, y)
@@ -94,8 +97,19 @@ def play(identifier: Identifier, samples: Iterator[tuple[Samples, Samples]]) -> 
         image = snapshot.save(identifier)
         snapshot.restore(identifier, image[:-1])
         snapshot.restore(identifier, image)
-        if not identifier.form == "strong":
-            identifier.gap()
+        done += len(phi)
+    return done
+
+
+def play_engine(
+    identifier: Publisher, run: Callable[[Samples], object], parts: Iterator[tuple[Samples, Samples]]
+) -> int:
+    """The same of the weak engine, which takes y first; samples are missing after each."""
+    done = 0
+    for phi, y in parts:
+        run(np.stack([y, phi], axis=1))
+        identifier.assess()
+        identifier.gap()
         done += len(phi)
     return done
 
@@ -103,23 +117,25 @@ def play(identifier: Identifier, samples: Iterator[tuple[Samples, Samples]]) -> 
 def play_all(native: Native) -> int:
     """Every form, core and setting; returns the ticks."""
     done = 0
-    runs = {
-        bits: simulate(sensors=standard_sensors(bits), truth="linear", duration=4.0, seed=1).run for bits in (14, 20)
-    }
+    run = simulate(sensors=standard_sensors(20), truth="linear", duration=4.0, seed=1).run
     start = standard_start(3)
-    for settings in (*SETTINGS, *FLOAT_ALONE):
+    for settings in STRONG:
         rig = rig_of(**settings)
-        run = runs[20 if settings["form"] == "strong" else 14]
-        config = config_of(rig, 1000.0, start)
-        made = native.identifier(config)
-        done += play(made, float_samples(run))
-    for settings in SETTINGS:
-        rig = rig_of(**settings)
-        run = runs[20 if settings["form"] == "strong" else 14]
-        fixed = config_of_q31(rig, 1000.0, start)
+        done += play(native.identifier(strong_config(rig, 1000.0, start)), float_samples(run))
+        fixed = strong_config_q31(rig, 1000.0, start)
         phi, y = (counts[:TICKS] for counts in counts_of(rig, run))
-        limits = fixed.design if isinstance(fixed, WeakConfigQ31) else fixed.design.bank
-        done += play(native.identifier(fixed), count_samples(phi, y, limits.phi_max, limits.y_max))
+        bank = fixed.design.bank
+        done += play(native.identifier(fixed), count_samples(phi, y, bank.phi_max, bank.y_max))
+    compiled = compiled_of(DEFAULT)
+    config, engine = config_for_simulated_rig(compiled), engine_for_simulated_rig(compiled)
+    y, phi = engine.counts_of({"phi": run.phi[:TICKS], "y": run.y[:TICKS]}).T
+    for in_float, in_fixed in WEAK:
+        own = replace(config, estimator=replace(config.estimator, **in_float), range=None)
+        identifier = fourier_native(compiled, config.design).identifier_of(own)
+        done += play_engine(identifier, identifier.run_samples, float_samples(run))
+        of_counts = replace(engine.config, estimator=replace(engine.config.estimator, **in_fixed))
+        counting = fourier_native_q31(engine.made, engine.parameters, of_counts).identifier()
+        done += play_engine(counting, counting.run_samples, count_samples(phi, y, 2**12, 2**13))
     return done
 
 

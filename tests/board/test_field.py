@@ -37,7 +37,7 @@ Simulated = StreamRig | MechanismBoard | MechanismBoardQ31
 def standard_rig(form: str, core: str = "f32") -> Simulated:
     """Of a board that simulates a sensor."""
     if form == "strong":
-        return rig_of(standard_run("strong", 5000, core))
+        return rig_of(standard_run(5000, core))
     rig = RigFile.standard()
     return board_of_rig_file(replace(rig, identifier=replace(rig.identifier, core=core)))  # type: ignore[arg-type]
 

@@ -52,7 +52,19 @@ def library() -> Path:
     return TREE / "host" / "native" / "libpvid_native.so"
 
 
-def play_hostile(library: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+@pytest.fixture
+def compiler(tmp_path: Path) -> Path:
+    """The same for the engine, whose functions of a mechanism are generated."""
+    made = tmp_path / "clang-sanitized"
+    made.write_text(
+        f'#!/bin/sh\nunset LD_PRELOAD\nexec clang -shared-libasan -Wno-pass-failed {SANITIZERS} -g "$@"\n',
+        encoding="utf-8",
+    )
+    made.chmod(0o755)
+    return made
+
+
+def play_hostile(library: Path, compiler: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """hostile_runs.py with that library; Python itself is not clang's, so that the sanitizers' own has to be there
     before it, and what Python never gives back is not counted."""
     runtime = run("clang", "-print-file-name=libclang_rt.asan-x86_64.so").stdout.strip()
@@ -61,20 +73,21 @@ def play_hostile(library: Path, *arguments: str) -> subprocess.CompletedProcess[
         PLAYER,
         *arguments,
         PVID_NATIVE_LIBRARY=str(library),
+        CC=str(compiler),
         PYTHONPATH=os.pathsep.join(filter(None, (str(ROOT / "tests"), os.environ.get("PYTHONPATH")))),
         LD_PRELOAD=runtime,
         ASAN_OPTIONS=f"detect_leaks=0:{NO_SYMBOLIZER}",
     )
 
 
-def test_hostile_runs_of_the_library_are_clean(library: Path) -> None:
-    done = play_hostile(library)
+def test_hostile_runs_of_the_library_are_clean(library: Path, compiler: Path) -> None:
+    done = play_hostile(library, compiler)
     assert done.returncode == 0, done.stderr[-5000:]
     assert int(done.stdout.split()[0]) > 300_000
 
 
-def test_write_behind_an_array_is_found(library: Path) -> None:
-    done = play_hostile(library, "--planted")
+def test_write_behind_an_array_is_found(library: Path, compiler: Path) -> None:
+    done = play_hostile(library, compiler, "--planted")
     assert done.returncode != 0
     assert "heap-buffer-overflow" in done.stderr and library.name in done.stderr
 

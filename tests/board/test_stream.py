@@ -73,7 +73,7 @@ def rig_of(run: ReplayRun) -> StreamRig:
     """What an image is made for that plays it."""
     return StreamRig(
         config=run.config,
-        sample_rate=SAMPLING[run.form].rate,
+        sample_rate=SAMPLING.rate,
         l1=STANDARD_PENDULUM.l1,
         phi_lsb=float(run.phi_lsb),
         y_lsb=float(run.y_lsb),
@@ -92,7 +92,7 @@ class Standard:
 @cache
 def standard(form: str, core: str = "f32") -> Standard:
     if form == "strong":
-        run = standard_run("strong", TICKS, core)
+        run = standard_run(TICKS, core)
         return Standard(rig_of(run), run.samples, native_hashes(run, Native()))
     rig = MechanismRig(DEFAULT, known=simulated_rig(DEFAULT).knowns)
     if core == "q31":
@@ -142,7 +142,7 @@ def test_every_target_computes_the_bits_of_the_host(name: str, form: str, core: 
 @pytest.mark.long
 @pytest.mark.parametrize("core", ["f32", "q31"])
 def test_a_long_run_stays_equal_on_two_boards_at_once(core: str, native: Native) -> None:
-    run = standard_run("strong", LONG, core)
+    run = standard_run(LONG, core)
     phi, y = run.samples
     rig = rig_of(run)
     with ThreadPoolExecutor(2) as pool:

@@ -56,7 +56,7 @@ def expected_hashes(form: str, core: str) -> npt.NDArray[np.uint32]:
     """Running hash after every tick of the run that `pvid sizes` plays: of the weak form that of the twin, which other
     tests compare with the C core here; of the strong form that of the C core, since its twin is slow."""
     if form == "strong":
-        return native_hashes(standard_run("strong", sizes.TICKS, core), Native())
+        return native_hashes(standard_run(sizes.TICKS, core), Native())
     if core == "q31":
         return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run(DEFAULT))
     return mechanism_image.twin_hashes(mechanism_image.mechanism_run(DEFAULT))
@@ -73,7 +73,7 @@ def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -
 @pytest.mark.ticks(short=sizes.TICKS, long=40_000)
 @pytest.mark.parametrize("core", CORES)
 def test_the_host_computes_the_bits_of_the_strong_twin(core: str, native: Native, ticks: int) -> None:
-    replay = standard_run("strong", ticks, core)
+    replay = standard_run(ticks, core)
     assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
 
 
@@ -98,7 +98,7 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
 @pytest.mark.parametrize("core", CORES)
 @pytest.mark.parametrize("name", LONG)
 def test_long_runs_end_with_the_bits_of_the_host(name: str, core: str, native: Native) -> None:
-    replay = standard_run("strong", 40_000, core)
+    replay = standard_run(40_000, core)
     image, _ = build_image(BOARDS[name], replay)
     assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), native_hashes(replay, native))
 
@@ -106,7 +106,7 @@ def test_long_runs_end_with_the_bits_of_the_host(name: str, core: str, native: N
 def test_missing_samples_have_the_bits_of_the_host(native: Native, monkeypatch: pytest.MonkeyPatch) -> None:
     # by way of long runs: their samples stand in a file that the assembler takes in
     monkeypatch.setattr(replay_image, "MANY_TICKS", 1000)
-    replay = standard_run("strong", 2000)
+    replay = standard_run(2000)
     counts = replay.counts.copy()
     counts[1500:1507], counts[1722, 1] = replay_image.MISSING, replay_image.MISSING
     replay = replace(replay, counts=counts)
@@ -129,7 +129,7 @@ def test_the_weak_form_restarts_its_windows_alike_where_samples_are_missing() ->
 @pytest.mark.long
 def test_float32_on_an_avr_has_the_same_bits_where_it_fits(native: Native) -> None:
     """A product of the port, not of the core: the figures that benchmarks/cost.md gives for the AVR are from here."""
-    replay = standard_run("strong", 1000)
+    replay = standard_run(1000)
     image, _ = build_image(BOARDS["atmega2560"], replay)
     report = play(BOARDS["atmega2560"], image, TIMEOUT_S)
     assert_same_hashes(report, native_hashes(replay, native))
@@ -159,7 +159,7 @@ def test_the_strong_form_costs_half_of_soft_float_with_a_solve_at_every_fourth_r
 ) -> None:
     reports = {}
     for core in ("q31", "f32"):
-        replay = standard_run("strong", 1500, core, divider=4)  # all alike from the 500th on
+        replay = standard_run(1500, core, divider=4)  # all alike from the 500th on
         image, _ = build_image(BOARDS[board], replay)
         reports[core] = play(BOARDS[board], image, TIMEOUT_S)
         assert reports[core].hash == int(native_hashes(replay, native)[-1])

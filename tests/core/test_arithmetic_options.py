@@ -83,7 +83,7 @@ def test_a_cortex_m4f_image_at_gccs_default_standard_has_the_same_bits(
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", f"{compiler.parent}:{os.environ['PATH']}")
     monkeypatch.setattr(replay_image, "BUILD", tmp_path / "targets")
-    run = standard_run("strong", 1000)
+    run = standard_run(1000)
     image, _ = build_image(BOARDS["mps2-an386"], run)
     given = (tmp_path / "given").read_text(encoding="utf-8")
     assert "kapitza/strong_f32.c" in given and "-std=" not in given and "-ffp-contract" not in given

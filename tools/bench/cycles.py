@@ -98,7 +98,7 @@ def _fixed_engine(model: str) -> Case:
 
 
 def _strong(core: Core) -> Case:
-    run = replay_image.standard_run("strong", STRONG_TICKS, core)
+    run = replay_image.standard_run(STRONG_TICKS, core)
     native = Native()
     return _case(
         f"strong, {core}, kapitza", run, replay_image.build_image, lambda one: replay_image.native_hashes(one, native)

@@ -62,7 +62,7 @@ class Build(NamedTuple):
 
 def measured(core: Core, macros: dict[str, str] | None = None) -> Build:
     """Builds and runs the standard image of the strong form, without a dead zone."""
-    image, _ = build_image(BOARDS[BOARD], standard_run("strong", TICKS, core), macros)
+    image, _ = build_image(BOARDS[BOARD], standard_run(TICKS, core), macros)
     parts: Counter[str] = Counter()
     compiler = application = 0
     for section, size, file in sections(image.with_suffix(".map").read_text(encoding="utf-8")):

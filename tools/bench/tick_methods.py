@@ -218,7 +218,7 @@ def rows_of(
     native: Native, ticks: int = LONG, progress: Callable[[int], None] = lambda _: None
 ) -> Iterator[tuple[str, ...]]:
     """The rows of the table."""
-    on, run = board(BOARD), standard_run("strong", TICKS)
+    on, run = board(BOARD), standard_run(TICKS)
     n, y = exact_rows(run)
     for done, (name, label) in enumerate(BASELINES):
         progress(done)

@@ -96,7 +96,7 @@ def profile(board: Board, form: Form, core: Core = "f32", model: str = DEFAULT) 
 
 def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
     """Image, the function that is counted, the first tick that counts."""
-    run = standard_run("strong", TICKS, core)
+    run = standard_run(TICKS, core)
     return build_image(board, run)[0], f"pvid_strong_step_{core}", run.measure_from
 
 

@@ -51,9 +51,9 @@ class Sampling(NamedTuple):
     bits: int
 
 
-# Both fit 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20. The strong form's five points need 20 ms between samples
-# (benchmarks/accuracy.md); its window is five samples long.
-SAMPLING: dict[Form, Sampling] = {"strong": Sampling(50.0, 20), "weak": Sampling(1000.0, 14)}
+# It fits 16 bits: 0.107 rad is 17 900 steps of 2 pi / 2^20. The five points need 20 ms between samples
+# (benchmarks/accuracy.md); the window is five samples long.
+SAMPLING = Sampling(50.0, 20)
 
 
 @dataclass(frozen=True)
@@ -106,16 +106,16 @@ class ReplayRun:
 
 
 @cache
-def standard_run(form: Form, ticks: int, core: Core = "f32", divider: int = 1) -> ReplayRun:
-    """The standard rig (linear truth) for `ticks`: weak form at 1 kHz and 14 bits, strong form (five points) at 50 Hz
-    and 20 bits, with a solve every `divider` groups of rows."""
-    sensors = replace(standard_sensors(SAMPLING[form].bits), random_offset=False)
-    rate = SAMPLING[form].rate
+def standard_run(ticks: int, core: Core = "f32", divider: int = 1) -> ReplayRun:
+    """The standard rig (linear truth) for `ticks`, for the strong form of five points, with a solve every `divider`
+    groups of rows."""
+    sensors = replace(standard_sensors(SAMPLING.bits), random_offset=False)
+    rate = SAMPLING.rate
     run = simulate(sensors=sensors, truth="linear", sample_rate=rate, duration=ticks / rate, seed=1).run
     standard = RigFile.standard()
     identifier = replace(
         standard.identifier,
-        form=form,
+        form="strong",
         core=core,
         differentiator="finite-difference",
         stride=1,

@@ -130,7 +130,7 @@ class _Built:
 
 
 def _strong(configuration: Configuration) -> _Built:
-    run = standard_run("strong", TICKS, configuration.core)
+    run = standard_run(TICKS, configuration.core)
     tables = r"\.(s?rodata|progmem\.data)\.replay_(config_)?weights$"
     return _Built(*build_image(configuration.board, run), ((CODE, CORE),), ((tables, "replay"),))
 
