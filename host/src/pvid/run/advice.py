@@ -95,7 +95,7 @@ def advice(run: Run, rig: RigFile, result: Identification) -> tuple[str, ...]:
     found, case, now = _put_right(case, units=not _is_good(result))
     if not found:
         found = list(_remaining(case, result, now))
-    elif not _is_good(result) and not _answers(now):  # there is more to it
+    elif not _is_good(result) and not (_is_good(now) and _answers(now)):  # there is more to it
         found += _remaining(case, result, now)
     if now is not None and _is_good(now) and _answers(now) and (found or not result.identified):
         found += _clock_of(now.value.get("g", GRAVITY), 0.0, rig)
@@ -474,12 +474,12 @@ def _remaining(case: Case, result: Identification, now: Trial | None) -> Iterato
     if result.core == "q31" and not result.identified and _answers(now):
         yield "fixed point does not resolve this run: use --core f32, which answers it"
         return
-    excitation = excitation_of(case.run, case.rig)
+    excitation, angle = excitation_of(case.run, case.rig), _swing(case.run)[1]
     if excitation.weak is not None:
         yield excitation.weak
-    elif result.largest_angle > VALID_ANGLE:
+    elif angle > VALID_ANGLE:
         yield (
-            f"angles reach {result.largest_angle:.2g} rad, too far for the equations of the weak form: release the "
+            f"angles reach {angle:.2g} rad, too far for the equations of the weak form: release the "
             f"pendulum from a smaller angle, or drive it less near its modes"
         )
     elif result.identified:
