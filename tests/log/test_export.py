@@ -23,7 +23,7 @@ from pvid.base.errors import PvidError
 from pvid.link import frames as link
 from pvid.log.export import FORMATS, export_log
 from pvid.log.file import LogWriter
-from pvid.log.live_stream import LiveStream
+from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.rig import run_of_log
 from pvid.log.values import UNKNOWN_RIG, Values, tables_of
@@ -269,7 +269,7 @@ def listener() -> socket.socket:
 
 
 def teed(scheme: str, listener: socket.socket, sent: list[tuple[int, link.Message]]) -> list[bytes]:
-    tee = LiveStream(f"{scheme}://127.0.0.1:{listener.getsockname()[1]}", MECHANISM)
+    tee = live_stream(f"{scheme}://127.0.0.1:{listener.getsockname()[1]}", MECHANISM)
     stream = LogStream()
     listener.settimeout(0)
     got = []
@@ -333,10 +333,10 @@ def test_missing_listener_is_ignored_and_bad_address_reported(sent: list[tuple[i
     free.bind(("127.0.0.1", 0))
     port = free.getsockname()[1]
     free.close()
-    tee, stream = LiveStream(f"udp://127.0.0.1:{port}"), LogStream()
+    tee, stream = live_stream(f"udp://127.0.0.1:{port}"), LogStream()
     for record in stream.feed(b"".join(field_board.frames(sent[:40]))):
         tee.take(record, stream.account)
     tee.close(stream.account)
     for bad in ("udp://host", "tcp://127.0.0.1:1", "nonsense", "udp://:5", "udp://127.0.0.1:99999"):
         with pytest.raises(PvidError, match="is no address to send to"):
-            LiveStream(bad)
+            live_stream(bad)

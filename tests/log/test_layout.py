@@ -21,7 +21,7 @@ from pvid.log.board_model import mechanism_of
 from pvid.log.export import export_log
 from pvid.log.file import LogWriter
 from pvid.log.layout import LAYOUTS
-from pvid.log.live_stream import LiveStream
+from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogStream
 from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
@@ -95,7 +95,7 @@ def test_plotjuggler_finds_the_same_names_in_what_the_tee_sends(frames: list[byt
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
         listener.settimeout(0)
-        tee, stream, names = LiveStream(f"udp://127.0.0.1:{listener.getsockname()[1]}", PENDULUM), LogStream(), set()
+        tee, stream, names = live_stream(f"udp://127.0.0.1:{listener.getsockname()[1]}", PENDULUM), LogStream(), set()
         for record in stream.feed(b"".join(frames)):
             tee.take(record, stream.account)
             try:

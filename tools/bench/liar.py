@@ -33,7 +33,7 @@ from bench.lies import BEHAVIOURS, Behaviour
 from pvid.base.errors import PvidError
 from pvid.board.target import Target
 from pvid.link.frames import Raw
-from pvid.log.live_stream import LiveStream
+from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogReader, Observer
 from pvid.log.recorder import Logger
 from pvid.log.status import StatusLine
@@ -110,8 +110,8 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
     views: list[Observer] = [
         LiveView(console, "title", rig().mechanism),
         StatusLine(line),
-        LiveStream("udp://127.0.0.1:9"),
-        LiveStream("teleplot://[::1]:9"),
+        live_stream("udp://127.0.0.1:9"),
+        live_stream("teleplot://[::1]:9"),
     ]
     source.logger = Logger(source=source, out=log, observers=views, rig=honest_board().text())
     faults: list[str] = []

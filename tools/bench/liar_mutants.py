@@ -18,7 +18,7 @@ from bench.liar_board import LyingBoard, board, rig
 from pvid.link import frames as link
 from pvid.link.frames import LAYOUTS, MAX_PAYLOAD, Frame
 from pvid.log.file import LOG_SCHEMA, LogWriter
-from pvid.log.live_stream import LiveStream
+from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogReader, Observer
 from pvid.log.status import StatusLine
 from pvid.log.values import Values
@@ -126,7 +126,7 @@ def _read(log: Path) -> Iterator[str]:
     views: list[Observer] = [
         LiveView(Console(file=screen, force_terminal=True, width=100), "title", rig().mechanism),
         StatusLine(io.StringIO()),
-        LiveStream("udp://127.0.0.1:9", rig().mechanism),
+        live_stream("udp://127.0.0.1:9", rig().mechanism),
     ]
     values, reader = Values(rig().mechanism), LogReader(log)
     try:

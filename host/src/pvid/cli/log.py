@@ -18,7 +18,7 @@ from pvid.board.stream_rig import StreamRig, stream_rig
 from pvid.board.target import EMULATORS, HOST_TARGET, open_target
 from pvid.link.frames import Configuration, Source
 from pvid.link.port import BAUD
-from pvid.log.live_stream import LiveStream
+from pvid.log.live_stream import live_stream
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.reader import Account, Observer
 from pvid.log.recorder import EmulatorSource, Logger, PortSource
@@ -68,7 +68,8 @@ if TYPE_CHECKING:
     "live",
     metavar="URL",
     multiple=True,
-    help="Send live data to udp://host:9870 (JSON for PlotJuggler) or teleplot://host:47269; repeatable.",
+    help="Send live data to udp://host:9870 (JSON for PlotJuggler) or teleplot://host:47269, or serve them to "
+    "foxglove://host:8765; repeatable.",
 )
 @click.option(
     "--allow-loss",
@@ -132,7 +133,7 @@ def command(
     mechanism = UNKNOWN_RIG if rig is None else rig.mechanism
     title = f"{port} -> {out}"
     with page(web, out, title) if web is not None else nullcontext("") as address:
-        observers: list[Observer] = [LiveStream(one, mechanism) for one in live]
+        observers: list[Observer] = [live_stream(one, mechanism) for one in live]
         if not quiet:
             observers.append(_view(title, mechanism, address))
         logger = Logger(

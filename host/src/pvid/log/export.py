@@ -18,6 +18,7 @@ import numpy.typing as npt
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
 from pvid.base.version import __version__
+from pvid.log.json_messages import encoded, messages, schema, topic, units
 from pvid.log.reader import LogReader
 from pvid.log.rig import hello_of_log
 from pvid.log.values import TABLE_NAMES, Column, Rows, Tables, Values
@@ -194,35 +195,24 @@ class McapWriter:
         self._channels, self._tables = {}, tables
         self._sequence = 0
         for table, columns in tables.items():
-            schema = self._mcap.register_schema(
-                f"pvid.{table}", "jsonschema", json.dumps(self._schema(table, columns)).encode()
-            )
-            units = {name: column.unit for name, column in columns.items() if column.unit not in ("", "1")}
-            self._channels[table] = self._mcap.register_channel(f"/{table}", "json", schema, metadata=units)
+            described = schema(table, columns)
+            number = self._mcap.register_schema(described["title"], "jsonschema", encoded(described))
+            self._channels[table] = self._mcap.register_channel(topic(table), "json", number, metadata=units(columns))
 
     @staticmethod
     def suffixes() -> list[str]:
         """Endings of what is written."""
         return [".mcap"]
 
-    def _schema(self, table: str, columns: Mapping[str, Column]) -> dict[str, Any]:
-        kinds = {"f8": "number", "i8": "integer"}
-        properties = {
-            name: {"type": kinds.get(column.kind, "string"), "description": column.what, "unit": column.unit}
-            for name, column in columns.items()
-            if name != "log_time"
-        }
-        return {"title": f"pvid.{table}", "type": "object", "properties": properties}
-
     def write(self, rows: Rows) -> None:
-        """See Writer. A number that is none is left out of its message: JSON has no NaN."""
-        names = [name for name in self._tables[rows.table] if name != "log_time"]
-        channel = self._channels[rows.table]
-        times = rows.columns["log_time"].tolist()
-        for log_time, *row in zip(times, *(rows.columns[name].tolist() for name in names), strict=True):
-            message = {name: value for name, value in zip(names, row, strict=True) if value == value}
+        """See Writer."""
+        for log_time, message in messages(rows, self._tables):
             self._mcap.add_message(
-                channel, log_time, json.dumps(message).encode(), publish_time=log_time, sequence=self._sequence
+                self._channels[rows.table],
+                log_time,
+                encoded(message),
+                publish_time=log_time,
+                sequence=self._sequence,
             )
             self._sequence = (self._sequence + 1) & 0xFFFFFFFF
 

@@ -1,4 +1,4 @@
-"""Sends texts by UDP as they arrive: JSON for PlotJuggler and other receivers, or Teleplot's own lines.
+"""Sends rows as they arrive: by UDP as JSON for PlotJuggler and others or as Teleplot's lines, or to Foxglove.
 
 JSON as PlotJuggler's "UDP Server" takes it (plotjuggler_plugins/DataStreamUDP and the JSON parser of its repository,
 github.com/facontidavide/PlotJuggler): an object a datagram of less than 2048 bytes; objects within it become paths
@@ -18,23 +18,21 @@ from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 from pvid.base.errors import PvidError
-from pvid.base.hosts import addresses
+from pvid.base.hosts import Address, addresses
 from pvid.link.frames import Loss
-from pvid.log.reader import Account, Record
+from pvid.log.foxglove import FoxgloveServer
+from pvid.log.reader import Account, Observer, Record
 from pvid.log.values import UNKNOWN_RIG, Column, Rows, Tables, Values
 from pvid.models.model import Mechanism
 
+SCHEMES = ("udp", "teleplot", "foxglove")
 _TABLES = ("samples", "estimates")
 _LEFT_OUT = ("segment", "run", "log_time", "tick")
 _TELEPLOT_ROWS = 8  # a row of samples is at most 3 points of 46 bytes
 
 
-class LiveStream:
-    """An observer that sends samples and estimates to `udp://host:port` or `teleplot://host:port`.
-
-    udp: `{"timestamp": 1.7e9, "tick": 5, "estimates": {"w": 31.6, ...}}`, one for each row.
-    teleplot: `estimates.w:1700000000000:31.6§1/s^2`, up to eight rows of a table together. Nobody need listen;
-    what does not get through is lost, as UDP is.
+def live_stream(address: str, mechanism: Mechanism = UNKNOWN_RIG) -> Observer:
+    """The observer that sends to `udp://host:port`, `teleplot://host:port` or serves `foxglove://host:port`.
 
     Parameters
     ----------
@@ -44,22 +42,35 @@ class LiveStream:
     Raises
     ------
     PvidError
-        When the address is none.
+        When the address is none, or what it needs is not installed.
+    """
+    try:
+        parts = urlsplit(address)
+        scheme, host, port = parts.scheme, parts.hostname, parts.port
+    except ValueError:
+        scheme, host, port = "", None, None
+    if scheme not in SCHEMES or not host or not port:
+        forms = [f"{one}://host:port" for one in SCHEMES]
+        raise PvidError(f"{address!r} is no address to send to: {', '.join(forms[:-1])} or {forms[-1]}")
+    if scheme == "foxglove":
+        return FoxgloveServer(address, host, port, mechanism)
+    to = addresses(host, port, socket.SOCK_DGRAM, f"cannot send to {address}")[0]
+    return LiveStream(to, mechanism, teleplot=scheme == "teleplot")
+
+
+class LiveStream:
+    """An observer that sends samples and estimates by UDP.
+
+    udp: `{"timestamp": 1.7e9, "tick": 5, "estimates": {"w": 31.6, ...}}`, one for each row.
+    teleplot: `estimates.w:1700000000000:31.6§1/s^2`, up to eight rows of a table together. Nobody need listen;
+    what does not get through is lost, as UDP is.
     """
 
-    def __init__(self, address: str, mechanism: Mechanism = UNKNOWN_RIG) -> None:
-        try:
-            parts = urlsplit(address)
-            scheme, host, port = parts.scheme, parts.hostname, parts.port
-        except ValueError:
-            scheme, host, port = "", None, None
-        if scheme not in ("udp", "teleplot") or not host or not port:
-            raise PvidError(f"{address!r} is no address to send to: udp://host:port or teleplot://host:port")
-        found = addresses(host, port, socket.SOCK_DGRAM, f"cannot send to {address}")[0]
-        self._teleplot = scheme == "teleplot"
+    def __init__(self, to: Address, mechanism: Mechanism, teleplot: bool) -> None:
+        self._teleplot = teleplot
         self._values = Values(mechanism, follows=mechanism is UNKNOWN_RIG)
-        self._socket = socket.socket(found[0], socket.SOCK_DGRAM)
-        self._to = found[1]
+        self._socket = socket.socket(to[0], socket.SOCK_DGRAM)
+        self._to = to[1]
 
     def take(self, record: Record, account: Account) -> None:
         """See logreader.Observer."""
