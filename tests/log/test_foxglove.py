@@ -15,7 +15,6 @@ import pytest
 from websocket import WebSocket, create_connection
 
 from pvid.base.errors import PvidError
-from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.layout import LAYOUTS
 from pvid.log.live_stream import live_stream
@@ -83,9 +82,9 @@ def port() -> int:
 
 
 @pytest.fixture(scope="module")
-def sent(native: Native) -> list[tuple[int, link.Message]]:
+def sent() -> list[tuple[int, link.Message]]:
     """Of a run of 4 s, with estimates."""
-    return list(field_board.messages(field_board.Field(4000), native))
+    return list(field_board.messages(field_board.Field(4000)))
 
 
 def feed(server: Observer, stream: LogStream, messages: list[tuple[int, link.Message]]) -> None:

@@ -21,8 +21,8 @@ from pvid.rig.file import load
 def command(log: Path, rig_path: Path | None, program: str, out: Path | None) -> int:
     """Writes a layout file with the plots of a LOG's samples, estimates, standard errors and quality.
 
-    For a file of `pvid export --to mcap` in PlotJuggler or Foxglove, and for `pvid log --live`: udp://.. in PlotJuggler,
-    foxglove://.. in Foxglove.
+    For a file of `pvid export --to mcap` in PlotJuggler or Foxglove, and for `pvid log --live`:
+    udp://.. in PlotJuggler, foxglove://.. in Foxglove.
     A log of a few seconds is enough: the layout has the names of the board's mechanism.
     """
     from pvid.log.layout import LAYOUTS
