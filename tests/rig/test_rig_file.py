@@ -81,7 +81,6 @@ def test_the_window_is_the_forms_own_unless_given() -> None:
         ("l1 = 0.3\n[identifier]\ndegree = 6.0", "^\\[identifier\\] degree must be a whole number, not 6.0"),
         ("l1 = 0.3\n[identifier]\ndegree = 13", "^\\[identifier\\] degree must be from 4 to 12, not 13"),
         ("l1 = 0.3\n[identifier]\ndivider = 0", "^\\[identifier\\] divider must be from 1"),
-        ("l1 = 0.3\n[identifier]\nzero = 0", "^\\[identifier\\] zero must be true or false, not 0"),
         (
             "l1 = 0.3\n[identifier]\nkappa_min = 1",
             "^\\[identifier\\] kappa_min must be from 0 to 0.999, not 1",
@@ -242,7 +241,7 @@ def test_the_gate_where_the_file_does_not_say() -> None:
     assert Identifier(forgetting_s=10.0, outlier_patience_s=0.0).patience_s == 0.0
 
 
-@pytest.mark.parametrize(("key", "value"), [("stride", 0), ("test_functions", -1), ("decimation", -1)])
+@pytest.mark.parametrize(("key", "value"), [("stride", 0), ("stride", -1)])
 def test_whole_numbers_have_a_least_value(key: str, value: int) -> None:
     with pytest.raises(PvidError, match=f"{key} must be from"):
         RigFile.parse(f"l1 = 0.3\n[identifier]\n{key} = {value}")
@@ -269,7 +268,7 @@ def test_oversized_files_are_refused_in_one_sentence(text: str) -> None:
     assert len(str(caught.value)) < 500
 
 
-@pytest.mark.parametrize("line", ["zero = 0", "law = 5"])
+@pytest.mark.parametrize("line", ["core = 0", "law = 5"])
 def test_a_value_is_shown_as_it_was_written(line: str) -> None:
     with pytest.raises(PvidError, match=f"not {line[-1]}$"):
         RigFile.parse(f"l1 = 0.3\n[identifier]\n{line}")
