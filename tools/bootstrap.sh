@@ -206,8 +206,16 @@ make_environment() {
     write_stamp "$venv/made" "$(environment_identity)"
 }
 
+# paths: pvid itself, and tools/bench behind the installed packages, so that no module of tools/ hides one of theirs.
+# Bytecode is kept in the environment, also where PYTHONDONTWRITEBYTECODE keeps it out of the sources: without it each
+# process compiles some 1700 modules, which takes 4 s.
+paths() {
+    printf '%s\n' "$root/host/src" "$root/tools" \
+        'import sys; sys.dont_write_bytecode = False; sys.pycache_prefix = sys.prefix + "/bytecode"'
+}
+
 # What the installed packages hang on.
-requirements() { cat "$root/host/pyproject.toml" "$root/tools/requirements.txt" | sha256sum; }
+requirements() { { cat "$root/host/pyproject.toml" "$root/tools/requirements.txt" && paths; } | sha256sum; }
 
 requirements_are_installed() { # requirements_are_installed PROFILE
     local wanted stamp
@@ -243,8 +251,7 @@ install_requirements() { # install_requirements PROFILE
     local packages
     packages=$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
     find "$packages"/{numpy,scipy,sympy,matplotlib} -type d -name tests -prune -exec rm -rf {} + 2>/dev/null || true
-    # pvid itself, and tools/bench behind the installed packages, so that no module of tools/ hides one of theirs.
-    printf '%s\n' "$root/host/src" "$root/tools" >"$packages/pvid.pth"
+    paths >"$packages/pvid.pth"
     write_stamp "$venv/installed-$1" "$(requirements)"
 }
 

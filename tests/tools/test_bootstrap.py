@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import shutil
 import stat
 import subprocess
+import sys
 import tempfile
 import tomllib
 from collections.abc import Iterator
@@ -35,6 +35,14 @@ def test_a_folder_in_which_nothing_can_be_built_is_named(name: str, tmp_path: Pa
     assert not (tmp_path / name / "build").exists()
 
 
+def test_bytecode_is_kept_in_the_environment_alone() -> None:
+    """Also where the variable keeps it out of the sources: no process compiles all modules again."""
+    code = "import sys, pvid.base.errors as one; print(sys.dont_write_bytecode, one.__cached__, sys.prefix)"
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    told = subprocess.check_output([sys.executable, "-P", "-c", code], text=True, env=environment).split()
+    assert told[0] == "False" and Path(told[1]).is_relative_to(Path(told[2]) / "bytecode") and Path(told[1]).is_file()
+
+
 @pytest.fixture
 def foreign() -> Iterator[Path]:
     """A clone with all prepared, whose build/ this test's other user may read alone; its Python tells its arguments."""
@@ -50,8 +58,8 @@ def foreign() -> Iterator[Path]:
     python.write_text('#!/bin/sh\necho ran "$@"\n', encoding="utf-8")
     python.chmod(0o755)
     (clone / "build" / "venv" / "made").write_text(f"{clone}\n{python}", encoding="utf-8")
-    content = b"".join((clone / place).read_bytes() for place in ("host/pyproject.toml", "tools/requirements.txt"))
-    (clone / "build" / "venv" / "installed-pvid").write_text(f"{hashlib.sha256(content).hexdigest()}  -")
+    stamp = subprocess.check_output(["bash", "-c", f". '{clone}/tools/bootstrap.sh'; requirements"], text=True)
+    (clone / "build" / "venv" / "installed-pvid").write_text(stamp.strip("\n"), encoding="utf-8")
     (clone / "build" / "host").mkdir()
     (clone / "build" / "host" / "build.ninja").write_text("build pvid_native: phony\n", encoding="utf-8")
     for path in (clone, *clone.rglob("*")):
