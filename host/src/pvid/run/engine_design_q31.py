@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -29,6 +30,8 @@ _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
 _HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
 _FULL_SCALE = 1.5  # over the reach of a signal
 _SE_BITS = 24  # of se_max
+_ON_GRID = 1e-3  # of a count: digits of a file
+_FINER_BITS = 10  # at most
 _LONGEST_RUN_S = 3600.0  # of integrals since the start of the run, at least
 
 
@@ -95,6 +98,7 @@ def fixed_engine(
     p: Float | None = None,
     *,
     start_there: bool = False,
+    between_counts: bool = False,
     soft_signs: Mapping[str, float] | None = None,
 ) -> FixedEngine:
     """The engine for a rig, from a run of it.
@@ -104,6 +108,9 @@ def fixed_engine(
     design : of the oracle; the engine gets the nearest one that it has
     p : parameters near those of the rig [n_p]; None: the guesses
     start_there : the engine starts at the parameters of this run; False: at the guesses
+    between_counts
+        samples of the run that lie between counts, as with an offset taken off, are not rounded to them: the engine
+        gets finer counts; False: those of the sensor, as of a board
     soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
 
     Raises
@@ -117,9 +124,15 @@ def fixed_engine(
     lsb = lsb_of(compiled, functions.samples)
     largest = [float(np.max(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
     limits = most_counts(functions.signal, len(lsb), found.tables.decimation)
+    tops = [max(_FULL_SCALE * known[one].reach, top) for one, top in zip(functions.samples, largest, strict=True)]
+    if between_counts:
+        sensors = [known[one].resolution > 0 for one in functions.samples]
+        lsb = tuple(
+            _finer(step, run[one], limit / (top / step)) if is_sensor else step
+            for one, step, top, limit, is_sensor in zip(functions.samples, lsb, tops, limits, sensors, strict=True)
+        )
     full_scale = tuple(
-        max(round(min(max(_FULL_SCALE * known[one].reach, top) / step, limit)), 16)
-        for one, step, top, limit in zip(functions.samples, lsb, largest, limits, strict=True)
+        max(round(min(top / step, limit)), 16) for step, top, limit in zip(lsb, tops, limits, strict=True)
     )
     of_jets = {str(jet): x for jet, x in found.rows.record.grid.jets.items()}
     reaches = {one: _HIGHEST_JET * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in functions.jet_names}
@@ -144,6 +157,14 @@ def fixed_engine(
         least = tuple(min(round(float(x) / step), 2**24) for x, step in zip(still, lsb, strict=True))
         config = replace(config, drive_min=least)
     return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
+
+
+def _finer(step: float, samples: npt.ArrayLike, room: float) -> float:
+    """A count for samples: the sensor's, by a power of 2 finer where they lie between counts. room: at most so much."""
+    counts = np.asarray(samples, np.float64) / step
+    if room < 2 or np.max(np.abs(counts - np.rint(counts))) < _ON_GRID:
+        return step
+    return step / 2.0 ** min(_FINER_BITS, math.floor(math.log2(room)))
 
 
 def lsb_of(compiled: CompiledModel, samples: Sequence[str]) -> tuple[float, ...]:
@@ -187,7 +208,8 @@ def engine_for_recording(
 
 def engine_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FixedEngine:
     """The same, to identify the recording itself: as config_to_identify."""
-    engine = engine_for_recording(compiled, recording, ranking=ranking)
+    design, p, known = design_and_p(compiled, recording, None, ranking)
+    engine = fixed_engine(compiled, recording.signals, design, p, start_there=known, between_counts=True)
     trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS))
     return replace(engine, config=replace(engine.config, trust=trust))
 
