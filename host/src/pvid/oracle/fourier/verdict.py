@@ -122,9 +122,8 @@ class Halves:
 def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[Reason]:
     """Parameters that the run does not determine, and with what the worst is mixed."""
     p, parameters = fit.p, fit.parameters
-    relative = np.where(
-        parameters.positive, found.se / np.abs(p) / UNKNOWN, found.se / parameters.sd / _UNKNOWN_OF_RANGE
-    )
+    # an offset of exactly 0 has an error all the same
+    relative = found.se / np.where(parameters.positive, UNKNOWN * np.abs(p), _UNKNOWN_OF_RANGE * parameters.sd)
     bad = [k for k in np.argsort(-relative) if relative[k] > 1 or not np.isfinite(relative[k])]
     if not bad:
         return []
