@@ -170,10 +170,6 @@ static inline void any_state(const pvid_model_q31 *model, pvid_estimator_q31 *se
     self->settings.kappa_min = any_i32(0, PVID_ONE_Q30);
     self->settings.noise_margin = any_u32(0, (uint32_t)1 << 30);
     self->settings.dead_zone = any_u32(0, (uint32_t)100 << 16);
-    for (size_t i = 0; i < PVID_NOISE_TRACES_Q31; i++) {
-        self->noise[i].m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
-        self->noise[i].e = any_i32(-2000, 2000);
-    }
     self->noise_rows = (uint16_t)any_u32(0, UINT16_MAX);
     for (size_t i = 0; i < sizeof self->noise_table / sizeof self->noise_table[0]; i++) {
         self->noise_table[i] = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30 + 2047);

@@ -10,19 +10,6 @@
 
 #define GROUPS_MIN 4.0f
 
-/* What a setting may be, in the order of `values` below. */
-static const struct {
-    float least;
-    float most;
-    pvid_status status;
-} ranges[] = {
-    {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD},  {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE},
-    {0.0f, 1.0e12f, PVID_BAD_FORGETTING},  {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING},
-    {0.0f, 1.0e12f, PVID_BAD_FEEDBACK},    {1.0f, 1.0e6f, PVID_BAD_CORRELATION},
-    {1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT},  {0.0f, 0.999f, PVID_BAD_KAPPA_MIN},
-    {0.0f, 1.0e6f, PVID_BAD_NOISE_MARGIN}, {0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f, PVID_BAD_DEAD_ZONE},
-};
-
 static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive)
 {
     for (size_t i = 0; i < n_p; i++) {
@@ -49,6 +36,18 @@ PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f3
     if (parameters != PVID_OK) {
         return parameters;
     }
+    /* What a setting may be, in the order of `values`. */
+    static const struct {
+        float least;
+        float most;
+        pvid_status status;
+    } ranges[] = {
+        {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD},  {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE},
+        {0.0f, 1.0e12f, PVID_BAD_FORGETTING},  {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING},
+        {0.0f, 1.0e12f, PVID_BAD_FEEDBACK},    {1.0f, 1.0e6f, PVID_BAD_CORRELATION},
+        {1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT},  {0.0f, 0.999f, PVID_BAD_KAPPA_MIN},
+        {0.0f, 1.0e6f, PVID_BAD_NOISE_MARGIN}, {0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f, PVID_BAD_DEAD_ZONE},
+    };
     /* fewer than four groups in the time constant of forgetting are none */
     const float groups = (config->forgetting_s > 0.0f) ? (config->forgetting_s * update_rate_hz) : GROUPS_MIN;
     const float values[] = {config->row_sd,       update_rate_hz,      config->forgetting_s, groups,
