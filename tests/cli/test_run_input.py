@@ -113,7 +113,7 @@ def test_settings_come_before_what_the_file_holds(tmp_path: Path) -> None:
         ("motor.torque=1", "--set 'motor.torque': a rig file has no table 'motor'; it has sensor, nominal, identifier"),
         ("sensor.phi_lsb=2", "--set sensor.phi_lsb must be from 0 to 1 rad, not 2"),
         ("identifier.law=round", '--set identifier.law must be "stationary" or'),
-        ("identifier.zero=true", "identifier.zero is no key any more"),
+        ("identifier.zero=true", "--set identifier.zero is no key any more"),
         ("identifier.divider=1.5", "--set identifier.divider must be a whole number"),
     ],
 )

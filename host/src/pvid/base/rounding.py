@@ -10,7 +10,7 @@ _MOST_ZEROS = 4  # that stand in front of the point for digits that are not know
 
 def with_error(value: float, error: float) -> tuple[str, str]:
     """Value and standard error to the error's second digit: 9.50069, 0.0011 is ("9.5007", "0.0011")."""
-    if not (math.isfinite(error) and error > 0):
+    if not (math.isfinite(value) and math.isfinite(error) and error > 0):
         return f"{value:.6g}", f"{error:.2g}"
     decimals = 1 - math.floor(math.log10(error))
     if decimals > _MOST_DECIMALS or decimals < -_MOST_ZEROS:

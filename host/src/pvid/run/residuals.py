@@ -73,7 +73,8 @@ def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
 def _weak(run: Run, rig: RigFile, p: Float) -> Residuals:
     rows = rows_near(run, rig, p)
     if rows is None:
-        raise PvidError(f"the run of {len(run.t) / run.sample_rate:.3g} s is too short for the rows of the weak form")
+        lasted = len(run.t) / run.sample_rate
+        raise PvidError(f"the run of {lasted:.3g} s is too short for the rows of the weak form: record longer")
     theta = rows.compiled.parameters.theta(p)
     white = rows.white((0,), theta, [EquationError()] * rows.kinds)
     e = white.residuals(theta)
