@@ -109,3 +109,9 @@ def _print(found: CoreAnswer, truth: Mapping[str, float]) -> None:
     for doubt in found.verdict.reasons:
         if doubt.alarm:
             write_stderr(f"pvid: warning: {doubt.text}")
+    approximate = [f"{one.name}^2" for one in found.oracle.model.signals if one.neglected]
+    if approximate:
+        click.echo(
+            f"standard errors contain what small-angle equations neglect ({', '.join(approximate)}); "
+            f"this simulation has none of it: its errors are those of noise"
+        )
