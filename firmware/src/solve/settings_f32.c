@@ -10,6 +10,13 @@
 
 #define GROUPS_MIN 4.0f
 
+/* What a setting may be. */
+typedef struct {
+    float least;
+    float most;
+    pvid_status status;
+} range;
+
 static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive)
 {
     for (size_t i = 0; i < n_p; i++) {
@@ -36,12 +43,8 @@ PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f3
     if (parameters != PVID_OK) {
         return parameters;
     }
-    /* What a setting may be, in the order of `values`. */
-    static const struct {
-        float least;
-        float most;
-        pvid_status status;
-    } ranges[] = {
+    /* in the order of `values` */
+    static const range ranges[] = {
         {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD},  {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE},
         {0.0f, 1.0e12f, PVID_BAD_FORGETTING},  {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING},
         {0.0f, 1.0e12f, PVID_BAD_FEEDBACK},    {1.0f, 1.0e6f, PVID_BAD_CORRELATION},
