@@ -102,10 +102,10 @@ def test_demo_prints_its_table_and_draws_its_figure(tmp_path: Path) -> None:
         "l2 [m]",
         "rho2 [m]",
         "truth",
-        "standard error",
-        "of noise alone",
-        "error / noise",
+        "standard",
+        "of noise",
         "equal in every bit",
+        "small-angle",
     ):
         assert word in done.stdout
     assert (tmp_path / "pvid-demo.png").read_bytes().startswith(b"\x89PNG")
