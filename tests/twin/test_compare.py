@@ -14,7 +14,7 @@ from pvid.settings.bounds import SIZES
 
 MUTANTS = {
     "strong_f32.c": ("    rhs[0] = g[0] * e;", "    rhs[0] = 1.0000001f * (g[0] * e);"),
-    "kapitza_estimator_f32.c": ("self->prior[a] = ratio * ratio;", "self->prior[a] = 1.0000001f * (ratio * ratio);"),
+    "kapitza_estimator_f32.c": ("square = ratio * ratio;", "square = 1.0000001f * (ratio * ratio);"),
     "kapitza_sums_f32.c": (
         "self->low[i] = (kept_high - (total - part)) + (kept_low - part);",
         "self->low[i] = 0.0f * part;",

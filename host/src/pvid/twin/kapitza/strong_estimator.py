@@ -61,6 +61,7 @@ class StrongEstimator(Estimator):
     def __init__(self, configs: Sequence[EstimatorConfig], rate: float, exact_every: int) -> None:
         super().__init__(configs, rate, model.N_P, model.SUMS)
         lanes, rate32 = len(configs), _F(rate)
+        self.prior = np.maximum(self.prior, _LEAST_NORMAL)
         self.start_sd = np.sqrt(self.row_variance / self.prior)
         zone = self.dead_zone > 0
         paper = np.array([c.law is Law.PSEUDOVELOCITY for c in configs])
