@@ -336,9 +336,7 @@ def test_residuals_beyond_float32_have_a_finite_variance(native: Native) -> None
 def test_a_prior_that_is_no_number_of_float32_leaves_finite_errors(native: Native) -> None:
     config = strong_config(rig_with(form="strong"), 1000.0)
     estimator = replace(config.estimator, row_sd=1e-11, start_sd=np.array([1e12, 1.0, 1.0], np.float32))
-    core, twin = (
-        native.identifier(replace(config, estimator=estimator)),
-        StrongTwin(replace(config, estimator=estimator)),
-    )
+    config = replace(config, estimator=estimator)
+    core, twin = native.identifier(config), StrongTwin(config)
     assert np.isfinite(core.assess()["se"]).all()
     assert core.assess().tobytes() == twin.estimator.assess()[0].tobytes()

@@ -21,9 +21,6 @@
 /* A sixteenth of the time constant of forgetting, in rows. */
 #define FOLDS_PER_CONSTANT 16.0f
 
-/* Least prior information, FLT_MIN: row_variance over it is the square of a start_sd. */
-#define PRIOR_MIN 1.17549435e-38f
-
 /* Rows between exact projections, where no other number is configured. */
 #define EXACT_EVERY 8u
 
@@ -75,7 +72,8 @@ PVID_COLD pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 
         const float ratio = estimator->row_sd / estimator->start_sd[a];
         self->p[a] = estimator->start[a];
         const float square = ratio * ratio;
-        self->prior[a] = (square > PRIOR_MIN) ? square : PRIOR_MIN;
+        /* not 0: row_variance over it is the square of a start_sd */
+        self->prior[a] = (square > PVID_LEAST_NORMAL_F32) ? square : PVID_LEAST_NORMAL_F32;
         self->lower[a] = estimator->lower[a];
         self->upper[a] = estimator->upper[a];
     }

@@ -11,6 +11,7 @@
 #include "fourier/columns_f32.h"
 
 #include "number/exact.h"
+#include "number/finite_f32.h"
 #include "solve/products_f32.h"
 
 #define SKIP 1.0e-6f
@@ -60,7 +61,7 @@ void pvid_fourier_columns_add_f32(const pvid_fourier_design_f32 *design, const p
 bool pvid_fourier_columns_keep_f32(size_t rows, const float nuisance[], float whole, float *inverse)
 {
     const float left = pvid_product_f32(nuisance, nuisance, rows);
-    const bool kept = (left >= 1.17549435e-38f) && (left <= 3.4e38f) && (left > (SKIP * whole));
+    const bool kept = (left >= PVID_LEAST_NORMAL_F32) && (left <= 3.4e38f) && (left > (SKIP * whole));
     *inverse = kept ? (1.0f / left) : 0.0f;
     return kept;
 }

@@ -17,7 +17,7 @@ PVID_COLD uint32_t pvid_arithmetic_faults_f32(void)
     if (fused > 0.0f) {
         faults |= 1u;
     }
-    const volatile float smallest_normal = 1.17549435e-38f;
+    const volatile float smallest_normal = PVID_LEAST_NORMAL_F32;
     const volatile float half = 0.5f;
     const volatile float subnormal = smallest_normal * half;
     if (pvid_bits_f32(subnormal) != 0x00400000u) {

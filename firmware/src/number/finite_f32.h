@@ -6,6 +6,9 @@
 #include <stdint.h>
 #include <string.h>
 
+/* Least positive normal number. */
+#define PVID_LEAST_NORMAL_F32 1.17549435e-38f
+
 static inline uint32_t pvid_bits_f32(float x)
 {
     uint32_t bits;

@@ -98,7 +98,7 @@ def advice(run: Run, rig: RigFile, result: Identification) -> tuple[str, ...]:
         found = list(_remaining(case, result, now))
     elif not _is_good(result) and not (_is_good(now) and _answers(now)):  # there is more to it
         found += _remaining(case, result, now)
-    if now is not None and _is_good(now) and _answers(now) and (corrected or not (found or result.identified)):
+    if corrected and now is not None and _is_good(now) and _answers(now):
         found += _clock_of(now.value.get("g", GRAVITY), 0.0, rig)
     elif result.identified:
         found += _clock_of(result.value.get("g", GRAVITY), result.se.get("g", 0.0), rig)

@@ -126,10 +126,9 @@ def fixed_engine(
     limits = most_counts(functions.signal, len(lsb), found.tables.decimation)
     tops = [max(_FULL_SCALE * known[one].reach, top) for one, top in zip(functions.samples, largest, strict=True)]
     if between_counts:
-        sensors = [known[one].resolution > 0 for one in functions.samples]
         lsb = tuple(
-            _finer(step, run[one], limit / (top / step)) if is_sensor else step
-            for one, step, top, limit, is_sensor in zip(functions.samples, lsb, tops, limits, sensors, strict=True)
+            _finer(step, run[one], limit / (top / step)) if known[one].resolution > 0 else step
+            for one, step, top, limit in zip(functions.samples, lsb, tops, limits, strict=True)
         )
     full_scale = tuple(
         max(round(min(top / step, limit)), 16) for step, top, limit in zip(lsb, tops, limits, strict=True)
@@ -193,23 +192,32 @@ def engine_for_recording(
     functions: int | None = None,
     soft_signs: Mapping[str, float] | None = None,
     ranking: Sequence[Scored] = (),
+    *,
+    between_counts: bool = False,
 ) -> FixedEngine:
     """For the rig that made a recording, with the design that float32 gets.
 
     Parameters
     ----------
     functions : K; None: chosen
-    soft_signs : as of fixed_engine
+    soft_signs, between_counts : as of fixed_engine
     ranking : as of pvid.run.engine_design.design_for_recording
     """
     design, p, known = design_and_p(compiled, recording, functions, ranking)
-    return fixed_engine(compiled, recording.signals, design, p, start_there=known, soft_signs=soft_signs)
+    return fixed_engine(
+        compiled,
+        recording.signals,
+        design,
+        p,
+        start_there=known,
+        between_counts=between_counts,
+        soft_signs=soft_signs,
+    )
 
 
 def engine_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FixedEngine:
     """The same, to identify the recording itself: as config_to_identify."""
-    design, p, known = design_and_p(compiled, recording, None, ranking)
-    engine = fixed_engine(compiled, recording.signals, design, p, start_there=known, between_counts=True)
+    engine = engine_for_recording(compiled, recording, ranking=ranking, between_counts=True)
     trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS))
     return replace(engine, config=replace(engine.config, trust=trust))
 
