@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -70,6 +72,27 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if files[item] in places and item.name.partition("[")[0] not in QUICK:
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: places.get(files[item], len(places)))
+
+
+def boards_running() -> dict[int, str]:
+    """Emulators and stream programs that this process started and that still run: number and program."""
+    found = {}
+    for children in Path(f"/proc/{os.getpid()}/task").glob("*/children"):
+        for number in children.read_text().split():
+            try:
+                program = os.readlink(f"/proc/{number}/exe")
+            except OSError:
+                continue
+            if "qemu-system" in program or "apps/stream" in program:
+                found[int(number)] = program
+    return found
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_board_is_left_running() -> Iterator[None]:
+    """A board in field mode computes until it is ended, and would slow every test after it."""
+    yield
+    assert boards_running() == {}
 
 
 @pytest.fixture(scope="session")

@@ -65,9 +65,8 @@ def from_counts(rig: Simulated, read: npt.NDArray[np.int32]) -> tuple[npt.NDArra
 
 @pytest.fixture
 def host_target() -> Iterator[Target]:
-    target = open_target(HOST_TARGET, standard_rig("weak"))
-    yield target
-    target.close()
+    with open_target(HOST_TARGET, standard_rig("weak")) as target:
+        yield target
 
 
 def assert_replays(record: FieldRecord, rig: Simulated, form: str, native: Native) -> None:
@@ -91,11 +90,8 @@ def assert_replays(record: FieldRecord, rig: Simulated, form: str, native: Nativ
 def test_a_board_samples_by_itself(name: str, form: str, core: str, native: Native) -> None:
     rig = standard_rig(form, core)
     ticks = 5000 if form == "weak" else 1000
-    target = open_target(name, rig)
-    try:
+    with open_target(name, rig) as target:
         record = collect(target, ticks, begin=rig)
-    finally:
-        target.close()
     assert record.gaps == [] and record.received.missing == 0 and record.first == 0
     assert_replays(record, rig, form, native)
     assert record.schema == SCHEMA_TEXT
@@ -166,11 +162,8 @@ class Dropping:
 
 def test_losses_of_the_line_are_named(native: Native) -> None:
     rig = standard_rig("weak")
-    target = open_target(HOST_TARGET, rig, lambda port: Dropping(port, 20_000, 21_000))
-    try:
+    with open_target(HOST_TARGET, rig, lambda port: Dropping(port, 20_000, 21_000)) as target:
         record = collect(target, 5000, begin=rig)
-    finally:
-        target.close()
     assert record.received.missing >= 3
     (gap,) = record.gaps
     assert 64 <= gap[1] - gap[0] <= 160

@@ -79,7 +79,8 @@ def test_text_that_is_damaged_is_refused(motor: MechanismBoard) -> None:
 
 @pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
 def test_a_board_computes_the_bits_of_this_machine(motor: MechanismBoard, target: str) -> None:
-    record = collect(open_target(target, motor), TICKS, begin=motor, hash_every=500, estimate_every=1000)
+    with open_target(target, motor) as opened:
+        record = collect(opened, TICKS, begin=motor, hash_every=500, estimate_every=1000)
     identifier = fourier_native(motor.compiled, motor.config.design).identifier_of(motor.config)
     own = identifier.run_samples(motor.recording)
     assert record.hello is not None and (record.hello.form, record.hello.samples) == (Form.FOURIER, 3)

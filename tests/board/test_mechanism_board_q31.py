@@ -51,7 +51,8 @@ def test_text_that_is_damaged_is_refused(pendulum: MechanismBoardQ31) -> None:
 
 @pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
 def test_a_board_computes_the_bits_of_this_machine(pendulum: MechanismBoardQ31, target: str) -> None:
-    record = collect(open_target(target, pendulum), TICKS, begin=pendulum, hash_every=600, estimate_every=1200)
+    with open_target(target, pendulum) as opened:
+        record = collect(opened, TICKS, begin=pendulum, hash_every=600, estimate_every=1200)
     engine = pendulum.engine
     own = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier().run_samples(pendulum.recording)
     assert record.hello is not None and (record.hello.form, record.hello.core) == (Form.FOURIER, Core.Q31)

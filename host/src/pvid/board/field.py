@@ -1,7 +1,7 @@
 """Field mode: a board samples by itself, and the PC collects its frames.
 
-    target = open_target("mps2-an386", rig)
-    record = collect(target, 5000, begin=rig)          # starts the board over; without begin: joins in
+    with open_target("mps2-an386", rig) as target:
+        record = collect(target, 5000, begin=rig)      # starts the board over; without begin: joins in
     y, phi = record.samples(0, 5000)                   # exactly the identifier's input, in its order
 
 link.py describes the frames. The image's settings, the configuration and every sample from the session's first tick on

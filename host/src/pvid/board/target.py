@@ -82,6 +82,13 @@ class Target:
     process: subprocess.Popen[bytes] | None = None
     coming_up_s: float = 0.0
 
+    def __enter__(self) -> Target:
+        """`with`: closed at the end. A board in field mode would compute for ever."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
         """Closes the port and ends the emulator."""
         self.port.close()
