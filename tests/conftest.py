@@ -18,24 +18,23 @@ ROOT = Path(__file__).resolve().parents[1]
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = (
-    *("board/targets", "tools/pages", "board/stream", "twin/strong_bits_q31", "log/verify", "log/log", "cli/cli"),
-    *("run/advice", "board/memory", "show/report", "cli/run_input", "bench/longevity", "board/port"),
-    *("core/strong_q31", "bench/attack", "board/ports", "twin/gate", "bench/liar", "board/field"),
-    *(
-        "tools/consumer",
-        "core/core_q31",
-        "twin/bits",
-        "core/dead_zone",
-    ),
-    *("bench/hard", "twin/misfit", "core/freeze", "core/bad_config", "bench/year", "cli/readme", "bench/campaign_run"),
-    *("bench/cost", "link/link", "twin/compare", "bench/side_by_side", "core/read_while_stepping", "show/view"),
-    *("core/snapshot", "log/untrusted", "core/arithmetic_options", "twin/trust_q31"),
-    *("core/sizes_agree", "show/pictures", "show/page", "tools/docs"),
-    *("tools/proofs", "tools/analysis", "tools/loops", "tools/mutate", "tools/core_rooms", "bench/campaign_population"),
-    *("codegen/strong_model", "codegen/generated_q31", "codegen/generated_f32", "codegen/build", "codegen/random"),
-    "codegen/model_q31",
-    *("tools/notebooks", "fleet/batch"),
-    *("board/generated", "board/engine_boards", "twin/fourier_f32", "oracle/fourier_engine"),
+    *("run/advice", "tools/pages", "cli/cli", "cli/mechanism_core", "show/report", "cli/api", "tools/notebooks"),
+    *("cli/mechanism", "cli/run_input", "twin/strong_bits_q31", "fleet/batch", "models/scale_errors", "log/log"),
+    *("tools/wheel", "board/targets", "bench/liar", "bench/campaign_run", "board/memory", "log/verify"),
+    *("oracle/sensor_errors", "core/strong_q31", "board/ports", "board/stream", "core/dead_zone", "twin/gate"),
+    *("bench/longevity", "bench/attack", "core/core_q31", "bench/campaign_judge", "bench/refine_bench"),
+    *("tools/consumer", "core/freeze", "twin/misfit", "run/refined", "run/engine_identify", "codegen/build"),
+    *("twin/fourier_f32", "show/view", "twin/trust_q31", "twin/compare", "link/link", "twin/bits"),
+    *("oracle/fourier_identify", "bench/hard", "bench/side_by_side", "twin/fourier_bits_q31", "twin/kinds_q31"),
+    *("deploy/deploy", "oracle/oracle", "codegen/generated_q31", "log/export", "cli/mechanism_demo", "sim/pendulum"),
+    *("board/mechanism_board", "codegen/generated_f32", "board/field", "core/sizes_agree", "codegen/strong_model"),
+    *("bench/mechanisms", "oracle/strong_described", "oracle/fourier_choice", "bench/cost", "show/pictures"),
+    *("twin/refinement", "cli/readme", "board/generated", "bench/year", "tools/mutate", "board/engine_boards"),
+    *("twin/fourier_rows_q31", "codegen/refine", "board/port", "core/read_while_stepping", "codegen/fourier_c"),
+    *("codegen/model_q31", "twin/estimator_q31", "core/arithmetic_options", "sim/rigs", "cli/output", "run/skew"),
+    *("oracle/fourier_engine", "core/bad_config", "show/page", "log/untrusted", "bench/campaign_population"),
+    *("tools/core_rooms", "tools/docs", "tools/proofs", "tools/loops", "codegen/random", "core/snapshot"),
+    "tools/analysis",
 )
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")

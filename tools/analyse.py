@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import fnmatch
 import hashlib
+import os
 import re
 import subprocess
 import sys
@@ -25,6 +26,7 @@ import tomllib
 from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 
 from units import FIRMWARE, PORTS, ROOT, Unit, applications, chosen, core, demand, ports, take_files
 
@@ -94,7 +96,9 @@ def units() -> list[Unit]:
 
 
 def run(command: list[str]) -> str:
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    # cppcheck starts `python3` once a file: this one, not a wrapper that first looks for an interpreter
+    own = {**os.environ, "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env=own)
     return done.stdout + done.stderr
 
 
@@ -155,6 +159,7 @@ def cppcheck(alike: list[Unit]) -> set[Finding]:
     # A macro that a user may define as the name of a header; cppcheck would invent a value for it.
     checks += ["-UPVID_CONFIG_HEADER", f"--cppcheck-build-dir={folder}"]
     template = "--template={file}:{line}:{id}:{message}"
+    checks += ["-j", str(os.cpu_count() or 1)]
     output = run(["cppcheck", *checks, template, *options, *(str(unit.source) for unit in alike)])
     found = located("cppcheck", output, r"^(?P<file>/[^:]+):(?P<line>\d+):(?P<rule>[\w.-]+):(?P<text>.*)$")
     prefix = "misra-c2012-"
