@@ -55,7 +55,7 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
     starts = (f"{one.name} {one.guess:.4g}" for one in compiled.unknowns)
     write_stderr(f"{compiled.title}: {t[-1]:.0f} s at {rig.sample_rate:g} Hz; start {', '.join(starts)}")
     answer = identify_mechanism(recording, compiled)
-    equal = True
+    equal, answered = True, False
     for core in (FLOAT.name, FIXED.name):
         try:
             found = identify_in_c(answer, core)
@@ -63,6 +63,7 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
             write_stderr(f"pvid: {ENGINE_CORES[core].words}: {error}")
             continue
         _print(found, truth)
+        answered = True
         with progress_bar(f"{core}: comparing with the twin, streaming to {target}", 2 * len(t)) as advance:
             compared = compare_recording(compiled, recording, core, advance)
             verdict = verify_recording(target, own, recording, core, lambda done: advance(len(t) + done))
@@ -74,6 +75,12 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
         click.echo(f"core {core} here against its numpy twin: {compared.ticks} ticks {twin}")
         click.echo(f"streamed to {where}: {verdict.playback.done} ticks, {verdict.text} to here")
         equal = equal and compared.equal and verdict.equal
+    approximate = [f"{one.name}^2" for one in compiled.signals if one.neglected]
+    if approximate and answered:
+        click.echo(
+            f"standard errors contain what small-angle equations neglect ({', '.join(approximate)}); "
+            f"this simulation has none of it: its errors are those of noise"
+        )
     convergence(answer, figure)
     click.echo(f"figure: {figure}")
     return DONE if equal else DIFFERENT
@@ -109,9 +116,3 @@ def _print(found: CoreAnswer, truth: Mapping[str, float]) -> None:
     for doubt in found.verdict.reasons:
         if doubt.alarm:
             write_stderr(f"pvid: warning: {doubt.text}")
-    approximate = [f"{one.name}^2" for one in found.oracle.model.signals if one.neglected]
-    if approximate:
-        click.echo(
-            f"standard errors contain what small-angle equations neglect ({', '.join(approximate)}); "
-            f"this simulation has none of it: its errors are those of noise"
-        )
