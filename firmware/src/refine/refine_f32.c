@@ -34,6 +34,11 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
 #define MAY_GROW 3.0f
 #define HOPELESS 30.0f
 
+/* A search whose last step was longer than this [prior_sd] begins anew when there is a new estimate of the weak form; a
+ * block with a shorter one and small residuals need not converge: it goes on twice as long. */
+#define ASTRAY 3.0f
+#define ROUGH 2.0f
+
 /* Lost blocks until the search begins again from the weak form's estimate; a block that is not sane counts twice. */
 #define LOST_MOST 6u
 
@@ -46,6 +51,15 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
 
 /* Factor on the clash of the first two blocks: they are short, and neighbours err alike. */
 #define FIRST_CLASH 2.0f
+
+/* Part of the triangle that remains when a longer block begins anew: the past knows its samples already, and has next
+ * to no weight then, but still shows the clash. */
+#define KEPT (1.0f / 16.0f)
+
+/* Jobs of a pass for each of its big steps, at most, and beside them; entries that such a block keeps free. */
+#define JOBS 6u
+#define OTHER_JOBS 40u
+#define SPARE 16u
 
 static inline bool is_ready(const pvid_refine_f32 *self)
 {
@@ -67,6 +81,13 @@ static float at_least_one(float level)
 
 /* ---- blocks ---- */
 
+/* Whether the ring still has the beginning of the block, or will. */
+static bool is_there(const pvid_refine_f32 *self)
+{
+    const int32_t back = (int32_t)(pvid_refine_front_end_f32(&self->front) - self->begin);
+    return back <= ((int32_t)pvid_refine_front_room_f32(&self->front) - 8);
+}
+
 static void begin_pass(pvid_refine_f32 *self)
 {
     const bool gated = (self->taken > 0u) && (self->config.gate > 0.0f) && !self->restarted;
@@ -78,7 +99,7 @@ static void begin_pass(pvid_refine_f32 *self)
 
 static void begin_block(pvid_refine_f32 *self)
 {
-    if ((pvid_refine_front_end_f32(&self->front) - self->begin) > (pvid_refine_front_room_f32(&self->front) - 8u)) {
+    if (!is_there(self)) {
         self->begin = pvid_refine_front_end_f32(&self->front); /* overwritten, or will be */
         forget_state(self);
     }
@@ -119,6 +140,19 @@ static void begin_anew(pvid_refine_f32 *self)
     self->length = self->config.first_block;
 }
 
+/* How far back a block of the present length may begin: the ring must have it for its passes, the origin is the limit.
+ */
+static uint32_t oldest(const pvid_refine_f32 *self)
+{
+    const pvid_refine_config_f32 *config = &self->config;
+    const uint32_t jobs = config->passes * ((JOBS * (uint32_t)self->length) + OTHER_JOBS);
+    const uint32_t taken = (jobs / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + SPARE; /* in the meantime */
+    const uint32_t room = pvid_refine_front_room_f32(&self->front);
+    const uint32_t end = pvid_refine_front_end_f32(&self->front);
+    const uint32_t back = (room > taken) ? (room - taken) : 0u;
+    return ((end - self->origin) > back) ? (end - back) : self->origin;
+}
+
 /* ---- the end of a block ---- */
 
 static bool is_sane(const pvid_refine_f32 *self)
@@ -130,7 +164,20 @@ static bool is_sane(const pvid_refine_f32 *self)
     return sane;
 }
 
-static void take(pvid_refine_f32 *self, float square, float clash)
+/* Behind a block that was taken and began at `began`: twice as long, and from as far back as possible. */
+static void lengthen(pvid_refine_f32 *self, uint32_t began)
+{
+    const uint32_t twice = 2u * (uint32_t)self->length;
+    self->length = (uint16_t)((twice < self->config.block) ? twice : self->config.block);
+    const uint32_t first = oldest(self);
+    if ((int32_t)(self->begin - first) > 0) {
+        self->begin = first;
+        self->again = true;
+        self->same_start = first == began;
+    }
+}
+
+static void take(pvid_refine_f32 *self, float square, float clash, uint32_t began)
 {
     const pvid_refine_config_f32 *config = &self->config;
     self->refused = 0;
@@ -144,13 +191,13 @@ static void take(pvid_refine_f32 *self, float square, float clash)
     self->level = (self->taken == 1u) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
     memcpy(self->r, self->linear, sizeof self->r);
     memcpy(self->next, self->linear, sizeof self->next);
-    const float fade = 1.0f - ((1.0f - self->fade) * ((float)self->length / (float)config->block));
+    float fade = 1.0f - ((1.0f - self->fade) * ((float)self->length / (float)config->block));
+    if (self->length < config->block) {
+        lengthen(self, began);
+        fade = self->again ? KEPT : fade;
+    }
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
-    }
-    if (self->taken > 1u) { /* the second one is as long: it confirms the first one soon */
-        const uint32_t twice = 2u * (uint32_t)self->length;
-        self->length = (uint16_t)((twice < config->block) ? twice : config->block);
     }
 }
 
@@ -159,6 +206,7 @@ static void refuse(pvid_refine_f32 *self, bool sane)
 {
     if (self->taken > 0u) {
         self->refused++;
+        self->origin = self->begin;
         if (self->refused >= 2u) {
             begin_search(self);
             if (sane) {
@@ -191,11 +239,16 @@ static void resize(pvid_refine_f32 *self, bool sane, float square)
 static void follow(pvid_refine_f32 *self)
 {
     bool within = self->sane;
-    if (within) {
+    if (self->again) {
+        within = within && self->same_start;
+        memcpy(self->expected, self->start, sizeof self->expected);
+    } else if (within) {
         pvid_refine_end_state_f32(&self->solve, &self->work, self->linear, self->expected);
         for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
             within = within && pvid_refine_within_f32(self->expected[i], self->config.state_limit[i]);
         }
+    } else {
+        /* as it is */
     }
     self->restarted = false;
     if (!within) {
@@ -203,23 +256,32 @@ static void follow(pvid_refine_f32 *self)
     }
 }
 
-/* Takes the block or not; `square`: mean square of its residuals. */
+/* Of the block's residuals behind its own fit, over what the noise makes of it. */
+static float mean_square(const pvid_refine_f32 *self)
+{
+    const float variance = self->config.sd[0] * self->config.sd[0];
+    const uint32_t used = self->work.used;
+    const float freedom = (used > (PVID_REFINE_UNKNOWNS + 1u)) ? (float)(used - PVID_REFINE_UNKNOWNS) : 1.0f;
+    return self->solve.residual / (freedom * (WHITENESS * variance));
+}
+
+/* Takes the block or not. */
 static void end_block(pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    const float variance = config->sd[0] * config->sd[0];
-    const uint32_t used = self->work.used;
-    const float freedom = (used > (PVID_REFINE_UNKNOWNS + 1u)) ? (float)(used - PVID_REFINE_UNKNOWNS) : 1.0f;
-    const float square = self->solve.residual / (freedom * (WHITENESS * variance));
-    const float clash = self->solve.clash / ((float)N * variance);
+    const float square = mean_square(self);
+    const float past = self->again ? (KEPT * KEPT) : 1.0f;
+    const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * past);
     self->sane = is_sane(self);
     const float room = at_least_one(self->level);
     const bool taken = self->sane && (square < (config->chi_max * room)) &&
-                       ((self->taken == 0u) || (clash < (config->clash_max * room))) &&
+                       ((self->taken == 0u) || self->again || (clash < (config->clash_max * room))) &&
                        (self->solve.size < config->step_max);
+    const uint32_t began = self->begin;
     self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
+    self->again = false;
     if (taken) {
-        take(self, square, clash);
+        take(self, square, clash, began);
         self->verdict = (self->taken > 1u) ? PVID_UPDATED : PVID_HELD_UNCERTAIN; /* one block proves little */
     } else {
         self->verdict = (self->taken > 0u) ? PVID_HELD_BLOCK : PVID_HELD_SEARCHING;
@@ -265,12 +327,21 @@ static void solve_job(pvid_refine_f32 *self)
     }
 }
 
-/* Whether the block has had enough passes: until the steps are small, in the track `passes` of them usually do. */
+/* Whether the block has had enough passes: until the steps are small, in the track `passes` of them usually do; or the
+ * ring has lost it. */
 static bool is_enough(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
     const bool small = self->solve.size < config->step_max;
-    return (self->pass >= config->most_passes) || (small && (self->pass >= config->passes));
+    return (self->pass >= config->most_passes) || (small && (self->pass >= config->passes)) || !is_there(self);
+}
+
+/* Whether a block of a search goes on twice as long. */
+static bool grows(const pvid_refine_f32 *self)
+{
+    const pvid_refine_config_f32 *config = &self->config;
+    return (self->taken == 0u) && (self->pass >= 2u) && ((2u * (uint32_t)self->length) < config->block) &&
+           (self->solve.size < ROUGH) && (mean_square(self) < (MAY_GROW * config->chi_max));
 }
 
 /* The point of linearisation and the start move by the steps. */
@@ -283,8 +354,16 @@ static void move(pvid_refine_f32 *self)
         self->start[i] += self->solve.shift[i];
     }
     self->pass++;
-    if (is_enough(self)) {
+    if (grows(self)) {
+        self->length = (uint16_t)(2u * self->length);
+        self->pass = 0;
+        begin_pass(self);
+    } else if (is_enough(self)) {
         self->phase = END;
+    } else if ((self->taken == 0u) && self->renewed && !(self->solve.size < ASTRAY)) {
+        begin_anew(self);
+        self->begin = oldest(self);
+        begin_block(self);
     } else {
         begin_pass(self);
     }
@@ -328,12 +407,17 @@ static uint32_t recent(const pvid_refine_front_f32 *front)
     return (end > (first + RECENT)) ? (end - RECENT) : first;
 }
 
-/* The next block. A search begins anew from the weak form's newest estimate when it is lost. */
+/* The next block. A search that is lost begins anew from the weak form's newest estimate, in the samples of the past if
+ * it is one that they have not been tried with. */
 static void next_block(pvid_refine_f32 *self)
 {
-    const bool astray = (self->length == self->config.first_block) && self->renewed;
-    if ((self->taken == 0u) && ((self->lost >= LOST_MOST) || ((self->lost > 0u) && astray))) {
+    const bool lost = (self->taken == 0u) && (self->lost > 0u);
+    const bool astray = lost && self->renewed && (self->length == self->config.first_block);
+    if (astray || (lost && (self->lost >= LOST_MOST))) {
         begin_anew(self);
+    }
+    if (astray) {
+        self->begin = oldest(self);
     }
     begin_block(self);
 }
@@ -381,6 +465,7 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
         reason = PVID_WARMING_UP;
         if (self->renewed) {
             self->begin = recent(&self->front);
+            self->origin = pvid_refine_front_first_f32(&self->front);
             begin_search(self);
             begin_anew(self);
             begin_block(self);
@@ -420,6 +505,8 @@ static void restart(pvid_refine_f32 *self)
 {
     pvid_refine_front_reset_f32(&self->front, &self->config);
     self->begin = pvid_refine_front_first_f32(&self->front);
+    self->origin = self->begin;
+    self->again = false;
     forget_state(self);
     if (self->phase != (uint8_t)WAIT) {
         begin_block(self);

@@ -1,8 +1,8 @@
 #include "number/uncontracted.h"
 
 /* Means x of `ratio` samples, of an input that is held from tick to tick of its means about the ticks; x - droop (x_-1
- * - 2 x + x_+1): the mean's droop undone to second order. Second derivatives: w_0 x + sum_i w_i (x_-i + x_+i), i
- * = 1..half. */
+ * - 2 x + x_+1): the mean's droop undone to second order (the weights undo the rest). Second derivatives: w_0 x + sum_i
+ * w_i (x_-i + x_+i), i = 1..half. */
 #include "refine/refine_front_f32.h"
 
 #include <stddef.h>
@@ -41,6 +41,7 @@ void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_
     self->place = 0;
     self->next = 0;
     memset(self->sum, 0, sizeof self->sum);
+    memset(self->rest, 0, sizeof self->rest);
 }
 
 uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self)
@@ -58,13 +59,18 @@ uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)
     return (uint32_t)PVID_REFINE_RING - self->behind;
 }
 
-/* Rounded to the nearest count; INT16_MIN if it is not finite or beyond full scale. */
-static int16_t counts(float x)
+/* x and what rounding left of the entry before, rounded to the nearest count: the errors of neighbours cancel for slow
+ * signals. INT16_MIN if it is not finite or beyond full scale. */
+static int16_t counts(float *rest, float x)
 {
-    if (!((x > -FULL_SCALE) && (x < FULL_SCALE))) {
+    const float whole = x + *rest;
+    if (!((whole > -FULL_SCALE) && (whole < FULL_SCALE))) {
+        *rest = 0.0f;
         return INT16_MIN;
     }
-    return (int16_t)(int32_t)((x < 0.0f) ? (x - 0.5f) : (x + 0.5f));
+    const int16_t rounded = (int16_t)(int32_t)((whole < 0.0f) ? (whole - 0.5f) : (whole + 0.5f));
+    *rest = whole - (float)rounded;
+    return rounded;
 }
 
 /* The second derivative in the middle of a line. */
@@ -87,10 +93,11 @@ static void enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *con
         newest[LENGTH] = x;
         if (self->next >= (uint32_t)(LENGTH - 1)) {
             const float d = second_derivative(&newest[1], config->second);
-            self->ring[(self->next - PVID_REFINE_HALF) & MASK][signal] = counts(d * self->to_counts[signal]);
+            self->ring[(self->next - PVID_REFINE_HALF) & MASK][signal] =
+                counts(&self->rest[signal], d * self->to_counts[signal]);
         }
     } else {
-        self->ring[self->next & MASK][signal] = counts(x * self->to_counts[signal]);
+        self->ring[self->next & MASK][signal] = counts(&self->rest[signal], x * self->to_counts[signal]);
     }
 }
 

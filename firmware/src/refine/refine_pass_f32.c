@@ -1,6 +1,7 @@
 #include "number/uncontracted.h"
 
-/* Motion: Adams-Bashforth-Nystroem of order 7, one evaluation a step; the first six steps of a block are three double
+/* Motion: Adams-Bashforth-Nystroem of order 7 predicts, one evaluation a step; its seventh difference corrects
+ * prediction to Adams-Moulton's of order 8. The first six steps of a block are three double
  * steps of Runge-Kutta (order 4), their middles quintic Hermite polynomials.
  * Derivatives of the motion: leapfrog over four steps (drift, kick, drift) with one Jacobian at the middle; K replaced
  * by K + H^2/12 K^2, which gives the modes their frequencies. Their errors cost efficiency, not bias. Rows: the
@@ -35,6 +36,13 @@ enum { CLEAR, FIRST_A, FIRST_B, FIRST, MIDDLE, SECOND_A, SECOND_B, SECOND, END, 
 static const float position_weights[2 * AB] = {POSITION, POSITION};
 #endif
 static const float velocity_weights[2 * AB] = {VELOCITY, VELOCITY};
+
+/* Weights of the last accelerations, latest first, in the seventh difference of the newest one; twice. Its weights in
+ * the corrected position (h^2) and velocity (h). */
+#define DIFFERENCE -7.0f, 21.0f, -35.0f, 35.0f, -21.0f, 7.0f, -1.0f
+static const float difference_weights[2 * AB] = {DIFFERENCE, DIFFERENCE};
+#define CORRECTED_POSITION (33953.0f / 453600.0f)
+#define CORRECTED_VELOCITY (5257.0f / 17280.0f)
 
 #if PVID_REFINE_SKEW
 /* Weights of five steps that give a signal `skew` seconds after the middle one, and its derivative there: the
@@ -113,6 +121,26 @@ PVID_SELDOM static void adams_bashforth(pvid_refine_pass_f32 *self)
         self->state[i] += h * (self->state[V + i] + (h * position[i]));
 #endif
         self->state[V + i] += h * velocity[i];
+    }
+}
+
+/* The accelerations `a` at the predicted state correct it. */
+PVID_ALWAYS_INLINE void correct(pvid_refine_pass_f32 *self, const float a[])
+{
+    const float *weights = &difference_weights[AB - self->head];
+    const float h = self->h;
+    PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
+    {
+        float difference = a[i];
+        PVID_UNROLL for (size_t j = 0; j < AB; j++)
+        {
+            difference += weights[j] * self->rate[i][j];
+        }
+        const float kick = h * difference;
+#if PVID_REFINE_ORDER == 2
+        self->state[i] += (h * CORRECTED_POSITION) * kick;
+#endif
+        self->state[V + i] += CORRECTED_VELOCITY * kick;
     }
 }
 
@@ -425,6 +453,9 @@ PVID_SELDOM static void step(pvid_refine_pass_f32 *self, const float r[], const 
         differentiate(self, r, signals, u, a);
     } else {
         accelerations(self->constants, x, u, a);
+    }
+    if (started) {
+        correct(self, a);
     }
     push(self, a);
     if (started && (self->job == (uint8_t)FIRST)) {

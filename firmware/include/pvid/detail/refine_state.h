@@ -35,6 +35,7 @@ typedef struct {
     float to_counts[PVID_REFINE_SIGNALS];                /* 32767 / range, with the scale of the signal */
     float from_counts[PVID_REFINE_SIGNALS];              /* range / 32767 */
     float sum[PVID_REFINE_SIGNALS];                      /* of the block */
+    float rest[PVID_REFINE_SIGNALS];                     /* what rounding left of the last entry [counts] */
     float reference[PVID_REFINE_INPUTS];                 /* the first sample since the restart */
     float held[PVID_REFINE_INPUTS];                      /* the last sample of the block before, less the reference */
     float mean[2][PVID_REFINE_SIGNALS];                  /* the last two means, latest first */
@@ -99,6 +100,8 @@ struct pvid_refine_f32 {
     bool restarted;      /* the block's start is not known from the one before */
     bool waiting;        /* the next job needs an entry of the ring that is not there */
     bool sane;           /* the block */
+    bool again;          /* the block begins before the end of the last one */
+    bool same_start;     /* where that one began */
     pvid_reason verdict; /* on the block */
     pvid_reason told;    /* of the last block that ended */
     uint8_t phase;
@@ -108,6 +111,7 @@ struct pvid_refine_f32 {
     uint8_t lost;                         /* in the search */
     uint16_t length;                      /* of the block in big steps */
     uint32_t begin;                       /* entry of the ring */
+    uint32_t origin;                      /* the first one that a longer block may begin with */
     uint32_t due;                         /* end of the ring at which it is there */
     float level;                          /* mean square of residuals of the last blocks over the sensors' */
     float clash;                          /* mean square of what the last blocks and their past cannot both have */

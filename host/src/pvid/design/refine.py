@@ -15,7 +15,7 @@ RING = 512  # PVID_REFINE_RING
 HALF = 12  # PVID_REFINE_HALF
 
 _STEPS_OF_FAST = 48.0  # steps of the fast period, at least
-_BANDS = 3.2  # pass band of second derivatives over the fast frequency
+_BANDS = 4.0  # pass band of second derivatives over the fast frequency
 _PERIODS = 2.0  # slow periods of a block
 _LEAST_BLOCK = 16
 
@@ -39,7 +39,7 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0) -> RefineConfig:
     most = RING // 6
     block = min(max(round(_PERIODS / rig.slow_hz / (BIG_STEP * h)), _LEAST_BLOCK), most)
     derived = any(one.order == 2 for one in rig.signal)
-    second = refine_filter.second_derivative(HALF, min(_BANDS * rig.fast_hz * h, 0.4)) / h**2
+    second = refine_filter.second_derivative(HALF, min(_BANDS * rig.fast_hz * h, 0.4), ratio) / h**2
     share = math.sqrt(ratio * BIG_STEP)
     return RefineConfig(
         sample_rate=rig.sample_rate,

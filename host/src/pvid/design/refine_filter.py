@@ -14,15 +14,24 @@ _NOISE = 1e-6  # weight of white noise
 _DIGITS = 22  # binary digits of the largest weight behind its first one; one is left for the centre's
 
 
-def second_derivative(half: int, pass_band: float) -> Float:
+def _left_of_means(frequency: Float, ratio: int) -> Float:
+    """Response of means of `ratio` samples whose droop is undone to second order."""
+    mean = np.sinc(frequency) / np.sinc(frequency / ratio)
+    droop = (1.0 - 1.0 / ratio**2) / 24.0
+    return np.asarray(mean * (1.0 + 2.0 * droop * (1.0 - np.cos(2.0 * np.pi * frequency))))
+
+
+def second_derivative(half: int, pass_band: float, ratio: int = 1) -> Float:
     """Symmetric weights [half + 1], centre first, per squared step.
 
-    Least squares over all frequencies, exact for polynomials to degree 4.
+    Least squares over all frequencies, exact for polynomials to degree 4. In the pass band they undo what is left of
+    the droop of means of `ratio` samples, which refine_front_f32.c undoes to second order.
 
     Parameters
     ----------
     half : steps on each side
     pass_band : highest frequency that is not to be changed [cycles a step], < 0.5
+    ratio : samples of a step
     """
     place = np.arange(half + 1)
     frequency = np.linspace(0.0, 0.5, _GRID)
@@ -30,7 +39,7 @@ def second_derivative(half: int, pass_band: float) -> Float:
     response[:, 0] = 1.0
     edge = (2.0 * np.pi * pass_band) ** 2
     inside = frequency < pass_band
-    wanted = np.where(inside, -((2.0 * np.pi * frequency) ** 2), 0.0)
+    wanted = np.where(inside, -((2.0 * np.pi * frequency) ** 2) / _left_of_means(frequency, ratio), 0.0)
     size = np.maximum(np.abs(wanted), _LEAST_WANTED * edge)
     root = np.where(inside, np.sqrt(_EXACT) / size, np.sqrt(_NOISE) / edge)
     degrees = np.array([0, 2, 4])

@@ -21,11 +21,17 @@ _WHITENESS = _F(0.89)
 _ABSURD = _F(1e3)
 _MAY_GROW = _F(3)
 _HOPELESS = _F(30)
+_ASTRAY = _F(3)
+_ROUGH = _F(2)
 _LOST_MOST = 6
 _RECENT = 200
 _LEVEL_GAIN = _F(0.2)
 _CLASH_GAIN = _F(0.3)
 _FIRST_CLASH = _F(2)
+_KEPT = _F(1 / 16)
+_JOBS = 6
+_OTHER_JOBS = 40
+_SPARE = 16
 _ERRORS = _F(5)
 
 
@@ -93,7 +99,8 @@ class RefineTwin:
         n = shape.parameters
         self.phase = Phase.WAIT
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
-        self.passed = self.taken = self.refused = self.lost = self.length = self.begin = 0
+        self.again = self.same_start = False
+        self.passed = self.taken = self.refused = self.lost = self.length = self.begin = self.origin = 0
         self.level = self.clash = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
         self.weak_se = np.zeros(len(shape.place_of_p), _F)
@@ -118,8 +125,11 @@ class RefineTwin:
         self.phase = Phase.PASS
         self.waiting = False
 
+    def _is_there(self) -> bool:
+        return self.front.end - self.begin <= self.front.room - 8
+
     def _begin_block(self) -> None:
-        if (self.front.end - self.begin) % 2**32 > self.front.room - 8:
+        if not self._is_there():
             self.begin = self.front.end
             self._forget_state()
         self.linear, self.start = self.next.copy(), self.expected.copy()
@@ -144,13 +154,26 @@ class RefineTwin:
         self.lost = 0
         self.length = self.config.first_block
 
+    def _oldest(self) -> int:
+        jobs = self.config.passes * (_JOBS * self.length + _OTHER_JOBS)
+        taken = jobs // max(self.config.ratio - 1, 1) + _SPARE
+        back = max(self.front.room - taken, 0)
+        return max(self.front.end - back, self.origin)
+
     # ---- the end of a block ----
 
     def _is_sane(self) -> bool:
         enough = self.work.used * 10 >= self.length * 6 * self.shape.outputs
         return bool(self.solved and enough and np.all(np.abs(self.start) < self.state_limit))
 
-    def _take(self, square: np.float32, clash: np.float32) -> None:
+    def _lengthen(self, began: int) -> None:
+        self.length = min(2 * self.length, self.config.block)
+        first = self._oldest()
+        if self.begin > first:
+            self.again, self.same_start = True, first == began
+            self.begin = first
+
+    def _take(self, square: np.float32, clash: np.float32, began: int) -> None:
         config = self.config
         self.refused = self.lost = 0
         if self.taken > 1:
@@ -161,13 +184,15 @@ class RefineTwin:
         self.level = square if self.taken == 1 else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
         fade = _F(1) - (_F(1) - self.fade) * (_F(self.length) / _F(config.block))
+        if self.length < config.block:
+            self._lengthen(began)
+            fade = _KEPT if self.again else fade
         self.triangle = self.solve.triangle * fade
-        if self.taken > 1:
-            self.length = min(2 * self.length, config.block)
 
     def _refuse(self) -> None:
         if self.taken > 0:
             self.refused += 1
+            self.origin = self.begin
             if self.refused >= 2:
                 self._begin_search()
                 if self.sane:
@@ -186,30 +211,38 @@ class RefineTwin:
 
     def _follow(self) -> None:
         within = self.sane
-        if within:
+        if self.again:
+            within = within and self.same_start
+            self.expected = self.start.copy()
+        elif within:
             self.expected = self.solve.end_state(self.work, self.linear)
             within = bool(np.all(np.abs(self.expected) < self.state_limit))
         self.restarted = False
         if not within:
             self._forget_state()
 
-    def _end_block(self) -> None:
-        config, unknowns = self.config, self.shape.unknowns
-        used = self.work.used
+    def _mean_square(self) -> np.float32:
+        used, unknowns = self.work.used, self.shape.unknowns
         freedom = _F(used - unknowns) if used > unknowns + 1 else _F(1)
-        square = self.solve.residual / (freedom * (_WHITENESS * self.variance))
-        clash = self.solve.clash / (_F(self.shape.parameters) * self.variance)
+        return _F(self.solve.residual / (freedom * (_WHITENESS * self.variance)))
+
+    def _end_block(self) -> None:
+        config, square = self.config, self._mean_square()
+        past = _KEPT * _KEPT if self.again else _F(1)
+        clash = self.solve.clash / ((_F(self.shape.parameters) * self.variance) * past)
         self.sane = self._is_sane()
         room = _at_least_one(self.level)
         taken = (
             self.sane
             and square < _F(config.chi_max) * room
-            and (self.taken == 0 or clash < _F(config.clash_max) * room)
+            and (self.taken == 0 or self.again or clash < _F(config.clash_max) * room)
             and self.solve.size < _F(config.step_max)
         )
+        began = self.begin
         self.begin += self.work.step * BIG_STEP
+        self.again = False
         if taken:
-            self._take(square, clash)
+            self._take(square, clash, began)
             self.verdict = Reason.UPDATED if self.taken > 1 else Reason.HELD_UNCERTAIN
         else:
             self.verdict = Reason.HELD_BLOCK if self.taken > 0 else Reason.HELD_SEARCHING
@@ -277,26 +310,45 @@ class RefineTwin:
             self.solved = solution is Solution.SOLVED
             self.phase = Phase.MOVE if self.solved else Phase.END
 
-    def _move(self) -> None:
+    def _is_enough(self) -> bool:
         config = self.config
+        small = bool(self.solve.size < _F(config.step_max))
+        return self.passed >= config.most_passes or (small and self.passed >= config.passes) or not self._is_there()
+
+    def _grows(self) -> bool:
+        config = self.config
+        short = self.taken == 0 and self.passed >= 2 and 2 * self.length < config.block
+        return bool(short and self.solve.size < _ROUGH and self._mean_square() < _MAY_GROW * _F(config.chi_max))
+
+    def _move(self) -> None:
         self.linear = self.steps.moved(self.linear, self.solve.step)
         self.start = self.start + self.solve.shift
         self.passed += 1
-        small = bool(self.solve.size < _F(config.step_max))
-        if self.passed >= config.most_passes or (small and self.passed >= config.passes):
+        if self._grows():
+            self.length, self.passed = 2 * self.length, 0
+            self._begin_pass()
+        elif self._is_enough():
             self.phase = Phase.END
+        elif self.taken == 0 and self.renewed and not self.solve.size < _ASTRAY:
+            self._begin_anew()
+            self.begin = self._oldest()
+            self._begin_block()
         else:
             self._begin_pass()
 
     def _next_block(self) -> None:
-        astray = self.length == self.config.first_block and self.renewed
-        if self.taken == 0 and (self.lost >= _LOST_MOST or (self.lost > 0 and astray)):
+        lost = self.taken == 0 and self.lost > 0
+        astray = lost and self.renewed and self.length == self.config.first_block
+        if astray or (lost and self.lost >= _LOST_MOST):
             self._begin_anew()
+        if astray:
+            self.begin = self._oldest()
         self._begin_block()
 
     def _wait(self) -> None:
         if self.renewed:
             self.begin = max(self.front.end - _RECENT, self.front.first)
+            self.origin = self.front.first
             self._begin_search()
             self._begin_anew()
             self._begin_block()
@@ -339,7 +391,8 @@ class RefineTwin:
     def gap(self) -> None:
         """pvid_refine_gap_f32."""
         self.front.reset()
-        self.begin = self.front.first
+        self.begin = self.origin = self.front.first
+        self.again = False
         self._forget_state()
         if self.phase is not Phase.WAIT:
             self._begin_block()

@@ -25,13 +25,6 @@ class Entry(Enum):
     BROKEN = 2
 
 
-def counts(x: np.float32) -> int:
-    """Rounded to the nearest count; _MISSING if it is not finite or beyond full scale."""
-    if not -_FULL_SCALE < x < _FULL_SCALE:
-        return _MISSING
-    return int(x - _F(0.5) if x < 0 else x + _F(0.5))
-
-
 class Front:
     """pvid_refine_front_f32."""
 
@@ -57,6 +50,7 @@ class Front:
         """pvid_refine_front_reset_f32."""
         self.wait, self.means, self.next, self.referred = self.config.ratio, 0, 0, False
         self.sum = np.zeros(len(self.sample), _F)
+        self.rest = np.zeros(len(self.sample), _F)
         self.held = np.zeros(len(self.sample), _F)
         self.line: list[list[np.float32]] = [[] for _ in self.sample]
 
@@ -82,6 +76,17 @@ class Front:
             total = total + self.second[i] * (line[self.half - i] + line[self.half + i])
         return _F(total)
 
+    def _counts(self, signal: int, x: np.float32) -> int:
+        """x in counts and what rounding left of the entry before, rounded to the nearest one; _MISSING if it is not
+        finite or beyond full scale."""
+        whole = x * self.to_counts[signal] + self.rest[signal]
+        if not -_FULL_SCALE < whole < _FULL_SCALE:
+            self.rest[signal] = 0
+            return _MISSING
+        rounded = int(whole - _F(0.5) if whole < 0 else whole + _F(0.5))
+        self.rest[signal] = whole - _F(rounded)
+        return rounded
+
     def _enter(self, signal: int, x: np.float32) -> None:
         if self.derived[signal]:
             line = self.line[signal]
@@ -89,9 +94,9 @@ class Front:
             if len(line) > 2 * self.half:
                 del line[: len(line) - 2 * self.half - 1]
                 place = (self.next - self.half) % RING
-                self.ring[place, signal] = counts(self._second_derivative(line) * self.to_counts[signal])
+                self.ring[place, signal] = self._counts(signal, self._second_derivative(line))
         else:
-            self.ring[self.next % RING, signal] = counts(x * self.to_counts[signal])
+            self.ring[self.next % RING, signal] = self._counts(signal, x)
 
     def _end_block(self, last: Float32) -> Entry:
         self.sum = np.where(self.is_held, self.sum + _F(0.5) * (self.held - last), self.sum)

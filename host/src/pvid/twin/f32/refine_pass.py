@@ -13,6 +13,9 @@ from pvid.twin.f32.refine_model import Float32, RefineModel
 _F = np.float32
 _POSITION = "139849/120960 -4511/2240 123133/40320 -88547/30240 1537/896 -11351/20160 275/3456"
 _VELOCITY = "198721/60480 -18637/2520 235183/20160 -10754/945 135713/20160 -5603/2520 19087/60480"
+_DIFFERENCE = "-7/1 21/1 -35/1 35/1 -21/1 7/1 -1/1"
+_CORRECTED_POSITION = _F(33953) / _F(453600)
+_CORRECTED_VELOCITY = _F(5257) / _F(17280)
 _STARTS = 3
 
 Signals = tuple[Float32, Float32]
@@ -49,7 +52,7 @@ def _weights(text: str) -> Float32:
     return np.array([_F(a) / _F(b) for a, b in given], _F)
 
 
-_OF_POSITION, _OF_VELOCITY = _weights(_POSITION), _weights(_VELOCITY)
+_OF_POSITION, _OF_VELOCITY, _OF_DIFFERENCE = map(_weights, (_POSITION, _VELOCITY, _DIFFERENCE))
 ORDER = len(_OF_POSITION)
 
 
@@ -121,6 +124,16 @@ class Pass:
             return
         x, v = self.state[:q], self.state[q:]
         self.state = np.concatenate([x + h * (v + h * position), v + h * velocity])
+
+    def _correct(self, a: Float32) -> None:
+        difference = a
+        for j in range(ORDER):
+            difference = difference + _OF_DIFFERENCE[(j - self.head) % ORDER] * self.rate[j]
+        kick = self.h * difference
+        corrected = _CORRECTED_VELOCITY * kick
+        if self.shape.order == 2:
+            corrected = np.concatenate([(self.h * _CORRECTED_POSITION) * kick, corrected])
+        self.state = np.asarray(self.state + corrected)
 
     def _push(self, a: Float32) -> None:
         self.head = ORDER - 1 if self.head == 0 else self.head - 1
@@ -246,7 +259,10 @@ class Pass:
             x = self.state = self.end
             self.starts -= 1
         self._residuals(r, x, u, signals[1][0])
-        self._push(self._derivatives(r, signals, u) if self.job == Job.MIDDLE else self._motion(x, u))
+        a = self._derivatives(r, signals, u) if self.job == Job.MIDDLE else self._motion(x, u)
+        if started:
+            self._correct(a)
+        self._push(a)
         if started and self.job == Job.FIRST:
             self._adams_bashforth()
 
