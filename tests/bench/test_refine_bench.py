@@ -21,6 +21,15 @@ def test_the_refinement_reaches_the_bound(case: Case) -> None:
     assert row_of(case, runs)[3] == "2 of 2"
 
 
+def test_the_steps_of_the_motion_leave_no_bias() -> None:
+    """Without the correction to order 8 the errors are 4.5 times the bound, three times the standard errors."""
+    case = Case(0.3, 16, exact_drive=True)
+    runs = [run_case(case, seed) for seed in range(4)]
+    error = np.sqrt(np.mean([one.error**2 for one in runs], axis=0))
+    assert np.all(error < 2.5 * bound_of(case))
+    assert np.median([one.level for one in runs]) < 1.5
+
+
 def test_the_bound_shrinks_with_the_encoders_noise() -> None:
     coarse, fine = (bound_of(Case(0.1, bits, duration=5.0)) for bits in (14, 16))
     np.testing.assert_allclose(coarse / fine, 4.0)

@@ -19,7 +19,8 @@
  *   other context: if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
  * The model: refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is spread over the ticks,
- * one job each; that of a tick is bounded (with the weak form 1 500 instructions on a Cortex-M4F for the pendulum).
+ * one job each; that of a tick is bounded (with the weak form 1 500 instructions on a Cortex-M4F for the pendulum). A
+ * tick with a new estimate of the weak form has none, unless the tick before had such an estimate too.
  */
 #ifndef PVID_REFINE_H
 #define PVID_REFINE_H

@@ -177,7 +177,7 @@ static void lengthen(pvid_refine_f32 *self, uint32_t began)
     }
 }
 
-static void take(pvid_refine_f32 *self, float square, float clash, uint32_t began)
+static void take(pvid_refine_f32 *self, float square, float clash, bool again, uint32_t began)
 {
     const pvid_refine_config_f32 *config = &self->config;
     self->refused = 0;
@@ -188,7 +188,7 @@ static void take(pvid_refine_f32 *self, float square, float clash, uint32_t bega
         self->clash = (self->taken == 0u) ? 1.0f : (FIRST_CLASH * clash);
     }
     self->taken = (uint8_t)((self->taken < 2u) ? (self->taken + 1u) : 2u);
-    self->level = (self->taken == 1u) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
+    self->level = ((self->taken == 1u) || again) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
     memcpy(self->r, self->linear, sizeof self->r);
     memcpy(self->next, self->linear, sizeof self->next);
     float fade = 1.0f - ((1.0f - self->fade) * ((float)self->length / (float)config->block));
@@ -274,14 +274,16 @@ static void end_block(pvid_refine_f32 *self)
     const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * past);
     self->sane = is_sane(self);
     const float room = at_least_one(self->level);
-    const bool taken = self->sane && (square < (config->chi_max * room)) &&
-                       ((self->taken == 0u) || self->again || (clash < (config->clash_max * room))) &&
+    const bool again = self->again;
+    const float limit = again ? (MAY_GROW * config->chi_max) : config->chi_max;
+    const bool taken = self->sane && (square < (limit * room)) &&
+                       ((self->taken == 0u) || again || (clash < (config->clash_max * room))) &&
                        (self->solve.size < config->step_max);
     const uint32_t began = self->begin;
     self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
     self->again = false;
     if (taken) {
-        take(self, square, clash, began);
+        take(self, square, clash, again, began);
         self->verdict = (self->taken > 1u) ? PVID_UPDATED : PVID_HELD_UNCERTAIN; /* one block proves little */
     } else {
         self->verdict = (self->taken > 0u) ? PVID_HELD_BLOCK : PVID_HELD_SEARCHING;
@@ -532,7 +534,9 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
     if (!is_ready(self) || (sample == NULL)) {
         return PVID_NOT_READY;
     }
-    if (weak != NULL) {
+    const bool rests = (weak != NULL) && !self->beside; /* the weak form's tick is long */
+    self->beside = weak != NULL;
+    if (self->beside) {
         take_weak(self, weak);
     }
     const pvid_refine_entry entry = pvid_refine_front_step_f32(&self->front, &self->config, sample);
@@ -547,7 +551,7 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
         self->waiting = self->waiting && (pvid_refine_front_end_f32(&self->front) < self->due);
     }
     const bool works = (entry == PVID_REFINE_NOTHING) || (self->config.ratio == 1u);
-    if (works && !self->waiting) {
+    if (works && !rests && !self->waiting) {
         return work(self);
     }
     return (self->phase == (uint8_t)WAIT) ? PVID_WARMING_UP : PVID_ACCUMULATED;

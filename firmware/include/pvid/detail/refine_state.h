@@ -98,6 +98,7 @@ struct pvid_refine_f32 {
     bool frozen;
     bool solved;         /* the last solution exists */
     bool restarted;      /* the block's start is not known from the one before */
+    bool beside;         /* the tick before had a new estimate of the weak form */
     bool waiting;        /* the next job needs an entry of the ring that is not there */
     bool sane;           /* the block */
     bool again;          /* the block begins before the end of the last one */

@@ -99,7 +99,7 @@ class RefineTwin:
         n = shape.parameters
         self.phase = Phase.WAIT
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
-        self.again = self.same_start = False
+        self.again = self.same_start = self.beside = False
         self.passed = self.taken = self.refused = self.lost = self.length = self.begin = self.origin = 0
         self.level = self.clash = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
@@ -173,7 +173,7 @@ class RefineTwin:
             self.again, self.same_start = True, first == began
             self.begin = first
 
-    def _take(self, square: np.float32, clash: np.float32, began: int) -> None:
+    def _take(self, square: np.float32, clash: np.float32, again: bool, began: int) -> None:
         config = self.config
         self.refused = self.lost = 0
         if self.taken > 1:
@@ -181,7 +181,7 @@ class RefineTwin:
         else:
             self.clash = _FIRST_CLASH * clash if self.taken > 0 else _F(1)
         self.taken = min(self.taken + 1, 2)
-        self.level = square if self.taken == 1 else self.level + _LEVEL_GAIN * (square - self.level)
+        self.level = square if self.taken == 1 or again else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
         fade = _F(1) - (_F(1) - self.fade) * (_F(self.length) / _F(config.block))
         if self.length < config.block:
@@ -231,18 +231,19 @@ class RefineTwin:
         past = _KEPT * _KEPT if self.again else _F(1)
         clash = self.solve.clash / ((_F(self.shape.parameters) * self.variance) * past)
         self.sane = self._is_sane()
-        room = _at_least_one(self.level)
+        room, again = _at_least_one(self.level), self.again
+        limit = _MAY_GROW * _F(config.chi_max) if again else _F(config.chi_max)
         taken = (
             self.sane
-            and square < _F(config.chi_max) * room
-            and (self.taken == 0 or self.again or clash < _F(config.clash_max) * room)
+            and square < limit * room
+            and (self.taken == 0 or again or clash < _F(config.clash_max) * room)
             and self.solve.size < _F(config.step_max)
         )
         began = self.begin
         self.begin += self.work.step * BIG_STEP
         self.again = False
         if taken:
-            self._take(square, clash, began)
+            self._take(square, clash, again, began)
             self.verdict = Reason.UPDATED if self.taken > 1 else Reason.HELD_UNCERTAIN
         else:
             self.verdict = Reason.HELD_BLOCK if self.taken > 0 else Reason.HELD_SEARCHING
@@ -403,7 +404,10 @@ class RefineTwin:
 
     def step(self, sample: Float32, p: Float32, se: Float32) -> Reason:
         """A tick; p and se [p] of the weak form if they are new, else NaN."""
-        if np.isfinite(p[0]):
+        renewed = bool(np.isfinite(p[0]))
+        rests = renewed and not self.beside
+        self.beside = renewed
+        if renewed:
             self._take_weak(p, se)
         entry = self.front.step(sample)
         if entry is Entry.BROKEN:
@@ -414,7 +418,7 @@ class RefineTwin:
         if entry is Entry.ENTERED:
             self.waiting = self.waiting and self.front.end < self.due
         works = entry is Entry.NOTHING or self.config.ratio == 1
-        if works and not self.waiting:
+        if works and not rests and not self.waiting:
             return self._do()
         return Reason.WARMING_UP if self.phase is Phase.WAIT else Reason.ACCUMULATED
 
