@@ -426,6 +426,11 @@ static bool has_left_the_end(void)
     return refinement.phase != END;
 }
 
+static bool is_at_its_end(void)
+{
+    return refinement.phase == END;
+}
+
 static void begin_run(void)
 {
     const pvid_refine_config_f32 config = sampled();
@@ -479,6 +484,8 @@ static void test_a_longer_block_of_used_samples_is_judged_by_its_own_level(void 
             assert_int_equal(refinement.refused, taken ? 0 : 1);
             if (taken) {
                 assert_true(fabsf((refinement.level / (1.5f * levels[i])) - 1.0f) < 1.0e-4f);
+            } else {
+                assert_true(fabsf(refinement.clash - (0.3f * 25.0f * 1.5f)) < 1.0e-4f);
             }
         }
     }
@@ -491,6 +498,24 @@ static void test_a_longer_block_of_used_samples_is_judged_by_its_own_level(void 
     (void)run_until(has_left_the_end, tick);
     assert_int_equal(refinement.taken, 2);
     assert_true(fabsf(refinement.level - 1.7f) < 1.0e-4f);
+}
+
+static void test_a_search_behind_a_lost_track_remembers_the_refusals(void **state)
+{
+    (void)state;
+    begin_run();
+    uint32_t tick = run_until(is_published, 0);
+    assert_true(refinement.clash < 2.0f);
+    for (int i = 0; i < 2; i++) {
+        tick = run_until(is_at_its_end, tick);
+        refinement.solve.residual = 1.0f;
+        tick = run_until(has_left_the_end, tick);
+    }
+    assert_int_equal(refinement.taken, 0);
+    const float remembered = refinement.clash; /* of 25: all but the square of what CLASH_GAIN leaves */
+    assert_true((remembered > (25.0f * 0.51f)) && (remembered < 13.8f));
+    (void)run_until(has_taken, tick);
+    assert_true(!(refinement.clash < remembered));
 }
 
 static void test_a_gap_ends_a_longer_block_of_used_samples(void **state)
@@ -605,6 +630,7 @@ int main(void)
         cmocka_unit_test(test_it_waits_for_the_weak_form),
         cmocka_unit_test(test_a_search_grows_in_its_first_samples),
         cmocka_unit_test(test_a_longer_block_of_used_samples_is_judged_by_its_own_level),
+        cmocka_unit_test(test_a_search_behind_a_lost_track_remembers_the_refusals),
         cmocka_unit_test(test_a_gap_ends_a_longer_block_of_used_samples),
         cmocka_unit_test(test_rounding_to_counts_leaves_no_bias),
         cmocka_unit_test(test_new_estimates_at_every_tick_do_not_starve_it),

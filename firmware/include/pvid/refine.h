@@ -91,7 +91,8 @@ typedef struct {
     float covariance[PVID_REFINE_PARAMETERS][PVID_REFINE_PARAMETERS]; /* of the steps of r: relative if logarithmic */
     float level; /* residual variance over its expectation from the sensors' noise */
     float clash; /* square by which blocks differ from their past, over its expectation from that noise. The standard
-                    errors contain the root of the larger one of the two; well above 1 the equations lack something */
+                    errors contain the root of the larger one of the two; well above 1 the equations lack something. A
+                    block that is refused in the track counts with clash_max times the level */
 } pvid_refine_estimate_f32;
 
 /* State: detail/refine_state.h, not API. Only the functions below write to it. */

@@ -182,10 +182,10 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
     const pvid_refine_config_f32 *config = &self->config;
     self->refused = 0;
     self->lost = 0;
-    if (self->taken > 1u) {
-        self->clash += CLASH_GAIN * (clash - self->clash);
-    } else {
-        self->clash = (self->taken == 0u) ? 1.0f : (FIRST_CLASH * clash);
+    if (self->taken > 0u) {
+        const float mean = self->clash + (CLASH_GAIN * (clash - self->clash));
+        const float first = (self->taken == 1u) ? (FIRST_CLASH * clash) : 0.0f;
+        self->clash = (first > mean) ? first : mean;
     }
     self->taken = (uint8_t)((self->taken < 2u) ? (self->taken + 1u) : 2u);
     self->level = ((self->taken == 1u) || again) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
@@ -201,10 +201,13 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
     }
 }
 
-/* A block that is not taken. */
+/* A block that is not taken. In the track it counts with the largest clash of a block that is: what the next search
+ * finds has the standard errors of equations that did not always fit. */
 static void refuse(pvid_refine_f32 *self, bool sane)
 {
     if (self->taken > 0u) {
+        const float limit = self->config.clash_max * at_least_one(self->level);
+        self->clash += CLASH_GAIN * (limit - self->clash);
         self->refused++;
         self->origin = self->begin;
         if (self->refused >= 2u) {

@@ -176,10 +176,10 @@ class RefineTwin:
     def _take(self, square: np.float32, clash: np.float32, again: bool, began: int) -> None:
         config = self.config
         self.refused = self.lost = 0
-        if self.taken > 1:
-            self.clash = self.clash + _CLASH_GAIN * (clash - self.clash)
-        else:
-            self.clash = _FIRST_CLASH * clash if self.taken > 0 else _F(1)
+        if self.taken > 0:
+            mean = self.clash + _CLASH_GAIN * (clash - self.clash)
+            first = _FIRST_CLASH * clash if self.taken == 1 else _F(0)
+            self.clash = first if first > mean else mean
         self.taken = min(self.taken + 1, 2)
         self.level = square if self.taken == 1 or again else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
@@ -191,6 +191,8 @@ class RefineTwin:
 
     def _refuse(self) -> None:
         if self.taken > 0:
+            limit = _F(self.config.clash_max) * _at_least_one(self.level)
+            self.clash = self.clash + _CLASH_GAIN * (limit - self.clash)
             self.refused += 1
             self.origin = self.begin
             if self.refused >= 2:
