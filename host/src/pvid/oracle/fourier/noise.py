@@ -124,19 +124,21 @@ class NoiseModel:
         self._gram: dict[tuple[int, int], Float] = {}
         self._overlap: dict[tuple[int, int], Float] = {}
 
-    def _of_orders(self, a: int, left: Float, b: int, right: Float) -> dict[tuple[int, int], float]:
-        """Weights P of the pairs of orders of two kinds, for factors of their columns."""
-        out: dict[tuple[int, int], float] = {}
+    @cached_property
+    def _orders(self) -> int:
+        """One more than the highest order."""
+        return 1 + max((int(np.max(one.orders)) for one in self._sensors), default=0)
+
+    def _of_orders(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """Weights P of the pairs of orders of two kinds [orders, orders]."""
+        left, right = np.append(theta_a, -1.0), np.append(theta_b, -1.0)
+        out = np.zeros(self._orders**2)
         for one in self._sensors:
             i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
             weights = left[one.columns[i]][:, np.newaxis] * one.products[np.ix_(i, j)] * right[one.columns[j]]
-            top = 1 + int(np.max(one.orders))
-            places = one.orders[i][:, np.newaxis] * top + one.orders[j]
-            sums = np.bincount(places.reshape(-1), weights.reshape(-1), top * top)
-            for place in np.flatnonzero(sums):
-                mn = divmod(int(place), top)
-                out[mn] = out.get(mn, 0.0) + float(sums[place])
-        return out
+            places = one.orders[i][:, np.newaxis] * self._orders + one.orders[j]
+            out += np.bincount(places.reshape(-1), weights.reshape(-1), len(out))
+        return out.reshape(self._orders, self._orders)
 
     def of_harmonics(self, kind: int) -> Float:
         """P [powers, columns, columns] with D_h = sum_j omega_h^(2 j) theta^T P_j theta, theta = -1 for Y's column.
@@ -144,8 +146,7 @@ class NoiseModel:
         D_h is the variance a step of the noise at harmonic h. It is that of `covariance`, because gram(m, n) is
         (-1)^((m - n)/2) times the one of m + n halved, and those of odd sums cancel.
         """
-        top = max((int(np.max(one.orders)) for one in self._sensors), default=0)
-        out = np.zeros((top + 1, self._columns, self._columns))
+        out = np.zeros((self._orders, self._columns, self._columns))
         for one in self._sensors:
             own = np.flatnonzero(one.kinds == kind)
             for i in own:
@@ -170,13 +171,11 @@ class NoiseModel:
 
     def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
         """R0 [K, K] of two row kinds in one window."""
-        weights = self._of_orders(a, np.append(theta_a, -1.0), b, np.append(theta_b, -1.0))
-        return sum((w * self.gram(*mn) for mn, w in weights.items()), self._nothing())
+        return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._grams)
 
     def with_next(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
         """R1 [K, K]: of the rows of a kind with those of another in the next window."""
-        weights = self._of_orders(a, np.append(theta_a, -1.0), b, np.append(theta_b, -1.0))
-        return sum((w * self.overlap(*mn) for mn, w in weights.items()), self._nothing())
+        return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._overlaps)
 
     def pull(self, a: int, b: int, theta_b: Float, weight: Float) -> Float:
         """1/2 tr(weight dR0/d theta) with the thetas of kind a; weight [K, K] stands at the rows of a and b."""
@@ -192,11 +191,14 @@ class NoiseModel:
     @cached_property
     def _grams(self) -> Float:
         """Of all pairs of orders [orders, orders, K, K]."""
-        orders = range(1 + max((int(np.max(one.orders)) for one in self._sensors), default=0))
+        orders = range(self._orders)
         return np.array([[self.gram(m, n) for n in orders] for m in orders])
 
-    def _nothing(self) -> Float:
-        return np.zeros((self.functions.count, self.functions.count))
+    @cached_property
+    def _overlaps(self) -> Float:
+        """The same of neighbours."""
+        orders = range(self._orders)
+        return np.array([[self.overlap(m, n) for n in orders] for m in orders])
 
 
 @dataclass(frozen=True)
