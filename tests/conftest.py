@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from processes import children_of
 
 from pvid.core.native import Native
 from pvid.sim.pendulum import Simulation, simulate, standard_sensors
@@ -76,14 +77,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def boards_running() -> dict[int, str]:
     """Emulators and stream programs that this process started and that still run: number and program."""
     found = {}
-    for children in Path(f"/proc/{os.getpid()}/task").glob("*/children"):
-        for number in children.read_text().split():
-            try:
-                program = os.readlink(f"/proc/{number}/exe")
-            except OSError:
-                continue
-            if "qemu-system" in program or "apps/stream" in program:
-                found[int(number)] = program
+    for number in children_of(os.getpid()):
+        try:
+            program = os.readlink(f"/proc/{number}/exe")
+        except OSError:
+            continue
+        if "qemu-system" in program or "apps/stream" in program:
+            found[number] = program
     return found
 
 

@@ -155,11 +155,11 @@ def cppcheck(alike: list[Unit]) -> set[Finding]:
         "--addon=misra",
         "--quiet",
         f"--platform={PLATFORMS[first.machine]}",
+        f"-j{os.cpu_count() or 1}",
     ]
     # A macro that a user may define as the name of a header; cppcheck would invent a value for it.
     checks += ["-UPVID_CONFIG_HEADER", f"--cppcheck-build-dir={folder}"]
     template = "--template={file}:{line}:{id}:{message}"
-    checks += ["-j", str(os.cpu_count() or 1)]
     output = run(["cppcheck", *checks, template, *options, *(str(unit.source) for unit in alike)])
     found = located("cppcheck", output, r"^(?P<file>/[^:]+):(?P<line>\d+):(?P<rule>[\w.-]+):(?P<text>.*)$")
     prefix = "misra-c2012-"

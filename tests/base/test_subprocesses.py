@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from processes import children_of
 
 from pvid.board.target import HOST_TARGET
 from pvid.log.reader import LogReader, LogStream
@@ -32,20 +33,6 @@ def samples_in(path: Path) -> int:
     if path.exists():
         list(stream.feed(path.read_bytes()))
     return stream.account.samples
-
-
-def children_of(pid: int) -> list[int]:
-    """Processes of which this one is the parent, and that still run."""
-    found = []
-    for one in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            number, _, rest = one.read_text().rpartition(")")
-        except OSError:
-            continue
-        state, parent = rest.split()[:2]
-        if int(parent) == pid and state != "Z":
-            found.append(int(number.split()[0]))
-    return found
 
 
 def runs(pid: int) -> bool:

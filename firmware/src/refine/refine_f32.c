@@ -153,6 +153,13 @@ static uint32_t oldest(const pvid_refine_f32 *self)
     return ((end - self->origin) > back) ? (end - back) : self->origin;
 }
 
+/* From an estimate of the weak form that the samples of the past have not been tried with. */
+static void begin_anew_in_the_past(pvid_refine_f32 *self)
+{
+    begin_anew(self);
+    self->begin = oldest(self);
+}
+
 /* ---- the end of a block ---- */
 
 static bool is_sane(const pvid_refine_f32 *self)
@@ -366,8 +373,7 @@ static void move(pvid_refine_f32 *self)
     } else if (is_enough(self)) {
         self->phase = END;
     } else if ((self->taken == 0u) && self->renewed && !(self->solve.size < ASTRAY)) {
-        begin_anew(self);
-        self->begin = oldest(self);
+        begin_anew_in_the_past(self);
         begin_block(self);
     } else {
         begin_pass(self);
@@ -412,17 +418,17 @@ static uint32_t recent(const pvid_refine_front_f32 *front)
     return (end > (first + RECENT)) ? (end - RECENT) : first;
 }
 
-/* The next block. A search that is lost begins anew from the weak form's newest estimate, in the samples of the past if
- * it is one that they have not been tried with. */
+/* The next block. A search that is lost begins anew from the weak form's newest estimate. */
 static void next_block(pvid_refine_f32 *self)
 {
-    const bool lost = (self->taken == 0u) && (self->lost > 0u);
-    const bool astray = lost && self->renewed && (self->length == self->config.first_block);
-    if (astray || (lost && (self->lost >= LOST_MOST))) {
-        begin_anew(self);
-    }
-    if (astray) {
-        self->begin = oldest(self);
+    if ((self->taken == 0u) && (self->lost > 0u)) {
+        if (self->renewed && (self->length == self->config.first_block)) {
+            begin_anew_in_the_past(self);
+        } else if (self->lost >= LOST_MOST) {
+            begin_anew(self);
+        } else {
+            /* it goes on */
+        }
     }
     begin_block(self);
 }

@@ -160,6 +160,10 @@ class RefineTwin:
         back = max(self.front.room - taken, 0)
         return max(self.front.end - back, self.origin)
 
+    def _begin_anew_in_the_past(self) -> None:
+        self._begin_anew()
+        self.begin = self._oldest()
+
     # ---- the end of a block ----
 
     def _is_sane(self) -> bool:
@@ -333,19 +337,17 @@ class RefineTwin:
         elif self._is_enough():
             self.phase = Phase.END
         elif self.taken == 0 and self.renewed and not self.solve.size < _ASTRAY:
-            self._begin_anew()
-            self.begin = self._oldest()
+            self._begin_anew_in_the_past()
             self._begin_block()
         else:
             self._begin_pass()
 
     def _next_block(self) -> None:
-        lost = self.taken == 0 and self.lost > 0
-        astray = lost and self.renewed and self.length == self.config.first_block
-        if astray or (lost and self.lost >= _LOST_MOST):
-            self._begin_anew()
-        if astray:
-            self.begin = self._oldest()
+        if self.taken == 0 and self.lost > 0:
+            if self.renewed and self.length == self.config.first_block:
+                self._begin_anew_in_the_past()
+            elif self.lost >= _LOST_MOST:
+                self._begin_anew()
         self._begin_block()
 
     def _wait(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -191,14 +191,16 @@ class NoiseModel:
     @cached_property
     def _grams(self) -> Float:
         """Of all pairs of orders [orders, orders, K, K]."""
-        orders = range(self._orders)
-        return np.array([[self.gram(m, n) for n in orders] for m in orders])
+        return self._of_all(self.gram)
 
     @cached_property
     def _overlaps(self) -> Float:
         """The same of neighbours."""
+        return self._of_all(self.overlap)
+
+    def _of_all(self, of: Callable[[int, int], Float]) -> Float:
         orders = range(self._orders)
-        return np.array([[self.overlap(m, n) for n in orders] for m in orders])
+        return np.array([[of(m, n) for n in orders] for m in orders])
 
 
 @dataclass(frozen=True)
