@@ -167,6 +167,7 @@ TRUST = {
     "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(1.0, 1e6, Status.BAD_MISFIT_MAX, besides=(0.0,)),
     "trust.renewal": Range(0.01, 1e3, Status.BAD_RENEWAL, besides=(0.0,)),
+    "trust.neglected": Range(0.0, 1.0, Status.BAD_NEGLECTED),
     "trust.groups_min": Range(0, 65535, Status.OK),
     "trust.revert_after": Range(0, 65535, Status.OK),
     "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
@@ -183,6 +184,7 @@ WEAK_Q31 = {
     "trust.se_max": Range(1, 2**31 - 1, Status.BAD_SE_MAX),
     "trust.misfit_max": Range(2**16, 2**32 - 1, Status.BAD_MISFIT_MAX, besides=(0,)),
     "trust.renewal": Range(655, 1000 << 16, Status.BAD_RENEWAL, besides=(0,)),
+    "trust.neglected": Range(0, 2**30, Status.BAD_NEGLECTED),
 }
 OWN = {
     **ESTIMATOR,

@@ -6,14 +6,19 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from fourier_rig import assert_equals_the_twin
 
 from bench.board_engine import FloatBoard
 from bench.hard import CASES, HEADER, LARGEST, ZERO, Case, Outcome, modes, row, run_case
+from pvid.settings.enums import Core
 from pvid.sim.pendulum import Sensors, simulate, standard_start
 
 SEEDS = 5
+FAULT_SEEDS = 12
+
+Float = npt.NDArray[np.float64]
 
 
 @lru_cache
@@ -125,6 +130,7 @@ def test_row_contains_the_verdicts_of_its_runs() -> None:
         alarmed=np.array([False, True, False, False]),
         errors=np.array([[0.01, 0.02, 0.02], [0.5, 0.5, 0.5], [0.5, 0.0, 0.0], [9.0, 9.0, 9.0]]),
         standard_errors=np.full((4, 3), 0.01),
+        correlation=np.tile(np.eye(3), (4, 1, 1)),
         held=("held pivot",),
     )
     none = replace(few, published=np.zeros(4, np.bool_))
@@ -133,5 +139,44 @@ def test_row_contains_the_verdicts_of_its_runs() -> None:
     assert cells[1] == "3/4"
     assert cells[5] == "1"  # median of 0.01, per cent
     assert cells[6] == "33/67/67"
-    assert cells[7:] == ("1/3", "1", "held pivot", "0/4", "0")
-    assert row(CASES[0], none, few)[1:] == ("0/4", *["-"] * 6, "0", "held pivot", "3/4", "1")
+    assert cells[7:] == ("1/3", "1", "held pivot", "0/4", "0", "0.02", "f32: biased")
+    assert row(CASES[0], none, few)[1:] == ("0/4", *["-"] * 6, "0", "held pivot", "3/4", "1", "-", "q31: biased")
+
+
+def silent_runs(errors: Float, correlation: float = 0.0) -> Outcome:
+    """Runs without alarm whose errors are in standard errors [runs, 3]."""
+    runs = len(errors)
+    matrix = np.full((3, 3), correlation) + (1 - correlation) * np.eye(3)
+    none = np.zeros(runs, np.bool_)
+    return Outcome(~none, none, errors, np.ones((runs, 3)), np.tile(matrix, (runs, 1, 1)), ())
+
+
+def test_chance_is_that_of_errors_with_the_published_covariance() -> None:
+    """0.27 % of normal numbers lie beyond 3 standard deviations."""
+    none = np.zeros((2, 3))
+    assert silent_runs(none).chance == pytest.approx(1 - 0.9973002**3, abs=1e-5)
+    assert silent_runs(none, 0.999999).chance == pytest.approx(0.0026998, abs=3e-5)
+    assert replace(silent_runs(none), alarmed=np.ones(2, np.bool_)).chance == 0.0
+
+
+def test_a_fault_is_what_chance_does_not_explain() -> None:
+    """Of 40 runs one or two are beyond 3 standard errors by chance, three are not; nor is a mean error of one."""
+    few = np.zeros((40, 3))
+    few[:2, 0] = 3.1, -3.1
+    assert silent_runs(few).fault == ""
+    few[2:5, 0] = 3.1, -3.1, 3.1
+    assert silent_runs(few).fault == "wrong"
+    assert silent_runs(np.full((40, 3), 0.5)).fault == ""
+    assert silent_runs(np.full((40, 3), 1.0)).fault == "biased"
+    assert replace(silent_runs(few), alarmed=np.ones(40, np.bool_)).fault == ""
+
+
+@pytest.mark.parametrize("core", ["f32", "q31"])
+def test_neglected_terms_make_no_fault(core: Core, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 0.05 rad the residuals of half of the runs show nothing of a bias of 2 standard errors of the noise."""
+    full = case("full equations, 0.053 rad, 14 bits")
+    found = run_case(full, FAULT_SEEDS, core)
+    assert found.published.all() and found.silent.sum() >= FAULT_SEEDS // 4
+    assert found.wrong == 0 and found.fault == ""
+    monkeypatch.setattr(Case, "neglected", 0.0)
+    assert run_case(full, FAULT_SEEDS, core).fault == "biased"

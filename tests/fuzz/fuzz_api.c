@@ -200,7 +200,7 @@ static void configure_weak(bool sound)
     }
     float *const fields[] = {&config->sample_rate_hz,   &config->trust.kappa_min, &config->trust.se_max,
                              &config->trust.misfit_max, &config->trust.renewal,   &config->gate.sigmas,
-                             &config->gate.patience_s,  &weak.design.overlap};
+                             &config->gate.patience_s,  &config->trust.neglected, &weak.design.overlap};
     if (one_in(2)) {
         spoil(fields, sizeof fields / sizeof fields[0]);
     }
@@ -467,6 +467,7 @@ static void configure_weak_q31(bool sound)
     config->trust.se_max = one_in(6) ? any_size_i32() : config->trust.se_max;
     config->trust.misfit_max = one_in(6) ? (uint32_t)any_size_i32() : config->trust.misfit_max;
     config->trust.renewal = one_in(6) ? (uint32_t)any_size_i32() : config->trust.renewal;
+    config->trust.neglected = one_in(4) ? any_size_i32() : config->trust.neglected;
     spoil_tables_q31();
     pvid_fourier_design_q31 *design = &weak_q31.design;
     design->functions = one_in(8) ? (uint8_t)below(13) : design->functions;

@@ -108,9 +108,14 @@ def test_the_twin_has_the_same_integers_where_it_is_hard(label: str) -> None:
     run, board = one.run(3, duration=8.0), one.board("q31")
     assert isinstance(board, FixedBoard)
     readings = board.samples({"phi": run.phi, "y": run.y})
-    own = board.identifier(start).run_samples(readings)
-    twin = (
-        FourierTwinQ31(board.config_from(start), board.engine.parameters.model).run(readings.T.astype(np.int64)).lane()
-    )
+    identifier = board.identifier(start)
+    own = identifier.run_samples(readings)
+    twins = FourierTwinQ31(board.config_from(start), board.engine.parameters.model)
+    twin = twins.run(readings.T.astype(np.int64)).lane()
     for name in ("reason", "p", "sums", "exponent", "published"):
         assert np.array_equal(getattr(own, name), getattr(twin, name)), name
+    n_p = own.p.shape[1]
+    for name in ("se", "correlation"):
+        own_part, other = (x[name] for x in (identifier.estimate, twins.trust.estimate[0]))
+        first = (slice(n_p),) * own_part.ndim
+        assert np.array_equal(own_part[first], other[first]), name

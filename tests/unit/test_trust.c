@@ -112,6 +112,21 @@ static double fade_factor(void)
     return (double)pvid_trust_fade_factor_f32(&trust);
 }
 
+static void set_neglected(double part)
+{
+    trust.config.neglected = (float)part;
+}
+
+static double published_error(int a)
+{
+    return (double)trust.estimate.se[a];
+}
+
+static double published_correlation(int a, int b)
+{
+    return (double)trust.estimate.covariance[a][b] / (published_error(a) * published_error(b));
+}
+
 static void nan_counts_as_the_worst(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
 /* Which estimates of the fixed-point core are published: the gate, the alarm, the way back. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,8 +18,8 @@ static pvid_trust_q31 trust;
 
 #include "trust_cases.h"
 
-/* The defaults of trust.h: 3e-5, 5 %, 4, 3, 16, 20 %. */
-static const pvid_trust_config_q31 defaults = {32212, 838861, 262144, 3, 16, 13107};
+/* The defaults of trust.h: 3e-5, 5 %, 4, 3, 16, 20 %, 0. */
+static const pvid_trust_config_q31 defaults = {32212, 838861, 262144, 3, 16, 13107, 0};
 
 static int64_t q24(double x)
 {
@@ -102,6 +103,21 @@ static double fade_factor(void)
 {
     const int32_t factor = pvid_trust_fade_factor_q31(&trust);
     return (factor == 0) ? 1.0 : ((double)factor / 2147483648.0);
+}
+
+static void set_neglected(double part)
+{
+    trust.config.neglected = (int32_t)(part * 1073741824.0);
+}
+
+static double published_error(int a)
+{
+    return (double)trust.estimate.se[a] / (double)(1 << 20);
+}
+
+static double published_correlation(int a, int b)
+{
+    return (double)trust.estimate.correlation[a][b] / 1073741824.0;
 }
 
 /* One group that the model cannot explain at all must not outweigh thousands. */

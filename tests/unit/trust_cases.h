@@ -25,6 +25,11 @@ static void place(double p);
 static const void *fallback(void);
 static double fade_factor(void);
 
+/* Sets trust.config.neglected. Then what is published: a standard error, a correlation. */
+static void set_neglected(double part);
+static double published_error(int a);
+static double published_correlation(int a, int b);
+
 static pvid_reason judge_good(double variance_ratio)
 {
     return judge(PVID_UPDATED, 1.0e-5, true, variance_ratio, candidate(0.01, 1.0e-2));
@@ -229,6 +234,37 @@ static void the_alarm_can_be_switched_off(void **state)
     }
 }
 
+/* se^2 of p = 20 +- 1 % becomes 1 %^2 + 3 %^2, of which nine tenths are common to the positive parameters. */
+static void neglected_terms_join_what_is_published(void **state)
+{
+    (void)state;
+    set_neglected(0.03);
+    for (int i = 0; i < 4; i++) {
+        (void)judge_good(1.0);
+    }
+    for (int a = 0; a < 3; a++) {
+        assert_true(fabs(published_error(a) - 0.632456) < 1.0e-5);
+        assert_true(fabs(published_correlation(a, (a + 1) % 3) - 0.9) < 1.0e-5);
+        assert_true(fabs(published_correlation(a, 3)) < 1.0e-9);
+    }
+    assert_true(fabs(published_error(3) - 0.2) < 1.0e-5);
+}
+
+/* They are no reason to hold an estimate, however large they are. */
+static void neglected_terms_hold_nothing(void **state)
+{
+    (void)state;
+    set_neglected(1.0);
+    for (int i = 0; i < 4; i++) {
+        (void)judge_good(1.0);
+    }
+    assert_int_equal(judge_good(1.0), PVID_UPDATED);
+    assert_true(published_error(0) > 20.0);
+    set_neglected(0.0);
+    assert_int_equal(judge_good(1.0), PVID_UPDATED);
+    assert_true(fabs(published_error(0) - 0.2) < 1.0e-5);
+}
+
 #define TRUST_CASES                                                                                                    \
     cmocka_unit_test_setup(the_first_groups_are_never_published, start_again),                                         \
         cmocka_unit_test_setup(held_group_keeps_the_published_estimate_with_reason, start_again),                      \
@@ -241,6 +277,8 @@ static void the_alarm_can_be_switched_off(void **state)
         cmocka_unit_test_setup(nothing_fades_before_convergence_or_with_large_errors, start_again),                    \
         cmocka_unit_test_setup(the_alarms_means_restart_with_a_renewal, start_again),                                  \
         cmocka_unit_test_setup(expected_residuals_raise_no_alarm, start_again),                                        \
-        cmocka_unit_test_setup(the_alarm_can_be_switched_off, start_again),
+        cmocka_unit_test_setup(the_alarm_can_be_switched_off, start_again),                                            \
+        cmocka_unit_test_setup(neglected_terms_join_what_is_published, start_again),                                   \
+        cmocka_unit_test_setup(neglected_terms_hold_nothing, start_again),
 
 #endif

@@ -18,7 +18,7 @@ from pvid.core.native import Publisher
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.run.engine_design import engine_config, samples_of
-from pvid.run.engine_design_q31 import FixedEngine, fixed_engine
+from pvid.run.engine_design_q31 import FixedEngine, fixed_engine, with_neglected
 from pvid.settings.enums import Core, Reason
 from pvid.settings.fourier import FourierConfig
 from pvid.settings.fourier_q31 import FourierConfigQ31
@@ -37,12 +37,14 @@ class Answer:
     Attributes
     ----------
     p, se : published; before the first publication those of the start [n_p]
+    correlation : of their errors [n_p, n_p]
     history, errors : p and standard errors that are published after every tick [ticks, n_p]
     reasons : of every tick, Reason [ticks]
     """
 
     p: Float
     se: Float
+    correlation: Float
     history: Float
     errors: Float
     reasons: npt.NDArray[np.uint8]
@@ -102,7 +104,8 @@ class FloatBoard:
         record = identifier.run_samples(self.samples(run), sums=False, hashes=False)
         p, se = _published(identifier, record)
         p, se, history, errors = (x.astype(np.float64) for x in (p, se, record.published, record.published_se))
-        return Answer(p, se, history, errors, record.reason)
+        covariance = identifier.estimate["covariance"].astype(np.float64)[: len(p), : len(p)]
+        return Answer(p, se, covariance / np.outer(se, se), history, errors, record.reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +137,9 @@ class FixedBoard:
         identifier = self.identifier(start)
         record = identifier.run_samples(self.samples(run), sums=False, hashes=False)
         p, se = map(self.engine.values, _published(identifier, record))
+        correlation = identifier.estimate["correlation"][: len(p), : len(p)] * 2.0**-30
         values = self.engine.values
-        return Answer(p, se, values(record.published), values(record.published_se), record.reason)
+        return Answer(p, se, correlation, values(record.published), values(record.published_se), record.reason)
 
 
 def _published(identifier: Publisher, record: Record) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
@@ -144,9 +148,10 @@ def _published(identifier: Publisher, record: Record) -> tuple[npt.NDArray[Any],
 
 
 def board_of(
-    compiled: CompiledModel, run: Signals, design: FourierDesign, p: Float, core: Core
+    compiled: CompiledModel, run: Signals, design: FourierDesign, p: Float, core: Core, neglected: float = 0.0
 ) -> FloatBoard | FixedBoard:
-    """Settings from a run of the rig, at parameters near its own [n_p]."""
+    """Settings from a run of the rig, at parameters near its own [n_p]; neglected: as in trust.h."""
     if core == "q31":
-        return FixedBoard(fixed_engine(compiled, run, design, p))
-    return FloatBoard(compiled, engine_config(compiled, run, design, p))
+        return FixedBoard(with_neglected(fixed_engine(compiled, run, design, p), neglected))
+    config = engine_config(compiled, run, design, p)
+    return FloatBoard(compiled, replace(config, trust=replace(config.trust, neglected=neglected)))

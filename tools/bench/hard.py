@@ -2,7 +2,7 @@
 
 Every run has an unknown encoder offset of 0.02 rad. The engine runs as on a board: its settings are made once for the
 encoder, its own trust alone judges. What must not happen is a published answer that is far from the truth by its own
-standard errors and raises no alarm.
+standard errors and raises no alarm, more often than chance explains.
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 from bench.board_engine import Answer, FixedBoard, FloatBoard, board_of
 from bench.pendulum import RIGS, design_for, model_for
 from pvid.core.native import Native
 from pvid.rig.run import Run
+from pvid.run.engine_design import neglected_part
 from pvid.settings.enums import Core
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
@@ -52,8 +54,11 @@ HEADER = (
     "else held",
     "fixed point: published",
     "fixed point: wrong, no alarm",
+    "by chance",
+    "fault",
 )
 NOISE_LSB = 0.5  # of an encoder that nothing else is known of
+RARE = 1e-3  # probability below which chance is no explanation
 
 
 @dataclass(frozen=True)
@@ -89,7 +94,13 @@ class Case:
 
     def board(self, core: Core = "f32") -> FloatBoard | FixedBoard:
         """The engine with the settings for this encoder."""
-        return _board(self.bits, self.noise_lsb if self.told else NOISE_LSB, core)
+        noise = self.noise_lsb if self.told else NOISE_LSB
+        return _board(self.bits, noise, core, self.neglected)
+
+    @property
+    def neglected(self) -> float:
+        """As a recording of the rig gives it; 0 where its equations are linear."""
+        return 0.0 if self.truth == "linear" else _neglected(replace(self, bits=14, noise_lsb=NOISE_LSB))
 
     def run(self, seed: int, duration: float = 40.0) -> Run:
         """What the sensors see in `duration` [s]."""
@@ -165,10 +176,17 @@ CASES = tuple(_cases())
 
 
 @lru_cache(maxsize=4)
-def _board(bits: int, noise_lsb: float, core: Core) -> FloatBoard | FixedBoard:
+def _board(bits: int, noise_lsb: float, core: Core, neglected: float) -> FloatBoard | FixedBoard:
     """From a run of the standard rig with the encoder's resolution."""
     rig = replace(RIGS[0], bits=bits, zero=ZERO)
-    return board_of(model_for(rig, noise=noise_lsb), rig.signals(0), design_for(rig), np.append(TRUTH, ZERO), core)
+    model, p = model_for(rig, noise=noise_lsb), np.append(TRUTH, ZERO)
+    return board_of(model, rig.signals(0), design_for(rig), p, core, neglected)
+
+
+@lru_cache(maxsize=4)
+def _neglected(case: Case) -> float:
+    run = case.run(0)
+    return neglected_part(model_for(RIGS[0]), {"phi": run.phi, "y": run.y})
 
 
 @dataclass(frozen=True)
@@ -179,6 +197,7 @@ class Outcome:
     ----------
     published, alarmed : [seeds]
     errors, standard_errors : of w, d1, d2, relative to the truth [seeds, 3], published or not
+    correlation : of these errors as published [seeds, 3, 3]
     held : reason of the runs that were not published
     """
 
@@ -186,6 +205,7 @@ class Outcome:
     alarmed: npt.NDArray[np.bool_]
     errors: Float
     standard_errors: Float
+    correlation: Float
     held: tuple[str, ...]
 
     @property
@@ -196,7 +216,37 @@ class Outcome:
     @property
     def wrong(self) -> int:
         """Runs that publish, raise no alarm, and have w, d1 or d2 beyond 3 standard errors."""
-        return int((self.published & ~self.alarmed & ~self.covered.all(axis=1)).sum())
+        return int((self.silent & ~self.covered.all(axis=1)).sum())
+
+    @property
+    def silent(self) -> npt.NDArray[np.bool_]:
+        """Runs that publish and raise no alarm [seeds]."""
+        return self.published & ~self.alarmed
+
+    @property
+    def chance(self) -> float:
+        """Probability that normal errors with the published covariance put w, d1 or d2 beyond 3 standard errors."""
+        if not self.silent.any():
+            return 0.0
+        normal = stats.multivariate_normal(
+            cov=np.median(self.correlation[self.silent], axis=0), allow_singular=True, seed=0
+        )
+        return 1.0 - float(normal.cdf(np.full(3, 3.0), lower_limit=np.full(3, -3.0)))
+
+    @property
+    def fault(self) -> str:
+        """What chance does not explain of the runs without alarm, or nothing.
+
+        The number of wrong ones, or a mean error: each would be reported in one of 1000 rows without a fault.
+        """
+        runs = int(self.silent.sum())
+        if not runs:
+            return ""
+        if stats.binom.sf(self.wrong - 1, runs, self.chance) < RARE:
+            return "wrong"
+        mean = np.mean((self.errors / self.standard_errors)[self.silent], axis=0)
+        beyond = 3 * 2 * stats.norm.sf(np.abs(mean).max() * np.sqrt(runs))  # of three parameters, either sign
+        return "biased" if beyond < RARE else ""
 
 
 def answer_of(case: Case, seed: int, core: Core = "f32") -> Answer:
@@ -218,6 +268,7 @@ def run_case(
         alarmed=np.array([one.alarm for one in found]),
         errors=np.array([one.p[:3] for one in found]) / TRUTH - 1,
         standard_errors=np.array([one.se[:3] for one in found]) / TRUTH,
+        correlation=np.array([one.correlation[:3, :3] for one in found]),
         held=tuple(one.last.text for one in found if not one.published),
     )
 
@@ -245,6 +296,8 @@ def row(case: Case, outcome: Outcome, fixed: Outcome) -> tuple[str, ...]:
         reasons[0][0] if reasons else "",
         f"{fixed.published.sum()}/{runs}",
         str(fixed.wrong),
+        f"{outcome.silent.sum() * outcome.chance:.2f}" if outcome.silent.any() else "-",
+        ", ".join(f"{core}: {one.fault}" for core, one in (("f32", outcome), ("q31", fixed)) if one.fault),
     )
 
 

@@ -52,6 +52,7 @@ typedef enum {
     PVID_BAD_DRIVE_TICKS,  /* of the q31 strong form: outside 1..2^30 */
     PVID_BAD_FORMAT,       /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
     PVID_BAD_RENEWAL,      /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
+    PVID_BAD_NEGLECTED,    /* of trust.h: outside 0..1 */
     PVID_BAD_POINTER       /* the object, the configuration or the bank is NULL */
 } pvid_status;
 

@@ -18,6 +18,10 @@
  * Renewal. Rows added far from the solution may have too much weight, and float32 sums lose digits when p moves
  * far. When p has converged far from them, the old sums are faded over the next groups.
  *
+ * Neglected terms. Residuals do not show a small error of the equations, and more data do not reduce the error of p
+ * that it causes. `neglected` joins the standard errors of what is published, the same part of each positive parameter;
+ * the verdict does not depend on it.
+ *
  * Every input is allowed. Cost: O(n_p^2).
  */
 #ifndef PVID_TRUST_H
@@ -46,9 +50,11 @@ typedef struct {
     float renewal; /* the old sums are renewed when a positive parameter has converged this far from its value at their
                       rows, relative, and the residual variance of all rows is beyond the alarm's limit; 0.01..1e3; 0:
                       never */
+    float neglected; /* relative error of the positive parameters because the equations are approximate, as of small
+                        angles, 0..1; 0: they are exact */
 } pvid_trust_config_f32;
 
-/* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %. */
+/* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %, neglected 0. */
 extern const pvid_trust_config_f32 pvid_trust_defaults_f32;
 
 /* State: detail/trust_state.h, not API. Only the functions below write to it. */
@@ -80,10 +86,10 @@ const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self);
  *   reason, size:    of that solve
  *   above_noise:     of the assessment
  *   variance_ratio:  residual variance of the group over its expectation
- *   candidate:       the assessed estimate
+ *   candidate:       the assessed estimate; what is published has the neglected terms
  * Returns and counts the reason of the table above. */
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
-                                 bool above_noise, float variance_ratio, const pvid_estimate_f32 *candidate);
+                                 bool above_noise, float variance_ratio, pvid_estimate_f32 *candidate);
 
 #ifdef __cplusplus
 }

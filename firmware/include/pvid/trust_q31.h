@@ -25,6 +25,8 @@ typedef struct {
     uint16_t
         revert_after; /* consecutive uninformative groups after which p reverts to the published estimate; 0: never */
     uint32_t renewal; /* relative change of p after which the old sums are renewed, Q16, 0.01..1e3; 0: never */
+    int32_t
+        neglected; /* relative error of the positive parameters because the equations are approximate, Q30, 0..2^30 */
 } pvid_trust_config_q31;
 
 /* State: detail/trust_state_q31.h, not API. Only the functions below write to it. */
@@ -50,11 +52,11 @@ const int32_t *pvid_trust_fallback_q31(const pvid_trust_q31 *self);
  *   reason, size:    of that solve
  *   above_noise:     of the assessment
  *   variance_ratio:  residual variance of the group over its expectation, Q24, >= 0
- *   candidate:       the assessed estimate
+ *   candidate:       the assessed estimate; what is published has the neglected terms
  *
  * Returns and counts the reason of trust.h. */
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
-                                 bool above_noise, int64_t variance_ratio, const pvid_estimate_q31 *candidate);
+                                 bool above_noise, int64_t variance_ratio, pvid_estimate_q31 *candidate);
 
 #ifdef __cplusplus
 }

@@ -69,6 +69,7 @@ static const char *const statuses[] = {
     "bad drive ticks: of the q31 strong form: outside 1..2^30",
     "bad format: p_bits, n_bits or y_bits of a q31 estimator: outside -64..64",
     "bad renewal: of trust.h: not finite, or neither 0 nor 0.01..1e3",
+    "bad neglected: of trust.h: outside 0..1",
     "bad pointer: the object, the configuration or the bank is NULL",
 };
 /* clang-format on */

@@ -20,6 +20,7 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .groups_min = 3,
     .revert_after = 16,
     .renewal = 0.2f,
+    .neglected = 0.0f,
 };
 
 /* p has arrived if its last step, relative, is at most this part of the largest relative standard error, or 1e-4. */
@@ -42,6 +43,9 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
 /* Limit of a group's variance ratio: a single group must not outweigh thousands. */
 #define VARIANCE_RATIO_MAX 1.0e6f
 
+/* Largest variance with neglected terms: a covariance of two such is finite. */
+#define VARIANCE_MAX 1.0e36f
+
 static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
 {
     if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
@@ -55,6 +59,9 @@ static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
     }
     if (!pvid_within_f32(config->renewal, 0.01f, 1.0e3f) && !pvid_within_f32(config->renewal, 0.0f, 0.0f)) {
         return PVID_BAD_RENEWAL;
+    }
+    if (!pvid_within_f32(config->neglected, 0.0f, 1.0f)) {
+        return PVID_BAD_NEGLECTED;
     }
     return PVID_OK;
 }
@@ -245,8 +252,29 @@ static pvid_reason verdict(const pvid_trust_f32 *self, pvid_reason reason, float
     return PVID_UPDATED;
 }
 
+/* Adds the errors from neglected terms, which all positive parameters have at once. */
+static void add_neglected(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_estimate_f32 *candidate)
+{
+    const size_t n_p = estimator->model->n_p;
+    float error[PVID_MAX_P];
+    for (size_t a = 0; a < n_p; a++) {
+        error[a] = pvid_is_positive_f32(estimator->model, a) ? (self->config.neglected * candidate->p[a]) : 0.0f;
+        const float variance = (candidate->se[a] * candidate->se[a]) + (error[a] * error[a]);
+        if (variance <= VARIANCE_MAX) {
+            candidate->se[a] = sqrtf(variance);
+        } else { /* NaN too: as without */
+            error[a] = 0.0f;
+        }
+    }
+    for (size_t a = 0; a < n_p; a++) {
+        for (size_t b = 0; b < n_p; b++) {
+            candidate->covariance[a][b] += error[a] * error[b];
+        }
+    }
+}
+
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
-                                 bool above_noise, float variance_ratio, const pvid_estimate_f32 *candidate)
+                                 bool above_noise, float variance_ratio, pvid_estimate_f32 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
@@ -260,6 +288,9 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
     if (judged == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
+        if (self->config.neglected > 0.0f) {
+            add_neglected(self, estimator, candidate);
+        }
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }

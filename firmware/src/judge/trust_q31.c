@@ -48,6 +48,9 @@ static pvid_status config_is_valid(const pvid_trust_config_q31 *config)
     if ((config->renewal != 0u) && ((config->renewal < RENEWAL_MIN) || (config->renewal > RENEWAL_MAX))) {
         return PVID_BAD_RENEWAL;
     }
+    if ((config->neglected < 0) || (config->neglected > PVID_ONE_Q30)) {
+        return PVID_BAD_NEGLECTED;
+    }
     return PVID_OK;
 }
 
@@ -229,8 +232,36 @@ static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 
     return PVID_UPDATED;
 }
 
+/* Adds the errors from neglected terms, which all positive parameters have at once. With e = neglected p and
+ * se'^2 = se^2 + e^2, a correlation becomes (se_a se_b correlation + e_a e_b) / (se'_a se'_b). */
+static void add_neglected(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_estimate_q31 *candidate)
+{
+    const size_t n_p = estimator->model->n_p;
+    int64_t own[PVID_MAX_P];  /* se / se', Q30 */
+    int64_t more[PVID_MAX_P]; /* e / se', Q30 */
+    for (size_t a = 0; a < n_p; a++) {
+        const int64_t error = pvid_is_positive_q31(estimator->model, a)
+                                  ? pvid_round_shift_q31((int64_t)self->config.neglected * candidate->p[a], 30u)
+                                  : 0;
+        const int64_t before = candidate->se[a];
+        const int64_t root = (int64_t)pvid_square_root_q31((uint64_t)((before * before) + (error * error)));
+        const int64_t after = pvid_clamp_q31(root, INT32_MAX);
+        own[a] = (after > 0) ? ((before * PVID_ONE_Q30) / after) : PVID_ONE_Q30;
+        more[a] = (after > 0) ? ((error * PVID_ONE_Q30) / after) : 0;
+        candidate->se[a] = (int32_t)after;
+    }
+    for (size_t a = 0; a < n_p; a++) {
+        for (size_t b = a + 1u; b < n_p; b++) {
+            const int64_t part = pvid_round_shift_q31(own[a] * own[b], 30u) * candidate->correlation[a][b];
+            const int64_t sum = pvid_round_shift_q31(part, 30u) + pvid_round_shift_q31(more[a] * more[b], 30u);
+            candidate->correlation[a][b] = (int32_t)pvid_clamp_q31(sum, PVID_ONE_Q30);
+            candidate->correlation[b][a] = candidate->correlation[a][b];
+        }
+    }
+}
+
 pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estimator, pvid_reason reason, int64_t size,
-                                 bool above_noise, int64_t variance_ratio, const pvid_estimate_q31 *candidate)
+                                 bool above_noise, int64_t variance_ratio, pvid_estimate_q31 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
@@ -242,6 +273,9 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
     if (judged == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
+        if (self->config.neglected > 0) {
+            add_neglected(self, estimator, candidate);
+        }
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }

@@ -48,5 +48,6 @@ uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *
     running = pvid_fingerprint_float(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
     running = pvid_fnv_word(running, config->revert_after);
-    return pvid_fingerprint_float(running, config->renewal);
+    running = pvid_fingerprint_float(running, config->renewal);
+    return pvid_fingerprint_float(running, config->neglected);
 }

@@ -67,7 +67,8 @@ uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *
     running = pvid_fnv_word(running, config->misfit_max);
     running = pvid_fnv_word(running, config->groups_min);
     running = pvid_fnv_word(running, config->revert_after);
-    return pvid_fnv_word(running, config->renewal);
+    running = pvid_fnv_word(running, config->renewal);
+    return pvid_fnv_word(running, (uint32_t)config->neglected);
 }
 
 uint32_t pvid_fingerprint_gate_q31(uint32_t hash, const pvid_gate_config_q31 *config)

@@ -154,6 +154,7 @@ static const pvid_fourier_config_f32 kapitza_config_f32 = {
         .groups_min = 3,
         .revert_after = 16,
         .renewal = 0.200000003f,
+        .neglected = 0.0f,
     },
     .gate = {
         .sigmas = 4.0f,

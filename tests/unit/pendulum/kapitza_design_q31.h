@@ -186,7 +186,7 @@ static const pvid_fourier_config_q31 kapitza_config_q31 = {
         .dead_zone = 0,
         .divider = 1,
     },
-    .trust = {.kappa_min = 32212, .se_max = 838861, .misfit_max = 262144, .groups_min = 3, .revert_after = 16, .renewal = 13107},
+    .trust = {.kappa_min = 32212, .se_max = 838861, .misfit_max = 262144, .groups_min = 3, .revert_after = 16, .renewal = 13107, .neglected = 0},
     .gate = {.sigmas = 262144, .patience_groups = 100},
 };
 

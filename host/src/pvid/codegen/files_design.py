@@ -159,6 +159,7 @@ def _config(config: FourierConfig) -> str:
                 "groups_min": trust.groups_min,
                 "revert_after": trust.revert_after,
                 "renewal": number(trust.renewal),
+                "neglected": number(trust.neglected),
             }
         ),
         "gate": inner({"sigmas": number(gate.sigmas), "patience_s": number(gate.patience_s)}),

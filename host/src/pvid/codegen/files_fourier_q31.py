@@ -222,7 +222,7 @@ def configuration(config: FourierConfigQ31, prefix: str) -> str:
     arrays = ("start", "start_sd", "lower", "upper", "p_bits", "n_bits")
     numbers = ("y_bits", "row_sd", "forgetting_groups", "gain", "correlation", "row_weight", "step_limit")
     more = ("kappa_min", "noise_margin", "dead_zone", "divider")
-    of_trust = ("kappa_min", "se_max", "misfit_max", "groups_min", "revert_after", "renewal")
+    of_trust = ("kappa_min", "se_max", "misfit_max", "groups_min", "revert_after", "renewal", "neglected")
     parts = [_numbers("int32_t", f"{prefix}_offset", config.offset)]
     if config.drive_min is not None:
         parts.append(_numbers("int32_t", f"{prefix}_drive_min", config.drive_min))

@@ -16,7 +16,7 @@ from pvid.oracle.fourier.choice import MODEL_ERROR, Scored, ranked, ranked_for_e
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.gate import gated
-from pvid.oracle.fourier.identify import ready
+from pvid.oracle.fourier.identify import neglected, ready
 from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.run import Recording
@@ -91,13 +91,22 @@ def config_for_recording(
 ) -> FourierConfig:
     """Settings for the rig that made a recording; the estimate starts at what the recording shows.
 
+    The standard errors that a microcontroller publishes contain what linearised equations neglect at the largest motion
+    of the recording.
+
     Parameters
     ----------
     functions : K; None: chosen
     ranking : as of design_for_recording
     """
     design, p, known = design_and_p(compiled, recording, functions, ranking)
-    return engine_config(compiled, recording.signals, design, p, start_there=known)
+    config = engine_config(compiled, recording.signals, design, p, start_there=known)
+    return replace(config, trust=replace(config.trust, neglected=neglected_part(compiled, recording.signals)))
+
+
+def neglected_part(compiled: CompiledModel, run: Run) -> float:
+    """Relative error of p because equations are linearised, from the largest motion of a run, at most 1."""
+    return min(neglected(compiled, run), 1.0)
 
 
 def design_and_p(
@@ -110,9 +119,10 @@ def design_and_p(
 
 def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FourierConfig:
     """The same, to identify the recording itself: the limit of a standard error is that of the analysis, whose verdict
-    judges the answer, not that of a microcontroller on its own."""
+    judges the answer and whose standard errors contain what the equations neglect, not that of a microcontroller on its
+    own."""
     config = config_for_recording(compiled, recording, ranking=ranking)
-    return replace(config, trust=replace(config.trust, se_max=UNKNOWN))
+    return replace(config, trust=replace(config.trust, se_max=UNKNOWN, neglected=0.0))
 
 
 def design_for_recording(model: Compiled, run: Run, sample_rate: float, ranking: Sequence[Scored] = ()) -> Scored:

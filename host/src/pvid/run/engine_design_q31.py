@@ -21,7 +21,7 @@ from pvid.oracle.fourier.identify import ready
 from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.verdict import UNKNOWN
 from pvid.rig.run import Recording
-from pvid.run.engine_design import Run, design_and_p, engine_tables, simulated_run_of
+from pvid.run.engine_design import Run, design_and_p, engine_tables, neglected_part, simulated_run_of
 from pvid.settings.fourier_q31 import FourierConfigQ31
 from pvid.setup.fourier import drive_min_of, with_soft_widths
 from pvid.setup.fourier_q31 import config_of_q31, row_formats
@@ -30,6 +30,7 @@ _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
 _HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
 _FULL_SCALE = 1.5  # over the reach of a signal
 _SE_BITS = 24  # of se_max
+_PART_BITS = 30  # of neglected
 _ON_GRID = 1e-3  # of a count: digits of a file
 _FINER_BITS = 10  # at most
 _LONGEST_RUN_S = 3600.0  # of integrals since the start of the run, at least
@@ -204,7 +205,7 @@ def engine_for_recording(
     ranking : as of pvid.run.engine_design.design_for_recording
     """
     design, p, known = design_and_p(compiled, recording, functions, ranking)
-    return fixed_engine(
+    engine = fixed_engine(
         compiled,
         recording.signals,
         design,
@@ -213,12 +214,19 @@ def engine_for_recording(
         between_counts=between_counts,
         soft_signs=soft_signs,
     )
+    return with_neglected(engine, neglected_part(compiled, recording.signals))
+
+
+def with_neglected(engine: FixedEngine, part: float) -> FixedEngine:
+    """With standard errors that contain a relative error of p because equations are linearised."""
+    trust = replace(engine.config.trust, neglected=round(part * 2**_PART_BITS))
+    return replace(engine, config=replace(engine.config, trust=trust))
 
 
 def engine_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FixedEngine:
     """The same, to identify the recording itself: as config_to_identify."""
     engine = engine_for_recording(compiled, recording, ranking=ranking, between_counts=True)
-    trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS))
+    trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS), neglected=0)
     return replace(engine, config=replace(engine.config, trust=trust))
 
 

@@ -83,7 +83,8 @@ class Status(_Named):
     BAD_DRIVE_TICKS = 40
     BAD_FORMAT = 41
     BAD_RENEWAL = 42
-    BAD_POINTER = 43
+    BAD_NEGLECTED = 43
+    BAD_POINTER = 44
 
 
 class Law(_Named):

@@ -84,3 +84,4 @@ class TrustConfig:
     groups_min: int = 3
     revert_after: int = 16
     renewal: float = 0.2
+    neglected: float = 0.0

@@ -39,8 +39,8 @@ class EstimatorConfigQ31:
 
 @dataclass(frozen=True)
 class TrustConfigQ31:
-    """Which estimates are published, as in trust_q31.h: kappa_min in Q30, se_max in Q24, misfit_max and renewal in
-    Q16."""
+    """Which estimates are published, as in trust_q31.h: kappa_min and neglected in Q30, se_max in Q24, misfit_max and
+    renewal in Q16."""
 
     kappa_min: int = 32212
     se_max: int = 838861
@@ -48,6 +48,7 @@ class TrustConfigQ31:
     groups_min: int = 3
     revert_after: int = 16
     renewal: int = 13107
+    neglected: int = 0
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,8 @@ class TrustTwin(ABC):
         enough = self.groups >= self.config.groups_min
         sure = enough & (error <= self.config.se_max) & self._has_arrived(size, error)
         good = stepped & excited & sure
-        self.estimate = np.where(good, candidate, self.estimate)
+        published = self._with_neglected(candidate) if self.config.neglected > 0 else candidate
+        self.estimate = np.where(good, published, self.estimate)
         self.published = self.published | good
         return self._report(reason, excited, sure)
 
@@ -198,6 +199,10 @@ class TrustTwin(ABC):
     @abstractmethod
     def _has_moved(self, a: int) -> Mask:
         """Whether p[a] is further from its anchor than `renewal` allows."""
+
+    @abstractmethod
+    def _with_neglected(self, candidate: Candidate) -> Candidate:
+        """With the errors from neglected terms."""
 
     def _is_rounded(self) -> Mask | bool:
         """Whether rounding dominates the sums."""

@@ -16,7 +16,8 @@ from pvid.twin.trust import LONG, LONG_MEMORY, SHORT, Candidate, TrustTwin
 Float32 = npt.NDArray[np.float32]
 
 _ARRIVED, _SMALL_STEP, _VARIANCE_RATIO_MAX = np.float32(0.3), np.float32(1e-4), np.float32(1e6)
-_SINGLES = ("kappa_min", "se_max", "misfit_max", "renewal")
+_VARIANCE_MAX = np.float32(1e36)
+_SINGLES = ("kappa_min", "se_max", "misfit_max", "renewal", "neglected")
 
 
 class Trust(TrustTwin):
@@ -72,6 +73,21 @@ class Trust(TrustTwin):
     def _has_moved(self, a: int) -> Mask:
         part = self.estimator.p[a] / self.anchor[a] - np.float32(1)
         return np.asarray((part > self.config.renewal) | (part < -self.config.renewal))
+
+    def _with_neglected(self, candidate: Candidate) -> Candidate:
+        found = candidate.copy()
+        errors = []
+        for a, positive in enumerate(self.estimator.model.positive):
+            zero = np.zeros(len(found), np.float32)
+            error = self.config.neglected * found["p"][:, a] if positive else zero
+            variance = found["se"][:, a] * found["se"][:, a] + error * error
+            small = variance <= _VARIANCE_MAX
+            found["se"][:, a] = np.where(small, np.sqrt(variance), found["se"][:, a])
+            errors.append(np.where(small, error, zero))
+        for a, one in enumerate(errors):
+            for b, other in enumerate(errors):
+                found["covariance"][:, a, b] += one * other
+        return found
 
     def _is_rounded(self) -> Mask:
         return np.asarray(self.estimator.rounded)

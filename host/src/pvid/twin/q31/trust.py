@@ -59,3 +59,22 @@ class TrustQ31(TrustTwin):
     def _has_moved(self, a: int) -> Mask:
         way = np.abs(self.estimator.p[a] - self.anchor[a])
         return np.asarray((way << 16) > self.anchor[a] * self.config.renewal)
+
+    def _with_neglected(self, candidate: Candidate) -> Candidate:
+        found = candidate.copy()
+        own, more = [], []
+        for a, positive in enumerate(self.estimator.model.positive):
+            p, before = (found[name][:, a].astype(np.int64) for name in ("p", "se"))
+            error = round_shift(self.config.neglected * p, 30) if positive else np.zeros_like(p)
+            after = clamp(square_root(before * before + error * error), 2**31 - 1)
+            some = np.maximum(after, 1)
+            own.append(np.where(after > 0, before * ONE // some, ONE))
+            more.append(error * ONE // some)
+            found["se"][:, a] = after
+        correlation = found["correlation"]
+        for a in range(len(own)):
+            for b in range(a + 1, len(own)):
+                part = round_shift(own[a] * own[b], 30) * correlation[:, a, b].astype(np.int64)
+                total = clamp(round_shift(part, 30) + round_shift(more[a] * more[b], 30), ONE)
+                correlation[:, a, b] = correlation[:, b, a] = total
+        return found
