@@ -103,20 +103,15 @@ class Case:
         return 0.0 if self.truth == "linear" else _neglected(replace(self, bits=14, noise_lsb=NOISE_LSB))
 
     def run(self, seed: int, duration: float = 40.0) -> Run:
-        """What the sensors see in `duration` [s]."""
-        pendulum = replace(STANDARD_PENDULUM, damping1=self.damping, damping2=self.damping)
-        tones = tuple(replace(tone, amplitude_m=self.drive * tone.amplitude_m) for tone in self.tones if self.drive)
-        simulation = simulate(
-            pendulum,
-            tones,
-            self.sensors,
-            RATE_HZ,
-            duration,
-            self.release,
-            self.truth,
-            seed,
-        )
-        return simulation.run
+        """What the sensors see in `duration` [s]; both cores get the same."""
+        return _run(self, seed, duration)
+
+
+@lru_cache(maxsize=SEEDS)
+def _run(case: Case, seed: int, duration: float) -> Run:
+    pendulum = replace(STANDARD_PENDULUM, damping1=case.damping, damping2=case.damping)
+    tones = tuple(replace(tone, amplitude_m=case.drive * tone.amplitude_m) for tone in case.tones if case.drive)
+    return simulate(pendulum, tones, case.sensors, RATE_HZ, duration, case.release, case.truth, seed).run
 
 
 def modes() -> Float:

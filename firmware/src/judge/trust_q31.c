@@ -232,6 +232,12 @@ static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 
     return PVID_UPDATED;
 }
 
+/* x / y in Q30, 0 <= x <= y; 1 where y is 0. */
+static int64_t part_of(int64_t x, int64_t y)
+{
+    return (y > 0) ? pvid_clamp_q31((x * PVID_ONE_Q30) / y, PVID_ONE_Q30) : PVID_ONE_Q30;
+}
+
 /* Adds the errors from neglected terms, which all positive parameters have at once. With e = neglected p and
  * se'^2 = se^2 + e^2, a correlation becomes (se_a se_b correlation + e_a e_b) / (se'_a se'_b). */
 static void add_neglected(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_estimate_q31 *candidate)
@@ -240,14 +246,13 @@ static void add_neglected(const pvid_trust_q31 *self, const pvid_estimator_q31 *
     int64_t own[PVID_MAX_P];  /* se / se', Q30 */
     int64_t more[PVID_MAX_P]; /* e / se', Q30 */
     for (size_t a = 0; a < n_p; a++) {
-        const int64_t error = pvid_is_positive_q31(estimator->model, a)
-                                  ? pvid_round_shift_q31((int64_t)self->config.neglected * candidate->p[a], 30u)
-                                  : 0;
+        const int64_t share = pvid_is_positive_q31(estimator->model, a) ? self->config.neglected : 0;
+        const int64_t error = pvid_clamp_q31(pvid_round_shift_q31(share * candidate->p[a], 30u), INT32_MAX);
         const int64_t before = candidate->se[a];
-        const int64_t root = (int64_t)pvid_square_root_q31((uint64_t)((before * before) + (error * error)));
-        const int64_t after = pvid_clamp_q31(root, INT32_MAX);
-        own[a] = (after > 0) ? ((before * PVID_ONE_Q30) / after) : PVID_ONE_Q30;
-        more[a] = (after > 0) ? ((error * PVID_ONE_Q30) / after) : 0;
+        const int64_t square = pvid_clamp_q31((before * before) + (error * error), (int64_t)1 << 62);
+        const int64_t after = pvid_clamp_q31((int64_t)pvid_square_root_q31((uint64_t)square), INT32_MAX);
+        own[a] = part_of(before, after);
+        more[a] = (after > 0) ? part_of(error, after) : 0;
         candidate->se[a] = (int32_t)after;
     }
     for (size_t a = 0; a < n_p; a++) {
