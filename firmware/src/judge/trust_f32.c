@@ -12,6 +12,7 @@
 #include "number/finite_f32.h"
 #include "judge/publication.h"
 #include "judge/verdict.h"
+#include "number/unroll.h"
 
 const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .kappa_min = 3.0e-5f,
@@ -253,7 +254,8 @@ static pvid_reason verdict(const pvid_trust_f32 *self, pvid_reason reason, float
 }
 
 /* Adds the errors from neglected terms, which all positive parameters have at once. */
-static void add_neglected(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_estimate_f32 *candidate)
+PVID_COLD static void add_neglected(const pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
+                                    pvid_estimate_f32 *candidate)
 {
     const size_t n_p = estimator->model->n_p;
     float error[PVID_MAX_P];

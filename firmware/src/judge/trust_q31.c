@@ -7,6 +7,7 @@
 #include "solve/state_q31.h"
 #include "judge/publication.h"
 #include "judge/verdict.h"
+#include "number/unroll.h"
 
 /* p has arrived if its last step, relative, is at most this part of the largest relative standard error, or 1e-4. */
 #define ARRIVED 19661 /* 0.3, Q16 */
@@ -233,14 +234,15 @@ static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 
 }
 
 /* x / y in Q30, 0 <= x <= y; 1 where y is 0. */
-static int64_t part_of(int64_t x, int64_t y)
+PVID_COLD static int64_t part_of(int64_t x, int64_t y)
 {
     return (y > 0) ? pvid_clamp_q31((x * PVID_ONE_Q30) / y, PVID_ONE_Q30) : PVID_ONE_Q30;
 }
 
 /* Adds the errors from neglected terms, which all positive parameters have at once. With e = neglected p and
  * se'^2 = se^2 + e^2, a correlation becomes (se_a se_b correlation + e_a e_b) / (se'_a se'_b). */
-static void add_neglected(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_estimate_q31 *candidate)
+PVID_COLD static void add_neglected(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator,
+                                    pvid_estimate_q31 *candidate)
 {
     const size_t n_p = estimator->model->n_p;
     int64_t own[PVID_MAX_P];  /* se / se', Q30 */
