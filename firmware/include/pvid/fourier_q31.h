@@ -139,8 +139,8 @@ typedef struct {
     const int32_t *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, 0..2^24
                                  [counts]; NULL: no check */
     bool compensation;        /* corrects the bias by the sensors' noise (errors in variables), as in fourier.h */
-    uint8_t iterations;       /* most Gauss-Newton steps per window, 1..PVID_MAX_ITERATIONS; recommended: 3. There is no
-                                 other one behind a step below 0.8 % */
+    uint8_t iterations; /* Gauss-Newton steps in each of the first eight windows, 1..PVID_MAX_ITERATIONS; then one.
+                           Recommended: 2, as in fourier.h */
     pvid_estimator_config_q31 estimator; /* row_sd 2^(8 + y_bits): rows are in standard deviations. init sets model and
                                             row_weight */
     pvid_trust_config_q31 trust;         /* conditions of publication */

@@ -11,6 +11,7 @@
 #include "fourier/columns_f32.h"
 #include "fourier/noise_f32.h"
 #include "fourier/scores_f32.h"
+#include "fourier/steps.h"
 #include "fourier/sums_f32.h"
 #include "fourier/white_f32.h"
 #include "number/count.h"
@@ -37,8 +38,8 @@ enum {
     STAGE_ADD,      /* a few products of columns to the estimator */
     /* for the window */
     STAGE_SCORE,   /* C^T (sum N e + g) */
-    STAGE_BEGIN,   /* of the solves */
-    STAGE_SOLVE,   /* `iterations` solves, several stages each */
+    STAGE_BEGIN,   /* of a solve */
+    STAGE_SOLVE,   /* several stages; BEGIN again as often as steps.h says */
     STAGE_MEAN,    /* the scores to their means */
     STAGE_PREPARE, /* of the assessment; this and the next three only behind a solve that was due */
     STAGE_ASSESS,  /* several stages */
@@ -475,21 +476,18 @@ PVID_SELDOM static bool add_stage(pvid_fourier_f32 *self)
 
 /* ---- steps of p and verdict ---- */
 
-static void begin_solve(pvid_fourier_f32 *self, bool ends_group)
+static void begin_solve(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_estimator_begin_f32(&self->estimator, &finish->work.solve, ends_group);
+    const bool first = finish->iteration == 0u;
+    if (first) {
+        pvid_estimator_set_expected_f32(&self->estimator, finish->expected / (float)finish->used);
+    }
+    pvid_estimator_begin_f32(&self->estimator, &finish->work.solve, first);
+    finish->work.solve.fallback = first ? pvid_trust_fallback_f32(&self->trust) : NULL;
     if (checks_noise(self)) {
         finish->work.solve.noise = (const float (*)[PVID_MAX_P])finish->candidate.covariance;
     }
-}
-
-static void begin_solves(pvid_fourier_f32 *self)
-{
-    pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_estimator_set_expected_f32(&self->estimator, finish->expected / (float)finish->used);
-    begin_solve(self, true);
-    finish->work.solve.fallback = pvid_trust_fallback_f32(&self->trust);
 }
 
 PVID_SELDOM static bool solve_stage(pvid_fourier_f32 *self)
@@ -501,12 +499,14 @@ PVID_SELDOM static bool solve_stage(pvid_fourier_f32 *self)
     finish->iteration++;
     finish->reason = finish->work.solve.reason;
     finish->size = finish->work.solve.size;
-    /* ACCUMULATED: the divider allows no solve after this window */
-    if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED)) {
-        return false;
-    }
-    begin_solve(self, false);
-    return true;
+    return false;
+}
+
+/* ACCUMULATED: the divider allows no solve after this window. */
+static bool solves_again(const pvid_fourier_f32 *self)
+{
+    return (self->finish.reason != PVID_ACCUMULATED) &&
+           (self->finish.iteration < pvid_fourier_steps(self->iterations, self->trust.groups));
 }
 
 /* The larger of the two standard errors of a parameter; the covariance grows with it. */
@@ -613,6 +613,8 @@ static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
         return self->finish.shares ? (uint8_t)STAGE_SHARE : (uint8_t)STAGE_NOISE;
     case STAGE_GATE:
         return gated(self, reason);
+    case STAGE_SOLVE:
+        return solves_again(self) ? (uint8_t)STAGE_BEGIN : (uint8_t)STAGE_MEAN;
     case STAGE_MEAN: /* no assessment if no solve was due */
         return (self->finish.reason == PVID_ACCUMULATED) ? (uint8_t)STAGE_JUDGE : (uint8_t)STAGE_PREPARE;
     case STAGE_JUDGE:
@@ -683,7 +685,7 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         pvid_fourier_scores_take_f32(&finish->scores, &self->estimator, finish->work.rows.score);
         break;
     case STAGE_BEGIN:
-        begin_solves(self);
+        begin_solve(self);
         break;
     case STAGE_SOLVE:
         repeat = solve_stage(self);
@@ -799,6 +801,6 @@ uint32_t pvid_fourier_finish_stages_f32(const pvid_fourier_f32 *self)
     }
     const uint32_t first = pvid_estimator_stages_f32(&self->estimator, true);
     const uint32_t more = pvid_estimator_stages_f32(&self->estimator, false);
-    return stages + first + ((self->iterations - 1u) * more) +
+    return stages + first + ((self->iterations - 1u) * (more + 1u)) + /* BEGIN */
            pvid_estimator_assess_solved_stages_f32(&self->estimator);
 }

@@ -6,6 +6,7 @@
 #include "fourier/columns_q31.h"
 #include "fourier/mirror_q31.h"
 #include "fourier/noise_q31.h"
+#include "fourier/steps.h"
 #include "fourier/sums_q31.h"
 #include "fourier/white_q31.h"
 #include "number/count.h"
@@ -46,12 +47,9 @@ enum {
 #define SHARES_PER_STAGE 1u
 #define RESIDUALS_PER_STAGE 2u
 
-/* Relative step of p behind which there is no other one on the same sums: 2^-7, Q22. The next is below the square of
- * that. */
-#define SMALL_STEP ((int64_t)1 << 15)
-
-/* Windows after which the noise is computed anew; it is behind a step that is not small. */
+/* Windows after which the noise is computed anew, and relative step of p behind which it is at once: 2^-7, Q22. */
 #define NOISE_WINDOWS 16u
+#define SMALL_STEP ((int64_t)1 << 15)
 
 /* Windows in the average of the gate's scale, which is relative to the sensors' noise and at least 1. */
 #define GATE_MEMORY 4u
@@ -453,9 +451,9 @@ static bool solve_stage(pvid_fourier_q31 *self)
     finish->iteration++;
     finish->reason = finish->work.solve.reason;
     finish->size = finish->work.solve.size;
-    /* the divider may allow no solve after this window; another step would change less than the sensors' noise does */
-    if ((finish->iteration >= self->iterations) || (finish->reason == PVID_ACCUMULATED) ||
-        (finish->size <= SMALL_STEP)) {
+    /* ACCUMULATED: the divider allows no solve after this window */
+    if ((finish->iteration >= pvid_fourier_steps(self->iterations, self->trust.groups)) ||
+        (finish->reason == PVID_ACCUMULATED)) {
         return false;
     }
     pvid_estimator_begin_q31(&self->estimator, &finish->work.solve, false);

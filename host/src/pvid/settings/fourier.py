@@ -282,7 +282,7 @@ class FourierConfig:
     range : window dropped if a sample's absolute value is beyond [samples]; None: no check
     drive_min : window dropped if the standard deviation of a sample is below [samples]; None: no check
     compensation : B gets what the sensors' noise takes from it
-    iterations : Gauss-Newton steps a window
+    iterations : Gauss-Newton steps in each of the first eight windows; then one
     """
 
     sample_rate: float
@@ -291,7 +291,7 @@ class FourierConfig:
     range: Float32 | None = None
     drive_min: Float32 | None = None
     compensation: bool = True
-    iterations: int = 1
+    iterations: int = 2
     trust: TrustConfig = field(default_factory=TrustConfig)
     gate: GateConfig = field(default_factory=GateConfig)
 

@@ -185,7 +185,7 @@ class FourierConfigQ31:
     offset : reading of each sensor at 0 [counts]
     drive_min : window dropped if the standard deviation of a sample is below [counts]; None: no check
     compensation : b gets what the sensors' noise takes from it
-    iterations : Gauss-Newton steps a window
+    iterations : Gauss-Newton steps in each of the first eight windows; then one
     """
 
     design: FourierDesignQ31
@@ -193,6 +193,6 @@ class FourierConfigQ31:
     offset: tuple[int, ...]
     drive_min: tuple[int, ...] | None = None
     compensation: bool = True
-    iterations: int = 3
+    iterations: int = 2
     trust: TrustConfigQ31 = TrustConfigQ31()
     gate: GateConfigQ31 = GateConfigQ31()

@@ -127,7 +127,7 @@ class Finish:
         """Of a window with all its solves."""
         estimator = self.estimator
         of_kinds = sum(self._stages_of_kind(kind) for kind in range(self.design.model.kinds))
-        solves = estimator.solve_stages(True) + (self.iterations - 1) * estimator.solve_stages(False)
+        solves = estimator.solve_stages(True) + (self.iterations - 1) * (estimator.solve_stages(False) + 1)
         return of_kinds + 6 + len(estimator.p) + solves + estimator.assess_solved_stages
 
     # ---- a window
@@ -241,7 +241,9 @@ class Finish:
         estimator.set_expected(expected)
         yield None
         reason = np.full(score.shape[1], Reason.ACCUMULATED, np.uint8)
-        for iteration in range(self.iterations):
+        for iteration in range(self.trust.steps(self.iterations)):
+            if iteration:
+                yield None
             fallback = self.trust.fallback if iteration == 0 else None
             for solved in estimator.solve(ends_group=iteration == 0, fallback=fallback):
                 yield None

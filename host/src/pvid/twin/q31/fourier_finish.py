@@ -184,13 +184,13 @@ def stages(
     sensors = known.expected(expected, len(design.model.kind))
     estimator.set_expected(sensors)
     reason = np.full(lanes, Reason.ACCUMULATED, np.uint8)
-    for iteration in range(iterations):
+    for iteration in range(trust.steps(iterations)):
         fallback = trust.fallback if iteration == 0 else None
         for solved in estimator.solve(ends_group=iteration == 0, fallback=fallback):
             yield None
             if solved is not None:
                 reason = solved
-        if not estimator.was_due or of_all_lanes(estimator.size <= _SMALL_STEP):
+        if not estimator.was_due:
             break
     size = noise.size = estimator.size
     for _ in range(estimator.assessment_stages):
