@@ -14,6 +14,7 @@
 #include "fourier/steps.h"
 #include "fourier/sums_f32.h"
 #include "fourier/white_f32.h"
+#include "judge/trust_f32.h"
 #include "number/count.h"
 #include "number/exact.h"
 #include "solve/information_f32.h"
@@ -45,7 +46,8 @@ enum {
     STAGE_ASSESS,  /* several stages */
     STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
     STAGE_GROW,    /* the covariance grows with the standard errors */
-    STAGE_JUDGE,   /* trust.h publishes the estimate or holds it */
+    STAGE_JUDGE,   /* trust.h decides */
+    STAGE_PUBLISH, /* publishes the estimate or holds it */
     STAGE_IDLE = PVID_FOURIER_IDLE
 };
 
@@ -544,14 +546,14 @@ PVID_SELDOM static void grow_stage(pvid_fourier_f32 *self)
     }
 }
 
-PVID_SELDOM static void judge_stage(pvid_fourier_f32 *self, pvid_reason *reason)
+PVID_SELDOM static void judge_stage(pvid_fourier_f32 *self)
 {
     pvid_fourier_finish_f32 *finish = &self->finish;
-    pvid_estimate_f32 *estimate = &finish->candidate;
     const float expected = finish->expected / (float)finish->used;
     const float variance_ratio = finish->work.solve.group_rss / (finish->free * expected);
-    *reason = pvid_trust_judge_f32(&self->trust, &self->estimator, finish->reason, finish->size,
-                                   finish->work.solve.above_noise, variance_ratio, estimate);
+    finish->verdict =
+        (uint8_t)pvid_trust_decide_f32(&self->trust, &self->estimator, finish->reason, finish->size,
+                                       finish->work.solve.above_noise, variance_ratio, &finish->candidate);
 }
 
 /* ---- the order of the stages ---- */
@@ -617,7 +619,7 @@ static uint8_t stage_after(pvid_fourier_f32 *self, pvid_reason *reason)
         return solves_again(self) ? (uint8_t)STAGE_BEGIN : (uint8_t)STAGE_MEAN;
     case STAGE_MEAN: /* no assessment if no solve was due */
         return (self->finish.reason == PVID_ACCUMULATED) ? (uint8_t)STAGE_JUDGE : (uint8_t)STAGE_PREPARE;
-    case STAGE_JUDGE:
+    case STAGE_PUBLISH:
         return STAGE_IDLE;
     default:
         return (uint8_t)(self->finish.stage + 1u);
@@ -706,7 +708,11 @@ void pvid_fourier_finish_step_f32(pvid_fourier_f32 *self, pvid_reason *reason)
         grow_stage(self);
         break;
     case STAGE_JUDGE:
-        judge_stage(self, reason);
+        judge_stage(self);
+        break;
+    case STAGE_PUBLISH:
+        *reason = pvid_trust_publish_f32(&self->trust, &self->estimator, (pvid_reason)finish->verdict, finish->reason,
+                                         &finish->candidate);
         break;
     default:
         return;
@@ -795,7 +801,7 @@ uint32_t pvid_fourier_finish_columns_f32(const pvid_fourier_f32 *self)
 uint32_t pvid_fourier_finish_stages_f32(const pvid_fourier_f32 *self)
 {
     const pvid_fourier_model_f32 *model = self->design->model;
-    uint32_t stages = 6u + model->model->n_p; /* SCORE, BEGIN, MEAN, PREPARE, GROW, JUDGE; CLUSTER */
+    uint32_t stages = 7u + model->model->n_p; /* SCORE, BEGIN, MEAN, PREPARE, GROW, JUDGE, PUBLISH; CLUSTER */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }

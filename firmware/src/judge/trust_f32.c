@@ -11,6 +11,7 @@
 #include "solve/state_f32.h"
 #include "number/finite_f32.h"
 #include "judge/publication.h"
+#include "judge/trust_f32.h"
 #include "judge/verdict.h"
 #include "number/unroll.h"
 
@@ -235,8 +236,8 @@ static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimato
     }
 }
 
-static pvid_reason verdict(const pvid_trust_f32 *self, pvid_reason reason, float size, bool above_noise, float error,
-                           const pvid_estimate_f32 *candidate)
+static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason reason, float size, bool above_noise, float error,
+                              const pvid_estimate_f32 *candidate)
 {
     if (reason != PVID_UPDATED) {
         return reason;
@@ -275,8 +276,9 @@ PVID_COLD static void add_neglected(const pvid_trust_f32 *self, const pvid_estim
     }
 }
 
-pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
-                                 bool above_noise, float variance_ratio, pvid_estimate_f32 *candidate)
+pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
+                                  float size, bool above_noise, float variance_ratio,
+                                  const pvid_estimate_f32 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
@@ -286,8 +288,13 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
     const float error = pvid_trust_largest_error_f32(estimator, candidate);
     const bool settled = (reason == PVID_UPDATED) && (size <= SETTLED_STEP);
     raise_alarm(self, estimator, settled, variance_ratio, error, candidate);
-    const pvid_reason judged = verdict(self, reason, size, above_noise, error, candidate);
-    if (judged == PVID_UPDATED) {
+    return verdict_on(self, reason, size, above_noise, error, candidate);
+}
+
+pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
+                                   pvid_reason reason, pvid_estimate_f32 *candidate)
+{
+    if (verdict == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
         if (self->config.neglected > 0.0f) {
@@ -296,5 +303,13 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);
         self->published = true;
     }
-    return pvid_trust_report(&estimator->counters, judged, reason, self->misfit);
+    return pvid_trust_report(&estimator->counters, verdict, reason, self->misfit);
+}
+
+pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
+                                 bool above_noise, float variance_ratio, pvid_estimate_f32 *candidate)
+{
+    const pvid_reason verdict =
+        pvid_trust_decide_f32(self, estimator, reason, size, above_noise, variance_ratio, candidate);
+    return pvid_trust_publish_f32(self, estimator, verdict, reason, candidate);
 }

@@ -172,6 +172,7 @@ typedef struct {
     uint8_t used;       /* kinds whose rows have been added */
     uint8_t live;       /* nuisances of the kind that are projected out */
     uint8_t iteration;  /* solves done for this window */
+    uint8_t verdict;    /* of trust.h on the candidate, a pvid_reason */
     uint8_t other;      /* column of the next product */
     uint16_t index;     /* within the stage */
     uint16_t term;      /* next one of the kind */

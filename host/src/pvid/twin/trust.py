@@ -100,6 +100,13 @@ class TrustTwin(ABC):
         self, reason: Reasons, size: Array, above_noise: Mask, variance_ratio: Array, candidate: Candidate
     ) -> Reasons:
         """pvid_trust_judge of the core in every lane; shapes [lanes]."""
+        verdict = self.decide(reason, size, above_noise, variance_ratio, candidate)
+        return self.publish(verdict, reason, candidate)
+
+    def decide(
+        self, reason: Reasons, size: Array, above_noise: Mask, variance_ratio: Array, candidate: Candidate
+    ) -> Reasons:
+        """The verdict on every lane's candidate [lanes]."""
         self.groups = min(self.groups + 1, _COUNT_MAX)
         if (reason == Reason.ACCUMULATED).all():
             return reason
@@ -112,28 +119,32 @@ class TrustTwin(ABC):
         excited = above_noise & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         enough = self.groups >= self.config.groups_min
         sure = enough & (error <= self.config.se_max) & self._has_arrived(size, error)
-        good = stepped & excited & sure
+        verdict = reason.copy()
+        verdict[stepped & ~excited] = Reason.HELD_NOT_EXCITED
+        verdict[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
+        return verdict
+
+    def publish(self, verdict: Reasons, reason: Reasons, candidate: Candidate) -> Reasons:
+        """Publishes what is good; reason: of the solve. Returns the reasons to report [lanes]."""
+        good = verdict == Reason.UPDATED
         published = self._with_neglected(candidate) if self.config.neglected > 0 else candidate
         self.estimate = np.where(good, published, self.estimate)
         self.published = self.published | good
-        return self._report(reason, excited, sure)
+        return self._report(verdict, reason)
 
     def _count_uninformative(self, stepped: Mask) -> None:
         """Consecutive groups without a step: pvid_trust_count_uninformative of verdict.h."""
         counted = np.minimum(self.uninformative + 1, _COUNT_MAX)
         self.uninformative = np.where(stepped | self.fallback[0], 0, counted)
 
-    def _report(self, reason: Reasons, excited: Mask, sure: Mask) -> Reasons:
+    def _report(self, verdict: Reasons, reason: Reasons) -> Reasons:
         """pvid_trust_report of verdict.h: counts the verdicts and returns the reasons to report [lanes]."""
         counters = self.estimator.counters
-        stepped = reason == Reason.UPDATED
-        reported = reason.copy()
-        reported[stepped & ~excited] = Reason.HELD_NOT_EXCITED
-        reported[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN
-        reported[stepped & excited & sure & self.misfit] = Reason.MISFIT
+        reported = verdict.copy()
+        reported[(verdict == Reason.UPDATED) & self.misfit] = Reason.MISFIT
         counters["misfits"] += reported == Reason.MISFIT
         counters["held_uncertain"] += reported == Reason.HELD_UNCERTAIN
-        counters["held_not_excited"] += stepped & ~excited
+        counters["held_not_excited"] += (verdict == Reason.HELD_NOT_EXCITED) & (reason == Reason.UPDATED)
         return reported
 
     # ---- the alarm

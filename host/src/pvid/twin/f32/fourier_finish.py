@@ -128,7 +128,7 @@ class Finish:
         estimator = self.estimator
         of_kinds = sum(self._stages_of_kind(kind) for kind in range(self.design.model.kinds))
         solves = estimator.solve_stages(True) + (self.iterations - 1) * (estimator.solve_stages(False) + 1)
-        return of_kinds + 6 + len(estimator.p) + solves + estimator.assess_solved_stages
+        return of_kinds + 7 + len(estimator.p) + solves + estimator.assess_solved_stages
 
     # ---- a window
 
@@ -258,14 +258,22 @@ class Finish:
             variance_ratio = group_rss / (free * expected)
         yield None
         if not estimator.was_due:
-            yield self.trust.judge(reason, size, estimator.everywhere, variance_ratio, self.trust.estimate)
+            yield from self._judge(reason, size, estimator.everywhere, variance_ratio, self.trust.estimate)
             return
         for _ in range(1 + estimator.assess_solved_stages + len(estimator.p) + 1):
             yield None
         with np.errstate(all="ignore"):
             candidate, above_noise = estimator.judged_as_solved()
             self._cluster(candidate)
-        yield self.trust.judge(reason, size, above_noise, variance_ratio, candidate)
+        yield from self._judge(reason, size, above_noise, variance_ratio, candidate)
+
+    def _judge(
+        self, reason: Reasons, size: Float32, above_noise: Mask, variance_ratio: Float32, candidate: Candidate
+    ) -> Stages:
+        """The verdict; a tick later the publication."""
+        verdict = self.trust.decide(reason, size, above_noise, variance_ratio, candidate)
+        yield None
+        yield self.trust.publish(verdict, reason, candidate)
 
     def _cluster(self, candidate: Candidate) -> None:
         """The larger of the two standard errors of each parameter; the covariance grows with it."""

@@ -1,0 +1,17 @@
+/* The verdict of trust.h in two parts, each for a tick of its own. Private to the core. */
+#ifndef PVID_TRUST_F32_H
+#define PVID_TRUST_F32_H
+
+#include "pvid/trust.h"
+
+/* The verdict on a candidate; arguments as of pvid_trust_judge_f32. */
+pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
+                                  float size, bool above_noise, float variance_ratio,
+                                  const pvid_estimate_f32 *candidate);
+
+/* Publishes the candidate, with the neglected terms, if the verdict is PVID_UPDATED; counts the verdict. `reason` is
+ * that of the solve. Returns the reason to report. */
+pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
+                                   pvid_reason reason, pvid_estimate_f32 *candidate);
+
+#endif
