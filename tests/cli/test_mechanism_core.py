@@ -119,7 +119,7 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     assert answer.return_value == DONE and answer.stdout.count("equal") == 2 and "6000" in answer.stdout
     assert "f32" in answer.stdout and "q31" in answer.stdout
     changed = "pvid.run.mechanism_compare.FourierTwin"
-    monkeypatch.setattr(changed, lambda config: FourierTwin(replace(config, iterations=2)))
+    monkeypatch.setattr(changed, lambda config: FourierTwin(replace(config, iterations=1)))
     answer = pvid("compare", recorded["dc_motor"])
     assert answer.return_value == DIFFERENT
     assert "DIFFERENT: tick" in " ".join(answer.stdout.split())
