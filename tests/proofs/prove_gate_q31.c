@@ -26,10 +26,14 @@ static void any_residual(uint32_t least, uint32_t most)
     gate.judged = any_u32(least, most);
     gate.part.m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
     gate.part.e = any_i32(-200, 200);
+    gate.usual.m = any_i32(-PVID_ONE_Q30, PVID_ONE_Q30);
+    gate.usual.e = any_i32(LOWEST - 1, HIGHEST + 1);
     const pvid_scaled_q31 square = {any_i32(0, PVID_ONE_Q30), any_i32(-2000, 200)};
-    (void)pvid_gate_passes_q31(&gate, square);
+    (void)(any_bool() ? pvid_gate_passes_q31(&gate, square) : (pvid_gate_judge_q31(&gate, square) != 0));
     /*@ assert -0x40000000 <= gate.scale.m <= 0x40000000; */
     /*@ assert LOWEST - 1 <= gate.scale.e <= HIGHEST + 1; */
+    /*@ assert -0x40000000 <= gate.usual.m <= 0x40000000; */
+    /*@ assert LOWEST - 1 <= gate.usual.e <= HIGHEST + 1; */
     /*@ assert -0x40000000 <= gate.part.m <= 0x40000000; */
     /*@ assert -200 <= gate.part.e <= 200; */
 }

@@ -100,6 +100,20 @@ def test_one_percent_of_outliers_barely_widens_the_scale() -> None:
     assert float(one.scale[0]) < 1.2
 
 
+def test_what_opens_the_gate_is_told_in_both_cores() -> None:
+    single = gate(4.0, patience_s=3.0, memory=4.0)
+    integer = GateQ31(gate_config_q31(GateConfig(4.0, 3.0), 100.0), 4, one_lane(1.0))
+    told = {}
+    for tick, square in enumerate([1.0] * 8 + [1e4] * 50 + [15.0] + [1e4] * 400 + [1.0] * 20 + [9.0]):
+        passes, opens = single.judge(np.array([square], np.float32))
+        again = integer.judge(one_lane(square), np.ones(1, np.bool_))
+        assert (bool(again[0][0]), bool(again[1][0])) == (passes[0], opens[0]), tick
+        if opens[0]:
+            told[tick] = square
+            assert single.judged[0] == integer.judged[0] == 1
+    assert list(told.values()) == [1e4] and 200 < list(told)[0] < 300
+
+
 @settings(deadline=None)
 @given(squares=st.lists(st.floats(0, 1e38), max_size=60), patience=st.floats(0, 1e6))
 def test_gate_scale_stays_finite(squares: list[float], patience: float) -> None:

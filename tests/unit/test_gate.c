@@ -102,6 +102,57 @@ static void uninformative_count_is_reset(void **state)
     assert_true(gate.memory == 1.0f);
 }
 
+/* What passes only because outliers have widened the scale is a change, and the scale begins anew with it; what was
+ * usual before them is none. */
+static void what_opens_the_gate_is_told(void **state)
+{
+    (void)state;
+    start(3.0f, 2.0f, 4.0f);
+    for (int i = 0; i < 8; i++) {
+        assert_int_equal(pvid_gate_judge_f32(&gate, 1.0f), PVID_GATE_ACCEPTS);
+    }
+    for (int i = 0; i < 50; i++) {
+        assert_int_equal(pvid_gate_judge_f32(&gate, 9.0e4f), PVID_GATE_REJECTS);
+    }
+    assert_true(gate.scale > 5.0f);
+    assert_int_equal(pvid_gate_judge_f32(&gate, 8.9f), PVID_GATE_ACCEPTS); /* within 9 times the usual */
+    int kept_out = 0;
+    pvid_gate_verdict verdict = pvid_gate_judge_f32(&gate, 9.0e4f);
+    for (; (verdict == PVID_GATE_REJECTS) && (kept_out < 1000); kept_out++) {
+        verdict = pvid_gate_judge_f32(&gate, 9.0e4f);
+    }
+    assert_int_equal(verdict, PVID_GATE_OPENS);
+    assert_in_range(kept_out, 100, 206);
+    assert_true(gate.scale == 9.0e4f);
+    assert_true(gate.judged == 1.0f);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(pvid_gate_judge_f32(&gate, 1.0f), PVID_GATE_ACCEPTS);
+    }
+    assert_true(gate.judged == 4.0f);
+}
+
+/* Not a number changes nothing, and an open gate tells nothing. */
+static void nan_and_a_disabled_gate_tell_no_change(void **state)
+{
+    (void)state;
+    start(3.0f, 2.0f, 1.0f);
+    (void)pvid_gate_judge_f32(&gate, 1.0f);
+    assert_int_equal(pvid_gate_judge_f32(&gate, 9.0e4f), PVID_GATE_REJECTS);
+    const pvid_gate_f32 before = gate;
+    assert_int_equal(pvid_gate_judge_f32(&gate, NAN), PVID_GATE_ACCEPTS);
+    assert_int_equal(pvid_gate_judge_f32(&gate, INFINITY), PVID_GATE_ACCEPTS);
+    assert_memory_equal(&gate, &before, sizeof gate);
+    start(0.0f, 2.0f, 1.0f);
+    for (int i = 0; i < 20; i++) {
+        assert_int_equal(pvid_gate_judge_f32(&gate, (i % 2 == 0) ? 1.0f : 1.0e20f), PVID_GATE_ACCEPTS);
+    }
+    start(1000.0f, 2.0f, 1.0f);
+    (void)pvid_gate_judge_f32(&gate, 1.0f);
+    gate.scale = 1.0e28f; /* after many outliers */
+    assert_int_equal(pvid_gate_judge_f32(&gate, 1.0e33f), PVID_GATE_OPENS);
+    assert_true(gate.scale == 1.0e30f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -110,6 +161,8 @@ int main(void)
         cmocka_unit_test(gate_passes_nan),
         cmocka_unit_test(the_scale_stays_between_its_floor_and_its_ceiling),
         cmocka_unit_test(uninformative_count_is_reset),
+        cmocka_unit_test(what_opens_the_gate_is_told),
+        cmocka_unit_test(nan_and_a_disabled_gate_tell_no_change),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -143,6 +143,42 @@ static void test_memory_is_at_least_one(void **state)
     assert_int_equal(feed(401, 1), 0);
 }
 
+static pvid_gate_verdict judge(int64_t square)
+{
+    return pvid_gate_judge_q31(&gate, number(square));
+}
+
+/* What passes only because outliers have widened the scale is a change, and the scale begins anew with it; what was
+ * usual before them is none. */
+static void test_what_opens_the_gate_is_told(void **state)
+{
+    (void)state;
+    make(4, 300);
+    for (int i = 0; i < 100; i++) {
+        assert_int_equal(judge(100), PVID_GATE_ACCEPTS);
+    }
+    for (int i = 0; i < 100; i++) {
+        assert_int_equal(judge(1000000), PVID_GATE_REJECTS);
+    }
+    assert_true(pvid_scaled_fixed_q31(gate.scale, 0) > 1000);
+    assert_int_equal(judge(1600), PVID_GATE_ACCEPTS); /* 16 times the usual */
+    int kept_out = 0;
+    pvid_gate_verdict verdict = judge(1000000);
+    for (; (verdict == PVID_GATE_REJECTS) && (kept_out < 1000); kept_out++) {
+        verdict = judge(1000000);
+    }
+    assert_int_equal(verdict, PVID_GATE_OPENS);
+    assert_in_range(kept_out, 100, 214);
+    assert_int_equal(pvid_scaled_fixed_q31(gate.scale, 0), 1000000);
+    assert_int_equal(judge(100), PVID_GATE_ACCEPTS);
+    assert_int_equal(gate.judged, 2);
+    assert_int_equal(pvid_scaled_fixed_q31(gate.scale, 0), 500050);
+    make(0, 300);
+    for (int i = 0; i < 20; i++) {
+        assert_int_equal(judge((i % 2 == 0) ? 1 : INT64_MAX / 2), PVID_GATE_ACCEPTS);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -156,6 +192,7 @@ int main(void)
         cmocka_unit_test(test_the_longest_patience_still_widens_it),
         cmocka_unit_test(test_the_scale_has_an_end),
         cmocka_unit_test(test_memory_is_at_least_one),
+        cmocka_unit_test(test_what_opens_the_gate_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

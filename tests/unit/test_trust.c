@@ -112,6 +112,16 @@ static double fade_factor(void)
     return (double)pvid_trust_fade_factor_f32(&trust);
 }
 
+static bool begin_anew(void)
+{
+    return pvid_trust_begin_anew_f32(&trust, &estimator);
+}
+
+static void set_forgetting(void)
+{
+    estimator.information.retention = 0.9f;
+}
+
 static void set_neglected(double part)
 {
     trust.config.neglected = (float)part;

@@ -105,6 +105,16 @@ static double fade_factor(void)
     return (factor == 0) ? 1.0 : ((double)factor / 2147483648.0);
 }
 
+static bool begin_anew(void)
+{
+    return pvid_trust_begin_anew_q31(&trust, &estimator);
+}
+
+static void set_forgetting(void)
+{
+    estimator.information.retention = 1932735283; /* 0.9, Q31 */
+}
+
 static void set_neglected(double part)
 {
     trust.config.neglected = (int32_t)(part * 1073741824.0);

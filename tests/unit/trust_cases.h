@@ -25,6 +25,10 @@ static void place(double p);
 static const void *fallback(void);
 static double fade_factor(void);
 
+/* The mechanism has changed. Lets the estimator forget. */
+static bool begin_anew(void);
+static void set_forgetting(void);
+
 /* Sets trust.config.neglected. Then what is published: a standard error, a correlation. */
 static void set_neglected(double part);
 static double published_error(int a);
@@ -217,6 +221,30 @@ static void the_alarms_means_restart_with_a_renewal(void **state)
     assert_false(trust.misfit);
 }
 
+/* Next to nothing remains of the sums, at once, however large the errors are; what is published is held until the new
+ * sums are trusted. An estimator that keeps everything keeps it. */
+static void a_changed_mechanism_begins_the_sums_anew(void **state)
+{
+    (void)state;
+    double left;
+    for (int i = 0; i < 3 + 20; i++) {
+        (void)judge_good(100.0);
+    }
+    assert_true(trust.misfit);
+    assert_false(begin_anew());
+    assert_int_equal(groups_of_fading(&left), 0);
+    set_forgetting();
+    assert_true(begin_anew());
+    assert_true(trust.published);
+    assert_int_equal(groups_of_fading(&left), 1);
+    assert_true(fabs(left - 1.0e-4) < 1.0e-9);
+    assert_int_equal(trust.judged, 0);
+    assert_int_equal(judge_good(1.0), PVID_HELD_UNCERTAIN);
+    assert_int_equal(judge_good(1.0), PVID_HELD_UNCERTAIN);
+    assert_int_equal(judge_good(1.0), PVID_UPDATED);
+    assert_int_equal(groups_of_fading(&left), 0);
+}
+
 static void expected_residuals_raise_no_alarm(void **state)
 {
     (void)state;
@@ -276,6 +304,7 @@ static void neglected_terms_hold_nothing(void **state)
         cmocka_unit_test_setup(rows_of_a_poor_start_fade, start_again),                                                \
         cmocka_unit_test_setup(nothing_fades_before_convergence_or_with_large_errors, start_again),                    \
         cmocka_unit_test_setup(the_alarms_means_restart_with_a_renewal, start_again),                                  \
+        cmocka_unit_test_setup(a_changed_mechanism_begins_the_sums_anew, start_again),                                 \
         cmocka_unit_test_setup(expected_residuals_raise_no_alarm, start_again),                                        \
         cmocka_unit_test_setup(the_alarm_can_be_switched_off, start_again),                                            \
         cmocka_unit_test_setup(neglected_terms_join_what_is_published, start_again),                                   \

@@ -7,7 +7,8 @@
  *
  * The usual size is the running mean square of accepted residuals; outliers do not contribute. Each outlier widens
  * it slightly (squares: by 10^4 within patience_s), so that a changed mechanism is accepted after `patience_s`, or
- * never.
+ * never. A residual that is accepted only because outliers have widened the scale tells that the mechanism has changed:
+ * the weak form, if it forgets, then begins its sums anew instead of waiting until the old rows have faded.
  *
  * Enabled by default in rig files, except for the paper's law (5); a zeroed configuration disables it. Every input
  * is allowed. Cost: one comparison and one division per residual.
@@ -43,6 +44,15 @@ pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *
 /* Returns whether a residual is accepted, given its square. The first `memory` residuals are accepted. NaN and
  * infinity pass: the estimator rejects them with their own reason. */
 bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square);
+
+typedef enum {
+    PVID_GATE_REJECTS,
+    PVID_GATE_ACCEPTS,
+    PVID_GATE_OPENS /* accepts what was an outlier before: the scale begins anew with it */
+} pvid_gate_verdict;
+
+/* pvid_gate_passes_f32 that tells a change. Call only one of the two on a gate. */
+pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square);
 
 #ifdef __cplusplus
 }

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "pvid/estimator_q31.h"
+#include "pvid/gate.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus
@@ -35,6 +36,9 @@ pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *
 /* Returns whether a residual is accepted, given its square, m >= 0, below 2^200. The first `memory` residuals are
  * accepted. */
 bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
+
+/* pvid_gate_passes_q31 that tells a change. Call only one of the two on a gate. */
+pvid_gate_verdict pvid_gate_judge_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
 
 #ifdef __cplusplus
 }

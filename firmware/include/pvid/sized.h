@@ -109,10 +109,12 @@
 /* gate.h */
 #define pvid_gate_init_f32 PVID_SIZED(pvid_gate_init_f32)
 #define pvid_gate_passes_f32 PVID_SIZED(pvid_gate_passes_f32)
+#define pvid_gate_judge_f32 PVID_SIZED(pvid_gate_judge_f32)
 
 /* gate_q31.h */
 #define pvid_gate_init_q31 PVID_SIZED(pvid_gate_init_q31)
 #define pvid_gate_passes_q31 PVID_SIZED(pvid_gate_passes_q31)
+#define pvid_gate_judge_q31 PVID_SIZED(pvid_gate_judge_q31)
 
 /* information.h */
 #define pvid_information_init_f32 PVID_SIZED(pvid_information_init_f32)
@@ -182,6 +184,7 @@
 #define pvid_trust_init_f32 PVID_SIZED(pvid_trust_init_f32)
 #define pvid_trust_place_f32 PVID_SIZED(pvid_trust_place_f32)
 #define pvid_trust_renew_f32 PVID_SIZED(pvid_trust_renew_f32)
+#define pvid_trust_begin_anew_f32 PVID_SIZED(pvid_trust_begin_anew_f32)
 #define pvid_trust_fade_factor_f32 PVID_SIZED(pvid_trust_fade_factor_f32)
 #define pvid_trust_largest_error_f32 PVID_SIZED(pvid_trust_largest_error_f32)
 #define pvid_trust_fallback_f32 PVID_SIZED(pvid_trust_fallback_f32)
@@ -192,6 +195,7 @@
 /* trust_q31.h */
 #define pvid_trust_init_q31 PVID_SIZED(pvid_trust_init_q31)
 #define pvid_trust_place_q31 PVID_SIZED(pvid_trust_place_q31)
+#define pvid_trust_begin_anew_q31 PVID_SIZED(pvid_trust_begin_anew_q31)
 #define pvid_trust_fade_factor_q31 PVID_SIZED(pvid_trust_fade_factor_q31)
 #define pvid_trust_fallback_q31 PVID_SIZED(pvid_trust_fallback_q31)
 #define pvid_trust_judge_q31 PVID_SIZED(pvid_trust_judge_q31)

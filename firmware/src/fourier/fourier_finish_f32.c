@@ -569,10 +569,14 @@ static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
         *reason = accepted;
         return STAGE_SCORE; /* that is, the next kind */
     }
-    if (!pvid_gate_passes_f32(&finish->gate[finish->kind], finish->rss / freedom)) {
+    const pvid_gate_verdict verdict = pvid_gate_judge_f32(&finish->gate[finish->kind], finish->rss / freedom);
+    if (verdict == PVID_GATE_REJECTS) {
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         *reason = PVID_REJECTED_OUTLIER;
         return STAGE_SCORE;
+    }
+    if ((verdict == PVID_GATE_OPENS) && pvid_trust_begin_anew_f32(&self->trust, &self->estimator)) {
+        pvid_fourier_scores_init_f32(&finish->scores, finish->scores.memory);
     }
     if (finish->used == 0u) {
         const float factor = pvid_trust_fade_factor_f32(&self->trust);

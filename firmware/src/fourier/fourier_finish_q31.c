@@ -360,13 +360,21 @@ static int64_t freedom_of(const pvid_fourier_q31 *self)
     return (freedom > 0) ? freedom : 1;
 }
 
-/* Whether the gate accepts the kind. Saturated rows pass; the estimator rejects them. */
+/* Whether the gate accepts the kind; it may tell that the mechanism has changed. Saturated rows pass; the estimator
+ * rejects them. */
 static bool passes(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;
     pvid_gate_q31 *gate = &finish->gate[finish->kind];
-    return (gate->limit.m == 0) || finish->saturated ||
-           pvid_gate_passes_q31(gate, variance_ratio_of(finish->expected, finish->rss, freedom_of(self)));
+    if ((gate->limit.m == 0) || finish->saturated) {
+        return true;
+    }
+    const pvid_gate_verdict verdict =
+        pvid_gate_judge_q31(gate, variance_ratio_of(finish->expected, finish->rss, freedom_of(self)));
+    if (verdict == PVID_GATE_OPENS) {
+        (void)pvid_trust_begin_anew_q31(&self->trust, &self->estimator);
+    }
+    return verdict != PVID_GATE_REJECTS;
 }
 
 static bool fade_stage(pvid_fourier_q31 *self)

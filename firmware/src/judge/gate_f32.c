@@ -34,10 +34,29 @@ PVID_COLD pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_co
     self->widening = 1.0f + growth;
     self->judged = 0.0f;
     self->scale = floor;
+    self->usual = floor;
     return PVID_OK;
 }
 
 bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square)
 {
     return pvid_gate_judges_f32(self, square);
+}
+
+pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square)
+{
+    const bool widened = self->scale > self->usual;
+    if (!pvid_gate_judges_f32(self, square)) {
+        return PVID_GATE_REJECTS;
+    }
+    if (!pvid_finite_f32(square)) {
+        return PVID_GATE_ACCEPTS;
+    }
+    const bool opens = widened && (square > (self->limit * self->usual));
+    if (opens) {
+        self->judged = 1.0f;
+        self->scale = (square < PVID_GATE_SCALE_MAX) ? square : PVID_GATE_SCALE_MAX;
+    }
+    self->usual = self->scale;
+    return opens ? PVID_GATE_OPENS : PVID_GATE_ACCEPTS;
 }

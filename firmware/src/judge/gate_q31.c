@@ -38,6 +38,7 @@ PVID_COLD pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_co
         self->widening = pvid_scaled_plus_q31(one, pvid_scaled_over_q31(growth, patience));
     }
     self->scale = floor;
+    self->usual = floor;
     self->part = one;
     self->memory = (memory >= 1u) ? memory : 1u;
     self->judged = 0;
@@ -80,4 +81,20 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
     }
     self->scale = clamped(scale, self->floor);
     return passes;
+}
+
+pvid_gate_verdict pvid_gate_judge_q31(pvid_gate_q31 *self, pvid_scaled_q31 square)
+{
+    const bool widened = pvid_scaled_exceeds_q31(self->scale, self->usual);
+    if (!pvid_gate_passes_q31(self, square)) {
+        return PVID_GATE_REJECTS;
+    }
+    const bool opens = widened && pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->usual));
+    if (opens) {
+        self->judged = 1;
+        self->part = pvid_scaled_of_q31(1, 0);
+        self->scale = clamped(square, self->floor);
+    }
+    self->usual = self->scale;
+    return opens ? PVID_GATE_OPENS : PVID_GATE_ACCEPTS;
 }

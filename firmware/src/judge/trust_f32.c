@@ -39,6 +39,9 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
 #define FADE 0.3f
 #define FADE_GROUPS 4u
 
+/* What remains of the sums when they begin anew: nothing that counts, but a system that can be solved. */
+#define REMAINS 1.0e-4f
+
 /* Most groups in the alarm's long mean; with forgetting it is as long as the memory of the sums. */
 #define LONG_MEMORY 4096.0f
 
@@ -177,8 +180,26 @@ void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
     restart_alarm(self);
 }
 
+bool pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+{
+    if (!(estimator->information.retention < 1.0f)) {
+        return false;
+    }
+    self->anew = true;
+    self->groups = 0;
+    self->groups_to_fade = 0;
+    self->converged = false;
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    restart_alarm(self);
+    return true;
+}
+
 float pvid_trust_fade_factor_f32(pvid_trust_f32 *self)
 {
+    if (self->anew) {
+        self->anew = false;
+        return REMAINS;
+    }
     if ((self->groups_to_fade == 0u) || !self->errors_small) {
         return 1.0f;
     }

@@ -22,6 +22,9 @@
 #define FADE 644245094 /* 0.3, Q31 */
 #define FADE_GROUPS 4u
 
+/* What remains of the sums when they begin anew: nothing that counts, but a system that can be solved. */
+#define REMAINS 214748 /* 1e-4, Q31 */
+
 #define CHANCE_MAX 92682 /* sqrt(2), Q16: of one degree of freedom */
 
 #define RENEWAL_MIN 655u /* 0.01, Q16 */
@@ -155,8 +158,26 @@ static int64_t largest_error(const pvid_estimator_q31 *estimator, const pvid_est
 
 /* ---- renewal ---- */
 
+bool pvid_trust_begin_anew_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
+{
+    if (estimator->information.retention == INT32_MAX) { /* everything is kept */
+        return false;
+    }
+    self->anew = true;
+    self->groups = 0;
+    self->groups_to_fade = 0;
+    self->converged = false;
+    memcpy(self->anchor, estimator->p, sizeof self->anchor);
+    restart_alarm(self);
+    return true;
+}
+
 int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self)
 {
+    if (self->anew) {
+        self->anew = false;
+        return REMAINS;
+    }
     if ((self->groups_to_fade == 0u) || !self->errors_small) {
         return 0;
     }

@@ -11,7 +11,8 @@ struct pvid_gate_f32 {
     float floor;    /* least scale */
     float widening; /* factor on the scale at an outlier */
     float judged;   /* accepted residuals; stops at memory */
-    float scale;    /* mean square of the accepted residuals */
+    float scale;    /* mean square of the accepted residuals, wider by each outlier since */
+    float usual;    /* scale behind the last residual that pvid_gate_judge_f32 accepted */
 };
 
 #endif

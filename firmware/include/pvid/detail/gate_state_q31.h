@@ -9,7 +9,8 @@ struct pvid_gate_q31 {
     pvid_scaled_q31 limit;    /* sigmas^2; 0: no gate */
     pvid_scaled_q31 floor;    /* least scale */
     pvid_scaled_q31 widening; /* factor on the scale at an outlier */
-    pvid_scaled_q31 scale;    /* mean square of the accepted residuals */
+    pvid_scaled_q31 scale;    /* mean square of the accepted residuals, wider by each outlier since */
+    pvid_scaled_q31 usual;    /* scale behind the last residual that pvid_gate_judge_q31 accepted */
     pvid_scaled_q31 part;     /* of it that the next one replaces: 1 / judged */
     uint32_t memory;          /* residuals that the scale remembers */
     uint32_t judged;          /* accepted residuals; stops at memory */

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pvid.settings.enums import Reason
 from pvid.settings.record import Array
-from pvid.twin.record import Mask, Reasons
+from pvid.twin.record import Mask, Reasons, of_all_lanes
 
 Candidate = npt.NDArray[np.void]
 
@@ -37,6 +37,7 @@ class TrustTwin(ABC):
     settled_step: ClassVar[Any]  # largest step of a settled p
     small_error: ClassVar[Any]
     fade: ClassVar[Any]  # factor of the sums while they fade
+    remains: ClassVar[Any]  # and when they begin anew
     keep: ClassVar[Any]  # and while they do not
 
     def __init__(self, config: Any, estimator: Any, long_memory: Array, layout: np.dtype[np.void]) -> None:
@@ -49,6 +50,7 @@ class TrustTwin(ABC):
         self.judged = np.zeros(lanes, np.int64)
         self.next = np.zeros(lanes, np.int64)
         self.groups_to_fade = np.zeros(lanes, np.int64)
+        self.anew = np.zeros(lanes, np.bool_)
         self.errors_small = np.zeros(lanes, np.bool_)
         self.converged = np.zeros(lanes, np.bool_)
         self.published = np.zeros(lanes, np.bool_)
@@ -81,11 +83,26 @@ class TrustTwin(ABC):
         self.anchor = np.where(lanes, self.estimator.p, self.anchor)
         self._restart_alarm(lanes)
 
+    def begin_anew(self, lanes: Mask) -> bool:
+        """pvid_trust_begin_anew of the core: in all of the given lanes or in none."""
+        lanes = lanes & self._forgets()
+        if not of_all_lanes(lanes):
+            return False
+        self.anew = lanes
+        self.groups = 0
+        self.groups_to_fade = np.zeros_like(self.groups_to_fade)
+        self.converged = np.zeros_like(self.converged)
+        self.anchor = self.estimator.p.copy()
+        self._restart_alarm(lanes)
+        return True
+
     def next_fade_factor(self) -> Array:
         """pvid_trust_fade_factor of the core [lanes]."""
-        fading = (self.groups_to_fade > 0) & self.errors_small
+        fading = ~self.anew & (self.groups_to_fade > 0) & self.errors_small
         self.groups_to_fade = np.where(fading, self.groups_to_fade - 1, self.groups_to_fade)
-        return np.asarray(np.where(fading, self.fade, self.keep))
+        factor = np.where(self.anew, self.remains, np.where(fading, self.fade, self.keep))
+        self.anew = np.zeros_like(self.anew)
+        return np.asarray(factor)
 
     def largest_error(self, candidate: Candidate) -> Array:
         """Largest relative standard error of a positive parameter [lanes]."""
@@ -187,6 +204,10 @@ class TrustTwin(ABC):
         self.anchor = np.where(lanes & ~stale & errors_small & agrees, self.estimator.p, self.anchor)
 
     # ---- in the arithmetic of a core, all [lanes]
+
+    @abstractmethod
+    def _forgets(self) -> Mask:
+        """Whether the estimator forgets."""
 
     @abstractmethod
     def _relative_error(self, candidate: Candidate, a: int) -> Array:

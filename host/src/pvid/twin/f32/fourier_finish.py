@@ -165,11 +165,13 @@ class Finish:
                 yield accepted
                 continue
             with np.errstate(all="ignore"):
-                passes = of_all_lanes(self.gates[kind].passes(rss / freedom))
-            if not passes:
+                passes, opens = self.gates[kind].judge(rss / freedom)
+            if not of_all_lanes(passes):
                 estimator.counters["rejected_outlier"] += 1
                 yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
                 continue
+            if self.trust.begin_anew(opens):
+                self.scores.begin_anew()
             if used == 0:
                 with np.errstate(all="ignore"):
                     estimator.information.fade(self.trust.next_fade_factor())

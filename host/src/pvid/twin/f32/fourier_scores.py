@@ -24,13 +24,17 @@ class Scores:
     """
 
     def __init__(self, n_p: int, memory: Float32) -> None:
-        lanes = len(memory)
+        with np.errstate(all="ignore"):
+            self.least = np.where(memory > 0, _F(1) / memory, _F(0)).astype(np.float32, copy=False)
+        self.own = np.zeros((n_p, len(memory)), np.float32)
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """No windows yet."""
+        n_p, lanes = self.own.shape
         self.windows = np.zeros(lanes, np.int64)
         self.known = np.zeros(lanes, np.bool_)
         self.residual = np.zeros(lanes, np.float32)
-        with np.errstate(all="ignore"):
-            self.least = np.where(memory > 0, _F(1) / memory, _F(0)).astype(np.float32, copy=False)
-        self.own = np.zeros((n_p, lanes), np.float32)
         self.before = np.zeros((n_p, lanes), np.float32)
         self.same = np.zeros((n_p, n_p, lanes), np.float32)
         self.neighbour = np.zeros((n_p, n_p, lanes), np.float32)

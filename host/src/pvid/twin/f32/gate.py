@@ -30,6 +30,7 @@ class Gate:
         self.widening = np.float32(1) + growth
         self.judged = np.zeros(len(floor), np.float32)
         self.scale = floor.copy()
+        self.usual = floor.copy()
 
     @property
     def is_on(self) -> bool:
@@ -52,3 +53,17 @@ class Gate:
         self.judged = np.where(known, judged, self.judged)
         self.scale = np.where(known, scale, self.scale)
         return passes | ~known
+
+    def judge(self, square: Float32) -> tuple[Mask, Mask]:
+        """Which lanes let a residual of this square in, and which of them did not before [lanes]."""
+        widened = self.scale > self.usual
+        passes = self.passes(square)
+        known = passes & np.isfinite(square)
+        if not self.is_on:
+            return passes, np.zeros_like(passes)
+        with np.errstate(all="ignore"):
+            opens = known & widened & (square > self.limit * self.usual)
+        self.judged = np.where(opens, np.float32(1), self.judged)
+        self.scale = np.where(opens, np.where(square < _SCALE_MAX, square, _SCALE_MAX), self.scale)
+        self.usual = np.where(known, self.scale, self.usual)
+        return passes, opens

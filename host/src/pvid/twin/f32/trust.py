@@ -25,7 +25,7 @@ class Trust(TrustTwin):
 
     number = np.float32
     settled_step, small_error = np.float32(0.02), np.float32(0.1)
-    fade, keep = np.float32(0.3), np.float32(1)
+    fade, remains, keep = np.float32(0.3), np.float32(1e-4), np.float32(1)
 
     def __init__(self, config: TrustConfig, estimator: RelativeEstimator) -> None:
         information = estimator.information
@@ -44,6 +44,9 @@ class Trust(TrustTwin):
     ) -> Reasons:
         with np.errstate(all="ignore"):
             return super().judge(reason, size, above_noise, variance_ratio, candidate)
+
+    def _forgets(self) -> Mask:
+        return np.asarray(self.estimator.information.retention < 1)
 
     def _relative_error(self, candidate: Candidate, a: int) -> Float32:
         return np.asarray(candidate["se"][:, a] / candidate["p"][:, a])

@@ -162,10 +162,13 @@ def stages(
         for _ in range(_stages_before_gate(design, kind, live) - 1):
             yield None
         gate = gates[place]
-        if gate.is_on and not of_all_lanes(gate.passes(_ratio(rss, freedom, expected), ~saturated)):
-            estimator.counters["rejected_outlier"] += 1
-            yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
-            continue
+        if gate.is_on:
+            passes, opens = gate.judge(_ratio(rss, freedom, expected), ~saturated)
+            if not of_all_lanes(passes):
+                estimator.counters["rejected_outlier"] += 1
+                yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
+                continue
+            trust.begin_anew(opens)
         yield None
         if used:
             yield None

@@ -26,7 +26,7 @@ class GateQ31:
         if config.patience_groups > 0:
             growth = scaled(_GROWTH, -_GROWTH_BITS).over(scaled(config.patience_groups, 0))
             self.widening = self.widening.plus(growth)
-        self.scale = floor
+        self.scale = self.usual = floor
         self.memory = max(memory, 1)
         self.judged = np.zeros(np.shape(floor.m), np.int64)
 
@@ -41,8 +41,24 @@ class GateQ31:
         part = scaled(np.ones_like(judged), 0).over(scaled(np.maximum(judged, 1), 0))
         change = square.minus(self.scale).times(part)
         scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))
+        self.judged = np.where(asking, judged, self.judged)
+        self.scale = pick(asking, self._clamped(scale), self.scale)
+        return passes | ~asking
+
+    def judge(self, square: Scaled, asked: Mask) -> tuple[Mask, Mask]:
+        """Lanes that accept a residual of this square, and those of them that did not before [lanes]."""
+        widened = self.scale.exceeds(self.usual)
+        passes = self.passes(square, asked)
+        if not self.is_on:
+            return passes, np.zeros_like(passes)
+        known = passes & asked
+        opens = known & widened & square.exceeds(self.limit.times(self.usual))
+        self.judged = np.where(opens, 1, self.judged)
+        self.scale = pick(opens, self._clamped(square), self.scale)
+        self.usual = pick(known, self.scale, self.usual)
+        return passes, opens
+
+    def _clamped(self, scale: Scaled) -> Scaled:
         scale = pick((scale.e < self.floor.e - 1) | self.floor.exceeds(scale), self.floor, scale)
         scale = pick((scale.e > _SCALE_MAX.e + 1) | scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)
-        self.judged = np.where(asking, judged, self.judged)
-        self.scale = pick(asking, Scaled(integers(scale.m), integers(scale.e)), self.scale)
-        return passes | ~asking
+        return Scaled(integers(scale.m), integers(scale.e))

@@ -23,13 +23,16 @@ class TrustQ31(TrustTwin):
 
     number = np.int64
     settled_step, small_error = (1 << SIZE_BITS) // 50, (1 << _ERROR_BITS) // 10
-    fade, keep = 644245094, 0  # 0.3 in Q31; 0: no fading
+    fade, remains, keep = 644245094, 214748, 0  # 0.3 and 1e-4 in Q31; 0: no fading
 
     def __init__(self, config: TrustConfigQ31, estimator: EstimatorQ31) -> None:
         long_memory = np.clip((estimator.block << 31) // (2**31 - estimator.retention), LONG, LONG_MEMORY)
         super().__init__(config, estimator, long_memory, estimates.q31_of(len(estimator.p)))
         for a in range(len(estimator.p)):
             self.estimate["correlation"][:, a, a] = ONE
+
+    def _forgets(self) -> Mask:
+        return np.asarray(self.estimator.retention < 2**31 - 1)
 
     def _relative_error(self, candidate: Candidate, a: int) -> Int:
         return np.asarray((candidate["se"][:, a].astype(np.int64) << _ERROR_BITS) // candidate["p"][:, a])
