@@ -71,7 +71,7 @@ static void any_group(const pvid_model_q31 *model, uint16_t least, uint16_t most
         trust.anchor[a] = any_i32(-INT32_MAX, INT32_MAX);
     }
     trust.anew = any_bool();
-    (void)pvid_trust_begin_anew_q31(&trust, &estimator);
+    pvid_trust_begin_anew_q31(&trust, &estimator);
     const int32_t fading = pvid_trust_fade_factor_q31(&trust);
     /*@ assert 0 <= fading; */
     any_estimate(model, &candidate);

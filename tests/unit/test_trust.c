@@ -112,14 +112,9 @@ static double fade_factor(void)
     return (double)pvid_trust_fade_factor_f32(&trust);
 }
 
-static bool begin_anew(void)
+static void begin_anew(void)
 {
-    return pvid_trust_begin_anew_f32(&trust, &estimator);
-}
-
-static void set_forgetting(void)
-{
-    estimator.information.retention = 0.9f;
+    pvid_trust_begin_anew_f32(&trust, &estimator);
 }
 
 static void set_neglected(double part)

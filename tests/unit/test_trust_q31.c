@@ -105,14 +105,9 @@ static double fade_factor(void)
     return (factor == 0) ? 1.0 : ((double)factor / 2147483648.0);
 }
 
-static bool begin_anew(void)
+static void begin_anew(void)
 {
-    return pvid_trust_begin_anew_q31(&trust, &estimator);
-}
-
-static void set_forgetting(void)
-{
-    estimator.information.retention = 1932735283; /* 0.9, Q31 */
+    pvid_trust_begin_anew_q31(&trust, &estimator);
 }
 
 static void set_neglected(double part)

@@ -8,7 +8,7 @@
  * The usual size is the running mean square of accepted residuals; outliers do not contribute. Each outlier widens
  * it slightly (squares: by 10^4 within patience_s), so that a changed mechanism is accepted after `patience_s`, or
  * never. A residual that is accepted only because outliers have widened the scale tells that the mechanism has changed:
- * the weak form, if it forgets, then begins its sums anew instead of waiting until the old rows have faded.
+ * the weak form then begins its sums anew, for old and new rows together fit no p.
  *
  * Enabled by default in rig files, except for the paper's law (5); a zeroed configuration disables it. Every input
  * is allowed. Cost: one comparison and one division per residual.
@@ -48,7 +48,7 @@ bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square);
 typedef enum {
     PVID_GATE_REJECTS,
     PVID_GATE_ACCEPTS,
-    PVID_GATE_OPENS /* accepts what was an outlier before: the scale begins anew with it */
+    PVID_GATE_OPENS /* accepts what was an outlier before */
 } pvid_gate_verdict;
 
 /* pvid_gate_passes_f32 that tells a change. Call only one of the two on a gate. */

@@ -18,8 +18,8 @@
  * Renewal. Rows added far from the solution may have too much weight, and float32 sums lose digits when p moves
  * far. When p has converged far from them, the old sums are faded over the next groups.
  *
- * Beginning anew. When the gate tells that the mechanism has changed, and the estimator forgets, next to nothing of the
- * old sums remains. p stays, and what is published is held until it is trusted as after the start.
+ * Beginning anew. When the gate tells that the mechanism has changed, next to nothing of the old sums remains. p stays,
+ * and what is published is held until p is trusted as after the start.
  *
  * Neglected terms. Residuals do not show a small error of the equations, and more data do not reduce the error of p
  * that it causes. `neglected` joins the standard errors of what is published, the same part of each positive parameter;
@@ -76,8 +76,8 @@ void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
 void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
 /* The mechanism has changed: the sums and the alarm begin anew with the next group, and the estimate has to be trusted
- * anew. Nothing if the estimator does not forget. Returns whether it does. */
-bool pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
+ * anew. */
+void pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
 /* Factor on the sums before the rows of the next group are added; 1: no renewal, or too little would remain. Call
  * it once per group. */

@@ -42,7 +42,7 @@ pvid_status pvid_trust_init_q31(pvid_trust_q31 *self, const pvid_trust_config_q3
 void pvid_trust_place_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator);
 
 /* pvid_trust_begin_anew_f32. */
-bool pvid_trust_begin_anew_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator);
+void pvid_trust_begin_anew_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator);
 
 /* Factor on the sums before the rows of the next group are added, Q31; 0: no renewal, or too little would remain.
  * Call it once per group. */

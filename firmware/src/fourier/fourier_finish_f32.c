@@ -575,7 +575,8 @@ static uint8_t gated(pvid_fourier_f32 *self, pvid_reason *reason)
         *reason = PVID_REJECTED_OUTLIER;
         return STAGE_SCORE;
     }
-    if ((verdict == PVID_GATE_OPENS) && pvid_trust_begin_anew_f32(&self->trust, &self->estimator)) {
+    if (verdict == PVID_GATE_OPENS) {
+        pvid_trust_begin_anew_f32(&self->trust, &self->estimator);
         pvid_fourier_scores_init_f32(&finish->scores, finish->scores.memory);
     }
     if (finish->used == 0u) {

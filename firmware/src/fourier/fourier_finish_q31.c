@@ -372,7 +372,7 @@ static bool passes(pvid_fourier_q31 *self)
     const pvid_gate_verdict verdict =
         pvid_gate_judge_q31(gate, variance_ratio_of(finish->expected, finish->rss, freedom_of(self)));
     if (verdict == PVID_GATE_OPENS) {
-        (void)pvid_trust_begin_anew_q31(&self->trust, &self->estimator);
+        pvid_trust_begin_anew_q31(&self->trust, &self->estimator);
     }
     return verdict != PVID_GATE_REJECTS;
 }

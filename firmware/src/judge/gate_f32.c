@@ -53,10 +53,6 @@ pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square)
         return PVID_GATE_ACCEPTS;
     }
     const bool opens = widened && (square > (self->limit * self->usual));
-    if (opens) {
-        self->judged = 1.0f;
-        self->scale = (square < PVID_GATE_SCALE_MAX) ? square : PVID_GATE_SCALE_MAX;
-    }
     self->usual = self->scale;
     return opens ? PVID_GATE_OPENS : PVID_GATE_ACCEPTS;
 }

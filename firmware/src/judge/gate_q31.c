@@ -90,11 +90,6 @@ pvid_gate_verdict pvid_gate_judge_q31(pvid_gate_q31 *self, pvid_scaled_q31 squar
         return PVID_GATE_REJECTS;
     }
     const bool opens = widened && pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->usual));
-    if (opens) {
-        self->judged = 1;
-        self->part = pvid_scaled_of_q31(1, 0);
-        self->scale = clamped(square, self->floor);
-    }
     self->usual = self->scale;
     return opens ? PVID_GATE_OPENS : PVID_GATE_ACCEPTS;
 }

@@ -180,18 +180,14 @@ void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
     restart_alarm(self);
 }
 
-bool pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+void pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
-    if (!(estimator->information.retention < 1.0f)) {
-        return false;
-    }
     self->anew = true;
     self->groups = 0;
     self->groups_to_fade = 0;
     self->converged = false;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
     restart_alarm(self);
-    return true;
 }
 
 float pvid_trust_fade_factor_f32(pvid_trust_f32 *self)

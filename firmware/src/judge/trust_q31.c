@@ -158,18 +158,14 @@ static int64_t largest_error(const pvid_estimator_q31 *estimator, const pvid_est
 
 /* ---- renewal ---- */
 
-bool pvid_trust_begin_anew_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
+void pvid_trust_begin_anew_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator)
 {
-    if (estimator->information.retention == INT32_MAX) { /* everything is kept */
-        return false;
-    }
     self->anew = true;
     self->groups = 0;
     self->groups_to_fade = 0;
     self->converged = false;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
     restart_alarm(self);
-    return true;
 }
 
 int32_t pvid_trust_fade_factor_q31(pvid_trust_q31 *self)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pvid.settings.enums import Reason
 from pvid.settings.record import Array
-from pvid.twin.record import Mask, Reasons, of_all_lanes
+from pvid.twin.record import Mask, Reasons
 
 Candidate = npt.NDArray[np.void]
 
@@ -83,18 +83,14 @@ class TrustTwin(ABC):
         self.anchor = np.where(lanes, self.estimator.p, self.anchor)
         self._restart_alarm(lanes)
 
-    def begin_anew(self, lanes: Mask) -> bool:
-        """pvid_trust_begin_anew of the core: in all of the given lanes or in none."""
-        lanes = lanes & self._forgets()
-        if not of_all_lanes(lanes):
-            return False
-        self.anew = lanes
+    def begin_anew(self) -> None:
+        """pvid_trust_begin_anew of the core, in all lanes."""
+        self.anew = np.ones_like(self.anew)
         self.groups = 0
         self.groups_to_fade = np.zeros_like(self.groups_to_fade)
         self.converged = np.zeros_like(self.converged)
         self.anchor = self.estimator.p.copy()
-        self._restart_alarm(lanes)
-        return True
+        self._restart_alarm(self.anew)
 
     def next_fade_factor(self) -> Array:
         """pvid_trust_fade_factor of the core [lanes]."""
@@ -204,10 +200,6 @@ class TrustTwin(ABC):
         self.anchor = np.where(lanes & ~stale & errors_small & agrees, self.estimator.p, self.anchor)
 
     # ---- in the arithmetic of a core, all [lanes]
-
-    @abstractmethod
-    def _forgets(self) -> Mask:
-        """Whether the estimator forgets."""
 
     @abstractmethod
     def _relative_error(self, candidate: Candidate, a: int) -> Array:

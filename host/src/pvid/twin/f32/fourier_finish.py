@@ -170,7 +170,8 @@ class Finish:
                 estimator.counters["rejected_outlier"] += 1
                 yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
                 continue
-            if self.trust.begin_anew(opens):
+            if of_all_lanes(opens):
+                self.trust.begin_anew()
                 self.scores.begin_anew()
             if used == 0:
                 with np.errstate(all="ignore"):

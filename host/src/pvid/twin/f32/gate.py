@@ -63,7 +63,5 @@ class Gate:
             return passes, np.zeros_like(passes)
         with np.errstate(all="ignore"):
             opens = known & widened & (square > self.limit * self.usual)
-        self.judged = np.where(opens, np.float32(1), self.judged)
-        self.scale = np.where(opens, np.where(square < _SCALE_MAX, square, _SCALE_MAX), self.scale)
         self.usual = np.where(known, self.scale, self.usual)
         return passes, opens

@@ -45,9 +45,6 @@ class Trust(TrustTwin):
         with np.errstate(all="ignore"):
             return super().judge(reason, size, above_noise, variance_ratio, candidate)
 
-    def _forgets(self) -> Mask:
-        return np.asarray(self.estimator.information.retention < 1)
-
     def _relative_error(self, candidate: Candidate, a: int) -> Float32:
         return np.asarray(candidate["se"][:, a] / candidate["p"][:, a])
 

@@ -168,7 +168,8 @@ def stages(
                 estimator.counters["rejected_outlier"] += 1
                 yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
                 continue
-            trust.begin_anew(opens)
+            if of_all_lanes(opens):
+                trust.begin_anew()
         yield None
         if used:
             yield None

@@ -42,7 +42,9 @@ class GateQ31:
         change = square.minus(self.scale).times(part)
         scale = pick(passes, self.scale.plus(change), self.scale.times(self.widening))
         self.judged = np.where(asking, judged, self.judged)
-        self.scale = pick(asking, self._clamped(scale), self.scale)
+        scale = pick((scale.e < self.floor.e - 1) | self.floor.exceeds(scale), self.floor, scale)
+        scale = pick((scale.e > _SCALE_MAX.e + 1) | scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)
+        self.scale = pick(asking, Scaled(integers(scale.m), integers(scale.e)), self.scale)
         return passes | ~asking
 
     def judge(self, square: Scaled, asked: Mask) -> tuple[Mask, Mask]:
@@ -53,12 +55,5 @@ class GateQ31:
             return passes, np.zeros_like(passes)
         known = passes & asked
         opens = known & widened & square.exceeds(self.limit.times(self.usual))
-        self.judged = np.where(opens, 1, self.judged)
-        self.scale = pick(opens, self._clamped(square), self.scale)
         self.usual = pick(known, self.scale, self.usual)
         return passes, opens
-
-    def _clamped(self, scale: Scaled) -> Scaled:
-        scale = pick((scale.e < self.floor.e - 1) | self.floor.exceeds(scale), self.floor, scale)
-        scale = pick((scale.e > _SCALE_MAX.e + 1) | scale.exceeds(_SCALE_MAX), _SCALE_MAX, scale)
-        return Scaled(integers(scale.m), integers(scale.e))

@@ -31,9 +31,6 @@ class TrustQ31(TrustTwin):
         for a in range(len(estimator.p)):
             self.estimate["correlation"][:, a, a] = ONE
 
-    def _forgets(self) -> Mask:
-        return np.asarray(self.estimator.retention < 2**31 - 1)
-
     def _relative_error(self, candidate: Candidate, a: int) -> Int:
         return np.asarray((candidate["se"][:, a].astype(np.int64) << _ERROR_BITS) // candidate["p"][:, a])
 
