@@ -20,6 +20,7 @@
 #include <stdint.h>
 
 #include "pvid/config.h"
+#include "pvid/detail/gate_verdict.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus
@@ -44,12 +45,6 @@ pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *
 /* Returns whether a residual is accepted, given its square. The first `memory` residuals are accepted. NaN and
  * infinity pass: the estimator rejects them with their own reason. */
 bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square);
-
-typedef enum {
-    PVID_GATE_REJECTS,
-    PVID_GATE_ACCEPTS,
-    PVID_GATE_OPENS /* accepts what was an outlier before */
-} pvid_gate_verdict;
 
 /* pvid_gate_passes_f32 that tells a change. Call only one of the two on a gate. */
 pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square);

@@ -9,8 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pvid/detail/gate_verdict.h"
 #include "pvid/estimator_q31.h"
-#include "pvid/gate.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus

@@ -188,8 +188,6 @@
 #define pvid_trust_fade_factor_f32 PVID_SIZED(pvid_trust_fade_factor_f32)
 #define pvid_trust_largest_error_f32 PVID_SIZED(pvid_trust_largest_error_f32)
 #define pvid_trust_fallback_f32 PVID_SIZED(pvid_trust_fallback_f32)
-#define pvid_trust_decide_f32 PVID_SIZED(pvid_trust_decide_f32)
-#define pvid_trust_publish_f32 PVID_SIZED(pvid_trust_publish_f32)
 #define pvid_trust_judge_f32 PVID_SIZED(pvid_trust_judge_f32)
 
 /* trust_q31.h */

@@ -39,11 +39,15 @@ class Trust(TrustTwin):
         for a, sd in enumerate(estimator.start_sd):
             self.estimate["covariance"][:, a, a] = sd * sd
 
-    def judge(
+    def decide(
         self, reason: Reasons, size: Float32, above_noise: Mask, variance_ratio: Float32, candidate: Candidate
     ) -> Reasons:
         with np.errstate(all="ignore"):
-            return super().judge(reason, size, above_noise, variance_ratio, candidate)
+            return super().decide(reason, size, above_noise, variance_ratio, candidate)
+
+    def publish(self, verdict: Reasons, reason: Reasons, candidate: Candidate) -> Reasons:
+        with np.errstate(all="ignore"):
+            return super().publish(verdict, reason, candidate)
 
     def _relative_error(self, candidate: Candidate, a: int) -> Float32:
         return np.asarray(candidate["se"][:, a] / candidate["p"][:, a])

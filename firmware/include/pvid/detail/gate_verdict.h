@@ -1,0 +1,11 @@
+/* pvid/detail/gate_verdict.h - what a gate says of a residual: gate.h, gate_q31.h. */
+#ifndef PVID_DETAIL_GATE_VERDICT_H
+#define PVID_DETAIL_GATE_VERDICT_H
+
+typedef enum {
+    PVID_GATE_REJECTS,
+    PVID_GATE_ACCEPTS,
+    PVID_GATE_OPENS /* accepts what was an outlier before */
+} pvid_gate_verdict;
+
+#endif
