@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
+import cffi
+import pytest
 from conftest import ROOT
 
+from pvid.core import headers
 from pvid.core.native import Native
 from pvid.settings.bounds import MAX_MOMENTS, MAX_WINDOW
 from pvid.twin import estimates
@@ -28,3 +32,20 @@ def test_the_sizes_are_those_of_the_build(native: Native) -> None:
     differentiator, sums = (native.headers.dtype(f"pvid_{one}_f32") for one in ("differentiator", "information"))
     assert differentiator["history"].shape == (MAX_WINDOW,)
     assert sums["high"].shape == (MAX_MOMENTS + 11 + 2,)
+
+
+def test_declarations_are_parsed_once_for_all_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(headers, "build_folder", lambda: tmp_path)
+    text = "typedef struct { int16_t a; float b[3]; } pair; enum { THREE = 3 }; int f(pair *);"
+    first = headers.Headers(text)
+    monkeypatch.delattr(cffi, "FFI")
+    second = headers.Headers(text)
+    assert second.dtype("pair") == first.dtype("pair") and second.dtype("pair").itemsize == 16
+    with pytest.raises(AttributeError):
+        headers.Headers(text.replace("int16_t", "int32_t"))  # another text is parsed
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(headers, "build_folder", lambda: tmp_path / "file")
+    assert headers.Headers("typedef struct { float a; } one;").dtype("one").itemsize == 4

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import cffi
 import numpy as np
 import numpy.typing as npt
-from cffi import FFI
 
+from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.core.sources import IS_CLONE, PACKAGE, ROOT
+from pvid.core.sources import IS_CLONE, PACKAGE, ROOT, build_folder
 
 HEADERS = "pvid.i"  # the preprocessed headers, beside the library that the build makes with them
 
@@ -82,8 +86,9 @@ class Headers:
     """The declarations of one build of the core. `ffi`: cffi's interface to them."""
 
     def __init__(self, text: str) -> None:
-        self.ffi = FFI()
-        self.ffi.cdef(text.replace("extern const ", "extern "))  # a constant that is no number has no address in cffi
+        space: dict[str, Any] = {}
+        exec(_compiled(text), space)
+        self.ffi: Any = space["ffi"]
 
     @staticmethod
     def of(library: Path) -> Headers:
@@ -198,3 +203,22 @@ class Headers:
 @cache
 def _parsed(text: str) -> Headers:
     return Headers(text)
+
+
+def _compiled(text: str) -> str:
+    """Python text that makes cffi's interface to declarations in milliseconds; parsing them takes a third of a second,
+    once: the text stays in the cache of builds."""
+    name = hashlib.sha256("\n".join((cffi.__version__, text)).encode()).hexdigest()[:24]
+    place = build_folder() / "cache" / "headers" / f"{name}.py"
+    with suppress(OSError):
+        return place.read_text(encoding="utf-8")
+    from cffi import recompiler  # with the parser of C
+
+    ffi = cffi.FFI()
+    ffi.cdef(text.replace("extern const ", "extern "))  # a constant that is no number has no address in cffi
+    out = io.StringIO()
+    recompiler.make_py_source(ffi, "pvid_headers", out)
+    with suppress(OSError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(place, out.getvalue())
+    return out.getvalue()
