@@ -16,6 +16,7 @@ import numpy as np
 import sympy as sp
 
 from pvid.base.errors import PvidError
+from pvid.base.recent import Recent
 from pvid.codegen.functions import Function, ModelFunctions, functions_of
 from pvid.codegen.names import identifiers
 from pvid.codegen.operations import program_of
@@ -78,6 +79,7 @@ class FourierFunctions:
         return self.functions.model
 
 
+@Recent
 def fourier_functions_of(compiled: CompiledModel) -> FourierFunctions:
     """What is generated for the weak engine; `compiled` is the model without corners.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pvid.base.recent import Recent
 from pvid.codegen import numpy_f32
 from pvid.codegen.banner import banner
 from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
@@ -62,15 +63,7 @@ def loaded(made: FourierFunctions) -> FourierModel:
     )
 
 
-_KEPT = 16
-_made: dict[int, tuple[CompiledModel, FourierModel]] = {}
-
-
+@Recent
 def fourier_model_of(compiled: CompiledModel) -> FourierModel:
-    """The tables and twin of a compiled model, without corners as given; made once for each object."""
-    found = _made.get(id(compiled))
-    if found is None or found[0] is not compiled:
-        found = _made[id(compiled)] = (compiled, loaded(fourier_functions_of(compiled)))
-        while len(_made) > _KEPT:
-            del _made[next(iter(_made))]
-    return found[1]
+    """The tables and twin of a compiled model, without corners as given."""
+    return loaded(fourier_functions_of(compiled))

@@ -8,6 +8,7 @@ from importlib.resources import files
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.recent import Recent
 from pvid.codegen.files_refine import DOUBLE, function
 from pvid.codegen.refine import RefineFunctions, has_skew, refine_functions_of, without_optional
 from pvid.model.compiled import CompiledModel
@@ -156,16 +157,9 @@ def _code(made: RefineFunctions) -> str:
     )
 
 
-_KEPT = 32
-_made: dict[tuple[int, tuple[str, ...]], tuple[CompiledModel, RefinedKernel]] = {}
+_made = Recent(RefinedKernel, 32)
 
 
 def kernel_of(model: CompiledModel, optional: tuple[str, ...] = ()) -> RefinedKernel:
-    """The kernel of a compiled model with these of its optional extras; made once for each object."""
-    key = (id(model), optional)
-    found = _made.get(key)
-    if found is None or found[0] is not model:
-        found = _made[key] = (model, RefinedKernel(without_optional(model, optional)))
-        while len(_made) > _KEPT:
-            del _made[next(iter(_made))]
-    return found[1]
+    """The kernel of a compiled model with these of its optional extras."""
+    return _made(without_optional(model, optional))

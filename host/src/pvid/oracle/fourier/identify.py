@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.recent import Recent
 from pvid.model.compiled import CompiledModel, Known
 from pvid.oracle.fourier import verdict
 from pvid.oracle.fourier.attenuation import other_line
@@ -79,19 +80,9 @@ class Identified:
 
 
 _SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
-_KEPT = 16
 _STEPS_OF_KNOWN = 10
-_ready: dict[int, Compiled] = {}
 
-
-def ready(model: CompiledModel) -> Compiled:
-    """A model with its functions, made once for each object and kept for the last few."""
-    found = _ready.get(id(model))
-    if found is None or found.bare is not model:
-        found = _ready[id(model)] = Compiled(model)
-        while len(_ready) > _KEPT:
-            del _ready[next(iter(_ready))]
-    return found
+ready = Recent(Compiled)  # a model with its functions
 
 
 def start_of(model: CompiledModel, start: Mapping[str, float] | npt.ArrayLike | None) -> Float | None:
@@ -230,7 +221,7 @@ def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:
 def of_known(compiled: CompiledModel, run: Mapping[str, npt.ArrayLike], fit: Fit, known: Known) -> Float:
     """d p / d constant [n_p], with the weights of the fit: one standard deviation more, and p again."""
     moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in compiled.knowns)
-    rows = WeakRows.of(Compiled(replace(compiled, knowns=moved)), run, fit.rows.record.grid.design)
+    rows = WeakRows.of(ready(replace(compiled, knowns=moved)), run, fit.rows.record.grid.design)
     rows = rows.only(np.isin(rows.numbers, fit.rows.numbers))
     p, prior = fit.p, fit.parameters.prior(fit.start)
     theta = rows.compiled.parameters.theta(p)
