@@ -10,6 +10,7 @@ from pvid.base.errors import PvidError
 from pvid.model import Model, sgn
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.fourier import choice
 from pvid.oracle.fourier.choice import lengths, power_of, ranked
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.identify import identify, ready
@@ -40,6 +41,28 @@ def test_the_best_design_by_score_is_near_the_best_by_truth() -> None:
     assert best < worst / 2
     # Measured over eight seeds: 0.0037 % for the first, 0.0054 to 0.0061 % for the next three.
     assert best < float(np.mean([error(one.design) for one in tried[1:4]]))
+
+
+def test_a_score_is_kept_for_the_same_samples_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim = RigSimulation.of(compiled_of("furuta"), simulated_rig("furuta"))
+    run = {name: x[:4000] for name, x in sim.run().items()}
+    design = FourierDesign(1000.0, 1.0, power=power_of(ready(sim.model)))
+    monkeypatch.setattr(choice, "_scores", {})
+    first = choice.score_of(ready(sim.model), run, design, sim.truth, False)
+    assert first is not None
+    computed: list[object] = []
+    monkeypatch.setattr(choice, "_scored", lambda *asked: computed.append(asked))
+    copied = {name: x.copy() for name, x in run.items()}
+    assert choice.score_of(ready(sim.model), copied, design, sim.truth.copy(), False) is first and not computed
+    name = next(iter(run))
+    for model, samples, start, errors in (
+        (sim.model, {**run, name: run[name] + 1e-12}, sim.truth, False),
+        (sim.model, run, 1.001 * sim.truth, False),
+        (sim.model, run, sim.truth, True),
+        (compiled_of("cart_pendulum"), run, sim.truth, False),
+    ):
+        assert choice.score_of(ready(model), samples, design, start, errors) is None
+    assert len(computed) == 4
 
 
 def test_windows_that_are_tried_fill_the_run_and_halve() -> None:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from scipy.ndimage import maximum_filter1d
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Part
@@ -258,7 +257,8 @@ def blur_of(position: Float, grid: Grid, v: Float) -> Float:
     off[grid.places < taps] = 0.0
     off[grid.places >= len(position) - taps] = 0.0
     reach = max(taps // (4 * grid.design.decimation), 1)
-    return np.asarray(maximum_filter1d(off, 2 * reach + 1))
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(off, reach), 2 * reach + 1)
+    return np.asarray(np.fmax.reduce(near, axis=1))
 
 
 def evaluated(expression: sp.Expr, values: dict[sp.Symbol, Float]) -> Any:
@@ -355,9 +355,11 @@ def running_integrals(f: Float, hop: int, fold: int, dt: float) -> list[Float]:
     count = len(f) // hop
     e = np.concatenate([2 * f[:1] - f[1:2], f, 2 * f[-1:] - f[-2:-1]])
     step = np.concatenate([dt / 24 * (-e[:-3] + 13 * e[1:-2] + 13 * e[2:-1] - e[3:]), dt * f[-1:]])
-    places = hop * np.arange(count)[:, np.newaxis] + np.arange(hop + 1)
-    values = f[np.minimum(places, len(f) - 1)]
-    out = [values, from_steps(step[np.minimum(places[:, :-1], len(f) - 1)])]
+    values = np.empty((count, hop + 1))
+    values[:, :-1] = f[: count * hop].reshape(count, hop)
+    values[:-1, -1] = values[1:, 0]
+    values[-1:, -1] = f[min(count * hop, len(f) - 1)]
+    out = [values, from_steps(step[: count * hop].reshape(count, hop))]
     for n in range(2, fold + 1):
         last, slope = out[n - 1], out[n - 2]
         rise = dt / 2 * (last[:, 1:] + last[:, :-1]) - dt**2 / 12 * (slope[:, 1:] - slope[:, :-1])

@@ -7,6 +7,7 @@ the best by truth.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -65,6 +66,10 @@ class Scored:
     known: bool
 
 
+_KEPT = 4096
+_scores: dict[tuple[object, ...], Scored | None] = {}
+
+
 def score_of(
     model: Compiled,
     run: Mapping[str, npt.ArrayLike],
@@ -73,7 +78,31 @@ def score_of(
     errors: bool,
     fewest: int = 1,
 ) -> Scored | None:
-    """None where the design does not fit the run, or has not the fewest windows that are wanted."""
+    """None where the design does not fit the run, or has not the fewest windows that are wanted.
+
+    Kept for the last few thousand arguments: both cores, a comparison and a second command ask for the same scores.
+    """
+    samples = hashlib.blake2b()
+    for name in sorted(run):
+        samples.update(name.encode())
+        samples.update(np.ascontiguousarray(run[name], np.float64).data)
+    begun = None if start is None else tuple(np.asarray(start, np.float64).tolist())
+    key = (model.number, samples.digest(), design, begun, errors, fewest)
+    if key not in _scores:
+        _scores[key] = _scored(model, run, design, start, errors, fewest)
+        while len(_scores) > _KEPT:
+            del _scores[next(iter(_scores))]
+    return _scores[key]
+
+
+def _scored(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    design: FourierDesign,
+    start: Float | None,
+    errors: bool,
+    fewest: int,
+) -> Scored | None:
     try:
         rows = WeakRows.of(model, run, design)
         if rows.windows < fewest:

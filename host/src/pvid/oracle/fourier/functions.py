@@ -99,6 +99,15 @@ class TestFunctions:
 
     def combine(self, order: int) -> Float:
         """[2 H + 1, K]: sum chi^(order) psi = (S_0, Re S_1, Im S_1, Re S_2, ...) @ combine."""
+        if order not in self._combined:
+            self._combined[order] = self._combine(order)
+        return self._combined[order]
+
+    @cached_property
+    def _combined(self) -> dict[int, Float]:
+        return {}
+
+    def _combine(self, order: int) -> Float:
         top = self.highest
         weights = self.coefficients * ((1j * self.rates) ** order)[:, np.newaxis]
         out = np.empty((2 * top + 1, self.count))
@@ -132,7 +141,13 @@ class TestFunctions:
 
     def half_sums(self, halves: Float) -> Complex:
         """A_h [..., halves, H + 1] of half windows [..., halves, hop]; time counts from each half's start."""
-        return np.asarray((halves @ self.circle.real.copy()) + 1j * (halves @ self.circle.imag.copy()))
+        real, imaginary = self._turns
+        return np.asarray((halves @ real) + 1j * (halves @ imaginary))
+
+    @cached_property
+    def _turns(self) -> tuple[Float, Float]:
+        """Real and imaginary parts of `circle`."""
+        return self.circle.real.copy(), self.circle.imag.copy()
 
     def joined(self, first: Complex, second: Complex) -> Float:
         """S_h = A_h + (-1)^h B_h as (S_0, Re S_1, Im S_1, ...) [..., 2 H + 1] of two halves' sums [..., H + 1]."""

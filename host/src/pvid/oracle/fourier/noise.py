@@ -64,22 +64,26 @@ class NoiseFilters:
             broadcast(one, size) for one in self._function(*record.arguments, *(one.slopes for one in record.signs))
         ]
         smooth = max(design.rate_taps // (2 * design.decimation), 1)
+        chains = []
+        for (_, _, depth), slope in zip(self.entries, slopes, strict=True):
+            chain = [slope]
+            for _ in range(depth):
+                chain.append(slope_of(chain[-1], smooth, design.dt))
+            chains.append(chain)
         out = []
         for row in self.channels.rows:
             found: dict[tuple[str, int, int], Float] = {}
             for term in row.terms:
                 if term.column > row.thetas:
                     continue
-                for (place, sensor, depth), slope in zip(self.entries, slopes, strict=True):
+                for (place, sensor, depth), chain in zip(self.entries, chains, strict=True):
                     if place != term.channel:
                         continue
                     # (-1)^m (-D)^d [chi^(m) g] = (-1)^(m + d) sum_i C(d, i) chi^(m + d - i) g^(i)
-                    g = slope
-                    for i in range(depth + 1):
+                    for i, g in enumerate(chain):
                         factor = (-1.0) ** (term.order + depth) * float(sp.binomial(depth, i)) * term.factor
                         key = (sensor, term.column, term.order + depth - i)
                         found[key] = found.get(key, np.zeros(size)) + factor * g
-                        g = slope_of(g, smooth, design.dt)
             of_row: dict[str, list[Gain]] = {}
             for (sensor, column, order), values in found.items():
                 if values.any():
@@ -121,6 +125,7 @@ class NoiseModel:
                     np.array([gain.order for _, gain in own]),
                 )
             )
+        self._pairs: dict[tuple[int, int], list[_Pairs]] = {}
         self._gram: dict[tuple[int, int], Float] = {}
         self._overlap: dict[tuple[int, int], Float] = {}
 
@@ -133,12 +138,21 @@ class NoiseModel:
         """Weights P of the pairs of orders of two kinds [orders, orders]."""
         left, right = np.append(theta_a, -1.0), np.append(theta_b, -1.0)
         out = np.zeros(self._orders**2)
-        for one in self._sensors:
-            i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
-            weights = left[one.columns[i]][:, np.newaxis] * one.products[np.ix_(i, j)] * right[one.columns[j]]
-            places = one.orders[i][:, np.newaxis] * self._orders + one.orders[j]
-            out += np.bincount(places.reshape(-1), weights.reshape(-1), len(out))
+        for one in self._pairs_of(a, b):
+            weights = left[one.first][:, np.newaxis] * one.products * right[one.second]
+            out += np.bincount(one.places, weights.reshape(-1), len(out))
         return out.reshape(self._orders, self._orders)
+
+    def _pairs_of(self, a: int, b: int) -> list[_Pairs]:
+        """Pairs of gains of two kinds, of each sensor."""
+        if (a, b) not in self._pairs:
+            found = []
+            for one in self._sensors:
+                i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
+                places = one.orders[i][:, np.newaxis] * self._orders + one.orders[j]
+                found.append(_Pairs(one.columns[i], one.columns[j], one.products[np.ix_(i, j)], places.reshape(-1)))
+            self._pairs[a, b] = found
+        return self._pairs[a, b]
 
     def of_harmonics(self, kind: int) -> Float:
         """P [powers, columns, columns] with D_h = sum_j omega_h^(2 j) theta^T P_j theta, theta = -1 for Y's column.
@@ -182,10 +196,9 @@ class NoiseModel:
         right = np.append(theta_b, -1.0)
         out = np.zeros(self._columns)
         traces = np.einsum("mnkl,kl->mn", self._grams, weight, optimize=True)
-        for one in self._sensors:
-            i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
-            shares = one.products[np.ix_(i, j)] * right[one.columns[j]] * traces[np.ix_(one.orders[i], one.orders[j])]
-            out += np.bincount(one.columns[i], shares.sum(axis=1), self._columns)
+        for one in self._pairs_of(a, b):
+            shares = one.products * right[one.second] * traces.reshape(-1)[one.places].reshape(one.products.shape)
+            out += np.bincount(one.first, shares.sum(axis=1), self._columns)
         return out
 
     @cached_property
@@ -211,6 +224,17 @@ class _SensorGains:
     kinds: npt.NDArray[np.int64]
     columns: npt.NDArray[np.int64]
     orders: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Pairs of gains of one sensor in two kinds [gains, gains]: their columns, mean products, and flat places in a
+    table of the pairs of orders."""
+
+    first: npt.NDArray[np.int64]
+    second: npt.NDArray[np.int64]
+    products: Float
+    places: npt.NDArray[np.int64]
 
 
 class ReversalNoise:
@@ -272,6 +296,8 @@ class ReversalNoise:
 
     def places(self, windows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
         """Entries of each of some windows, by their numbers [windows, most entries]; -1 where there are fewer."""
+        if not len(self.windows):
+            return np.zeros((len(windows), 0), np.int64)
         first, behind = np.searchsorted(self.windows, windows), np.searchsorted(self.windows, windows + 1)
         steps = np.arange(int(np.max(behind - first, initial=0)))
         found = first[:, np.newaxis] + steps

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -33,9 +34,13 @@ class Compiled:
     bare : as compiled
     model : its rows with the corners of sampled signals
     jumps : name of a signal in them -> input whose scaled jump it is
+    number : of the object in this process
     """
 
+    _numbers = itertools.count()
+
     def __init__(self, model: CompiledModel) -> None:
+        self.number = next(Compiled._numbers)
         self.bare = model
         model, self.jumps = with_corners(model)
         self.model = model
@@ -206,7 +211,7 @@ class WeakRows:
         parts = self._whitened(kinds, whitener)
         regressors = np.concatenate([x[:, : row.thetas] for x, row in zip(parts, plans, strict=True)], axis=1)
         known = sum((x[:, row.thetas] for x, row in zip(parts, plans, strict=True)), np.zeros(regressors[:, 0].shape))
-        nuisances = self.white_nuisances(kinds, whitener)
+        nuisances = np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
         gone = 0
         if nuisances.shape[1]:
             q, r = np.linalg.qr(nuisances.transpose(0, 2, 1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -54,9 +55,9 @@ class Moments:
         return [np.concatenate([of_kinds[kind] for kind in group]) for group in self.kinds]
 
 
-def normal(parameters: Parameters, moments: Moments, p: Float) -> tuple[Float, Float]:
-    """S [n_p, n_p] and F [n_p] at p, in units of a step."""
-    theta, jacobian = moments.grouped(parameters.theta(p)), moments.grouped(parameters.jacobian(p))
+def normal(parameters: Parameters, moments: Moments, p: Float, theta: list[Float]) -> tuple[Float, Float]:
+    """S [n_p, n_p] and F [n_p] at p and its thetas of each group, in units of a step."""
+    jacobian = moments.grouped(parameters.jacobian(p))
     n = len(p)
     s, f = np.zeros((n, n)), np.zeros(n)
     for m, b, th, c in zip(moments.m, moments.b, theta, jacobian, strict=True):
@@ -65,18 +66,23 @@ def normal(parameters: Parameters, moments: Moments, p: Float) -> tuple[Float, F
     return s, f
 
 
-def misfit(parameters: Parameters, moments: Moments, p: Float) -> float:
-    """Sum of squared residuals but for a constant."""
+def misfit(moments: Moments, theta: list[Float]) -> float:
+    """Sum of squared residuals at the thetas of each group, but for a constant."""
     total = 0.0
-    for m, b, th in zip(moments.m, moments.b, moments.grouped(parameters.theta(p)), strict=True):
+    for m, b, th in zip(moments.m, moments.b, theta, strict=True):
         total += float(th @ m @ th - 2 * th @ b)
     return total
 
 
 def solved(s: Float, f: Float) -> Float:
     """S^-1 f with S scaled to a unit diagonal."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
-    return np.asarray(scale * np.linalg.solve(s * np.outer(scale, scale) + 1e-13 * np.eye(len(s)), scale * f))
+    scale = 1 / np.sqrt(np.maximum(s.diagonal(), 1e-300))
+    return np.asarray(scale * np.linalg.solve(s * (scale[:, np.newaxis] * scale) + _ridge(len(s)), scale * f))
+
+
+@cache
+def _ridge(n: int) -> Float:
+    return 1e-13 * np.eye(n)
 
 
 def inverse(s: Float) -> Float:
@@ -88,19 +94,22 @@ def inverse(s: Float) -> Float:
 
 def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Float, steps: int) -> tuple[Float, float]:
     """p after up to `steps` limited steps, and the size of the first one."""
-    reach = parameters.reach()
+    reach, weak = parameters.reach(), np.diag(prior)
     first = 0.0
-    damping = 1.0
+    theta = moments.grouped(parameters.theta(p))
+    after = misfit(moments, theta)
     for k in range(steps):
-        s, f = normal(parameters, moments, p)
-        step = solved(s + damping * np.diag(prior), f)
+        s, f = normal(parameters, moments, p, theta)
+        step = solved(s + weak, f)
         size = float(np.max(np.abs(step) / reach))
         step *= min(1.0, _STEP_LIMIT / max(size, 1e-300))
         first = size if k == 0 else first
-        before = misfit(parameters, moments, p)
+        before = after
         for _ in range(8):
             moved = parameters.moved(p, step)
-            if misfit(parameters, moments, moved) <= before + 1e-9 * abs(before):
+            theta = moments.grouped(parameters.theta(moved))
+            after = misfit(moments, theta)
+            if after <= before + 1e-9 * abs(before):
                 break
             step = step / 2
         p = moved
@@ -250,7 +259,7 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError
     share = plain.free / (rows.windows * rows.functions.count)
     moment = e.T @ e / (len(e) * share)
     whitener = plain.whitener.base
-    without = unlikely(rows, kind, theta, EquationError())
+    without = _unlikely(plain, e)
     for order in range(rows.compiled.channels.rows_top(kind) + 1):
         white = whitener @ rows.noise.gram(order, order) @ whitener.T
         if not np.isfinite(white).all():  # sensors of no size that a number holds
@@ -272,7 +281,10 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError
 def unlikely(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError) -> float:
     """Minus twice the logarithm of the likelihood of one kind's residuals, but for a constant."""
     white = rows.white((kind,), theta, [error] * rows.kinds)
-    e = white.residuals(theta)
+    return _unlikely(white, white.residuals(theta))
+
+
+def _unlikely(white: WhiteRows, e: Float) -> float:
     return float(np.sum(e**2)) + white.whitener.log_determinant() * white.free / e.size
 
 

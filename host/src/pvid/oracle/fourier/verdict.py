@@ -138,7 +138,8 @@ def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[R
 
 def partner_of(fit: Fit, worst: int) -> int | None:
     """The parameter that compensates a change of the worst one best; None where none does much."""
-    information, _ = normal(fit.parameters, Moments.of(fit.white), fit.p)
+    moments = Moments.of(fit.white)
+    information, _ = normal(fit.parameters, moments, fit.p, moments.grouped(fit.parameters.theta(fit.p)))
     covariance = inverse(information + np.diag(fit.parameters.prior(fit.start)))
     scale = np.sqrt(np.diag(covariance))
     correlation = np.abs(covariance[worst] / (scale[worst] * scale))

@@ -40,6 +40,9 @@ class Whitener:
         """From R [R, R] and the directions of each window [windows, r, R], zeros where there are fewer."""
         base = np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.float64)
         v = base @ directions.transpose(0, 2, 1)
+        if not v.shape[2]:
+            nothing = np.zeros((len(v), 0, 0))
+            return cls(base, v, nothing, nothing)
         one = np.eye(v.shape[2])
         k = np.linalg.cholesky(one + v.transpose(0, 2, 1) @ v)
         back = np.linalg.inv(k)
