@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -50,7 +51,6 @@ _SKEW_TOLD = 0.1  # ticks, at least
 
 _MOST_SAMPLES = 200_000  # of a run, for trials
 _BETTER = 0.5  # largest chi^2 of a trial that counts, relative to that without it
-_EXPLAINED = 3.0  # below this chi^2 no mistake in the equations is sought
 _MOST_ROUNDS = 4
 _CLOCK_OFF = 0.3  # least relative error of the clock that is sought: smaller errors do not prevent an estimate
 
@@ -61,6 +61,16 @@ class Case:
 
     run: Run
     rig: RigFile
+
+    @cached_property
+    def trial(self) -> Trial | None:
+        """Its quick identification."""
+        return trial_of(self.run, self.rig)
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the trial answers without a doubt."""
+        return _is_good(self.trial) and _answers(self.trial)
 
 
 @dataclass(frozen=True)
@@ -92,14 +102,12 @@ def advice(run: Run, rig: RigFile, result: Identification) -> tuple[str, ...]:
         degrees = _angle_in_degrees(case)
         if degrees:
             return (degrees[0].sentence,)
-    found, case, now = _put_right(case, units=not _is_good(result))
+    found, case = _put_right(case, _is_good(result))
     corrected = bool(found)
-    if not found:
-        found = list(_remaining(case, result, now))
-    elif not _is_good(result) and not (_is_good(now) and _answers(now)):  # there is more to it
-        found += _remaining(case, result, now)
-    if corrected and now is not None and _is_good(now) and _answers(now):
-        found += _clock_of(now.value.get("g", GRAVITY), 0.0, rig)
+    if not found or (not _is_good(result) and not case.is_explained):  # there is more to it
+        found += _remaining(case, result)
+    if corrected and case.trial is not None and case.is_explained:
+        found += _clock_of(case.trial.value.get("g", GRAVITY), 0.0, rig)
     elif result.identified:
         found += _clock_of(result.value.get("g", GRAVITY), result.se.get("g", 0.0), rig)
     return tuple(found)
@@ -133,24 +141,18 @@ def behind(advices: tuple[str, ...], error: PvidError) -> PvidError:
     return PvidError(f"{'; '.join(advices)} (as it is: {error})" if advices else str(error))
 
 
-def _put_right(case: Case, units: bool = True) -> tuple[list[str], Case, Trial | None]:
-    """The mistakes found, the case without them, its identification; units: whether mistakes of units are sought."""
+def _put_right(case: Case, good: bool = False) -> tuple[list[str], Case]:
+    """The mistakes found, and the case without them; good: it is identified without a warning, by which units and
+    equations are right."""
     found: list[str] = []
-    for _ in range(_MOST_ROUNDS if units else 0):
-        cure = _unit_mistake(case)
-        if cure is None or cure.sentence in found:
-            break
-        found.append(cure.sentence)
-        case = cure.case
-    now = _trial(case)
-    for search in (_exchanged, _step_of, _equation_mistake):
+    for search in (_step_of,) if good else (_unit_mistake, _exchanged, _step_of, _equation_mistake):
         for _ in range(_MOST_ROUNDS):
-            cure = None if search is _equation_mistake and _is_explained(now) else search(case, now)
+            cure = search(case)
             if cure is None or cure.sentence in found:
                 break
             found.append(cure.sentence)
-            case, now = cure.case, _trial(cure.case)
-    return found, case, now
+            case = cure.case
+    return found, case
 
 
 # ---- trials
@@ -163,16 +165,8 @@ def _shortened(run: Run) -> Run:
     return replace(run, t=run.t[first], phi=run.phi[first], y=run.y[first])
 
 
-def _trial(case: Case) -> Trial | None:
-    return trial_of(case.run, case.rig)
-
-
 def _is_good(result: Identification | Trial | None) -> bool:
     return result is not None and result.identified and result.warning is None
-
-
-def _is_explained(result: Trial | None) -> bool:
-    return _is_good(result) and result is not None and result.chi2 < _EXPLAINED
 
 
 def _answers(trial: Trial | None) -> bool:
@@ -207,7 +201,7 @@ def _unit_mistake(case: Case) -> Cure | None:
     """The first mistake of a unit that magnitudes show; of several units the first that identifies the run."""
     for cures in _by_magnitude(case):
         if len(cures) > 1:
-            return next((cure for cure in cures if _answers(_trial(cure.case))), cures[0])
+            return next((cure for cure in cures if _answers(cure.case.trial)), cures[0])
         if cures:
             return cures[0]
     return None
@@ -263,7 +257,7 @@ def _angle_in_degrees(case: Case, tries: bool = True) -> list[Cure]:
     if swing < _WIDE_SWING and not by_step:
         return []
     in_degrees = Case(replace(run, phi=joined(np.radians(run.phi))[0]), case.rig)
-    if swing < _FULL_TURN and not by_step and not (tries and _is_better(_trial(in_degrees), _trial(case))):
+    if swing < _FULL_TURN and not by_step and not (tries and _is_better(in_degrees.trial, case.trial)):
         return []
     return [
         Cure(
@@ -342,9 +336,9 @@ def _height_units(case: Case) -> list[Cure]:
 # ---- sensors
 
 
-def _exchanged(case: Case, now: Trial | None) -> Cure | None:
+def _exchanged(case: Case) -> Cure | None:
     """phi and y exchanged: the run is identified only after exchanging them back."""
-    if now is not None and now.identified:
+    if case.trial is not None and case.trial.identified:
         return None
     sensor = case.rig.sensor
     steps = [resolution_of(values) for values in (case.run.y, case.run.phi)]
@@ -353,8 +347,7 @@ def _exchanged(case: Case, now: Trial | None) -> Cure | None:
         right = Case(replace(case.run, phi=case.run.y, y=case.run.phi), replace(case.rig, sensor=lsb))
     except PvidError:
         return None
-    trial = _trial(right)
-    if not (_is_good(trial) and _answers(trial)):
+    if not right.is_explained:
         return None
     return Cure(
         "phi and y are exchanged, it seems (the other way round the run is explained): use --columns phi=y,y=phi",
@@ -362,7 +355,7 @@ def _exchanged(case: Case, now: Trial | None) -> Cure | None:
     )
 
 
-def _step_of(case: Case, _: Trial | None) -> Cure | None:
+def _step_of(case: Case) -> Cure | None:
     return next(iter(_steps(case)), None)
 
 
@@ -390,15 +383,15 @@ def _steps(case: Case) -> list[Cure]:
 # ---- equations
 
 
-def _equation_mistake(case: Case, now: Trial | None) -> Cure | None:
+def _equation_mistake(case: Case) -> Cure | None:
     """The sign of y, or the clock, with which a run is identified that is not identified as it is."""
-    if now is not None and now.identified:
+    if case.trial is not None and case.trial.identified:
         return None
     turned = Cure(
         "y is counted downwards, it seems (with its sign turned the run is explained): use --columns y=y:-m",
         Case(replace(case.run, y=-case.run.y), case.rig),
     )
-    return turned if _is_better(_trial(turned.case), now) else _clock(case)
+    return turned if _is_better(turned.case.trial, case.trial) else _clock(case)
 
 
 def _at_rate(case: Case, factor: float) -> Case:
@@ -414,12 +407,12 @@ def _clock(case: Case) -> Cure | None:
     tried = slow / dominant_hz(case.run)
     if abs(math.log(tried)) < math.log(1 + _CLOCK_OFF):
         return None
-    trial = _trial(_at_rate(case, tried))
+    trial = _at_rate(case, tried).trial
     if trial is None or not _answers(trial):
         return None
     factor = tried * math.sqrt(GRAVITY / trial.value["g"])
     right = _at_rate(case, factor)
-    if abs(math.log(factor)) < math.log(1 + _CLOCK_OFF) or not _answers(_trial(right)):
+    if abs(math.log(factor)) < math.log(1 + _CLOCK_OFF) or not _answers(right.trial):
         return None
     rate = case.run.sample_rate
     return Cure(
@@ -462,17 +455,17 @@ def _wider_ranges(result: Identification) -> str:
     )
 
 
-def _remaining(case: Case, result: Identification, now: Trial | None) -> Iterator[str]:
-    """Sentences for a run in which no mistake was found; now: its trial."""
+def _remaining(case: Case, result: Identification) -> Iterator[str]:
+    """Sentences for a run in which no further mistake was found."""
     if _is_good(result):
         return
-    if result.form == "strong" and _is_good(now):
+    if result.form == "strong" and _is_good(case.trial):
         yield "the strong form needs an encoder of 20 bits and more: use --form weak, which explains this run"
         return
-    if result.law != "stationary" and _is_good(now):
+    if result.law != "stationary" and _is_good(case.trial):
         yield "equation (5) does not arrive from this guess: use --law stationary, which explains this run"
         return
-    if result.core == "q31" and not result.identified and _answers(now):
+    if result.core == "q31" and not result.identified and _answers(case.trial):
         yield "fixed point does not resolve this run: use --core f32, which answers it"
         return
     excitation, angle = excitation_of(case.run, case.rig), _swing(case.run)[1]
