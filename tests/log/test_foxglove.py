@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
 import struct
+import subprocess
 import sys
+import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import field_board
 import numpy as np
 import pytest
+from program import PVID
 from websocket import WebSocket, create_connection
 
 from pvid.base.errors import PvidError
@@ -160,6 +165,52 @@ def test_the_topics_follow_a_board_that_names_its_mechanism(port: int) -> None:
     assert {"R": "ohm", "R_se": "ohm", "i0": "1"}.items() <= {n: one["unit"] for n, one in estimates.items()}.items()
     assert client.topics["/samples"]["metadata"] == {"t": "s", "V": "V", "i": "A", "phi": "rad"}
     server.close(stream.account)
+
+
+def client_of(process: subprocess.Popen[str], port: int) -> Client:
+    """Of the server that a process is about to start."""
+    limit = time.monotonic() + 60
+    while True:
+        try:
+            return Client(port)
+        except ConnectionRefusedError:
+            assert process.poll() is None, process.communicate()
+            assert time.monotonic() < limit
+            time.sleep(0.1)
+
+
+def test_the_command_serves_what_it_records(port: int, sent: list[tuple[int, link.Message]], tmp_path: Path) -> None:
+    """A board behind a pseudo-terminal; the client subscribes between its first frames and the others."""
+    first = next(i for i, (_, message) in enumerate(sent) if isinstance(message, link.Estimate))
+    frames = list(field_board.frames(sent[: first + 40]))
+    line = field_board.PtyLine(tmp_path / "board")
+    command = [*PVID, "log", "board", "run.pvlog", "--live", f"foxglove://127.0.0.1:{port}", "--quiet"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            client = client_of(process, port)
+            line.await_word()
+            for frame in frames[:BEGUN]:
+                line.write(frame)
+            client.advertised(4)
+            client.parameters([])  # the subscription is in force
+            for frame in frames[BEGUN:]:
+                line.write(frame)
+            got = list(client.messages())
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert (process.returncode, err) == (0, "")
+
+    stream = LogStream()
+    records = list(stream.feed((tmp_path / "run.pvlog").read_bytes()))
+    assert f"{stream.account.samples} samples in 1 segment; lost 0 frames" in out and records
+    samples = [one for topic, _, one in got if topic == "/samples"]
+    ticks = [one["tick"] for one in samples]
+    assert len(ticks) > 100 and ticks == list(range(ticks[0], stream.account.samples))
+    assert [one["phi"] for one in samples] == field_board.Field(4000).run.phi[ticks].astype(np.float32).tolist()
+    recorded = {tick: message.p[0] for tick, message in sent[: first + 40] if isinstance(message, link.Estimate)}
+    assert {one["tick"]: one["w"] for topic, _, one in got if topic == "/estimates"} == recorded
 
 
 def test_each_mistake_has_one_sentence(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
