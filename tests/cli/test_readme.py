@@ -12,8 +12,11 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from conftest import ROOT
 
+from pvid.board import sizes
+from pvid.cli.main import commands
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, sources_of
 from pvid.rig.file import RigFile
 from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate
@@ -111,7 +114,6 @@ def commands_shown() -> Iterator[tuple[Path, list[str]]]:
 
 
 def test_commands_and_options_exist() -> None:
-    from pvid.cli.main import commands
 
     shown = list(commands_shown())
     assert len(shown) > 40
@@ -219,20 +221,15 @@ def test_sources_cite_pages_that_exist() -> None:
 # ---- figures of the README
 
 
-def test_figures_of_the_readme_are_those_of_the_cost_page() -> None:
-    def rows(page: Path) -> list[list[str]]:
-        return [
-            [cell.strip() for cell in line.strip("|").split("|")]
-            for line in text_of(page).splitlines()
-            if line[:2] == "| "
-        ]
-
-    sizes = {(row[0], row[1]): row[2:] for row in rows(DOCS / "benchmarks" / "cost.md") if len(row) == 11}
-    shown = [row for row in rows(README) if len(row) == 7 and "(" in row[1]]
-    assert len(shown) == 5
-    for form, board, instructions, ram, flash, *_ in shown:
-        text, _, tables, _, bss, stack, _, mean, longest = sizes[board, form]
-        assert (instructions, ram, flash) == (f"{mean} / {longest}", f"{bss} + {stack}", f"{text} + {tables}"), board
+def test_the_costs_of_the_readme_are_what_its_command_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the budget, with which tests/board/test_targets.py compares what is measured."""
+    budget = sizes.budgeted(ROOT / "tests" / "budget.toml")
+    monkeypatch.setattr(sizes, "measure", lambda one: (budget[one], None))
+    page = tmp_path / "README.md"
+    page.write_text(re.sub(r"\| \d+ / \d+ \| \d+", "| 1 / 2 | 3", text_of(README)), encoding="utf-8")
+    assert text_of(page).count("| 1 / 2 | 3") == 5
+    CliRunner().invoke(commands, ["sizes", "--update", str(page)], standalone_mode=False, catch_exceptions=False)
+    assert text_of(page) == text_of(README), "./tools/pvid sizes --update README.md"
 
 
 def test_readme_is_short_and_its_program_comes_first() -> None:

@@ -213,6 +213,34 @@ def _form_of(configuration: Configuration) -> str:
     return f"{model}{configuration.form}, {configuration.core}"
 
 
+# ---- a summary: a table whose rows begin with form and board, then figures, then what is measured otherwise
+
+SUMMARY = "costs"  # its marker
+
+
+def _begin(configuration: Configuration) -> str:
+    """Of a row of the summary."""
+    return f"| {_form_of(configuration)} | {configuration.board.core} ({configuration.board.name}) |"
+
+
+def named_in(summary: str) -> list[Configuration]:
+    """What the rows of a summary name."""
+    return [one for one in CONFIGURATIONS if _begin(one) in summary]
+
+
+def with_costs(summary: str, footprints: Mapping[Configuration, Footprint]) -> str:
+    """The summary with these figures: instructions, RAM and stack, code and tables."""
+    lines = summary.splitlines()
+    for configuration, found in footprints.items():
+        begin = _begin(configuration)
+        figures = f"{found.mean} / {found.longest} | {found.bss} + {found.stack_bound} | {found.text} + {found.tables}"
+        for at, line in enumerate(lines):
+            if line.startswith(begin):
+                rest = line.removeprefix(begin).split("|", 3)[3]
+                lines[at] = f"{begin} {figures} |{rest}"
+    return "\n".join(lines)
+
+
 # ---- the budget
 
 OPENING, CLOSING = "# <sizes>", "# </sizes>"
@@ -240,6 +268,12 @@ def write_budget(path: Path, footprints: dict[Configuration, Footprint]) -> None
         raise PvidError(f"{path} does not contain the marker lines of the budget, {OPENING} and {CLOSING}")
     head, rest = old.split(OPENING, 1)
     write_whole(path, f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}")
+
+
+def budgeted(path: Path) -> dict[Configuration, Footprint]:
+    """The figures in a budget."""
+    targets = tomllib.loads(path.read_text(encoding="utf-8")).get("targets", {})
+    return {one: Footprint(**targets[one.name]) for one in CONFIGURATIONS if one.name in targets}
 
 
 def over_budget(path: Path, footprints: dict[Configuration, Footprint]) -> list[str]:

@@ -11,6 +11,12 @@ from pvid.base.console import write_stderr
 from pvid.base.errors import PvidError
 
 
+def table_in(page: Path, marker: str) -> str | None:
+    """What stands between <!-- marker --> and <!-- /marker -->; None: the page has no such lines."""
+    _, opening, rest = page.read_text(encoding="utf-8").partition(f"<!-- {marker} -->\n")
+    return rest.partition(f"\n<!-- /{marker} -->")[0] if opening else None
+
+
 def with_table(page: Path, marker: str, text: str) -> str:
     """The page with this text between <!-- marker --> and <!-- /marker -->.
 

@@ -9,7 +9,7 @@ import click
 
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.page_table import UPDATE, markdown, put_table
+from pvid.cli.page_table import UPDATE, markdown, put_table, table_in
 from pvid.settings.enums import Core
 from pvid.settings.forms import FORMS
 
@@ -38,7 +38,10 @@ def command(
     targets: tuple[str, ...],
 ) -> int:
     """Measures flash, RAM, stack and instructions per tick, built and run in an emulator: on every board, or on those
-    named as TARGET."""
+    named as TARGET.
+
+    --update README.md measures what the rows of its table `costs` name, and replaces their figures.
+    """
     from pvid.board import boards, sizes
 
     if core is not None and not models:
@@ -57,7 +60,12 @@ def command(
     if (targets or models) and (update is not None or budget is not None or check is not None):
         raise PvidError("--update, --budget and --check measure every board: name no TARGET and no --model")
     named = [boards.board(name) for name in targets] or list(boards.BOARDS.values())
+    summary = None if update is None else table_in(update, sizes.SUMMARY)
     chosen = sizes.configurations_on(named, models, core or "f32")
+    if summary is not None:
+        if budget is not None or check is not None:
+            raise PvidError(f"{update} names some boards; --budget and --check measure every board")
+        chosen = sizes.named_in(summary)
     footprints = {}
     with progress_bar("boards", len(chosen)) as advance:
         for done, configuration in enumerate(chosen):
@@ -65,6 +73,9 @@ def command(
             advance(done + 1)
     if as_json:
         click.echo(json.dumps(sizes.as_json(footprints), indent=2))
+        return DONE
+    if summary is not None:
+        put_table(update, sizes.SUMMARY, sizes.with_costs(summary, footprints))
         return DONE
     put_table(update, "sizes", markdown(sizes.HEADER, sizes.table_rows(footprints)))
     if budget is not None:
