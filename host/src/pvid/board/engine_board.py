@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.target import Verdict, verify
 from pvid.core.native import Native
+from pvid.oracle.fourier.choice import Scored
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.settings.engine_cores import ENGINE_CORES
@@ -23,14 +24,19 @@ def verify_recording(
     recording: Recording,
     core: Core = "f32",
     progress: Callable[[int], None] | None = None,
+    ranking: Sequence[Scored] = (),
 ) -> Verdict:
     """Plays it on a target, with the settings of `identify`; every hash is compared.
+
+    Parameters
+    ----------
+    ranking : of the analysis of the recording, where there is one: the design is not searched for again
 
     Raises
     ------
     PvidError
         When the target cannot be started or refuses, or the engine does not have what the model needs.
     """
-    board = _BOARDS[core].of_recording(rig, recording, to_identify=True)
+    board = _BOARDS[core].of_recording(rig, recording, to_identify=True, ranking=ranking)
     samples = board.recording.T
     return verify(target, board.without_recording, Native(), *samples, progress=progress)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Any
@@ -30,6 +30,7 @@ from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.fourier.choice import Scored
 from pvid.rig.described import rig_of_document
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
@@ -81,12 +82,15 @@ class MechanismBoard:
     recording: npt.NDArray[np.float32]
 
     @classmethod
-    def of_recording(cls, rig: MechanismRig, recording: Recording, to_identify: bool = False) -> MechanismBoard:
+    def of_recording(
+        cls, rig: MechanismRig, recording: Recording, to_identify: bool = False, ranking: Sequence[Scored] = ()
+    ) -> MechanismBoard:
         """With the design and the tables that a recording of the rig asks for; the board's sensors read it.
 
         Parameters
         ----------
         to_identify : as `identify` does: what is published is judged on this machine
+        ranking : as of pvid.run.engine_design.design_for_recording
 
         Raises
         ------
@@ -96,7 +100,7 @@ class MechanismBoard:
         compiled = model_of(rig)
         recording.refuse_damaged()
         whole = recording.whole()
-        config = (config_to_identify if to_identify else config_for_recording)(compiled, whole)
+        config = (config_to_identify if to_identify else config_for_recording)(compiled, whole, ranking=ranking)
         return cls(rig, compiled, config, samples_of(config, whole.signals))
 
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -26,6 +26,7 @@ from pvid.design.fourier_q31 import circle_of
 from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
 from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.fourier.choice import Scored
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
@@ -78,11 +79,13 @@ class MechanismBoardQ31:
     recording: npt.NDArray[np.int32]
 
     @classmethod
-    def of_recording(cls, rig: MechanismRig, recording: Recording, to_identify: bool = False) -> MechanismBoardQ31:
+    def of_recording(
+        cls, rig: MechanismRig, recording: Recording, to_identify: bool = False, ranking: Sequence[Scored] = ()
+    ) -> MechanismBoardQ31:
         """As MechanismBoard.of_recording."""
         recording.refuse_damaged()
         whole = recording.whole()
-        engine = (engine_to_identify if to_identify else engine_for_recording)(model_of(rig), whole)
+        engine = (engine_to_identify if to_identify else engine_for_recording)(model_of(rig), whole, ranking=ranking)
         return cls(rig, engine, engine.counts_of(whole.signals))
 
     @classmethod

@@ -65,8 +65,10 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
         _print(found, truth)
         answered = True
         with progress_bar(f"{core}: comparing with the twin, streaming to {target}", 2 * len(t)) as advance:
-            compared = compare_recording(compiled, recording, core, advance)
-            verdict = verify_recording(target, own, recording, core, lambda done: advance(len(t) + done))
+            compared = compare_recording(compiled, recording, core, advance, answer.ranking)
+            verdict = verify_recording(
+                target, own, recording, core, lambda done: advance(len(t) + done), answer.ranking
+            )
         twin = (
             f"equal in every bit, hash {compared.twin_hash:08x}"
             if compared.equal

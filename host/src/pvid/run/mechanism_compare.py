@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,7 @@ import numpy.typing as npt
 from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.fourier_library_q31 import fourier_native_q31
 from pvid.model.compiled import CompiledModel
+from pvid.oracle.fourier.choice import Scored
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, first_difference
 from pvid.run.engine_design import config_to_identify, samples_of
@@ -26,25 +27,37 @@ Progress = Callable[[int], None]
 
 
 def compare_recording(
-    compiled: CompiledModel, recording: Recording, core: Core = "f32", progress: Progress | None = None
+    compiled: CompiledModel,
+    recording: Recording,
+    core: Core = "f32",
+    progress: Progress | None = None,
+    ranking: Sequence[Scored] = (),
 ) -> Comparison:
     """Runs a recording through the engine and its twin, with the design that `identify` chooses.
+
+    Parameters
+    ----------
+    ranking : of the analysis of the recording, where there is one: the design is not searched for again
 
     Raises
     ------
     PvidError
         When there is no C compiler, or the engine does not have what the model needs.
     """
-    return _COMPARISONS[core](compiled, recording, progress)
+    return _COMPARISONS[core](compiled, recording, progress, ranking)
 
 
-def _in_float(compiled: CompiledModel, recording: Recording, progress: Progress | None) -> Comparison:
-    config = config_to_identify(compiled, recording)
+def _in_float(
+    compiled: CompiledModel, recording: Recording, progress: Progress | None, ranking: Sequence[Scored]
+) -> Comparison:
+    config = config_to_identify(compiled, recording, ranking)
     return compare_samples(compiled, config, samples_of(config, recording.signals), progress)
 
 
-def _in_fixed_point(compiled: CompiledModel, recording: Recording, progress: Progress | None) -> Comparison:
-    engine = engine_to_identify(compiled, recording)
+def _in_fixed_point(
+    compiled: CompiledModel, recording: Recording, progress: Progress | None, ranking: Sequence[Scored]
+) -> Comparison:
+    engine = engine_to_identify(compiled, recording, ranking)
     return compare_counts(engine, engine.counts_of(recording.signals), progress)
 
 
