@@ -174,7 +174,7 @@ class EstimatorInC:
                 for i, value in enumerate(values):
                     out[i] = float(value)
 
-            return ffi.callback("void(const float *, float *)", call)
+            return ffi.callback("void(*)(const float *, float *)", call)
 
         columns, rows = zip(*model.non_zeros, strict=True)
         several = len(model.kind_end) > 1
@@ -306,7 +306,7 @@ class EstimatorQ31InC(Q31InC):
                 for i, value in enumerate(function(np.array([p[a] for a in range(real.n_p)], np.int64))):
                     out[i] = int(value)
 
-            return ffi.callback("void(const int32_t *, int64_t *)", call)
+            return ffi.callback("void(*)(const int32_t *, int64_t *)", call)
 
         def formats(p_bits: Any, theta_bits: Any, c_bits: Any) -> None:
             theta, c = model.formats([p_bits[a] for a in range(real.n_p)])
@@ -323,7 +323,7 @@ class EstimatorQ31InC(Q31InC):
             ffi.new("uint8_t[]", list(real.kind_end)),
             filled(model.theta),
             filled(model.jacobian),
-            ffi.callback("void(const int8_t *, int16_t *, int16_t *)", formats),
+            ffi.callback("void(*)(const int8_t *, int16_t *, int16_t *)", formats),
         ]
         self.model = ffi.new("pvid_model_q31 *")
         self.model.n_theta, self.model.n_p, self.model.n_c = real.n_theta, real.n_p, len(rows)

@@ -112,9 +112,9 @@ def test_every_field_and_table_entry_that_differs_is_refused_with_its_status(nam
 def test_a_model_with_the_same_tables_and_another_function_is_another_model() -> None:
     rig = engine_rig("dc_motor")
     one, _, _owner = engines(rig, rig.config)
-    assert_every_function_is_hashed(one, "void(float *, float *)", None)
+    assert_every_function_is_hashed(one, "void(*)(float *, float *)", None)
     image = one.save()
-    nothing = one.ffi.callback("void(float *, float *)", lambda p, theta: None)
+    nothing = one.ffi.callback("void(*)(float *, float *)", lambda p, theta: None)
     one.config.design.model.model.theta = nothing
     assert one.restore(image) is SnapshotStatus.OTHER_MODEL
 

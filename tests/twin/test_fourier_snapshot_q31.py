@@ -55,4 +55,4 @@ def test_every_field_and_table_entry_that_differs_is_refused_with_its_status(nam
 
 def test_a_model_with_the_same_tables_and_another_function_is_another_model() -> None:
     one, _, _owner = engines("dc_motor")
-    assert_every_function_is_hashed(one, "bool(int32_t *, int32_t *)", True)
+    assert_every_function_is_hashed(one, "bool(*)(int32_t *, int32_t *)", True)

@@ -135,8 +135,8 @@ class Estimator:
             for k, value in enumerate(slope.T.ravel()):
                 out[k] = value
 
-        return ffi.callback("void(const float *, float *)", theta), ffi.callback(
-            "void(const float *, float *)", jacobian
+        return ffi.callback("void(*)(const float *, float *)", theta), ffi.callback(
+            "void(*)(const float *, float *)", jacobian
         )
 
     def _numbers(self, p: Any) -> Float:
