@@ -33,7 +33,8 @@ def test_what_the_equations_neglect_is_printed_once_behind_both_cores(
 
     same = SimpleNamespace(equal=True, twin_hash=0, ticks=1, text="equal", playback=SimpleNamespace(done=1))
     monkeypatch.setattr("pvid.cli.mechanism_demo.identify_in_c", identified)
-    for name in ("identify_mechanism", "_print", "convergence"):
+    monkeypatch.setattr("pvid.cli.mechanism_demo.identify_mechanism", lambda *_: SimpleNamespace(ranking=()))
+    for name in ("_print", "convergence"):
         monkeypatch.setattr(f"pvid.cli.mechanism_demo.{name}", lambda *_: None)
     for name in ("compare_recording", "verify_recording"):
         monkeypatch.setattr(f"pvid.cli.mechanism_demo.{name}", lambda *_: same)
