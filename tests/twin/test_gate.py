@@ -100,7 +100,7 @@ def test_one_percent_of_outliers_barely_widens_the_scale() -> None:
     assert float(one.scale[0]) < 1.2
 
 
-def test_what_opens_the_gate_is_told_in_both_cores() -> None:
+def test_opening_gate_reports_a_change_in_both_cores() -> None:
     single = gate(4.0, patience_s=3.0, memory=4.0)
     integer = GateQ31(gate_config_q31(GateConfig(4.0, 3.0), 100.0), 4, one_lane(1.0))
     told = {}

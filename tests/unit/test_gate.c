@@ -103,7 +103,7 @@ static void uninformative_count_is_reset(void **state)
 }
 
 /* What passes only because outliers have widened the scale is a change; what was usual before them is none. */
-static void what_opens_the_gate_is_told(void **state)
+static void opening_gate_reports_a_change(void **state)
 {
     (void)state;
     start(3.0f, 2.0f, 4.0f);
@@ -127,8 +127,8 @@ static void what_opens_the_gate_is_told(void **state)
     }
 }
 
-/* Not a number changes nothing, and an open gate tells nothing. */
-static void nan_and_a_disabled_gate_tell_no_change(void **state)
+/* Not a number changes nothing, and a disabled gate reports nothing. */
+static void nan_and_a_disabled_gate_report_no_change(void **state)
 {
     (void)state;
     start(3.0f, 2.0f, 1.0f);
@@ -152,8 +152,8 @@ int main(void)
         cmocka_unit_test(gate_passes_nan),
         cmocka_unit_test(the_scale_stays_between_its_floor_and_its_ceiling),
         cmocka_unit_test(uninformative_count_is_reset),
-        cmocka_unit_test(what_opens_the_gate_is_told),
-        cmocka_unit_test(nan_and_a_disabled_gate_tell_no_change),
+        cmocka_unit_test(opening_gate_reports_a_change),
+        cmocka_unit_test(nan_and_a_disabled_gate_report_no_change),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -149,7 +149,7 @@ static pvid_gate_verdict judge(int64_t square)
 }
 
 /* What passes only because outliers have widened the scale is a change; what was usual before them is none. */
-static void test_what_opens_the_gate_is_told(void **state)
+static void test_opening_gate_reports_a_change(void **state)
 {
     (void)state;
     make(4, 300);
@@ -188,7 +188,7 @@ int main(void)
         cmocka_unit_test(test_the_longest_patience_still_widens_it),
         cmocka_unit_test(test_the_scale_has_an_end),
         cmocka_unit_test(test_memory_is_at_least_one),
-        cmocka_unit_test(test_what_opens_the_gate_is_told),
+        cmocka_unit_test(test_opening_gate_reports_a_change),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

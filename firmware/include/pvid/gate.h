@@ -7,7 +7,7 @@
  *
  * The usual size is the running mean square of accepted residuals; outliers do not contribute. Each outlier widens
  * it slightly (squares: by 10^4 within patience_s), so that a changed mechanism is accepted after `patience_s`, or
- * never. A residual that is accepted only because outliers have widened the scale tells that the mechanism has changed:
+ * never. A residual that is accepted only because outliers have widened the scale means that the mechanism has changed:
  * the weak form then begins its sums anew, for old and new rows together fit no p.
  *
  * Enabled by default in rig files, except for the paper's law (5); a zeroed configuration disables it. Every input
@@ -46,7 +46,7 @@ pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_config_f32 *
  * infinity pass: the estimator rejects them with their own reason. */
 bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square);
 
-/* pvid_gate_passes_f32 that tells a change. Call only one of the two on a gate. */
+/* As pvid_gate_passes_f32; PVID_GATE_OPENS: the mechanism has changed. Call only one of the two on a gate. */
 pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square);
 
 #ifdef __cplusplus

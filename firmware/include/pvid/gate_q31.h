@@ -37,7 +37,7 @@ pvid_status pvid_gate_init_q31(pvid_gate_q31 *self, const pvid_gate_config_q31 *
  * accepted. */
 bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
 
-/* pvid_gate_passes_q31 that tells a change. Call only one of the two on a gate. */
+/* As pvid_gate_passes_q31; PVID_GATE_OPENS: the mechanism has changed. Call only one of the two on a gate. */
 pvid_gate_verdict pvid_gate_judge_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
 
 #ifdef __cplusplus

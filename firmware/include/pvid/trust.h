@@ -18,7 +18,7 @@
  * Renewal. Rows added far from the solution may have too much weight, and float32 sums lose digits when p moves
  * far. When p has converged far from them, the old sums are faded over the next groups.
  *
- * Beginning anew. When the gate tells that the mechanism has changed, next to nothing of the old sums remains. p stays,
+ * Beginning anew. When the gate opens to a changed mechanism, next to nothing of the old sums remains. p stays,
  * and what is published is held until p is trusted as after the start.
  *
  * Neglected terms. Residuals do not show a small error of the equations, and more data do not reduce the error of p

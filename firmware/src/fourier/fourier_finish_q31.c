@@ -360,8 +360,8 @@ static int64_t freedom_of(const pvid_fourier_q31 *self)
     return (freedom > 0) ? freedom : 1;
 }
 
-/* Whether the gate accepts the kind; it may tell that the mechanism has changed. Saturated rows pass; the estimator
- * rejects them. */
+/* Whether the gate accepts the kind; if it opens to a changed mechanism, the sums begin anew. Saturated rows pass; the
+ * estimator rejects them. */
 static bool passes(pvid_fourier_q31 *self)
 {
     pvid_fourier_finish_q31 *finish = &self->finish;

@@ -1,4 +1,4 @@
-/* pvid/detail/gate_verdict.h - what a gate says of a residual: gate.h, gate_q31.h. */
+/* pvid/detail/gate_verdict.h - what gate.h and gate_q31.h return for a residual. */
 #ifndef PVID_DETAIL_GATE_VERDICT_H
 #define PVID_DETAIL_GATE_VERDICT_H
 

@@ -270,15 +270,21 @@ def write_budget(path: Path, footprints: dict[Configuration, Footprint]) -> None
     write_whole(path, f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}")
 
 
+def _targets_in(path: Path) -> dict[str, dict[str, int]]:
+    """The figures in a budget, by the name of the configuration."""
+    targets: dict[str, dict[str, int]] = tomllib.loads(path.read_text(encoding="utf-8")).get("targets", {})
+    return targets
+
+
 def budgeted(path: Path) -> dict[Configuration, Footprint]:
     """The figures in a budget."""
-    targets = tomllib.loads(path.read_text(encoding="utf-8")).get("targets", {})
+    targets = _targets_in(path)
     return {one: Footprint(**targets[one.name]) for one in CONFIGURATIONS if one.name in targets}
 
 
 def over_budget(path: Path, footprints: dict[Configuration, Footprint]) -> list[str]:
     """A sentence for every figure that exceeds its budget in `path` by more than 2 %, or has none."""
-    allowed = tomllib.loads(path.read_text(encoding="utf-8")).get("targets", {})
+    allowed = _targets_in(path)
     found = []
     for configuration, footprint in footprints.items():
         limits = allowed.get(configuration.name, {})
