@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import MADE_BY, MechanismRun, build_with, files_of, mechanism_run
 from pvid.codegen import files_refine
@@ -18,9 +19,12 @@ from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.refine import RefineFunctions
 from pvid.core.fourier_native import RefinedIdentifier
 from pvid.design.c_tables import float_literal
+from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
 from pvid.run.refine_design import refine_settings
+from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
+from pvid.sim.pendulum import simulate, standard_sensors
 
 _START = "#define REPLAY_INIT pvid_fourier_init_f32"
 _HASH = "#define REPLAY_HASH pvid_fnv_estimator_f32"
@@ -50,6 +54,26 @@ def refined_run(name: str, ticks: int, **changes: object) -> RefinedRun:
     p = np.array([rig.truth[one] for one in run.compiled.p_names])
     settings = refine_settings(made, signals, run.config.sample_rate, p, 2 * rig.window_s)
     return RefinedRun(run, made, replace(settings, **changes))  # type: ignore[arg-type]
+
+
+def refined_pendulum(ticks: int) -> RefinedRun:
+    """The pendulum's standard rig with its full equations and 14 bits, on which the refinement finds its track; the
+    ticks behind the first window in which it is published count in the mean.
+
+    Raises
+    ------
+    PvidError
+        Where it is not published within `ticks`.
+    """
+    run = refined_run(DEFAULT, ticks)
+    found = simulate(sensors=standard_sensors(14), truth="full", duration=(ticks + 1) / 1000.0, seed=1).run
+    measured = {"phi": found.phi, "y": found.y}
+    samples = np.stack([measured[one] for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
+    run = replace(run, weak=replace(run.weak, counts=np.rint(samples / run.weak.lsb).astype(np.int32)))
+    published = np.flatnonzero(run.native().run_both(run.weak.samples).told == Reason.UPDATED)
+    if not len(published):
+        raise PvidError(f"no refined estimate is published within {ticks} ticks")
+    return replace(run, weak=replace(run.weak, measure_from=int(published[0])))
 
 
 def settings_text(settings: RefineConfig, name: str) -> str:

@@ -6,12 +6,14 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.engine_image import engine_image
+from pvid.board.refined_image import RefinedRun, build_refined_image, refined_pendulum
 from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
 from pvid.board.stack_bound import stack_bound
 from pvid.models.registry import DEFAULT
@@ -19,6 +21,7 @@ from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.forms import FORMS
 
 TICKS = 5000
+REFINED_TICKS = 16_000  # the refinement finds its track in the first 6 600
 TIMEOUT_S = 300.0
 ALLOWANCE = 1.02
 
@@ -39,7 +42,8 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Configuration:
-    """A board, the arithmetic and the form of the identifier; the weak form is that of the shipped rig of `model`."""
+    """A board, the arithmetic and the form of the identifier; the weak form is that of the shipped rig of `model`.
+    "refined" is the weak form with the refinement behind it."""
 
     board: Board
     form: str
@@ -53,14 +57,22 @@ class Configuration:
         return f"{self.board.name} {self.form} {self.core}{model}"
 
 
-WEAK = "weak"
+WEAK, REFINED = "weak", "refined"
 ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
 
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
 ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}
 
+# The refinement is in float32: a processor with an FPU, and two without.
+WITH_REFINEMENT = ("microbit", "mps2-an385", "mps2-an386")
+
 CONFIGURATIONS = tuple(
-    Configuration(board, form, core) for board in BOARDS.values() for form, core in ON_AVR.get(board.name, ALL)
+    Configuration(board, form, core)
+    for board in BOARDS.values()
+    for form, core in (
+        *ON_AVR.get(board.name, ALL),
+        *([(REFINED, "f32")] if board.name in WITH_REFINEMENT else []),
+    )
 )
 
 
@@ -119,14 +131,15 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
 class _Built:
     """An image with what is counted in it.
 
-    image, tree: the file, and where it was built; code, tables: (section, origin) of the core's code and constants and
-    of the design's tables, as patterns.
+    image, tree: the file, and where it was built; code, tables, state: (section, origin) of the core's code and
+    constants, of the design's tables, and of variables of the application beside the identifier, as patterns.
     """
 
     image: Path
     tree: Path
     code: tuple[tuple[str, str], ...]
     tables: tuple[tuple[str, str], ...]
+    state: tuple[tuple[str, str], ...] = ()
 
 
 def _strong(configuration: Configuration) -> _Built:
@@ -138,16 +151,36 @@ def _strong(configuration: Configuration) -> _Built:
 def _weak(configuration: Configuration) -> _Built:
     """Of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
     made = engine_image(configuration.board, configuration.model, ENGINE_CORES[configuration.core].name)
-    tables = rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.{made.name}_"
+    return _engine(made.image, made.tree, made.name)
+
+
+def _engine(image: Path, tree: Path, name: str) -> _Built:
+    """An image of the weak engine with the mechanism called `name` in C."""
+    tables = rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.({name}_|replay_refine_config)"
     return _Built(
-        made.image,
-        made.tree,
+        image,
+        tree,
         ((CODE, CORE), (r"\.text", _MODEL)),
         ((r"\.s?rodata", _MODEL), (tables, "replay")),
+        ((r"\.s?bss\.replay_refinement$", "replay"),),
     )
 
 
-_BUILT: dict[str, Callable[[Configuration], _Built]] = dict(zip(FORMS, (_weak, _strong), strict=True))
+@cache
+def refined_replay() -> RefinedRun:
+    """What the images of the refinement play."""
+    return refined_pendulum(REFINED_TICKS)
+
+
+def _refined(configuration: Configuration) -> _Built:
+    run = refined_replay()
+    return _engine(*build_refined_image(configuration.board, run), run.weak.name)
+
+
+_BUILT: dict[str, Callable[[Configuration], _Built]] = {
+    **dict(zip(FORMS, (_weak, _strong), strict=True)),
+    REFINED: _refined,
+}
 
 
 def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, ReplayReport]:
@@ -159,7 +192,9 @@ def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, R
         arithmetic=_bytes_of(map_text, CODE, ARITHMETIC),
         tables=sum(_bytes_of(map_text, *one) for one in built.tables),
         data=_bytes_of(map_text, r"\.s?data", CORE),
-        bss=_bytes_of(map_text, r"\.s?bss|COMMON", CORE) + report.state_bytes,
+        bss=_bytes_of(map_text, r"\.s?bss|COMMON", CORE)
+        + sum(_bytes_of(map_text, *one) for one in built.state)
+        + report.state_bytes,
         stack_bound=stack_bound(board.tool_prefix, built.image, built.tree, board.entry),
         stack_seen=report.stack_used,
         mean=round(report.instructions_mean),
