@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -96,3 +97,18 @@ def test_required_rule_is_not_deviated_from_more_often_than_written(copy: Path) 
     deviations.write_text(text, encoding="utf-8")
     done = run(copy, "firmware/src/keep/fnv.c")
     assert "1 findings, analysis.toml says 0" in done.stdout
+
+
+def test_every_header_that_names_a_hidden_macro_is_read_with_it() -> None:
+    tools = {**runpy.run_path(str(ROOT / "tools" / "units.py")), **runpy.run_path(str(ROOT / "tools" / "analyse.py"))}
+    read, named = set(), set()
+    for unit in tools["core"]("host"):
+        done = subprocess.run(
+            ["gcc", "-MM", *unit.common, str(unit.source)], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        headers = {Path(one).resolve() for one in done.stdout.replace("\\\n", " ").split()[1:] if one.endswith(".h")}
+        named |= {one for one in headers if any(f"({macro})" in one.read_text() for macro in tools["HIDDEN"])}
+        if tools["depends"](unit):
+            read |= headers
+    assert named - read == set()
+    assert {one.name for one in named} >= {"config.h", "sized.h", "unroll.h"}

@@ -12,7 +12,7 @@
 #define PVID_COUNT(size, count) ((PVID_EXACT != 0) ? (size_t)(size) : (size_t)(count))
 
 /* Before a loop over such a count. */
-#if PVID_EXACT
+#if PVID_EXACT == 1
 #define PVID_UNROLL_EXACT PVID_UNROLL
 #else
 #define PVID_UNROLL_EXACT

@@ -26,7 +26,7 @@
 
 /* Before a loop whose turns are long, and instead of `static inline` of a function with several callers: written out
  * at every place, but with PVID_SMALL once. */
-#if !PVID_SMALL
+#if PVID_SMALL == 0
 #define PVID_UNROLL_IF_FAST PVID_UNROLL
 #define PVID_INLINE_IF_FAST PVID_ALWAYS_INLINE
 #elif defined(__GNUC__) && (__GNUC__ >= 8) && !defined(__clang__)
