@@ -55,7 +55,7 @@ unlock() { exec 9>&-; }
 # ---- Debian packages ----
 
 # The packages of PROFILE that are missing, judged by what they bring, so that a tool installed in another way
-# counts. Profiles: pvid (to run), demo (to build for the Cortex-M boards and emulate them besides), targets (the same
+# counts. Profiles: python (to make the environment), pvid (to run), demo (to build for the Cortex-M boards and emulate them besides), targets (the same
 # for every board), test (to test, all of that and more), long (the long forms of the tests: a browser besides), cycles (to
 # simulate a core from its RTL).
 missing_packages() {
@@ -74,10 +74,12 @@ missing_packages() {
         fi
         need python3-venv "${candidate:-false}" -c 'import ensurepip, venv'
     fi
-    need gcc command -v gcc
-    need libc6-dev test -e /usr/include/stdio.h
-    need cmake command -v cmake
-    need ninja-build command -v ninja
+    if [[ $1 != python ]]; then
+        need gcc command -v gcc
+        need libc6-dev test -e /usr/include/stdio.h
+        need cmake command -v cmake
+        need ninja-build command -v ninja
+    fi
     if [[ $1 == long ]]; then
         need chromium command -v chromium
         need chromium-driver command -v chromedriver
@@ -141,8 +143,30 @@ apt_get() {
     as_root env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=200 "$@"
 }
 
-install_packages() { # install_packages PROFILE
+# apt_install PROFILE: what is missing of it; ends the shell with one sentence if it cannot be had.
+apt_install() {
     local missing packages
+    missing=$(missing_packages "$1")
+    [[ -n $missing ]] || return 0
+    read -ra packages <<<"$missing"
+    if ! logged "apt-$1" apt_get install --no-install-recommends "${packages[@]}" 2>/dev/null; then
+        # No lists of packages, or old ones; or an installation that was interrupted.
+        say "updating the lists of Debian packages"
+        as_root dpkg --configure -a >"$build/log/dpkg.log" 2>&1 </dev/null || true
+        logged apt-update apt_get update || die "apt-get update failed; its output is above"
+        logged "apt-$1" apt_get install --no-install-recommends "${packages[@]}" ||
+            die "apt-get install failed; its output is above"
+    fi
+    hash -r
+    missing=$(missing_packages "$1")
+    [[ -z $missing ]] || die "still missing after the installation: $missing"
+}
+
+# install_packages PROFILE: those of Python at once, the others beside what the caller does next: first those that
+# build the core, then the rest, with a line to `await_packages` behind either. It is never interrupted, and no exit
+# leaves it alone.
+install_packages() {
+    local missing
     missing=$(missing_packages "$1")
     [[ -n $missing ]] || return 0
     command -v apt-get >/dev/null || die "missing: $missing (Debian's names); install them and try again"
@@ -150,18 +174,27 @@ install_packages() { # install_packages PROFILE
         die "missing packages; run as root: apt-get install -y --no-install-recommends $missing"
     fi
     say "installing Debian packages: $missing"
-    read -ra packages <<<"$missing"
-    if ! logged apt apt_get install --no-install-recommends "${packages[@]}" 2>/dev/null; then
-        # No lists of packages, or old ones; or an installation that was interrupted.
-        say "updating the lists of Debian packages"
-        as_root dpkg --configure -a >"$build/log/dpkg.log" 2>&1 </dev/null || true
-        logged apt-update apt_get update || die "apt-get update failed; its output is above"
-        logged apt apt_get install --no-install-recommends "${packages[@]}" ||
-            die "apt-get install failed; its output is above"
-    fi
+    apt_install python
+    exec {installed}< <(
+        exec 9>&- # the lock is not its own
+        trap '' INT
+        apt_install pvid && echo pvid && apt_install "$1" && echo "$1"
+    )
+    installer=$!
+    trap 'kill -0 "$installer" 2>/dev/null && say "waiting until apt-get has ended"; wait "$installer"' EXIT
+}
+
+# await_packages PROFILE: until what `install_packages` has begun is there.
+await_packages() {
+    [[ -n ${installer-} ]] || return 0
+    local profile
+    while [[ ${profile-} != "$1" ]]; do
+        read -r profile <&"$installed" || { # it has printed why
+            trap - EXIT
+            exit 2
+        }
+    done
     hash -r
-    missing=$(missing_packages "$1")
-    [[ -z $missing ]] || die "still missing after the installation: $missing"
 }
 
 # can_install: whether there is anybody to install packages.
@@ -323,6 +356,9 @@ prepare() {
     install_packages "$profile"
     make_environment
     install_requirements "$python_profile"
+    await_packages pvid
     build_core
+    await_packages "$profile"
+    trap - EXIT
     unlock
 }

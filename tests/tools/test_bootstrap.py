@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import stat
 import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -118,6 +119,106 @@ def test_images_go_to_the_users_cache_where_the_clone_is_not_his(
     assert own == tmp_path / f"pvid-{os.getuid()}" and stat.S_IMODE(own.stat().st_mode) == 0o700
     own.chmod(0o777)  # somebody else may have put an image there
     assert user_cache.built_under(clone / "build") != own
+
+
+# Three packages instead of Debian's: one of Python, one for the core, one for the board. `apt_get` installs a package
+# once there is a file `may-PACKAGE`, fails for the one in $broken, and leaves a file PACKAGE.
+STAND_INS = """
+set -euo pipefail
+. tools/bootstrap.sh
+cd "$root"
+lock
+sudo() { :; }
+missing_packages() {
+    local package packages=python3 missing=()
+    [[ $1 == python ]] || packages+=" gcc"
+    [[ $1 != demo ]] || packages+=" qemu"
+    for package in $packages; do [[ -e $package ]] || missing+=("$package"); done
+    printf '%s' "${missing[*]}"
+}
+apt_get() {
+    local package
+    for package in "${@:3}"; do
+        [[ $package != "${broken-}" ]] || { echo "no $package"; return 1; }
+        until [[ -e may-$package ]]; do sleep 0.01; done
+        touch "$package"
+    done
+}
+touch may-python3
+"""
+
+
+@pytest.fixture
+def installing(tmp_path: Path) -> Iterator[Callable[[str], subprocess.Popen[str]]]:
+    """Starts a script behind the stand-ins, in a process group of its own."""
+    (tmp_path / "tools").mkdir()
+    shutil.copy(ROOT / "tools" / "bootstrap.sh", tmp_path / "tools")
+    started = []
+
+    def start(script: str) -> subprocess.Popen[str]:
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
+        command = ["bash", "-c", STAND_INS + script]
+        started.append(subprocess.Popen(command, cwd=tmp_path, text=True, start_new_session=True, **pipes))  # type: ignore[call-overload]
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.poll() is None:
+            os.killpg(one.pid, signal.SIGKILL)
+            one.communicate()
+
+
+Installing = Callable[[str], "subprocess.Popen[str]"]
+
+
+def test_packages_are_installed_beside_the_environment_and_awaited_where_they_are_needed(
+    installing: Installing,
+) -> None:
+    script = """
+install_packages demo
+echo environment: python3 $(ls gcc qemu 2>/dev/null)
+(exec 8>build/.lock; flock -n 8 && echo free || echo locked)
+unlock
+(exec 8>build/.lock; flock -n 8 && echo free || echo locked)
+touch may-gcc; await_packages pvid; echo core: $(ls gcc qemu 2>/dev/null)
+touch may-qemu; await_packages demo; trap - EXIT; echo board: $(ls gcc qemu)
+"""
+    out, err = installing(script).communicate(timeout=60)
+    assert out.splitlines() == ["environment: python3", "locked", "free", "core: gcc", "board: gcc qemu"]
+    assert err == "pvid: installing Debian packages: python3 gcc qemu\n"
+
+
+@pytest.mark.parametrize("broken", ["python3", "gcc", "qemu"])
+def test_a_package_that_cannot_be_installed_ends_the_set_up(broken: str, installing: Installing) -> None:
+    script = f"broken={broken}; as_root() {{ :; }}; touch may-gcc may-qemu\ninstall_packages demo; await_packages pvid"
+    process = installing(f"{script}; await_packages demo; echo 'the program'")
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (2, "")
+    assert err.splitlines()[1:] == [
+        "pvid: updating the lists of Debian packages",
+        f"no {broken}",
+        "pvid: apt-get install failed; its output is above",
+    ]
+
+
+def test_no_exit_leaves_an_installation_alone(installing: Installing, tmp_path: Path) -> None:
+    """Of the foreground: it has failed, or Ctrl-C has ended it, which reaches apt-get too."""
+    for end in ("die 'pip install failed'", "echo ready; sleep 60"):
+        for name in ("gcc", "qemu", "may-gcc", "may-qemu"):
+            (tmp_path / name).unlink(missing_ok=True)
+        process = installing(f"install_packages demo; {end}")
+        assert process.stdout is not None and process.stderr is not None
+        if "sleep" in end:
+            process.stdout.readline()
+            os.killpg(process.pid, signal.SIGINT)
+        told = process.stderr.readline()
+        while "waiting until apt-get has ended" not in told:
+            assert told, "it did not wait"
+            told = process.stderr.readline()
+        for name in ("may-gcc", "may-qemu"):
+            (tmp_path / name).touch()
+        assert process.wait(60) == (130 if "sleep" in end else 2)
+        assert (tmp_path / "gcc").exists() and (tmp_path / "qemu").exists()
 
 
 def test_every_package_that_is_installed_has_its_version_and_hashes() -> None:
