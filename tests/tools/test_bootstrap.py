@@ -153,12 +153,13 @@ def installing(tmp_path: Path) -> Iterator[Callable[[str], subprocess.Popen[str]
     """Starts a script behind the stand-ins, in a process group of its own."""
     (tmp_path / "tools").mkdir()
     shutil.copy(ROOT / "tools" / "bootstrap.sh", tmp_path / "tools")
-    started = []
+    started: list[subprocess.Popen[str]] = []
 
     def start(script: str) -> subprocess.Popen[str]:
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
-        command = ["bash", "-c", STAND_INS + script]
-        started.append(subprocess.Popen(command, cwd=tmp_path, text=True, start_new_session=True, **pipes))  # type: ignore[call-overload]
+        command, pipe = ["bash", "-c", STAND_INS + script], subprocess.PIPE
+        started.append(
+            subprocess.Popen(command, cwd=tmp_path, text=True, start_new_session=True, stdout=pipe, stderr=pipe)
+        )
         return started[-1]
 
     yield start
