@@ -175,13 +175,14 @@ install_packages() {
     fi
     say "installing Debian packages: $missing"
     apt_install python
+    trap '' INT # before the fork: set in the child it would come too late
     exec {installed}< <(
         exec 9>&- # the lock is not its own
-        trap '' INT
         apt_install pvid && echo pvid && apt_install "$1" && echo "$1"
     )
     installer=$!
     trap 'kill -0 "$installer" 2>/dev/null && say "waiting until apt-get has ended"; wait "$installer"' EXIT
+    trap 'exit 130' INT
 }
 
 # await_packages PROFILE: until what `install_packages` has begun is there.

@@ -203,8 +203,12 @@ def test_a_package_that_cannot_be_installed_ends_the_set_up(broken: str, install
 
 
 def test_no_exit_leaves_an_installation_alone(installing: Installing, tmp_path: Path) -> None:
-    """Of the foreground: it has failed, or Ctrl-C has ended it, which reaches apt-get too."""
-    for end in ("die 'pip install failed'", "echo ready; sleep 60"):
+    """Of the foreground: it has failed, or Ctrl-C has ended it, which reaches apt-get too.
+
+    The program that is interrupted says itself that it runs: a signal that meets the shell's child before it is that
+    program is lost.
+    """
+    for end in ("die 'pip install failed'", "sh -c 'echo ready; exec sleep 600'"):
         for name in ("gcc", "qemu", "may-gcc", "may-qemu"):
             (tmp_path / name).unlink(missing_ok=True)
         process = installing(f"install_packages demo; {end}")
