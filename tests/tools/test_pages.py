@@ -113,7 +113,7 @@ def test_every_block_of_a_page_is_executed(
                         done = run_once(line, folder, full, known)
                         assert done.code == 0, f"{block}: {line}: {done.text}"
                         printed += done.text + "\n"
-                    elif line.startswith("./tools/pvid") and not re.search("MODEL|FOLDER", line):
+                    elif line.startswith("./tools/pvid") and "FOLDER" not in line:  # of recordings not at hand
                         pages.parse(line)
             case "python" if pages.mechanism_page(page):
                 assert block.text == path_of(page.stem)[1].read_text(encoding="utf-8").rstrip()
@@ -147,7 +147,7 @@ def test_the_parser_finds_what_a_page_may_contain(tmp_path: Path, monkeypatch: p
     )
     found = pages.blocks_of(Path("index.md"))
     assert [block.kind for block in found] == ["commands", "output", "unknown"]
-    assert pages.commands_of(found[0]) == ["./tools/pvid ports", "cd x", "cmake --preset y"]
+    assert pages.commands_of(found[0]) == ["./tools/pvid ports", "cd x && cmake --preset y"]
 
 
 @pytest.mark.parametrize(
