@@ -162,9 +162,8 @@ apt_install() {
     [[ -z $missing ]] || die "still missing after the installation: $missing"
 }
 
-# install_packages PROFILE: those of Python at once, the others beside what the caller does next: first those that
-# build the core, then the rest, with a line to `await_packages` behind either. It is never interrupted, and no exit
-# leaves it alone.
+# install_packages PROFILE: those of Python at once, the others beside what the caller does next, and the core as soon as
+# there is a compiler. It is never interrupted, and no exit leaves it alone.
 install_packages() {
     local missing
     missing=$(missing_packages "$1")
@@ -178,23 +177,24 @@ install_packages() {
     trap '' INT # before the fork: set in the child it would come too late
     exec {installed}< <(
         exec 9>&- # the lock is not its own
-        apt_install pvid && echo pvid && apt_install "$1" && echo "$1"
+        apt_install pvid
+        build_core &
+        failed=
+        (apt_install "$1") || failed=yes
+        wait $! && [[ -z $failed ]] && echo ready
     )
     installer=$!
     trap 'kill -0 "$installer" 2>/dev/null && say "waiting until apt-get has ended"; wait "$installer"' EXIT
     trap 'exit 130' INT
 }
 
-# await_packages PROFILE: until what `install_packages` has begun is there.
+# await_packages: until all that `install_packages` has begun is there.
 await_packages() {
     [[ -n ${installer-} ]] || return 0
-    local profile
-    while [[ ${profile-} != "$1" ]]; do
-        read -r profile <&"$installed" || { # it has printed why
-            trap - EXIT
-            exit 2
-        }
-    done
+    read -r <&"$installed" || { # it has printed why
+        trap - EXIT
+        exit 2
+    }
     hash -r
 }
 
@@ -357,9 +357,8 @@ prepare() {
     install_packages "$profile"
     make_environment
     install_requirements "$python_profile"
-    await_packages pvid
+    await_packages
     build_core
-    await_packages "$profile"
     trap - EXIT
     unlock
 }

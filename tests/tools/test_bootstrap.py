@@ -122,7 +122,8 @@ def test_images_go_to_the_users_cache_where_the_clone_is_not_his(
 
 
 # Three packages instead of Debian's: one of Python, one for the core, one for the board. `apt_get` installs a package
-# once there is a file `may-PACKAGE`, fails for the one in $broken, and leaves a file PACKAGE.
+# once there is a file `may-PACKAGE`, fails for the one in $broken, and leaves a file PACKAGE. The core is built once
+# there is a file may-core.
 STAND_INS = """
 set -euo pipefail
 . tools/bootstrap.sh
@@ -143,6 +144,11 @@ apt_get() {
         until [[ -e may-$package ]]; do sleep 0.01; done
         touch "$package"
     done
+}
+build_core() {
+    until [[ -e may-core ]]; do sleep 0.01; done
+    [[ ${broken-} != core ]] || die "no core"
+    touch core
 }
 touch may-python3
 """
@@ -172,17 +178,15 @@ def installing(tmp_path: Path) -> Iterator[Callable[[str], subprocess.Popen[str]
 Installing = Callable[[str], "subprocess.Popen[str]"]
 
 
-def test_packages_are_installed_beside_the_environment_and_awaited_where_they_are_needed(
-    installing: Installing,
-) -> None:
+def test_packages_are_installed_and_the_core_is_built_beside_the_environment(installing: Installing) -> None:
     script = """
 install_packages demo
 echo environment: python3 $(ls gcc qemu 2>/dev/null)
 (exec 8>build/.lock; flock -n 8 && echo free || echo locked)
 unlock
 (exec 8>build/.lock; flock -n 8 && echo free || echo locked)
-touch may-gcc; await_packages pvid; echo core: $(ls gcc qemu 2>/dev/null)
-touch may-qemu; await_packages demo; trap - EXIT; echo board: $(ls gcc qemu)
+touch may-gcc may-core; until [[ -e core ]]; do sleep 0.01; done; echo core: $(ls gcc qemu 2>/dev/null)
+touch may-qemu; await_packages; trap - EXIT; echo board: $(ls gcc qemu)
 """
     out, err = installing(script).communicate(timeout=60)
     assert out.splitlines() == ["environment: python3", "locked", "free", "core: gcc", "board: gcc qemu"]
@@ -191,8 +195,8 @@ touch may-qemu; await_packages demo; trap - EXIT; echo board: $(ls gcc qemu)
 
 @pytest.mark.parametrize("broken", ["python3", "gcc", "qemu"])
 def test_a_package_that_cannot_be_installed_ends_the_set_up(broken: str, installing: Installing) -> None:
-    script = f"broken={broken}; as_root() {{ :; }}; touch may-gcc may-qemu\ninstall_packages demo; await_packages pvid"
-    process = installing(f"{script}; await_packages demo; echo 'the program'")
+    script = f"broken={broken}; as_root() {{ :; }}; touch may-gcc may-qemu may-core; install_packages demo"
+    process = installing(f"{script}; await_packages; echo 'the program'")
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (2, "")
     assert err.splitlines()[1:] == [
@@ -202,6 +206,13 @@ def test_a_package_that_cannot_be_installed_ends_the_set_up(broken: str, install
     ]
 
 
+def test_a_core_that_does_not_build_ends_the_set_up(installing: Installing, tmp_path: Path) -> None:
+    process = installing("broken=core; touch may-gcc may-qemu may-core; install_packages demo; await_packages; echo on")
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err.splitlines()[1:]) == (2, "", ["pvid: no core"])
+    assert (tmp_path / "qemu").exists()
+
+
 def test_no_exit_leaves_an_installation_alone(installing: Installing, tmp_path: Path) -> None:
     """Of the foreground: it has failed, or Ctrl-C has ended it, which reaches apt-get too.
 
@@ -209,7 +220,7 @@ def test_no_exit_leaves_an_installation_alone(installing: Installing, tmp_path: 
     program is lost.
     """
     for end in ("die 'pip install failed'", "sh -c 'echo ready; exec sleep 600'"):
-        for name in ("gcc", "qemu", "may-gcc", "may-qemu"):
+        for name in ("gcc", "qemu", "core", "may-gcc", "may-qemu", "may-core"):
             (tmp_path / name).unlink(missing_ok=True)
         process = installing(f"install_packages demo; {end}")
         assert process.stdout is not None and process.stderr is not None
@@ -220,10 +231,10 @@ def test_no_exit_leaves_an_installation_alone(installing: Installing, tmp_path: 
         while "waiting until apt-get has ended" not in told:
             assert told, "it did not wait"
             told = process.stderr.readline()
-        for name in ("may-gcc", "may-qemu"):
+        for name in ("may-gcc", "may-qemu", "may-core"):
             (tmp_path / name).touch()
         assert process.wait(60) == (130 if "sleep" in end else 2)
-        assert (tmp_path / "gcc").exists() and (tmp_path / "qemu").exists()
+        assert all((tmp_path / name).exists() for name in ("gcc", "qemu", "core"))
 
 
 def test_every_package_that_is_installed_has_its_version_and_hashes() -> None:
