@@ -44,6 +44,7 @@ def library() -> Path:
     """libpvid_native.so with the sanitizers."""
     flags = f"-shared-libasan -Wno-pass-failed {SANITIZERS} -g"
     options = ["-DCMAKE_C_COMPILER=clang", f"-DCMAKE_C_FLAGS={flags}", "-DPVID_BUILD_TESTS=OFF"]
+    options += ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O1 -g"]
     with one_at_a_time(TREE):
         configure = ("cmake", "-S", ROOT, "-B", TREE, "-G", "Ninja", *options)
         for command in (configure, ("ninja", "-C", TREE, "pvid_native")):
@@ -57,7 +58,7 @@ def compiler(tmp_path: Path) -> Path:
     """The same for the engine, whose functions of a mechanism are generated."""
     made = tmp_path / "clang-sanitized"
     made.write_text(
-        f'#!/bin/sh\nunset LD_PRELOAD\nexec clang -shared-libasan -Wno-pass-failed {SANITIZERS} -g "$@"\n',
+        f'#!/bin/sh\nunset LD_PRELOAD\nexec clang -shared-libasan -Wno-pass-failed {SANITIZERS} -g "$@" -O1\n',
         encoding="utf-8",
     )
     made.chmod(0o755)
