@@ -281,10 +281,14 @@ install_requirements() { # install_requirements PROFILE
     logged pip-builders "${pip[@]}" --require-hashes --only-binary :all: --requirement "$venv/builders.txt" ||
         die "$failed"
     logged pip "${pip[@]}" --require-hashes --no-build-isolation --requirement "$lock" || die "$failed"
-    # The tests that numpy, scipy, sympy and matplotlib bring along are 45 MB of nothing that is used here.
+    # 65 MB of nothing that is used here: the tests that numpy, scipy, sympy and matplotlib bring along, the C code that
+    # fontTools was made from, what others were built with, and bytecode where it is not looked for (`paths`).
     local packages
     packages=$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
     find "$packages"/{numpy,scipy,sympy,matplotlib} -type d -name tests -prune -exec rm -rf {} + 2>/dev/null || true
+    find "$packages"/fontTools -name "*.c" -delete 2>/dev/null || true
+    [[ $1 == test ]] || rm -rf "$packages"/{setuptools,setuptools-*.dist-info,_distutils_hack,distutils-precedence.pth}
+    find "$packages" -type d -name __pycache__ -prune -exec rm -rf {} +
     paths >"$packages/pvid.pth"
     write_stamp "$venv/installed-$1" "$(requirements)"
 }
