@@ -57,6 +57,24 @@ _LEFT, _RIGHT = np.array(_FAMILIES).T
 _POWER = np.array([1, 0, 3, 2, 1, 0, 4, 3, 2, 1, 0, 2])
 _POWERS = (_POWER[_LEFT] + _POWER[_RIGHT])[:, None]
 _AX, _AZ, _XX, _XZ, _ZZ = 6, 18, 33, 40, 48
+
+
+def _places() -> npt.NDArray[np.intp]:
+    """Which sum holds the product of two entries of a row, [12, 12]."""
+    places = np.full((Y + 1, Y + 1), -1, np.intp)
+    for k, (i, j) in reversed(list(enumerate(_FAMILIES))):
+        places[i, j] = places[j, i] = k
+    along = np.arange(max(Z - X, Y - Z))
+    powers = along[:, None] + along  # products of one power of G are one sum
+    x, z = Z - X, Y - Z
+    places[X:Z, X:Z] = _XX + powers[:x, :x]
+    places[X:Z, Z:Y] = _XZ + powers[:x, :z]
+    places[Z:Y, X:Z] = places[X:Z, Z:Y].T
+    places[Z:Y, Z:Y] = _ZZ + powers[:z, :z]
+    return places
+
+
+_PLACES = _places()
 _TRIPLES = {"k22": _XX, "k20": _XZ, "k00": _ZZ}
 _SQUARES = [0, 2, 5, _XX, _XX + 6, _ZZ, _ZZ + 8]
 _BINOMIALS = {2: (2, 1), 3: (3, 3, 1), 4: (4, 6, 4, 1), 5: (5, 10, 10, 5, 1), 6: (6, 15, 20, 15, 6, 1)}
@@ -165,8 +183,7 @@ class _System:
     @staticmethod
     def _shift_64(m: Int, at: int, count: int, d: Int) -> None:
         for left in range(count - 1, 0, -1):
-            for i in range(at, at + left):
-                m[i] = m[i] + times_q31(m[i + 1], d)
+            m[at : at + left] += times_q31(m[at + 1 : at + left + 1], d)
 
     @staticmethod
     def _shifts(a: Int, x: Int, z: Int) -> Int:
@@ -483,23 +500,10 @@ class KapitzaEstimatorQ31:
     def _residual(self) -> Int:
         """The sum of squares of the residuals at the present p."""
         theta, exponent = self._theta()
-        place = {frozenset((int(i), int(j))): k for k, (i, j) in reversed(list(enumerate(_FAMILIES)))}
-        for i in range(X, Z):
-            for j in range(X, Z):
-                place[frozenset((i, j))] = _XX + (i - X) + (j - X)
-            for j in range(Z, Y):
-                place[frozenset((i, j))] = _XZ + (i - X) + (j - Z)
-        for i in range(Z, Y):
-            for j in range(Z, Y):
-                place[frozenset((i, j))] = _ZZ + (i - Z) + (j - Z)
+        known = times_q31(round_shift(self.sums[_PLACES[:Y, :Y]], _GUARD_BITS), theta).sum(axis=1)
+        of_y = round_shift(self.sums[_PLACES[Y, :Y]], exponent + _GUARD_BITS)
         residual = round_shift(self.sums[5], 2 * exponent + _GUARD_BITS)
-        for i in range(11):
-            known = np.zeros(self.lanes, np.int64)
-            for j in range(11):
-                moment = self.sums[place[frozenset((i, j))]]
-                known = known + times_q31(round_shift(moment, _GUARD_BITS), theta[j])
-            of_y = round_shift(self.sums[place[frozenset((Y, i))]], exponent + _GUARD_BITS)
-            residual = residual + times_q31(clamp(known - 2 * of_y, WIDE // 8), theta[i])
+        residual = residual + times_q31(clamp(known - 2 * of_y, WIDE // 8), theta).sum(axis=0)
         return np.maximum(scale(clamp(residual, WIDE), -(2 * exponent + _GUARD_BITS)), 0)
 
     def _variance(self) -> Scaled:

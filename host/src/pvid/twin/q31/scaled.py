@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pvid.twin.q31.integer import Int, bit_length, integers, scale
+from pvid.twin.q31.integer import Int, bit_length, integers, round_shift, scale
 
 _DIGITS = 30
 
@@ -55,7 +55,8 @@ def scaled(x: npt.ArrayLike, exponent: npt.ArrayLike) -> Scaled:
     """x 2^exponent."""
     value = integers(x)
     shift = bit_length(np.abs(value)) - _DIGITS
-    return Scaled(scale(value, shift), integers(exponent) + shift)
+    up = np.maximum(-shift, 0)  # to 30 digits, which always fit
+    return Scaled(round_shift(value << up, shift + up), integers(exponent) + shift)
 
 
 def pick(where: npt.NDArray[np.bool_], a: Scaled, b: Scaled) -> Scaled:
