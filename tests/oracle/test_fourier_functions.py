@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -9,6 +12,7 @@ from scipy.integrate import quad
 
 from pvid.oracle.fourier import reversals
 from pvid.oracle.fourier.channels import running_integrals
+from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import TestFunctions
 
 FUNCTIONS = TestFunctions(count=13, power=6, hop=50, dt=0.01)
@@ -145,3 +149,12 @@ def test_sticking_is_cut_into_pieces_of_unknown_sign() -> None:
     turned = reversals.located(np.sign(np.arange(v.size) - 70) * v, 1e-3, np.zeros(v.size), 8)
     assert turned.stuck[50:90].all() and np.all(np.diff(turned.values[turned.stuck]) > 0)  # from - to +
     assert len(signs.times) == 6 and np.all(np.diff(signs.times) <= 8)
+
+
+def test_designs_that_are_kept_do_not_keep_their_tables() -> None:
+    """A search keeps the scores of thousands of designs; the tables of one may be megabytes."""
+    designs = [FourierDesign(sample_rate=1000.0, window_s=1.0 + 0.1 * k, functions=8) for k in range(40)]
+    tables = [weakref.ref(one.test_functions) for one in designs]
+    gc.collect()
+    assert sum(one() is not None for one in tables) <= 16
+    assert designs[-1].test_functions is designs[-1].test_functions

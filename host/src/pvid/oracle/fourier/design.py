@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Literal
 
 from pvid.base.errors import PvidError
@@ -99,7 +99,10 @@ class FourierDesign:
         count = nodes_of(order, degree)
         return max(round((taps + 1 - 2 * self.decimation) / (2 * self.decimation)), count), count
 
-    @cached_property
+    @property
     def test_functions(self) -> TestFunctions:
-        """Those of this design."""
-        return TestFunctions(self.functions, self.power, self.hop, self.dt)
+        """Those of this design: kept for the last few designs, since their tables are large and designs are many."""
+        return _functions(self.functions, self.power, self.hop, self.dt)
+
+
+_functions = lru_cache(maxsize=64)(TestFunctions)
