@@ -105,4 +105,4 @@ class FourierDesign:
         return _functions(self.functions, self.power, self.hop, self.dt)
 
 
-_functions = lru_cache(maxsize=64)(TestFunctions)
+_functions = lru_cache(maxsize=16)(TestFunctions)
