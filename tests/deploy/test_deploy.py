@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import tarfile
 from pathlib import Path
 
 import pytest
 import yaml  # type: ignore[import-untyped]
 from conftest import ROOT
+from ecosystems import newlib, packer
 from packages import STUBS, built, run
 from program import pvid
 
@@ -115,18 +118,57 @@ def test_zephyr(motor: Deployment, tmp_path: Path) -> None:
     assert re.search(pattern, expected(motor)[0])
 
 
-def test_cubemx_on_an_emulated_stm32(motor: Deployment, tmp_path: Path) -> None:
-    """Without newlib-nano, which is not on every machine: the package needs puts, memcpy, memset and sqrtf."""
+def test_cubemx_on_an_emulated_stm32_with_newlib_nano(motor: Deployment, tmp_path: Path) -> None:
     folder = written(motor, "cubemx", tmp_path / "p")
+    headers, libraries = newlib("thumb/v7e-m+fp/hard")
     toolchain = ROOT / "firmware" / "cmake" / "cortex-m.cmake"
-    options = (f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DPVID_MATH_LIBRARY=", f"-DPVID_PACKAGE={folder}")
-    board = (f"-DPVID_FIRMWARE={ROOT / 'firmware'}", "-DCMAKE_BUILD_TYPE=Release")
-    tree = built(STUBS / "stm32", tmp_path / "b", *options, *board)
+    options = (
+        f"-DCMAKE_TOOLCHAIN_FILE={toolchain}",
+        f"-DPVID_PACKAGE={folder}",
+        f"-DPVID_FIRMWARE={ROOT / 'firmware'}",
+    )
+    library = (f"-DNEWLIB_HEADERS={headers}", f"-DNEWLIB_LIBRARIES={libraries}", "-DCMAKE_BUILD_TYPE=Release")
+    tree = built(STUBS / "stm32", tmp_path / "b", *options, *library)
+    linked = set(re.findall(r"libc_nano\.a\((\S+)\.o\)", (tree / "cube.map").read_text(encoding="utf-8")))
+    assert {"lib_a-puts", "lib_a-memset"} <= linked
     done = run_on(BOARDS["netduinoplus2"], tree / "cube.elf", 60)
     lines = done.text.splitlines()
     assert done.exit_code == 0
     assert lines[-len(motor.parameters) :] == expected(motor)
     assert len(lines) > len(motor.parameters)  # estimates before the last one
+
+
+@pytest.mark.parametrize("target", ["platformio", "arduino"])
+def test_platformio_packs_it(target: str, motor: Deployment, tmp_path: Path) -> None:
+    """With PlatformIO's own command, for which the list of licences, which it downloads, has one entry here."""
+    folder = written(motor, target, tmp_path / "pvid_dc_motor")
+    python, _, program = packer("platformio")
+    licences = '{"licenses": [{"licenseId": "MIT"}]}'
+    offline = (
+        "from platformio.package.manifest.schema import ManifestSchema\n"
+        f"ManifestSchema.load_spdx_licenses = staticmethod(lambda: {licences})\n"
+        f"from {program}.__main__ import main\nmain()"
+    )
+    settings = {
+        **os.environ,
+        "PLATFORMIO_CORE_DIR": str(tmp_path / "core"),
+        "PLATFORMIO_SETTING_ENABLE_TELEMETRY": "no",
+    }
+    run(python, "-c", offline, "pkg", "pack", "-o", tmp_path, folder, env=settings)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as packed:
+        names = set(packed.getnames())
+    manifest = "library.json" if target == "platformio" else "library.properties"
+    assert {manifest, "src/dc_motor_identifier.h", "examples/dc_motor/dc_motor.ino"} <= names
+
+
+def test_esp_idf_packs_it(motor: Deployment, tmp_path: Path) -> None:
+    folder = written(motor, "esp-idf", tmp_path / "p")
+    run(*packer("idf_component_manager"), "component", "pack", "--name", "pvid_dc_motor", cwd=folder)
+    (archive,) = (folder / "dist").glob("pvid_dc_motor_*.tgz")
+    with tarfile.open(archive) as packed:
+        names = {name.removeprefix("./") for name in packed.getnames()}
+    assert {"idf_component.yml", "CMakeLists.txt", "examples/dc_motor/main/idf_component.yml"} <= names
 
 
 def test_platformios_manifest_names_what_is_there(motor: Deployment, tmp_path: Path) -> None:

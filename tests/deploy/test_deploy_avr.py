@@ -1,15 +1,22 @@
-"""The Arduino package on an emulated ATmega2560, and what an Uno lacks."""
+"""The Arduino package, built by arduino-mk on Arduino's own core and run on an emulated Mega; and what an Uno holds."""
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+import re
+import shutil
+import subprocess
+import threading
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
+from ecosystems import arduino
 from packages import STUBS, run
+from program import pvid
+from test_examples import ESTIMATOR, PRINTED
 
-from pvid.board.boards import BOARDS
-from pvid.board.boards import run as run_on
+from pvid.base.subprocesses import start
+from pvid.board.boards import BOARDS, prepare_emulator
 from pvid.deploy import memory
 from pvid.deploy.arduino import package
 from pvid.deploy.deployment import Deployment
@@ -20,9 +27,7 @@ from pvid.models.mechanisms import compiled_of
 from pvid.run.engine_design import simulated_run_of
 from pvid.run.engine_design_q31 import engine_for_simulated_rig
 
-# As Arduino compiles: GNU standards, the library's src and the sketch's folder on the path, the sketch as C++.
-C = ("avr-gcc", "-mmcu=atmega2560", "-Os", "-std=gnu11", "-ffunction-sections", "-fdata-sections", "-Wall", "-Wextra")
-CPP = ("avr-g++", "-mmcu=atmega2560", "-Os", "-std=gnu++11", "-fno-exceptions", "-Wall", "-Wextra", "-Werror")
+_SECONDS = 120  # of the emulator
 
 
 @pytest.fixture(scope="module")
@@ -31,26 +36,58 @@ def pendulum() -> Deployment:
     return deployment_q31(engine_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
 
 
+def uploaded(sketch: Path, board: str, libraries: Path, library: str, *more: str) -> Path:
+    """The image of a sketch."""
+    core, makefiles = arduino()
+    places = (f"ARDUINO_DIR={core}", f"ARDMK_DIR={makefiles}", f"USER_LIB_PATH={libraries}")
+    makefile = STUBS / "arduino" / "Makefile"
+    run("make", "-j2", "-C", sketch, "-f", makefile, *places, f"ARDUINO_LIBS={library}", f"BOARD={board}", *more)
+    (image,) = (sketch / "build").glob("*.elf")
+    return image
+
+
+def printed(board: str, image: Path, count: int) -> list[str]:
+    """The first lines that an image sends. A sketch never ends."""
+    target = BOARDS[board]
+    prepare_emulator(target)
+    process = start(target.command(image), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    end = threading.Timer(_SECONDS, process.kill)
+    end.start()
+    try:
+        return [process.stdout.readline().decode("ascii").rstrip() for _ in range(count)]
+    finally:
+        end.cancel()
+        process.kill()
+        process.communicate()
+
+
 def test_a_mega_identifies_the_pendulum_in_fixed_point(pendulum: Deployment, tmp_path: Path) -> None:
-    write_package(pendulum, "arduino", tmp_path)
-    example, stub = tmp_path / "examples" / "kapitza", STUBS / "arduino"
-    sources = [*(tmp_path / "src").rglob("*.c"), *example.glob("*.c")]
-    (tmp_path / "o").mkdir()
+    library = tmp_path / "pvid_kapitza"
+    write_package(pendulum, "arduino", library)
+    image = uploaded(library / "examples" / "kapitza", "mega", tmp_path, library.name)
+    wanted = expected(pendulum)
+    assert printed("atmega2560", image, len(wanted)) == wanted
 
-    def compiled(source: Path) -> str:
-        target = tmp_path / "o" / f"{source.stem}.o"
-        run(*C, f"-I{tmp_path / 'src'}", f"-I{example}", "-c", source, "-o", target)
-        return str(target)
 
-    with ThreadPoolExecutor(2) as pool:
-        objects = list(pool.map(compiled, sources))
-    sketch = ("-include", "Arduino.h", "-x", "c++", example / "kapitza.ino")
-    paths = (f"-I{stub}", f"-I{tmp_path / 'src'}", f"-I{example}")
-    lines = f"-DLINES={len(pendulum.parameters)}"
-    image = tmp_path / "sketch.elf"
-    run(*CPP, *paths, lines, *sketch, stub / "core.cpp", "-x", "none", *objects, "-Wl,--gc-sections", "-o", image)
-    done = run_on(BOARDS["atmega2560"], image, 120)
-    assert done.text.splitlines() == expected(pendulum)
+def test_an_uno_runs_the_estimator_on_rows_of_ones_own(tmp_path: Path) -> None:
+    sketch, library = tmp_path / "uno", tmp_path / "libraries" / "pvid"
+    source = library / "src"
+    shutil.copytree(STUBS / "arduino" / "uno", sketch)
+    shutil.copytree(ROOT / "firmware" / "include", source)
+    (library / "library.properties").write_text("name=pvid\n", encoding="utf-8")
+    for room in ("number", "solve"):
+        (source / room).mkdir()
+        for header in (ROOT / "firmware" / "src" / room).glob("*.h"):
+            shutil.copy(header, source / room)
+    for one in ESTIMATOR:
+        shutil.copy(one, source / one.parent.name)
+    sizes = f'MORE_FLAGS=-I{ROOT}/firmware/examples -I{sketch} -DPVID_CONFIG_HEADER=\\"sizes.h\\"'
+    floats = "MORE_LINKED=-Wl,-u,vfprintf -lprintf_flt"
+    image = uploaded(sketch, "uno", tmp_path / "libraries", "pvid", sizes, floats)
+    size = {name: int(number) for name, number in re.findall(r"^(\.\w+) +(\d+)", run("avr-size", "-A", image), re.M)}
+    assert size[".data"] + size[".bss"] < 2048 - 512  # of RAM, without the stack
+    assert re.fullmatch(PRINTED["own_mechanism"], "\n".join(printed("atmega328p", image, 3)) + "\n")
 
 
 def test_the_readme_tells_that_an_uno_has_too_little_ram(pendulum: Deployment) -> None:
@@ -58,3 +95,26 @@ def test_the_readme_tells_that_an_uno_has_too_little_ram(pendulum: Deployment) -
     assert size is not None and 4500 < size < 5500  # 5005 on an AVR
     sentence = f"An Uno has 2048 bytes of RAM, too few for the identifier's {size}; a Mega has 8192."
     assert sentence in package(pendulum)["README.md"]
+
+
+HEATER = """
+from pvid import Model
+
+model = Model("heated plate")
+P = model.input("P", "W", hold="zoh", reach=50)
+T = model.sensor("T", "K", resolution=0.0625, reach=100)
+C = model.unknown("C", "J/K", 100.0)
+h = model.unknown("h", "W/K", 0.5)
+model.equation(C * T.d() + h * T - P)
+"""
+
+
+def test_the_least_mechanism_is_too_large_for_an_uno_and_a_poor_recording_is_named(tmp_path: Path) -> None:
+    """One input, one sensor, two unknowns; the run is a tenth of the plate's time constant."""
+    (tmp_path / "heater.py").write_text(HEATER, encoding="utf-8")
+    assert pvid(tmp_path, "model", "simulate", "heater.py", "run.csv", "--drive", "steps").returncode == 0
+    done = pvid(tmp_path, *"deploy heater.py --for arduino --core q31 --run run.csv -o out".split())
+    assert done.returncode == 0, done.stderr
+    assert "the first 15 s of the recording and prints no estimate: held uncertain" in done.stderr
+    size = re.search(r"about (\d+) bytes of RAM", (tmp_path / "out" / "README.md").read_text(encoding="utf-8"))
+    assert size is not None and 2800 < int(size[1]) < 3200

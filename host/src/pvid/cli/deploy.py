@@ -60,6 +60,12 @@ def command(
     is_integer = ENGINE_CORES[core] is FIXED
     made = _deployment(model, rig_path, run_path, columns, is_integer, functions, title)
     paths = write_package(made, target, out)
+    if made.playback.held is not None:
+        seconds = len(made.playback.counts) / made.sample_rate
+        write_stderr(
+            f"note: the example replays the first {seconds:.3g} s of the recording and prints no estimate: "
+            f"{made.playback.held.text}. `pvid identify` says more; a longer or livelier recording helps"
+        )
     write_stderr(f"{out}: {len(paths)} files; start with {out / 'README.md'}")
     return DONE
 

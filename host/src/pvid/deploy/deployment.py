@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.deploy.arithmetic import Arithmetic
+from pvid.settings.enums import Reason
 
 Files = dict[str, str]
 
@@ -39,12 +40,14 @@ class Playback:
     counts : int32 [ticks, samples]
     lsb : value of a count [samples]
     value, error : what the core has published at the end [parameters]; None: nothing
+    held : outcome of the last window of a motion that brings nothing
     """
 
     counts: npt.NDArray[np.int32]
     lsb: tuple[float, ...]
     value: npt.NDArray[np.float64] | None
     error: npt.NDArray[np.float64] | None
+    held: Reason | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,7 +128,8 @@ def _playback(
     """Some half windows longer than up to the first estimate; all of it where there is none."""
     published = np.flatnonzero(np.isin(record.reason, _PUBLISHED))
     if not len(published):
-        return Playback(counts, tuple(lsb), None, None)
+        judged = record.reason[record.reason != Reason.ACCUMULATED]
+        return Playback(counts, tuple(lsb), None, None, Reason(judged[-1]))
     ticks = min(int(published[0]) + 1 + _LONGER * hop, len(counts))
     value, error = (np.asarray(one[ticks - 1], np.float64) * scale for one in (record.published, record.published_se))
     return Playback(counts[:ticks], tuple(lsb), value, error)

@@ -1,0 +1,67 @@
+"""What the ecosystems themselves bring, fetched once into build/fetched: packages of Debian unpacked without being
+installed (arduino-mk would drag in a Java environment, newlib 370 MB), and the packers of PlatformIO and ESP-IDF in
+an environment of their own."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from filelock import FileLock
+from packages import run
+
+from pvid.core.sources import build_folder
+
+PLACE = build_folder() / "fetched"
+PACKERS = Path(__file__).with_name("packers.txt")
+
+
+def _once(name: str, make: Callable[[Path], None]) -> Path:
+    """The folder of that name, made whole or not at all."""
+    made = PLACE / name
+    PLACE.mkdir(parents=True, exist_ok=True)
+    with FileLock(PLACE / f".{name}.lock"):
+        if not made.exists():
+            fresh = PLACE / f"{name}.new"
+            shutil.rmtree(fresh, ignore_errors=True)
+            fresh.mkdir()
+            make(fresh)
+            fresh.rename(made)
+    return made
+
+
+def _unpacked(package: str, *patterns: str) -> Path:
+    """Files of a Debian package that match a pattern of tar, all without one."""
+
+    def make(folder: Path) -> None:
+        run("apt-get", "-o", "APT::Sandbox::User=root", "download", package, cwd=folder)  # _apt may not write here
+        unpack = 'dpkg-deb --fsys-tarfile ./*.deb | tar -x --wildcards "$@"'
+        run("bash", "-o", "pipefail", "-c", unpack, "bash", *patterns, cwd=folder)
+
+    return _once(package, make) / "usr"
+
+
+def newlib(multilib: str) -> tuple[Path, Path]:
+    """Newlib's headers, and the folder of its libraries for one kind of core, like thumb/v7e-m+fp/hard."""
+    headers = _unpacked("libnewlib-dev", "./usr/include/*") / "include" / "newlib"
+    folder = _unpacked("libnewlib-arm-none-eabi", f"./usr/lib/arm-none-eabi/newlib/{multilib}/*.a")
+    return headers, folder / "lib" / "arm-none-eabi" / "newlib" / multilib
+
+
+def arduino() -> tuple[Path, Path]:
+    """Folders of Arduino's core for AVRs, and of arduino-mk."""
+    place = Path("share") / "arduino"
+    return _unpacked("arduino-core-avr", "./usr/share/*") / place, _unpacked("arduino-mk", "./usr/share/*") / place
+
+
+def packer(module: str) -> tuple[str | Path, ...]:
+    """The command of PlatformIO (`platformio`) or of ESP-IDF's component manager (`idf_component_manager`)."""
+
+    def make(folder: Path) -> None:
+        run(sys.executable, "-m", "venv", folder)
+        pip = (folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
+        run(*pip, "--requirement", PACKERS)
+
+    return _once("packers", make) / "bin" / "python", "-m", module
