@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 
@@ -17,3 +18,8 @@ def children_of(pid: int) -> list[int]:
         if int(parent) == pid and state != "Z":
             found.append(int(number.split()[0]))
     return found
+
+
+def heed_interrupts() -> None:
+    """In a process about to start: whoever runs the tests in the background may have Ctrl-C ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)

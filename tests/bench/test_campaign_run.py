@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pyarrow.parquet
 import pytest
+from processes import heed_interrupts
 
 from bench.campaign.judge import COLUMNS, Record, identify_rig
 from bench.campaign.population import parse
@@ -74,11 +75,6 @@ def test_four_rigs_through_the_command_line(population: Path, native: Native, tm
     found = {name: rows[2][name] for name in COLUMNS}
     assert {**found, "seconds": 0} == {**expected, "seconds": 0}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results.parquet", "small.toml"]
-
-
-def heed_interrupts() -> None:
-    """Whoever runs the tests in the background may have them ignored."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def test_an_interrupted_campaign_keeps_its_records_and_goes_on(population: Path, tmp_path: Path) -> None:

@@ -13,10 +13,12 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import ROOT
 from packaging.requirements import Requirement
+from processes import heed_interrupts
 
 from pvid.base import user_cache
 
@@ -162,10 +164,9 @@ def installing(tmp_path: Path) -> Iterator[Callable[[str], subprocess.Popen[str]
     started: list[subprocess.Popen[str]] = []
 
     def start(script: str) -> subprocess.Popen[str]:
-        command, pipe = ["bash", "-c", STAND_INS + script], subprocess.PIPE
-        started.append(
-            subprocess.Popen(command, cwd=tmp_path, text=True, start_new_session=True, stdout=pipe, stderr=pipe)
-        )
+        own: dict[str, Any] = {"start_new_session": True, "preexec_fn": heed_interrupts}
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        started.append(subprocess.Popen(["bash", "-c", STAND_INS + script], cwd=tmp_path, text=True, **own, **pipes))
         return started[-1]
 
     yield start
