@@ -146,7 +146,7 @@ def test_forgetting_follows_a_parameter(lane: str, scenario: str, outcomes: Outc
 def test_the_weak_form_begins_anew_when_the_mechanism_has_changed(
     core: str, native: Native, library: ctypes.CDLL
 ) -> None:
-    # 40 s after the step: the gate's patience, three times of forgetting, and a first publication
+    # 40 s after the step: the gate's patience, the time of forgetting, and a first publication
     lane = Lane("weak", 10.0, core=core)
     outcome = longevity.measure(native, library, SCENARIOS["step"], [lane], SLOW_TICKS)[lane.label]
     assert abs(outcome.error_after) < 0.5

@@ -8,6 +8,9 @@ import pytest
 from bench.refine import HEADER, Case, bound_of, refine_table, row_of, run_case
 from bench.refine_imperfect import HEADER as IMPERFECT
 from bench.refine_imperfect import Fault, imperfect_table, run_fault
+from bench.refine_step import HEADER as CHANGED
+from bench.refine_step import Change, run_change
+from bench.refine_step import row_of as row_of_change
 
 
 @pytest.mark.parametrize("case", [Case(0.3, 14, duration=15.0), Case(0.2, 14, (0.002, 0.0005), 0.001, 15.0)])
@@ -52,6 +55,17 @@ def test_what_the_equations_lack_is_in_the_standard_errors(fault: Fault) -> None
         assert len(found.error)
         assert np.abs(found.error / found.se).max() < 4.5
         assert not found.confidently_wrong
+
+
+@pytest.mark.parametrize("what", ["g", "l2"])
+def test_a_changed_mechanism_is_followed_within_the_time_of_forgetting_or_a_little_more(what: str) -> None:
+    """With three times the patience it takes 12 s and more."""
+    change = Change(0.2, what, duration=40.0)
+    runs = [run_change(change, seed) for seed in range(3)]
+    assert np.median([one.published for one in runs]) < change.forgetting_s
+    assert all(one.published < 13.0 and one.error < 0.005 for one in runs)
+    assert run_change(change, 0, patience_s=3 * change.forgetting_s).published > 11.0
+    assert len(row_of_change(change, runs)) == len(CHANGED)
 
 
 def test_the_gain_of_the_drive_is_in_the_standard_errors() -> None:

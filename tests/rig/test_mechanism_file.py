@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 from pvid.base.errors import PvidError
-from pvid.model.compiled import CompiledModel, Known, Signal, Unknown
+from pvid.model.compiled import CompiledModel, Following, Known, Signal, Unknown
 from pvid.model.signals import Jet
 from pvid.rig.mechanism_file import MechanismRig, with_settings
 
@@ -24,6 +24,9 @@ resolution = 1e-3
 gain_sd = 0.005
 [nominal]
 R = 2
+[identifier]
+forgetting_s = 20
+outlier_patience_s = 5
 """
 
 
@@ -52,6 +55,7 @@ def test_values_of_the_file_replace_those_of_the_model() -> None:
     assert (changed.signal("V").gain_sd, changed.signal("phi").gain_sd) == (0.005, 0.0)
     assert (changed.unknowns[0].guess, changed.unknowns[0].sd) == (2.0, 4.0)
     assert changed.unknowns[1].sd == 0.1
+    assert changed.following == Following(forgetting_s=20.0, outlier_patience_s=5.0)
 
 
 def test_text_gives_the_same_rig_back() -> None:
@@ -80,6 +84,11 @@ def test_settings_come_before_the_file() -> None:
             "'bits' is not a key: resolution, noise, gain_sd and neglected are",
         ),
         ("[model]\nname='x'\n[sensor.phi]\nnoise=-3", "sensor.phi.noise must not be negative"),
+        (
+            "[model]\nname='x'\n[identifier]\ndivider=3",
+            "identifier: 'divider' is not a key: forgetting_s, outlier_gate",
+        ),
+        ("[model]\nname='x'\n[identifier]\nforgetting_s=-3", "identifier.forgetting_s must not be negative"),
         ("model = 3", "model must be a table"),
         ("[model", "is not TOML"),
     ],

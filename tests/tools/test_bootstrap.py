@@ -13,7 +13,6 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from conftest import ROOT
@@ -164,10 +163,17 @@ def installing(tmp_path: Path) -> Iterator[Callable[[str], subprocess.Popen[str]
     started: list[subprocess.Popen[str]] = []
 
     def start(script: str) -> subprocess.Popen[str]:
-        own: dict[str, Any] = {"start_new_session": True, "preexec_fn": heed_interrupts}
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        started.append(subprocess.Popen(["bash", "-c", STAND_INS + script], cwd=tmp_path, text=True, **own, **pipes))
-        return started[-1]
+        process = subprocess.Popen(
+            ["bash", "-c", STAND_INS + script],
+            cwd=tmp_path,
+            text=True,
+            start_new_session=True,
+            preexec_fn=heed_interrupts,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        started.append(process)
+        return process
 
     yield start
     for one in started:

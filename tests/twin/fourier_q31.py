@@ -101,7 +101,8 @@ class Rig:
         start = np.where(known.positive, self.truth * wide, known.guess)
         formats = row_formats(self.rows, self.truth)
         offset = (0,) * len(self.lsb)
-        return config_of_q31(self.design, known, formats, self.parameters.p_bits, offset, start)
+        rate = self.oracle_design.sample_rate
+        return config_of_q31(self.design, known, formats, self.parameters.p_bits, offset, rate, start)
 
     def oracle_sums(self) -> dict[int, Float]:
         """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""

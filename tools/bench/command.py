@@ -100,14 +100,17 @@ for _table in TABLES:
 @UPDATE
 def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
     """The refinement behind the weak engine: errors beside the Cramer-Rao bound, and on imperfect rigs."""
-    from bench import refine, refine_imperfect
+    from bench import refine, refine_imperfect, refine_step
 
-    with progress_bar("refine", seeds * len(refine.CASES) + imperfect * len(refine_imperfect.FAULTS)) as advance:
+    runs = seeds * len(refine.CASES) + imperfect * (len(refine_imperfect.FAULTS) + len(refine_step.CHANGES))
+    with progress_bar("refine", runs) as advance:
         done = count(1)
         rows = refine.refine_table(seeds, lambda: advance(next(done)))
         wrong = refine_imperfect.imperfect_table(imperfect, lambda: advance(next(done)))
+        changed = refine_step.step_table(imperfect, lambda: advance(next(done)))
     put_table(update, "refine", markdown(refine.HEADER, rows))
     put_table(update, "refine-imperfect", markdown(refine_imperfect.HEADER, wrong))
+    put_table(update, "refine-step", markdown(refine_step.HEADER, changed))
     return DONE
 
 

@@ -129,9 +129,8 @@ class MechanismBoard:
         """
         made = nominal_run(rig)
         config = engine_config(made.compiled, made.run, made.design, made.p)
-        own = replace(config.estimator, forgetting_s=rig.identifier.forgetting_s)
         # What the rig really reads is not known: a height from the floor is no fault.
-        config = replace(config, estimator=own, range=None)
+        config = replace(config, range=None)
         return cls(rig, made.compiled, config, _nothing(config))
 
     def __post_init__(self) -> None:

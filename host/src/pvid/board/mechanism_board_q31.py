@@ -50,7 +50,6 @@ from pvid.settings.fourier_q31 import (
 )
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.setup.fourier_sizes import sizes_of_q31
-from pvid.setup.q31 import forgetting_groups_q31
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.fourier_q31 import FourierTwinQ31
 
@@ -102,9 +101,6 @@ class MechanismBoardQ31:
         """As MechanismBoard.of_rig_file."""
         made = nominal_run(rig)
         engine = fixed_engine(made.compiled, made.run, made.design, made.p)
-        groups = forgetting_groups_q31(rig.identifier.forgetting_s, 1.0 / engine.hop_s)
-        own = replace(engine.config.estimator, forgetting_groups=groups)
-        engine = replace(engine, config=replace(engine.config, estimator=own))
         return cls(rig, engine, _nothing(len(engine.lsb)))
 
     def __post_init__(self) -> None:

@@ -25,6 +25,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
+from pvid.run.engine_identify import ALL_ALIKE
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
@@ -129,6 +130,8 @@ def identify_run(
         _print_core(core)
     else:
         _print(answer)
+    if core is None and not model.following.is_usual:
+        write_stderr(f"pvid: note: {ALL_ALIKE}")
     if figure is not None:
         from pvid.show.mechanism_figure import convergence  # loads matplotlib
 

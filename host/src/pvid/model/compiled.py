@@ -14,6 +14,8 @@ from pvid.model.signals import Jet
 # derivative is needed), sgn, Integral and TIME, and no unknown.
 Part = Mapping[int, sp.Expr]
 
+_PATIENT_WINDOWS = 100
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -180,6 +182,36 @@ class Refinement:
 
 
 @dataclass(frozen=True)
+class Following:
+    """How an estimate in C follows a mechanism that changes.
+
+    Attributes
+    ----------
+    forgetting_s : time constant of forgetting [s]; 0: none
+    outlier_gate : windows whose residuals exceed this multiple of the usual are rejected; 0: none is
+    outlier_patience_s : the gate accepts a changed mechanism after this time [s], 0: never; None: as `patience_s`
+    dead_zone : p stays while it is within this many standard errors of the solution of all data; 0: no dead zone
+    """
+
+    forgetting_s: float = 0.0
+    outlier_gate: float = 4.0
+    outlier_patience_s: float | None = None
+    dead_zone: float = 0.0
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether it says nothing of its own."""
+        return self == Following()
+
+    def patience_s(self, window_s: float) -> float:
+        """Patience of the gate for windows that end every window_s: what is given, else the time constant of
+        forgetting, and without forgetting the time of 100 windows."""
+        if self.outlier_patience_s is not None:
+            return self.outlier_patience_s
+        return self.forgetting_s or _PATIENT_WINDOWS * window_s
+
+
+@dataclass(frozen=True)
 class CompiledModel:
     """A mechanism ready to identify.
 
@@ -195,6 +227,7 @@ class CompiledModel:
     equations : expressions = 0 as the user wrote them (in jets of signals and hidden), for the simulator
     hidden : unmeasured coordinates, and defined integrals, whose rates are among the equations
     refinement : of the second stage
+    following : of the rig: how its estimate follows a change
     """
 
     name: str
@@ -208,6 +241,7 @@ class CompiledModel:
     equations: tuple[sp.Expr, ...] = ()
     hidden: tuple[Jet, ...] = ()
     refinement: Refinement = field(default_factory=Refinement)
+    following: Following = Following()
 
     @property
     def p(self) -> tuple[sp.Symbol, ...]:

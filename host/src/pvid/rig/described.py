@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from pvid.base.errors import PvidError
-from pvid.rig.file import RigFile
-from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.file import Identifier, RigFile
+from pvid.rig.mechanism_file import OF_THE_IDENTIFIER, MechanismRig
+
+_OF_THE_STRONG_FORM = ("divider", "feedback_hz", "kappa_min")
 
 
 def described(rig: RigFile) -> MechanismRig:
@@ -26,6 +28,7 @@ def described(rig: RigFile) -> MechanismRig:
     for name in sensor:
         if hasattr(rig.sensor, f"{name}_gain_sd"):
             sensor[name]["gain_sd"] = float(getattr(rig.sensor, f"{name}_gain_sd"))
+    given = {key: getattr(rig.identifier, key) for key in OF_THE_IDENTIFIER}
     known_sd = {name: value * float(getattr(rig, f"{name}_sd")) for name, value in constants.items()}
     return MechanismRig(
         rig.model.name,
@@ -34,15 +37,20 @@ def described(rig: RigFile) -> MechanismRig:
         sensor=sensor,
         nominal=nominal,
         known_sd=known_sd,
+        identifier={key: float(value) for key, value in given.items() if value is not None},
     )
 
 
-def refuse_other_laws(rig: RigFile) -> None:
-    """PvidError where a rig file asks for a law that the description's weak form does not have."""
+def refuse_strong(rig: RigFile) -> None:
+    """PvidError where a rig file asks for what the strong form alone has."""
     if rig.identifier.law != "stationary":
         raise PvidError(f"the weak form has the stationary law alone, not {rig.identifier.law}: use --form strong")
+    for key in _OF_THE_STRONG_FORM:
+        if getattr(rig.identifier, key) != getattr(Identifier(), key):
+            raise PvidError(f"identifier.{key} is of the strong form: leave it out, or use --form strong")
 
 
 def rig_of_document(document: Mapping[str, Any]) -> MechanismRig | RigFile:
-    """The rig of a log: of a file that has a table `identifier` it is a pendulum's."""
-    return RigFile.of_document(document) if "identifier" in document else MechanismRig.of_document(document)
+    """The rig of a log: of a file that names a form it is a pendulum's."""
+    identifier = document.get("identifier", {})
+    return RigFile.of_document(document) if "form" in identifier else MechanismRig.of_document(document)

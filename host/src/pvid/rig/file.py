@@ -125,14 +125,14 @@ class Identifier:
     stride : strong form: samples between the points of the differentiator; with a block at least its length
     block : strong form, Savitzky-Golay: odd number of samples whose mean is a point; a window of window_s then
         takes the time of window_s / block points, with 2 % (phi) to 14 % (its fourth derivative) more noise
-    forgetting_s : time constant of forgetting; 0: no forgetting
-    feedback_hz : stationary law: rate at which F decays; 0: a whole Gauss-Newton step at every solve
-    divider : ticks (strong form) or windows (weak form) per solve
-    kappa_min : hold the estimate while less than this share of the information on w is its own
+    forgetting_s : time constant of forgetting; 0: no forgetting; the cores f32 and q31
+    feedback_hz : strong form, stationary law: rate at which F decays; 0: a whole Gauss-Newton step at every solve
+    divider : strong form: ticks per solve
+    kappa_min : strong form: hold the estimate while less than this share of the information on w is its own
     outlier_gate : reject rows or windows whose residuals exceed this multiple of the usual; 0: no gate; default: 4
         (weak form), 6 (strong form), and no gate with the law pseudovelocity
-    outlier_patience_s : the gate accepts a changed mechanism after this time; 0: never; default: forgetting_s times 3
-        (weak form) or 6 (strong form)
+    outlier_patience_s : the gate accepts a changed mechanism after this time; 0: never; default: forgetting_s, or
+        100 windows without forgetting (weak form); 6 times forgetting_s (strong form)
     dead_zone : keep p while it is within this many standard errors of the solution of all data; 0: no dead zone
     """
 
@@ -179,10 +179,12 @@ class Identifier:
         return self.form_traits.gate if self.law == "stationary" else 0.0
 
     @property
-    def patience_s(self) -> float:
-        """Time until the gate accepts a change [s], 0: never."""
+    def patience_s(self) -> float | None:
+        """Time until the gate accepts a change [s], 0: never; None: weak form without forgetting, of some windows."""
         if self.outlier_patience_s is not None:
             return self.outlier_patience_s
+        if self.form_traits.publishes and not self.forgetting_s:
+            return None
         return min(self.form_traits.patience * self.forgetting_s, 1e12) if self.gate > 0.0 else 0.0
 
 
@@ -477,7 +479,8 @@ def _lines(owner: Any) -> list[str]:
             continue
         if value is None:
             if key.name in _DERIVED:
-                lines.append(f"# {key.name} = {getattr(owner, _DERIVED[key.name])!r}")
+                follows = getattr(owner, _DERIVED[key.name])
+                lines.append(f"# {key.name}" if follows is None else f"# {key.name} = {follows!r}")
             continue
         shown = (
             f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)

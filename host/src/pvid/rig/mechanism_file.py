@@ -13,6 +13,8 @@
     gain_sd = 0.005           # of any signal, an input too: relative standard deviation of its gain
     [nominal]
     R = 1.2                   # rough guesses: the start of the estimate
+    [identifier]
+    forgetting_s = 20         # how the estimate follows a change: see Following
 
 A key that the model does not have becomes a PvidError that names it and lists those that it has.
 """
@@ -36,6 +38,7 @@ if TYPE_CHECKING:  # it loads SymPy, without which a run of the pendulum does
     from pvid.model.compiled import CompiledModel
 
 _OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected")
+OF_THE_IDENTIFIER = ("forgetting_s", "outlier_gate", "outlier_patience_s", "dead_zone")  # fields of Following
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class MechanismRig:
     sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative], neglected (see Signal); of an
         input gain_sd alone
     nominal : guesses of the unknowns
+    identifier : what differs from Following's defaults
     """
 
     model: str
@@ -58,6 +62,7 @@ class MechanismRig:
     sensor: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     nominal: Mapping[str, float] = field(default_factory=dict)
     known_sd: Mapping[str, float] = field(default_factory=dict)
+    identifier: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def parse(cls, text: str) -> MechanismRig:
@@ -73,7 +78,7 @@ class MechanismRig:
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> MechanismRig:
         """From the tables of a text; see `parse`."""
-        known_keys = ("sample_rate", "model", "known", "known_sd", "sensor", "nominal")
+        known_keys = ("sample_rate", "model", "known", "known_sd", "sensor", "nominal", "identifier")
         for key in document:
             if key not in known_keys:
                 raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(known_keys)} are")
@@ -89,6 +94,10 @@ class MechanismRig:
             for key in keys:
                 if key not in _OF_A_SENSOR:
                     raise PvidError(f"sensor.{name}: {shown(key)} is not a key: {listed(_OF_A_SENSOR)} are")
+        identifier = _numbers(_table(document, "identifier"), "identifier")
+        for key in identifier:
+            if key not in OF_THE_IDENTIFIER:
+                raise PvidError(f"identifier: {shown(key)} is not a key: {listed(OF_THE_IDENTIFIER)} are")
         return cls(
             model,
             None if rate is None else _numbers({"sample_rate": rate}, "")["sample_rate"],
@@ -96,6 +105,7 @@ class MechanismRig:
             sensors,
             _numbers(_table(document, "nominal"), "nominal"),
             _numbers(_table(document, "known_sd"), "known_sd"),
+            identifier,
         )
 
     def text(self) -> str:
@@ -104,7 +114,7 @@ class MechanismRig:
         lines += ["", "[model]", f'name = "{self.model}"']
         tables: dict[str, Mapping[str, float]] = {"known": self.known, "known_sd": self.known_sd}
         tables |= {f"sensor.{name}": keys for name, keys in self.sensor.items()}
-        tables["nominal"] = self.nominal
+        tables |= {"nominal": self.nominal, "identifier": self.identifier}
         for name, keys in tables.items():
             if keys:
                 lines += ["", f"[{name}]", *(f"{key} = {value!r}" for key, value in keys.items())]
@@ -149,7 +159,8 @@ class MechanismRig:
             if one.positive and not guess > 0:
                 raise PvidError(f"nominal.{one.name} must be positive, not {guess:g}")
             unknowns.append(replace(one, guess=guess, sd=2 * guess if one.positive else one.sd))
-        return replace(model, knowns=knowns, signals=tuple(signals), unknowns=tuple(unknowns))
+        following = replace(model.following, **self.identifier)
+        return replace(model, knowns=knowns, signals=tuple(signals), unknowns=tuple(unknowns), following=following)
 
 
 def channels_of(model: CompiledModel) -> tuple[Channel, ...]:
@@ -197,7 +208,7 @@ def _numbers(table: Mapping[str, Any], place: str) -> dict[str, float]:
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             name = f"{place}.{key}" if place else key
             raise PvidError(f"{name} must be a number, not {shown(str(value))}")
-        if (key in (*_OF_A_SENSOR, "sample_rate") or place == "known_sd") and not value >= 0:
+        if (key in (*_OF_A_SENSOR, "sample_rate") or place in ("known_sd", "identifier")) and not value >= 0:
             raise PvidError(f"{place}.{key} must not be negative".removeprefix("."))
     return {key: float(value) for key, value in table.items()}
 

@@ -149,6 +149,7 @@ def fixed_engine(
         formats,
         parameters.p_bits,
         (0,) * len(lsb),
+        design.sample_rate,
         found.p if start_there else None,
         found.tables.overlap,
     )

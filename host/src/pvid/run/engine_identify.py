@@ -15,7 +15,7 @@ from pvid.base.errors import PvidError
 from pvid.oracle.fourier.choice import MODEL_ERROR
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.verdict import UNKNOWN
-from pvid.rig.described import described, refuse_other_laws
+from pvid.rig.described import described, refuse_strong
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
@@ -37,6 +37,9 @@ from pvid.setup.f32 import nominal_start
 
 _EXPLAINED = 0.97  # R^2 of each row kind: below, the equations do not fit the run
 _FARTHEST = 20.0  # times the guess: what lies beyond is no start
+
+NO_CORE = "No core has computed this answer"  # how a remark begins
+ALL_ALIKE = f"{NO_CORE} but that of float64, which takes all windows alike: [identifier] has no effect"
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,7 @@ def identify_by_engine(run: Run, rig: RigFile) -> Identification:
     PvidError
         When the recording is too short, or holds a signal beyond all reason.
     """
-    refuse_other_laws(rig)
+    refuse_strong(rig)
     run, rig = run.whole(), resolved(rig, run)
     _refuse_slow(run, rig)
     answer = identify_mechanism(run.recording, model_of(described(rig)))
@@ -105,13 +108,15 @@ def _computed(run: Run, rig: RigFile, answer: MechanismAnswer) -> tuple[RigFile,
     """By the core of the rig file; where it cannot be, by the analysis alone, which says why."""
     engine = ENGINE_CORES.get(rig.identifier.core)
     if engine is None:
-        return rig, answer, _of_analysis(answer, run)
+        alone = _of_analysis(answer, run)
+        said = () if answer.model.following.is_usual else (ALL_ALIKE,)
+        return rig, answer, replace(alone, remarks=(*said, *alone.remarks))
     try:
         return rig, answer, _of_core(identify_in_c(answer, engine.name), run)
     except PvidError as error:
         in_float64 = replace(rig, identifier=replace(rig.identifier, core="f64"))
         alone = _of_analysis(answer, run)
-        why = f"The answer is that of the float64 analysis alone: {error}"
+        why = f"{NO_CORE} but that of float64: {error}"
         return in_float64, answer, replace(alone, remarks=(why, *alone.remarks))
 
 

@@ -24,7 +24,7 @@ from pvid.oracle.fourier.choice import score_of
 from pvid.oracle.fourier.design import FourierDesign
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.identify import ready
-from pvid.rig.described import described, refuse_other_laws
+from pvid.rig.described import described, refuse_strong
 from pvid.rig.file import RigFile
 from pvid.run.engine_design import Run, design_for_recording
 from pvid.run.mechanism import model_of
@@ -79,7 +79,7 @@ def nominal_run(rig: RigFile) -> NominalRun:
         Without a sample rate, with one that does not show the modes of the guess, or with a law that the weak form does
         not have.
     """
-    refuse_other_laws(rig)
+    refuse_strong(rig)
     if rig.sample_rate is None:
         raise PvidError("sample_rate is required in the rig file: the board samples on its own clock")
     compiled = model_of_rig_file(rig)

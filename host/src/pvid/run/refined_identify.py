@@ -14,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
+from pvid.run.engine_identify import NO_CORE
 from pvid.run.identify import Identification, largest_angle, parts_of
 from pvid.run.refined import GOOD
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
@@ -138,7 +139,7 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
         chi2=found.slow_chi2,
         alarm=found.slow_chi2 > GOOD,
         doubts=None if weak.doubts is None else (),
-        remarks=(),
+        remarks=tuple(one for one in weak.remarks if one.startswith(NO_CORE)),
         status=Reason.UPDATED.text,
         largest_angle=largest_angle(run, value[model.offset_name]),
         refinement=verdict,

@@ -84,7 +84,7 @@ def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
 
 def gate_config(rig: RigFile) -> GateConfig:
     """The outlier gate of a rig file."""
-    return GateConfig(rig.identifier.gate, rig.identifier.patience_s)
+    return GateConfig(rig.identifier.gate, rig.identifier.patience_s or 0.0)
 
 
 def strong_config(rig: RigFile, sample_rate: float, start: npt.ArrayLike | None = None) -> StrongConfig:

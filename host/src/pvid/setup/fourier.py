@@ -27,9 +27,6 @@ _STEPS_OF_A_BLOCK = 8  # half a window is a whole number of blocks
 # An entry whose share is below this part of the noise at every harmonic is left out.
 _SHARE = 1e-6
 
-# The outlier gate: as the pendulum's weak form, whose windows are few and alike.
-_GATE = GateConfig(sigmas=4.0, patience_s=0.0)
-_PATIENCE_WINDOWS = 100
 
 # The information of a rig at rest is 0.1 to 1 times that of its sensors' noise. At a poor start that of a rig in motion
 # is less than at the truth: with 16, one of 80 runs of the standard rig with 12 bits stays at its start.
@@ -163,6 +160,7 @@ def config_of(
     # The prior of the oracle, in units of p.
     unit = parameters.unit(p)
     start_sd = np.abs(unit) / np.sqrt(parameters.prior(p))
+    following = parameters.model.following
     hop_s = design.hop * design.decimation / sample_rate
     return FourierConfig(
         sample_rate=sample_rate,
@@ -173,12 +171,14 @@ def config_of(
             lower=_as_float32([min(one.low, value) for one, value in zip(unknowns, p, strict=True)]),
             upper=_as_float32([max(one.high, value) for one, value in zip(unknowns, p, strict=True)]),
             row_sd=1.0,
+            forgetting_s=following.forgetting_s,
             noise_margin=_NOISE_MARGIN,
+            dead_zone=following.dead_zone,
         ),
         range=None if run is None else _as_float32(_ranges(design.model, parameters.model, run)),
         drive_min=None if run is None else drive_min_of(design, parameters.model),
         trust=TrustConfig(),
-        gate=replace(_GATE, patience_s=_PATIENCE_WINDOWS * hop_s),
+        gate=GateConfig(following.outlier_gate, following.patience_s(hop_s)),
     )
 
 

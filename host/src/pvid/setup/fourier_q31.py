@@ -11,10 +11,10 @@ from pvid.base.errors import PvidError
 from pvid.oracle.fourier.functions import Float
 from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.fourier.rows import EquationError, WeakRows
+from pvid.settings.f32 import GateConfig
 from pvid.settings.fourier_q31 import FourierConfigQ31, FourierDesignQ31
-from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31
-
-_GATE = GateConfigQ31(sigmas=4 << 16, patience_groups=100)  # as in float32
+from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.setup.q31 import forgetting_groups_q31, gate_config_q31
 
 _NOISE_MARGIN = 16  # as in float32
 _ROW_BITS = 28  # of an entry of a row
@@ -64,6 +64,7 @@ def config_of_q31(
     formats: tuple[Sequence[int], int],
     p_bits: Sequence[int],
     offset: Sequence[int],
+    sample_rate: float,
     start: Float | None = None,
     overlap: float = 1.0,
 ) -> FourierConfigQ31:
@@ -75,7 +76,8 @@ def config_of_q31(
     overlap : inflation of variances because windows share samples, as in float32
     """
     p = parameters.checked(start)
-    unknowns = parameters.model.unknowns
+    unknowns, following = parameters.model.unknowns, parameters.model.following
+    windows_hz = sample_rate / (design.hop * design.decimation)
     start_sd = np.abs(parameters.unit(p)) / np.sqrt(parameters.prior(p))
     lower = [min(one.low, value) for one, value in zip(unknowns, p, strict=True)]
     upper = [max(one.high, value) for one, value in zip(unknowns, p, strict=True)]
@@ -101,7 +103,9 @@ def config_of_q31(
             row_sd=2 ** (8 + y_bits),
             correlation=max(round(overlap * 2**16), 2**16),
             noise_margin=_NOISE_MARGIN << 16,
+            forgetting_groups=forgetting_groups_q31(following.forgetting_s, windows_hz),
+            dead_zone=round(following.dead_zone * 2**16),
         ),
         offset=tuple(offset),
-        gate=_GATE,
+        gate=gate_config_q31(GateConfig(following.outlier_gate, following.patience_s(1 / windows_hz)), windows_hz),
     )

@@ -1,0 +1,98 @@
+"""What a rig file says of forgetting and of the gate reaches the weak engine, in both cores, and the refinement."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pvid.base.errors import PvidError
+from pvid.codegen.build import refine_functions
+from pvid.model.compiled import Following
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.described import described, refuse_strong, rig_of_document
+from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
+from pvid.run.engine_design_q31 import engine_for_simulated_rig
+from pvid.run.engine_identify import ALL_ALIKE, identify_by_engine
+from pvid.run.mechanism import model_of
+from pvid.run.refine_design import refine_settings
+from pvid.settings.forms import AnyCore
+from pvid.sim.pendulum import simulate
+
+GIVEN = {"forgetting_s": 20.0, "outlier_gate": 5.0, "outlier_patience_s": 8.0, "dead_zone": 0.5}
+
+
+def settings_of(following: Following) -> tuple[dict[str, float], dict[str, float]]:
+    """Of the engine for the motor in float32, and in fixed point in the same units."""
+    compiled = replace(compiled_of("dc_motor"), following=following)
+    config, fixed = config_for_simulated_rig(compiled), engine_for_simulated_rig(compiled)
+    estimator, whole = config.estimator, fixed.config.estimator
+    in_float: dict[str, Any] = {
+        "forgetting_s": estimator.forgetting_s,
+        "outlier_gate": config.gate.sigmas,
+        "outlier_patience_s": config.gate.patience_s,
+        "dead_zone": estimator.dead_zone,
+    }
+    in_fixed = {
+        "forgetting_s": whole.forgetting_groups * fixed.hop_s,
+        "outlier_gate": fixed.config.gate.sigmas / 2**16,
+        "outlier_patience_s": fixed.config.gate.patience_groups * fixed.hop_s,
+        "dead_zone": whole.dead_zone / 2**16,
+    }
+    return in_float, in_fixed
+
+
+def test_both_cores_have_the_settings_of_the_rig() -> None:
+    rig = MechanismRig.of_document({"model": {"name": "dc_motor"}, "identifier": GIVEN})
+    following = rig.applied(compiled_of("dc_motor")).following
+    for found in settings_of(following):
+        assert found == pytest.approx(GIVEN, rel=0.02)  # fixed point counts windows
+
+
+def test_what_a_rig_file_does_not_say_has_its_default() -> None:
+    for found in settings_of(Following()):
+        patience = found.pop("outlier_patience_s")
+        assert found == {"forgetting_s": 0.0, "outlier_gate": 4.0, "dead_zone": 0.0}
+        assert 10.0 < patience < 30.0  # 100 windows
+    for found in settings_of(Following(forgetting_s=12.0)):
+        assert found["outlier_patience_s"] == pytest.approx(12.0, rel=0.02)
+
+
+def test_the_refinement_forgets_alike() -> None:
+    compiled = replace(compiled_of("kapitza"), following=Following(forgetting_s=15.0))
+    run, rate = simulated_run_of(compiled)[0], simulated_rig("kapitza").sample_rate
+    p = np.array([one.guess for one in compiled.unknowns])
+    assert refine_settings(refine_functions(compiled), run, rate, p, 1.0).forgetting_s == 15.0
+
+
+def test_a_pendulums_rig_file_says_the_same() -> None:
+    lines = "\n".join(f"{key} = {value}" for key, value in GIVEN.items())
+    rig = RigFile.parse(f"l1 = 0.3\n[identifier]\n{lines}\n")
+    assert model_of(described(rig)).following == Following(**GIVEN)
+    assert model_of(described(RigFile.parse("l1 = 0.3"))).following == Following()
+
+
+@pytest.mark.parametrize("setting", ["divider = 3", "feedback_hz = 5.0", "kappa_min = 0.1"])
+def test_settings_of_the_strong_form_are_refused_by_the_weak_one(setting: str) -> None:
+    rig = RigFile.parse(f"l1 = 0.3\n[identifier]\n{setting}\n")
+    with pytest.raises(PvidError, match=rf"identifier\.{setting.split()[0]} is of the strong form: leave it out"):
+        refuse_strong(rig)
+
+
+def test_the_rig_of_a_log_is_told_by_its_form() -> None:
+    for rig in (RigFile.standard(), MechanismRig("kapitza", 1000.0, identifier={"forgetting_s": 3.0})):
+        assert rig_of_document(tomllib.loads(rig.text())) == rig
+
+
+@pytest.mark.parametrize("core", ["f64", "f32"])
+def test_the_float64_analysis_says_that_it_does_not_forget(core: AnyCore) -> None:
+    rig = RigFile.standard()
+    rig = replace(rig, identifier=replace(rig.identifier, core=core, forgetting_s=20.0))
+    found = identify_by_engine(simulate(truth="linear", duration=10.0).run, rig)
+    assert found.identified and (ALL_ALIKE in found.remarks) == (core == "f64")
