@@ -32,11 +32,12 @@ from click.testing import CliRunner
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
 
-COMMAND = re.compile(r"(?:\./tools/|build/venv/|cmake |cd |cc |pip |head |python3? )")
+COMMAND = re.compile(r"(?:\./tools/|build/venv/|cmake |cd |cc |pip |head |python3? |stty )")
 
 # ---- commands that are not executed, only parsed: pattern, reason
 NOT_EXECUTED = (
     (r"^\./tools/pvid (bench|campaign)\b", "takes minutes to hours; tests/bench executes its short form"),
+    (r"^(stty|timeout) ", "needs a board; tests/deploy/test_deploy_avr.py runs the sketch"),
     (r"^\./tools/pvid demo", "tests/cli/test_cli.py and test_mechanism_demo.py execute it"),
     (r"^\./tools/pvid sizes", "builds every image; tests/board/test_targets.py measures some of them"),
     (r"^\./tools/(test|release)\b", "executes the tests themselves; tests/tools/test_release.py executes parts of it"),
@@ -220,19 +221,23 @@ def prepared(folder: Path) -> None:
         with_columns(Path("run.csv"), Path("run.csv"), {**scales, "h": ("y", 1e3)})
         others = {"time": ("t", 1e3), "current_mA": ("i", 1e3), "angle": ("phi", 180 / np.pi), "u": ("V", 1.0)}
         with_columns(Path("motor.csv"), Path("recorded.csv"), others)
+        of_a_sketch = {"t": ("t", 1e3), "duty": ("V", 255 / 12), "current": ("i", 1023 / 5)}
+        turned = {"counts": ("phi", 2400 / (2 * np.pi))}
+        with_columns(Path("motor.csv"), Path("sketch.csv"), of_a_sketch | turned, keep=False)
         for place, name in (("fleet/a", "run.pvlog"), ("runs", "run.csv"), ("motors/a", "motor.csv")):
             Path(place).mkdir(parents=True)
             shutil.copy(name, place)
 
 
-def with_columns(source: Path, target: Path, scales: dict[str, tuple[str, float]]) -> None:
-    """A run with further columns: name -> the column and its factor."""
+def with_columns(source: Path, target: Path, scales: dict[str, tuple[str, float]], *, keep: bool = True) -> None:
+    """A run with further columns, or with these alone: name -> the column and its factor."""
     header, *rows = source.read_text(encoding="utf-8").splitlines()
     names = header.split(",")
     data = np.array([row.split(",") for row in rows], dtype=float)
     more = [data[:, names.index(column)] * factor for column, factor in scales.values()]
-    table = np.column_stack([data, *more])
-    np.savetxt(target, table, fmt="%.9g", delimiter=",", header=",".join([*names, *scales]), comments="")
+    table = np.column_stack([data, *more] if keep else more)
+    named = ",".join([*names, *scales] if keep else scales)
+    np.savetxt(target, table, fmt="%.9g", delimiter=",", header=named, comments="")
 
 
 def executed(line: str, folder: Path, full: bool) -> Printed:

@@ -8,6 +8,7 @@ import subprocess
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import ROOT
 from ecosystems import arduino
@@ -118,3 +119,15 @@ def test_the_least_mechanism_is_too_large_for_an_uno_and_a_poor_recording_is_nam
     assert "the first 15 s of the recording and prints no estimate: held uncertain" in done.stderr
     size = re.search(r"about (\d+) bytes of RAM", (tmp_path / "out" / "README.md").read_text(encoding="utf-8"))
     assert size is not None and 2800 < int(size[1]) < 3200
+
+
+def test_the_sketch_that_records_sends_a_run(tmp_path: Path) -> None:
+    """On an emulated Uno, whose inputs are open: the clock, the drive and the format of its lines."""
+    sketch = tmp_path / "record"
+    shutil.copytree(ROOT / "firmware" / "examples" / "record", sketch)
+    header, *lines = printed("atmega328p", uploaded(sketch, "uno", tmp_path, ""), 202)
+    assert header == "t,duty,current,counts"
+    t, duty, current, counts = np.array([line.split(",") for line in lines], float).T
+    assert np.array_equal(t, 5.0 * np.arange(201))  # no line was late
+    assert len(set(duty)) == 6 and np.array_equal(np.flatnonzero(np.diff(duty)) + 1, [40, 80, 120, 160, 200])
+    assert duty.min() >= 0 and duty.max() <= 255 and np.all((0 <= current) & (current < 1024)) and not counts.any()

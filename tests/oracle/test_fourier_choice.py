@@ -131,6 +131,34 @@ def driven(feedback_only: bool) -> dict[str, npt.NDArray[np.float64]]:
     return {"torque": torque, "q": np.round((q + rng.normal(0, 5e-5, n)) / 1e-4) * 1e-4}
 
 
+def heated(feedback: float) -> dict[str, npt.NDArray[np.float64]]:
+    """A plate of the first order, whose power is a slow sine, or a thermostat's."""
+    rng = np.random.default_rng(2)
+    n, dt = 12_000, 0.1
+    swing = 30 * np.sin(2 * np.pi * np.arange(n) * dt / 400)
+    power, warm = np.empty(n), np.empty(n)
+    now = 10.0
+    for k in range(n):
+        warm[k] = round(16 * (now + rng.normal(0, 0.03))) / 16
+        power[k] = 30 - feedback * warm[k] if feedback else 30 + swing[k]
+        now += dt * (power[k] - 0.6 * now + (swing[k] if feedback else 0.0)) / 130
+    return {"P": power, "T": warm}
+
+
+@pytest.mark.parametrize("feedback", [0.0, 2.0])
+def test_the_law_of_a_mechanism_of_the_first_order_is_no_feedback(feedback: float) -> None:
+    """Its input is a law of the output and its rate by its own equation."""
+    model = Model("plate")
+    power = model.input("P", "W", hold="zoh", reach=60)
+    warm = model.sensor("T", "K", resolution=0.0625, reach=100)
+    capacity, loss = model.unknown("C", "J/K", 100.0), model.unknown("h", "W/K", 0.5)
+    model.equation(capacity * warm.d() + loss * warm - power)
+    found = identify(model.compiled("plate"), heated(feedback), 10.0)
+    assert ("feedback" in [one.name for one in found.verdict.reasons if one.alarm]) == (feedback > 0)
+    if not feedback:
+        assert np.all(np.abs(found.p - [130.0, 0.6]) < 4 * found.se)
+
+
 def test_a_torque_that_is_a_law_of_the_angle_is_named_as_feedback() -> None:
     model = wheel().compiled("wheel")
     design = FourierDesign(1000.0, 1.0, 8)

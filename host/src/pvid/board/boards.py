@@ -136,6 +136,10 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
             done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
             if done.returncode != 0:
                 lines = (done.stdout + done.stderr).strip().splitlines()
+                full = [re.search(r"region `(\w+)' overflowed by (\d+) bytes", line) for line in lines]
+                if any(full):
+                    said = ", ".join(sorted({f"{one[1]} lacks {one[2]} bytes" for one in full if one}))
+                    raise PvidError(f"{target.name}: the image does not fit: {said}")
                 errors = [line for line in lines if re.search(r"error|undefined|overflowed|CMake Error", line)]
                 raise PvidError(f"{target.name}: the build failed: {' '.join((errors or lines or ['no output'])[:2])}")
     return tree

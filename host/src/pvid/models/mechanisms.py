@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from pvid import model as language
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
@@ -62,13 +63,19 @@ def described(name_or_path: str | Path) -> Model:
         raise PvidError(f"{Path(error.filename or path).name}, line {error.lineno}: {error.msg}") from None
     except (Exception, SystemExit) as error:
         where = str(Place(str(path), _line(error, path))).removesuffix(": ") or path.name
-        raise PvidError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from None
+        raise PvidError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}{_import(error)}") from None
     finally:
         sys.path.remove(folder)
     model = space.get("model")
     if not isinstance(model, Model):
         raise PvidError(f"{path.name}: the file leaves no variable `model` that is a pvid.model.Model")
     return model
+
+
+def _import(error: BaseException) -> str:
+    """How to get what a model file forgot to import; "": it is nothing of ours."""
+    name = error.name if isinstance(error, NameError) else None
+    return f"; add `from pvid.model import {name}`" if name in language.__all__ else ""
 
 
 def _line(error: BaseException, path: Path) -> int:

@@ -44,7 +44,9 @@ def uncertainty(fit: Fit) -> Uncertainty:
     covariance = s_inverse @ (information + neighbours + neighbours.T) @ s_inverse
     free = sum(one.free for one in fit.white) - len(fit.p)
     weighted = sum(float(np.sum(e**2)) for e in residuals) / max(free, 1)
-    predicted = unit * np.sqrt(np.diag(covariance) * max(1.0, weighted))
+    variance = np.diag(covariance)
+    # Not positive: the run says nothing of a combination of parameters.
+    predicted = unit * np.sqrt(np.where(variance >= 0, variance, np.inf) * max(1.0, weighted))
     scores = sum((np.einsum("wkp,wk->wp", d, e) for d, e in zip(designs, residuals, strict=True)))
     clustered = unit * np.sqrt(clustered_variance(np.asarray(scores), s_inverse))
     return Uncertainty(

@@ -268,7 +268,10 @@ def of_residuals(found: Uncertainty, equation_error: bool = True) -> list[Reason
 
 
 def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
-    """Inputs that a static law of the outputs explains as well as the model explains them."""
+    """Inputs that a static law of the outputs explains as well as the model explains them.
+
+    Of an output the law has derivatives below the highest one of the equations: all of them are the mechanism itself.
+    """
     rows, functions = fit.rows, fit.rows.functions
     grid = rows.record.grid
     chi = functions.combine(0)
@@ -281,8 +284,11 @@ def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
     for one in model.signals:
         if one.kind == "sensor" and not one.driven:
             z = filtered(grid.raw[one.name], weights_of(grid.design, 0))[grid.places]
+            order = _order_of(model, one.name)
+            if order < 1:
+                continue
             outputs.append(z)
-            if grid.design.rate_taps > 1 or grid.design.taps > 1:
+            if order > 1 and (grid.design.rate_taps > 1 or grid.design.taps > 1):
                 outputs.append(filtered(grid.raw[one.name], weights_of(grid.design, 1))[grid.places])
             if one.unit == "rad":
                 outputs += [np.sin(z), np.cos(z)]
@@ -309,6 +315,18 @@ def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
                 )
             )
     return out
+
+
+def _order_of(model: CompiledModel, name: str) -> int:
+    """Highest derivative of a signal in the rows."""
+    orders = [0]
+    for row in model.rows:
+        for part in (*row.regressors, row.known):
+            for order, psi in part.items():
+                for jet in sp.sympify(psi).atoms(Jet):
+                    below = model.opaque.get(Jet(jet.of), Jet(jet.of)).atoms(Jet)
+                    orders += [order + jet.order + one.order for one in below if one.of == name]
+    return max(orders)
 
 
 def unexplained(model: CompiledModel, fit: Fit, jet: Jet, total: float) -> float | None:
