@@ -78,7 +78,7 @@ def test_a_file_may_import_what_lies_beside_it(tmp_path: Path) -> None:
     [
         ("model.equation(m * x.d(2) + b * x - u)", "mine.py, line 6: equation 1: the term b*x has the unit"),
         ("model.equation(m * x.d(2) + c * x.d() - u)", "mine.py, line 6: NameError: name 'c' is not defined"),
-        ("model.equation(m * x.d(2) - cos(x) * u)", "name 'cos' is not defined; add `from pvid.model import cos`"),
+        ("del sgn; model.equation(m * sgn(x) - u)", "name 'sgn' is not defined; add `from pvid.model import sgn`"),
         ("model.equation(m * x.d(2) +)", "mine.py, line 6: invalid syntax"),
         ("import sympy; model.equation(m * x.d(2) - u + sympy.Symbol('k') * x)", "line 6: k is not declared"),
         ("model.unknown('m', 'kg', 1.0)", "line 6: m is declared twice"),
