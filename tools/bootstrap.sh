@@ -55,9 +55,9 @@ unlock() { exec 9>&-; }
 # ---- Debian packages ----
 
 # The packages of PROFILE that are missing, judged by what they bring, so that a tool installed in another way
-# counts. Profiles: python (to make the environment), pvid (to run), demo (to build for the Cortex-M boards and emulate them besides), targets (the same
-# for every board), test (to test, all of that and more), long (the long forms of the tests: a browser besides), cycles (to
-# simulate a core from its RTL).
+# counts. Profiles: python (to make the environment), pvid (to run), demo (to build for the Cortex-M boards and emulate
+# them besides), targets (the same for every board), test (to test, all of that and more), cycles (to simulate a core from
+# its RTL).
 missing_packages() {
     local missing=()
     need() { # need PACKAGE CHECK...
@@ -79,11 +79,6 @@ missing_packages() {
         need libc6-dev test -e /usr/include/stdio.h
         need cmake command -v cmake
         need ninja-build command -v ninja
-    fi
-    if [[ $1 == long ]]; then
-        need chromium command -v chromium
-        need chromium-driver command -v chromedriver
-        set -- test
     fi
     if [[ $1 == cycles ]]; then
         need verilator command -v verilator
@@ -108,6 +103,8 @@ missing_packages() {
     fi
     if [[ $1 == test ]]; then
         need binutils command -v readelf
+        need chromium command -v chromium
+        need chromium-driver command -v chromedriver
         need clang command -v clang
         need clang-tidy command -v clang-tidy
         need cppcheck command -v cppcheck
@@ -350,7 +347,7 @@ core_is_built() {
 # prepare PROFILE [more]: as above; "more" adds what parquet, mcap and campaigns need.
 prepare() {
     local profile=$1 python_profile=${2:-pvid}
-    [[ $1 != test && $1 != long ]] || python_profile="test"
+    [[ $1 != test ]] || python_profile="test"
     if ! is_ours; then
         use_as_it_is "$python_profile"
         return

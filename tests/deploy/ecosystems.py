@@ -4,32 +4,13 @@ an environment of their own."""
 
 from __future__ import annotations
 
-import shutil
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
-from filelock import FileLock
+from fetched import once
 from packages import run
 
-from pvid.core.sources import build_folder
-
-PLACE = build_folder() / "fetched"
 PACKERS = Path(__file__).with_name("packers.txt")
-
-
-def _once(name: str, make: Callable[[Path], None]) -> Path:
-    """The folder of that name, made whole or not at all."""
-    made = PLACE / name
-    PLACE.mkdir(parents=True, exist_ok=True)
-    with FileLock(PLACE / f".{name}.lock"):
-        if not made.exists():
-            fresh = PLACE / f"{name}.new"
-            shutil.rmtree(fresh, ignore_errors=True)
-            fresh.mkdir()
-            make(fresh)
-            fresh.rename(made)
-    return made
 
 
 def _unpacked(package: str, *patterns: str) -> Path:
@@ -40,7 +21,7 @@ def _unpacked(package: str, *patterns: str) -> Path:
         unpack = 'dpkg-deb --fsys-tarfile ./*.deb | tar -x --wildcards "$@"'
         run("bash", "-o", "pipefail", "-c", unpack, "bash", *patterns, cwd=folder)
 
-    return _once(package, make) / "usr"
+    return once(package, make) / "usr"
 
 
 def newlib(multilib: str) -> tuple[Path, Path]:
@@ -64,4 +45,4 @@ def packer(module: str) -> tuple[str | Path, ...]:
         pip = (folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
         run(*pip, "--requirement", PACKERS)
 
-    return _once("packers", make) / "bin" / "python", "-m", module
+    return once("packers", make) / "bin" / "python", "-m", module

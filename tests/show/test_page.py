@@ -231,7 +231,12 @@ def drawn(browser: webdriver.Chrome, plot: str) -> list[dict[str, Any]]:
     return list(browser.execute_script(script, plot))
 
 
-@pytest.mark.long
+def complaints(browser: webdriver.Chrome) -> list[str]:
+    """What the browser said of the page, but for a hint at how `drawn` reads its pixels."""
+    said = [str(one["message"]) for one in browser.get_log("browser")]  # type: ignore[no-untyped-call]
+    return [one for one in said if "willReadFrequently" not in one and "will-read-frequently" not in one]
+
+
 def test_the_page_moves_in_a_browser_and_asks_nobody_else(
     tmp_path: Path, board: Path, browser: webdriver.Chrome
 ) -> None:
@@ -258,7 +263,7 @@ def test_the_page_moves_in_a_browser_and_asks_nobody_else(
         asked = requests_of(browser)
         assert any(one.endswith("/uplot.js") for one in asked)
         assert all(one.startswith((f"http://{at}/", "data:", "blob:")) for one in asked), set(asked)
-        assert browser.get_log("browser") == []  # type: ignore[no-untyped-call]
+        assert complaints(browser) == []
         logger.send_signal(signal.SIGINT)
         out, err = logger.communicate(timeout=30)
         assert logger.returncode == 0, err
@@ -283,9 +288,9 @@ def finished(sent: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("width", "height"), [(390, 844), (1280, 800), (1920, 1080)])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("scheme", "width", "height"), [("dark", 390, 844), ("light", 1280, 800), ("dark", 1920, 1080)]
+)
 def test_a_finished_log_fits_every_screen_and_scheme(
     tmp_path: Path, finished: Path, width: int, height: int, scheme: str
 ) -> None:
@@ -305,7 +310,38 @@ def test_a_finished_log_fits_every_screen_and_scheme(
         assert table[0] == '"t [s]","estimate","−2 s.e.","+2 s.e."' and len(table) == 1 + TICKS // 100
         browser.find_element("id", "pause").click()
         assert browser.execute_script("return paused") is True
-        assert browser.get_log("browser") == []  # type: ignore[no-untyped-call]
+        assert complaints(browser) == []
+
+
+def test_the_plots_share_a_cursor_and_a_time_range_and_are_saved(tmp_path: Path, finished: Path) -> None:
+    with page("127.0.0.1:0", finished, "a.pvlog") as address, chromium(tmp_path / "chromium", 1280, 800) as browser:
+        until(lambda: _answers(address))
+        browser.get(address)
+        until(lambda: all(drawn(browser, plot) for plot in PLOTS))
+        browser.find_element("id", "pause").click()
+
+        def asked(expression: str) -> Any:
+            return browser.execute_script(f"const x = plots.get('signal0').chart.scales.x; return {expression}")
+
+        whole = asked("x.max - x.min")
+        browser.execute_script("plots.get('signal0').chart.setCursor({left: 100, top: 50}, true, true)")
+        until(lambda: browser.execute_script("return plots.get('parameter0').chart.cursor.idx") is not None)
+        browser.execute_script(
+            "const last = new Option('last 5 s', '5'); place('range').add(last); last.selected = true;"
+            "place('range').dispatchEvent(new Event('change'))"
+        )
+        assert whole > 8 and asked("x.max - x.min") == pytest.approx(5.0)
+        assert browser.execute_script("return marks.t.length") > 0  # of windows that were rejected or held
+        saved: dict[str, str] = browser.execute_async_script("""
+            const [done] = arguments, names = {}, real = HTMLAnchorElement.prototype.click;
+            HTMLAnchorElement.prototype.click = function () { names[this.download] = this.href.slice(0, 40); };
+            document.querySelectorAll("#signal0 button").forEach((one) => one.click());
+            HTMLAnchorElement.prototype.click = real;
+            done(names);""")
+        assert saved["signal0.png"].startswith("data:image/png;base64,iVBOR") and saved["signal0.csv"].startswith(
+            "blob:"
+        )
+        assert complaints(browser) == []
 
 
 def test_state_of_a_log_names_withheld_windows_and_what_the_estimate_predicts(finished: Path) -> None:

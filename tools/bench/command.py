@@ -591,7 +591,7 @@ def bench_side_by_side(update: Path | None) -> int:
 @UPDATE
 @click.option("--only", metavar="ROOM", multiple=True, help="A folder of tests/; repeatable.")
 def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
-    """The long forms of the tests: 40 000 ticks, every build and board, mutants, a browser (an hour)."""
+    """The long forms of the tests: 40 000 ticks, every build and board, mutants (an hour)."""
     from bench import long
 
     rows = long.long_table(only)

@@ -69,7 +69,6 @@ _EXTRAS = {
     "pyarrow": "parquet",
     "serial": "serial",
     "starlette": "page",
-    "sympy": "models",
     "uvicorn": "page",
 }
 
