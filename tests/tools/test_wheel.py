@@ -124,7 +124,7 @@ def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel
         text = (ROOT / "host" / "pyproject.toml").read_text(encoding="utf-8")
         needed = tomllib.loads(text)["project"]["dependencies"]
         subprocess.run([python, "-m", "venv", folder], check=True)
-        pip = [folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
+        pip = [str(folder / "bin" / "python"), "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
         subprocess.run([*pip, *needed], check=True)
 
     environment = once(f"python-{version}", make)
@@ -133,8 +133,8 @@ def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel
     (packages,) = place.glob("lib/python*/site-packages")
     (others,) = environment.glob("lib/python*/site-packages")
     (packages / "others.pth").write_text(f"{others}\n", encoding="utf-8")
-    pip = [environment / "bin" / "python", "-m", "pip", "--python", place / "bin" / "python", "install", "--quiet"]
-    subprocess.run([*pip, "--no-deps", "--no-index", wheel], check=True)
+    pip = [str(environment / "bin" / "python"), "-m", "pip", "--python", str(place / "bin" / "python")]
+    subprocess.run([*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)], check=True)
     program = place / "bin" / "pvid"
     subprocess.run([program, "simulate", "run.csv", "--duration", "20"], cwd=tmp_path, check=True)
     told = run(place / "bin" / "python", "import pvid; print(pvid.__file__); print(pvid.identify('run.csv'))", tmp_path)
