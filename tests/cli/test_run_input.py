@@ -223,8 +223,8 @@ def test_a_row_costs_a_few_numbers_of_memory_and_time_grows_with_the_rows(jitter
         assert costs[-1][0] == pytest.approx(rows, abs=1)
     (_, low, short), (_, high, long) = costs
     # 10^7 rows within 500 MB leave 40 bytes a row beside the interpreter's own 100 MB; the blocks of what is read take
-    # 8 MB more until there are several
-    assert high - low < 40 * (large - small) + 8e6
+    # 8 MB more until there are several, and 4 where the threads that read are ahead of a busy machine
+    assert high - low < 40 * (large - small) + 12e6
     assert high < 100e6
     # Eleven times the rows in eleven times the processor time, and half as much again on a busy machine; a step that
     # went through all rows for each block would take 121 times.

@@ -16,6 +16,7 @@ import pytest
 from conftest import ROOT
 from program import pvid
 
+from pvid.base.cluster import _distributed
 from pvid.base.errors import PvidError
 from pvid.cli.batch import command
 from pvid.fleet import run as fleet
@@ -80,6 +81,22 @@ def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> Non
     assert abs(good["g"] - 9.5) < 5 * good["g_se"] and table.schema.field("g").metadata[b"unit"] == b"m/s^2"
     assert rows["b/broken.csv"]["g"] is None and rows["b/broken.csv"]["identified"] is None
     assert "<svg" in (tmp_path / "fleet.html").read_text() and not (tmp_path / "fleet.partial.jsonl").exists()
+
+
+def test_the_workers_of_a_running_scheduler_do_the_work(runs: Path, tmp_path: Path) -> None:
+    broken = str(runs / "b" / "broken.csv")
+    with _distributed().LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        host="127.0.0.1",
+        dashboard_address=None,
+        protocol="tcp",
+        local_directory=tmp_path / "dask",
+    ) as cluster:
+        store = Store(tmp_path / "fleet.parquet")
+        (row,) = fleet.run([broken], asked(), store, lambda _: None, scheduler=cluster.scheduler_address)
+    assert "line 2, column phi" in (row.failure or "")
 
 
 def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(

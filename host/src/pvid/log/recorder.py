@@ -389,7 +389,7 @@ class Logger:
                 recorder.why = f"{self.duration_s:g} s are over"
                 recorder.stop.set()
             elif self.samples is not None and self.stream.account.samples >= self.samples:
-                recorder.why = f"{self.samples} samples received"
+                recorder.why = f"the {self.samples} samples that were asked for have come"
                 recorder.stop.set()
 
     def _catch_up(self, data: bytes) -> bool:
