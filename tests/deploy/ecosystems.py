@@ -4,6 +4,7 @@ an environment of their own."""
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -17,7 +18,10 @@ def _unpacked(package: str, *patterns: str) -> Path:
     """Files of a Debian package that match a pattern of tar, all without one."""
 
     def make(folder: Path) -> None:
-        run("apt-get", "-o", "APT::Sandbox::User=root", "download", package, cwd=folder)  # _apt may not write here
+        fetch = ("apt-get", "-o", "APT::Sandbox::User=root", "download", package)  # _apt may not write here
+        if subprocess.run(fetch, cwd=folder, capture_output=True, check=False).returncode:
+            run("apt-get", "update")  # there may be no lists of packages yet
+            run(*fetch, cwd=folder)
         unpack = 'dpkg-deb --fsys-tarfile ./*.deb | tar -x --wildcards "$@"'
         run("bash", "-o", "pipefail", "-c", unpack, "bash", *patterns, cwd=folder)
 
