@@ -88,6 +88,8 @@ def test_settings_of_the_strong_form_are_refused_by_the_weak_one(setting: str) -
 def test_the_rig_of_a_log_is_told_by_its_form() -> None:
     for rig in (RigFile.standard(), MechanismRig("kapitza", 1000.0, identifier={"forgetting_s": 3.0})):
         assert rig_of_document(tomllib.loads(rig.text())) == rig
+    with pytest.raises(PvidError, match="identifier must be a table"):
+        rig_of_document({"model": {"name": "kapitza"}, "identifier": 3})
 
 
 @pytest.mark.parametrize("core", ["f64", "f32"])

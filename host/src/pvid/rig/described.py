@@ -52,5 +52,6 @@ def refuse_strong(rig: RigFile) -> None:
 
 def rig_of_document(document: Mapping[str, Any]) -> MechanismRig | RigFile:
     """The rig of a log: of a file that names a form it is a pendulum's."""
-    identifier = document.get("identifier", {})
-    return RigFile.of_document(document) if "form" in identifier else MechanismRig.of_document(document)
+    identifier = document.get("identifier")
+    is_pendulums = isinstance(identifier, Mapping) and "form" in identifier
+    return RigFile.of_document(document) if is_pendulums else MechanismRig.of_document(document)
