@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 from block_models import BlockModel, EstimatorInC
-from fourier_rig import engine_rig
+from weak_rig import engine_rig
 
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core import snapshot
-from pvid.core.fourier_native_q31 import FourierNativeQ31
 from pvid.core.headers import Headers, Scalar, default_library
 from pvid.core.native import Identifier, Native, Stepper
+from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
 from pvid.run.engine_design_q31 import engine_for_simulated_rig
@@ -210,7 +210,7 @@ SIZES = {
 }
 WITHOUT = {"weights": Status.BAD_BANK, "model": Status.BAD_MODEL}
 SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}  # what a form's init fills in
-# Of the engine: tests/core/test_fourier_valid_q31.py, tests/unit/test_fourier.c.
+# Of the engine: tests/core/test_weak_valid_q31.py, tests/unit/test_weak.c.
 ELSEWHERE = {"design", "refine", "range", "drive_min", "offset"}
 UNUSED = {
     "strong": SET_BY_INIT,
@@ -324,9 +324,9 @@ def estimator_of_rows(native: Native) -> Stepper:
 
 
 @cache
-def _fixed() -> FourierNativeQ31:
+def _fixed() -> WeakNativeQ31:
     engine = engine_for_simulated_rig(compiled_of("kapitza"))
-    return fourier_native_q31(engine.made, engine.parameters, engine.config)
+    return weak_native_q31(engine.made, engine.parameters, engine.config)
 
 
 def fixed_identifier() -> Stepper:

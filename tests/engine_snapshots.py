@@ -87,13 +87,13 @@ class Copied:
 
     Attributes
     ----------
-    pointer : pvid_fourier_config_<core> *
+    pointer : pvid_weak_config_<core> *
     numbers : every number of it, of its design, its model and their tables that a snapshot depends on
     """
 
     def __init__(self, ffi: Any, core: str, config: Any) -> None:
         self._ffi, self._lengths, self._not_read = ffi, _LENGTHS[core], _NOT_READ[core]
-        self.pointer = ffi.new(f"pvid_fourier_config_{core} *", config)
+        self.pointer = ffi.new(f"pvid_weak_config_{core} *", config)
         self._owners: list[Any] = []
         self.numbers: list[Scalar] = []
         self._model = config.design.model
@@ -144,12 +144,12 @@ class Engine:
 
     Parameters
     ----------
-    config : pvid_fourier_config_<core> *
+    config : pvid_weak_config_<core> *
     """
 
     def __init__(self, ffi: Any, library: Any, core: str, config: Any) -> None:
         self.ffi, self._library, self._core, self.config = ffi, library, core, config
-        self.type = f"pvid_fourier_{core}"
+        self.type = f"pvid_weak_{core}"
         self.state = ffi.new(f"{self.type} *")
         self._image = ffi.new("uint8_t[]", ffi.sizeof(self.type) + HEADER + CHECKSUM)
         self._owner: Copied | None = None
@@ -161,7 +161,7 @@ class Engine:
     def initialise(self) -> None:
         """Of memory that contains anything."""
         self.memory[:] = b"\xa5" * len(self.memory)
-        assert self._call("fourier_init", self.config) == 0
+        assert self._call("weak_init", self.config) == 0
 
     @property
     def memory(self) -> Any:
@@ -172,16 +172,16 @@ class Engine:
         """Steps through samples [ticks, samples] of the core's type; returns the reasons."""
         whole = np.ascontiguousarray(samples)
         kind = "const float *" if self._core == "f32" else "const int32_t *"
-        return [self._call("fourier_step", self.ffi.cast(kind, tick.ctypes.data)) for tick in whole]
+        return [self._call("weak_step", self.ffi.cast(kind, tick.ctypes.data)) for tick in whole]
 
     def save(self) -> bytes:
         """A snapshot."""
-        n = self._call("snapshot_save_fourier", self.config, 1, self._image, len(self._image))
+        n = self._call("snapshot_save_weak", self.config, 1, self._image, len(self._image))
         return bytes(self.ffi.buffer(self._image, n))
 
     def restore(self, image: bytes) -> SnapshotStatus:
         """Restores it."""
-        return SnapshotStatus(self._call("snapshot_restore_fourier", self.config, image, len(image)))
+        return SnapshotStatus(self._call("snapshot_restore_weak", self.config, image, len(image)))
 
     def copied(self) -> Copied:
         """Gives it a configuration that may be changed."""

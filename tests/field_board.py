@@ -21,8 +21,8 @@ import numpy as np
 
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number
-from pvid.codegen.fourier_library import fourier_native
-from pvid.core.fourier_native import FourierIdentifier
+from pvid.codegen.weak_library import weak_native
+from pvid.core.weak_native import WeakIdentifier
 from pvid.link import frames as link
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -83,7 +83,7 @@ def hello(session: int = 7, **values: Any) -> link.Hello:
     """Who it is."""
     own, n_p = rig().sensor, len(board().p_names)
     said: dict[str, Any] = {
-        "form": int(link.Form.FOURIER),
+        "form": int(link.Form.WEAK),
         "core": int(link.Core.F32),
         "n_p": n_p,
         "window": 256,
@@ -98,7 +98,7 @@ def hello(session: int = 7, **values: Any) -> link.Hello:
     return link.Hello(**{**said, **values})
 
 
-def estimate_of(identifier: FourierIdentifier, session: int, reason: int) -> link.Estimate:
+def estimate_of(identifier: WeakIdentifier, session: int, reason: int) -> link.Estimate:
     """What a board reports of it."""
     published = identifier.estimate
     return link.Estimate(
@@ -119,7 +119,7 @@ def messages(field: Field, session: int = 7) -> Iterator[tuple[int, link.Message
     settings = _settings()
     configure = own.configure(settings, field.hash_every, field.estimate_every, first_tick=field.first_tick)
     configure = replace(configure, session=session)
-    identifier = fourier_native(own.compiled, own.config.design).identifier_of(own.config)
+    identifier = weak_native(own.compiled, own.config.design).identifier_of(own.config)
     samples = own.readings(run.y[: field.ticks], run.phi[: field.ticks])
     verdict = int(Reason.WARMING_UP)
     sample_hash = fnv.START

@@ -345,17 +345,17 @@ PROOFS = (
         ("-eva-auto-loop-unroll", "1100", "-eva-min-loop-unroll", "13"),
     ),
     Proof(
-        "fourier_front_q31",
+        "weak_front_q31",
         "the weak engine's front end, the pendulum's design: any counts within full scale, three times round the line",
         ("src/number/integer_q31.c",),
         ("-eva-min-loop-unroll", "60"),
-        taken=("pvid_fourier_count_q31",),
+        taken=("pvid_weak_count_q31",),
     ),
     Proof(
-        "fourier_sums_q31",
+        "weak_sums_q31",
         "the same design: any jets within their reach through a half, its channels, any sums of them, a joined window",
         (
-            *("src/fourier/values_q31.c", "src/fourier/sums_q31.c", "src/number/integer_q31.c"),
+            *("src/weak/values_q31.c", "src/weak/sums_q31.c", "src/number/integer_q31.c"),
             *("src/number/scaled_q31.c", "src/number/elementary_q31.c"),
         ),
         ("-eva-min-loop-unroll", "100"),
@@ -370,7 +370,7 @@ PROOFS = (
         "snapshot_q31",
         "states of all forms saved into any room, any bytes of any length restored; their pointers stay",
         (
-            "src/keep/snapshot_fourier_q31.c",
+            "src/keep/snapshot_weak_q31.c",
             "src/keep/snapshot_strong_q31.c",
             "src/keep/snapshot.c",
             "src/keep/crc32.c",
@@ -378,8 +378,8 @@ PROOFS = (
         ),
         ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
         taken=(
-            *("pvid_fingerprint_strong_q31", "pvid_fingerprint_fourier_q31"),
-            *("pvid_fingerprint_fourier_model_q31", "pvid_fingerprint_fourier_design_q31"),
+            *("pvid_fingerprint_strong_q31", "pvid_fingerprint_weak_q31"),
+            *("pvid_fingerprint_weak_model_q31", "pvid_fingerprint_weak_design_q31"),
         ),
     ),
     Proof(
@@ -426,13 +426,13 @@ def unexplained(proof: Proof, said: str) -> list[str]:
 
 def engine_design(folder: Path) -> None:
     """Writes engine_design_q31.h: functions and tables of the pendulum's shipped rig, the reach of its jets."""
-    from pvid.codegen import files_fourier_q31
+    from pvid.codegen import files_weak_q31
     from pvid.models.mechanisms import compiled_of
     from pvid.run.engine_design_q31 import engine_for_simulated_rig
 
     engine = engine_for_simulated_rig(compiled_of("kapitza"))
     name, made_by = engine.name, "tools/prove.py"
-    text = files_fourier_q31.source(engine.made, engine.parameters, made_by)
+    text = files_weak_q31.source(engine.made, engine.parameters, made_by)
     reach = re.search(r"limits\[\d+\] = (\{[^}]*\})", text)
     assert reach is not None, "the generated function refuses no input"
     sizes = {"PVID_MAX_P": 3}  # those of the proofs are the defaults
@@ -441,8 +441,8 @@ def engine_design(folder: Path) -> None:
         f"static const int32_t engine_reach[] = {reach[1]};",
     ]
     files = {
-        f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, made_by),
-        f"{name}_design_q31.h": files_fourier_q31.design_header(engine.config, name, sizes, made_by, []),
+        f"{name}_weak_q31.h": files_weak_q31.header(engine.made, sizes, made_by),
+        f"{name}_design_q31.h": files_weak_q31.design_header(engine.config, name, sizes, made_by, []),
         "engine_design_q31.h": "\n".join([text, f'#include "{name}_design_q31.h"', *own, ""]),
     }
     for file, content in files.items():

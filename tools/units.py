@@ -104,7 +104,7 @@ def applications(machine: str) -> list[Unit]:
             if first:
                 found += _units(machine, [stream / "answers.c", stream / "sensor.c"], *kind)
                 engine = (RIG, board, "-DSTREAM_CORE=0", "-DSTREAM_FORM=2")
-                found += _units(machine, [stream / "identifier_fourier_f32.c", stream / "sensor_recording.c"], *engine)
+                found += _units(machine, [stream / "identifier_weak_f32.c", stream / "sensor_recording.c"], *engine)
     return found
 
 

@@ -178,8 +178,7 @@
 
 /* Hello.form */
 #define PVID_FORM_STRONG 0u
-#define PVID_FORM_WEAK 1u
-#define PVID_FORM_FOURIER 2u
+#define PVID_FORM_WEAK 2u
 
 /* Hello.core */
 #define PVID_CORE_F32 0u

@@ -39,17 +39,17 @@ void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_sa
     }
 }
 
-void pvid_replay_both_stages_f32(pvid_fourier_f32 *self, uint32_t ticks, const float samples[], uint8_t told[],
+void pvid_replay_both_stages_f32(pvid_weak_f32 *self, uint32_t ticks, const float samples[], uint8_t told[],
                                  float weak_p[], float weak_se[], float r[], float se[], uint32_t *running_hash,
                                  uint32_t hash[])
 {
     const uint32_t n_samples = self->design->model->samples;
     const pvid_refine_f32 *refinement = self->refine->storage;
     for (uint32_t tick = 0; tick < ticks; tick++) {
-        const pvid_reason reason = pvid_fourier_step_f32(self, &samples[(size_t)tick * n_samples]);
+        const pvid_reason reason = pvid_weak_step_f32(self, &samples[(size_t)tick * n_samples]);
         if ((weak_p != NULL) &&
             ((reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN))) {
-            const pvid_estimate_f32 *estimate = pvid_fourier_candidate_f32(self);
+            const pvid_estimate_f32 *estimate = pvid_weak_candidate_f32(self);
             memcpy(&weak_p[(size_t)tick * PVID_REFINE_P], estimate->p, PVID_REFINE_P * sizeof weak_p[0]);
             memcpy(&weak_se[(size_t)tick * PVID_REFINE_P], estimate->se, PVID_REFINE_P * sizeof weak_se[0]);
         }

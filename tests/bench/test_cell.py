@@ -9,7 +9,7 @@ from conftest import ROOT
 from bench import cell
 from bench.replay import Replay
 from pvid.models.mechanisms import compiled_of
-from pvid.oracle.fourier.identify import identify
+from pvid.oracle.weak.identify import identify
 from pvid.rig.columns import Columns
 from pvid.rig.run import read_recording
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 import pytest
-from fourier_rig import assert_equals_the_twin
+from weak_rig import assert_equals_the_twin
 
 from bench.board_engine import FloatBoard
 from bench.hard import CASES, HEADER, LARGEST, ZERO, Case, Outcome, modes, row, run_case

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from fourier_rig import assert_equals_the_twin
 from lanes import assert_lanes_equal
+from weak_rig import assert_equals_the_twin
 
 from bench import longevity, longevity_tables
 from bench.longevity import (

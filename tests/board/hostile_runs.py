@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core import snapshot
 from pvid.core.native import Identifier, Native, Publisher
 from pvid.models.mechanisms import compiled_of
@@ -131,10 +131,10 @@ def play_all(native: Native) -> int:
     y, phi = engine.counts_of({"phi": run.phi[:TICKS], "y": run.y[:TICKS]}).T
     for in_float, in_fixed in WEAK:
         own = replace(config, estimator=replace(config.estimator, **in_float), range=None)
-        identifier = fourier_native(compiled, config.design).identifier_of(own)
+        identifier = weak_native(compiled, config.design).identifier_of(own)
         done += play_engine(identifier, identifier.run_samples, float_samples(run))
         of_counts = replace(engine.config, estimator=replace(engine.config.estimator, **in_fixed))
-        counting = fourier_native_q31(engine.made, engine.parameters, of_counts).identifier()
+        counting = weak_native_q31(engine.made, engine.parameters, of_counts).identifier()
         done += play_engine(counting, counting.run_samples, count_samples(phi, y, 2**12, 2**13))
     return done
 

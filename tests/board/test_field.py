@@ -21,7 +21,7 @@ from pvid.board.replay_image import standard_run
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig
 from pvid.board.target import HOST_TARGET, Target, open_target
-from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.weak_library import weak_native
 from pvid.core.native import Native
 from pvid.link.frames import SCHEMA_TEXT, Core, Source, encode
 from pvid.link.port import Port
@@ -109,7 +109,7 @@ def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target) 
     assert isinstance(board, MechanismBoard)
     record = collect(host_target, TICKS, begin=board)
     tick = max(record.estimates)
-    identifier = fourier_native(board.compiled, board.config.design).identifier_of(board.config)
+    identifier = weak_native(board.compiled, board.config.design).identifier_of(board.config)
     identifier.run_samples(board.readings(*record.samples(0, tick)))
     last, estimate = identifier.published, record.estimates[tick]
     assert last is not None

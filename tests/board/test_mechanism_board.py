@@ -16,7 +16,7 @@ from pvid.board.field import collect
 from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.stream_image import settings_number
 from pvid.board.target import HOST_TARGET, judge, open_target, verify
-from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.weak_library import weak_native
 from pvid.core.native import Native
 from pvid.link.frames import Code, Estimate, Form, Raw, Source
 from pvid.log.export import export_log
@@ -81,9 +81,9 @@ def test_text_that_is_damaged_is_refused(motor: MechanismBoard) -> None:
 def test_a_board_computes_the_bits_of_this_machine(motor: MechanismBoard, target: str) -> None:
     with open_target(target, motor) as opened:
         record = collect(opened, TICKS, begin=motor, hash_every=500, estimate_every=1000)
-    identifier = fourier_native(motor.compiled, motor.config.design).identifier_of(motor.config)
+    identifier = weak_native(motor.compiled, motor.config.design).identifier_of(motor.config)
     own = identifier.run_samples(motor.recording)
-    assert record.hello is not None and (record.hello.form, record.hello.samples) == (Form.FOURIER, 3)
+    assert record.hello is not None and (record.hello.form, record.hello.samples) == (Form.WEAK, 3)
     assert record.status is not None and record.status.code == Code.RUNNING and record.gaps == []
     sent = np.concatenate([record.raw[first] for first in sorted(record.raw)])
     assert np.array_equal(sent[:TICKS], motor.recording)

@@ -15,7 +15,7 @@ from pvid.board.mechanism_board import board_of
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.stream_image import settings_number
 from pvid.board.target import HOST_TARGET, open_target
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.link.frames import Code, Core, EstimateQ31, Form, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader
@@ -54,8 +54,8 @@ def test_a_board_computes_the_bits_of_this_machine(pendulum: MechanismBoardQ31, 
     with open_target(target, pendulum) as opened:
         record = collect(opened, TICKS, begin=pendulum, hash_every=600, estimate_every=1200)
     engine = pendulum.engine
-    own = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier().run_samples(pendulum.recording)
-    assert record.hello is not None and (record.hello.form, record.hello.core) == (Form.FOURIER, Core.Q31)
+    own = weak_native_q31(engine.made, engine.parameters, engine.config).identifier().run_samples(pendulum.recording)
+    assert record.hello is not None and (record.hello.form, record.hello.core) == (Form.WEAK, Core.Q31)
     assert record.status is not None and record.status.code == Code.RUNNING and record.gaps == []
     sent = np.concatenate([record.raw[first] for first in sorted(record.raw)])
     assert np.array_equal(sent[:TICKS], pendulum.recording)

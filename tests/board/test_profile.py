@@ -29,7 +29,7 @@ def test_the_functions_add_up_to_the_measured_mean(profiles: dict[str, Profile],
 @pytest.mark.parametrize("form", FORMS)
 def test_only_what_a_tick_calls_is_counted(profiles: dict[str, Profile], form: str) -> None:
     names = {name for name, _ in profiles[form].functions}
-    of = {"weak": "fourier"}.get(form, form)
+    of = {"weak": "weak"}.get(form, form)
     assert f"pvid_{of}_step_f32" in names
     assert not names & {"main", "pvid_port_instructions", "pvid_fnv_estimator_f32", f"pvid_{of}_init_f32"}
 

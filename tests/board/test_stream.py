@@ -27,7 +27,7 @@ from pvid.board.mechanism_image_q31 import fixed_run
 from pvid.board.replay_image import SAMPLING, ReplayRun, native_hashes, standard_run
 from pvid.board.stream_rig import StreamRig
 from pvid.board.target import HOST_TARGET, Playback, Target, judge, open_target, play, verify
-from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.weak_library import weak_native
 from pvid.core.native import Native
 from pvid.link.frames import Estimate, upper_triangle
 from pvid.link.port import Port
@@ -154,7 +154,7 @@ def test_a_long_run_stays_equal_on_two_boards_at_once(core: str, native: Native)
 
 def test_the_last_estimate_is_the_published_one_of_the_core() -> None:
     board, signals = weak_board(), standard("weak").signals
-    identifier = fourier_native(board.compiled, board.config.design).identifier_of(board.config)
+    identifier = weak_native(board.compiled, board.config.design).identifier_of(board.config)
     identifier.run_samples(np.stack(signals, axis=1))
     last = identifier.published
     assert last is not None

@@ -23,8 +23,8 @@ from pvid.run.engine_design import config_to_identify
 from pvid.run.mechanism import identify_mechanism
 from pvid.run.mechanism_core import identify_in_c
 from pvid.settings.enums import Reason
-from pvid.settings.fourier import FourierConfig
-from pvid.twin.fourier import FourierTwin
+from pvid.settings.weak import WeakConfig
+from pvid.twin.weak import WeakTwin
 
 
 def pvid(*arguments: str | Path) -> Result:
@@ -101,7 +101,7 @@ def test_where_the_core_publishes_nothing_the_values_are_null(
 ) -> None:
     """Standard errors of a millionth are the limit of publication."""
 
-    def strict(*given: Any) -> FourierConfig:
+    def strict(*given: Any) -> WeakConfig:
         config = config_to_identify(*given)
         return replace(config, trust=replace(config.trust, se_max=1e-6))
 
@@ -118,8 +118,8 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     answer = pvid("compare", recorded["dc_motor"], "--core", "all")
     assert answer.return_value == DONE and answer.stdout.count("equal") == 2 and "6000" in answer.stdout
     assert "f32" in answer.stdout and "q31" in answer.stdout
-    changed = "pvid.run.mechanism_compare.FourierTwin"
-    monkeypatch.setattr(changed, lambda config: FourierTwin(replace(config, iterations=1)))
+    changed = "pvid.run.mechanism_compare.WeakTwin"
+    monkeypatch.setattr(changed, lambda config: WeakTwin(replace(config, iterations=1)))
     answer = pvid("compare", recorded["dc_motor"])
     assert answer.return_value == DIFFERENT
     assert "DIFFERENT: tick" in " ".join(answer.stdout.split())

@@ -80,8 +80,8 @@ def test_program_identifies_the_standard_rig(program: Path, truth: Truth, larges
 def compile_as_cpp(source: str, standard: str, folder: Path) -> None:
     (folder / "example.cpp").write_text(source, encoding="utf-8")
     declared = (
-        '#include "pvid/fourier.h"\n#define KAPITZA_WEAK_SAMPLES 2\n'
-        'extern "C" const pvid_fourier_config_f32 kapitza_config_f32;\n'
+        '#include "pvid/weak.h"\n#define KAPITZA_WEAK_SAMPLES 2\n'
+        'extern "C" const pvid_weak_config_f32 kapitza_config_f32;\n'
     )
     (folder / "kapitza_design_f32.h").write_text(declared, encoding="utf-8")
     command = ["g++", f"-std={standard}", "-fsyntax-only", "-Wall"]

@@ -19,7 +19,7 @@ from pvid.core.sources import source
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.run.engine_design import config_for_simulated_rig
-from pvid.setup.fourier_sizes import sizes_of_design
+from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
 
 USER = """
@@ -59,19 +59,19 @@ target_link_libraries(user PRIVATE rigid_body)
 WEAK_PROGRAM = """
 #include <stdio.h>
 #include "rigid_body_design_f32.h"
-static pvid_fourier_f32 identifier;
+static pvid_weak_f32 identifier;
 int main(int count, char **names)
 {
     float sample[RIGID_BODY_WEAK_SAMPLES];
     FILE *file = fopen(names[count - 1], "rb");
-    if (pvid_fourier_init_f32(&identifier, &rigid_body_config_f32) != PVID_OK) {
+    if (pvid_weak_init_f32(&identifier, &rigid_body_config_f32) != PVID_OK) {
         return 1;
     }
     while (fread(sample, sizeof sample, 1, file) == 1) {
-        (void)pvid_fourier_step_f32(&identifier, sample);
+        (void)pvid_weak_step_f32(&identifier, sample);
     }
     for (int k = 0; k < RIGID_BODY_WEAK_P; k++) {
-        printf("%.9g ", (double)pvid_fourier_estimate_f32(&identifier)->p[k]);
+        printf("%.9g ", (double)pvid_weak_estimate_f32(&identifier)->p[k]);
     }
     return 0;
 }

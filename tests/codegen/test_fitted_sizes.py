@@ -10,26 +10,26 @@ import pytest
 
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_image import mechanism_run
-from pvid.codegen import files_fourier
+from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes
-from pvid.codegen.fourier import fourier_functions_of
-from pvid.codegen.fourier_library import fourier_native
-from pvid.core.fourier_native import FourierNative
+from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.weak_library import weak_native
 from pvid.core.model_library import model_library
+from pvid.core.weak_native import WeakNative
 from pvid.settings.enums import Reason
-from pvid.setup.fourier_sizes import sizes_of_model
+from pvid.setup.weak_sizes import sizes_of_model
 
 RUN = mechanism_run("kapitza")
 
 
 @cache
-def fitted() -> FourierNative:
-    made, model = fourier_functions_of(RUN.compiled), RUN.config.design.model
+def fitted() -> WeakNative:
+    made, model = weak_functions_of(RUN.compiled), RUN.config.design.model
     texts = {
-        f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), "test"),
-        f"{made.name}_weak_f32.c": files_fourier.source(made, model, "test"),
+        f"{made.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), "test"),
+        f"{made.name}_weak_f32.c": files_weak.source(made, model, "test"),
     }
-    return FourierNative(made.name, model_library(made.name, texts, fitted_sizes(RUN.config)))
+    return WeakNative(made.name, model_library(made.name, texts, fitted_sizes(RUN.config)))
 
 
 def test_a_window_and_a_block_share_places_where_there_is_time() -> None:
@@ -46,7 +46,7 @@ def test_the_bits_are_those_of_a_roomy_build_with_samples_missing_anywhere() -> 
     random = np.random.default_rng(5)
     for gap in np.cumsum(2 * period + random.integers(0, period // 4, 5)):
         samples[gap] = np.nan
-    roomy = fourier_native(RUN.compiled, RUN.config.design).identifier_of(RUN.config).run_samples(samples)
+    roomy = weak_native(RUN.compiled, RUN.config.design).identifier_of(RUN.config).run_samples(samples)
     found = fitted().identifier_of(RUN.config).run_samples(samples)
     assert np.array_equal(found.hash, roomy.hash)
     assert np.array_equal(found.reason, roomy.reason)

@@ -5,21 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from pvid.codegen import files_design, files_fourier
-from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
-from pvid.codegen.fourier_twin import fourier_model_of
-from pvid.core.fourier_native import FourierNative
+from pvid.codegen import files_design, files_weak
+from pvid.codegen.weak import WeakFunctions, weak_functions_of
+from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.model_library import model_library
 from pvid.core.sizes import raised
+from pvid.core.weak_native import WeakNative
 from pvid.models import mechanisms
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import WeakRows
-from pvid.settings.fourier import FourierConfig, FourierModel
-from pvid.setup.fourier import config_of, design_tables, for_engine
-from pvid.setup.fourier_sizes import sizes_of_design
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.rows import WeakRows
+from pvid.settings.weak import WeakConfig, WeakModel
+from pvid.setup.weak import config_of, design_tables, for_engine
+from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
 
 NAMES = mechanisms.names()
@@ -36,12 +36,12 @@ class WeakForm:
     config : the tables, and settings
     """
 
-    made: FourierFunctions
-    model: FourierModel
+    made: WeakFunctions
+    model: WeakModel
     run: dict[str, Float]
     rows: WeakRows
     truth: Float
-    config: FourierConfig
+    config: WeakConfig
 
     @property
     def files(self) -> dict[str, str]:
@@ -49,8 +49,8 @@ class WeakForm:
         name, needed = self.made.name, sizes_of_design(self.config.design)
         title, units = self.made.model.title, self.made.model.p_names
         return {
-            f"{name}_weak.h": files_fourier.header(self.made, self.model, needed, "test"),
-            f"{name}_weak_f32.c": files_fourier.source(self.made, self.model, "test"),
+            f"{name}_weak.h": files_weak.header(self.made, self.model, needed, "test"),
+            f"{name}_weak_f32.c": files_weak.source(self.made, self.model, "test"),
             f"{name}_design_f32.h": files_design.header(self.config, needed, "test", title, units),
         }
 
@@ -62,12 +62,12 @@ def weak_form(name: str) -> WeakForm:
     simulation = RigSimulation.of(compiled, rig)
     run = simulation.run()
     model = ready(compiled)
-    design = for_engine(FourierDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
+    design = for_engine(WeakDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
     rows = WeakRows.of(model, run, design)
-    tables = design_tables(fourier_model_of(compiled), rows, simulation.truth)
+    tables = design_tables(weak_model_of(compiled), rows, simulation.truth)
     return WeakForm(
-        fourier_functions_of(compiled),
-        fourier_model_of(compiled),
+        weak_functions_of(compiled),
+        weak_model_of(compiled),
         run,
         rows,
         simulation.truth,
@@ -83,9 +83,9 @@ def sizes_of_all() -> dict[str, int]:
 
 
 @cache
-def native(name: str) -> FourierNative:
+def native(name: str) -> WeakNative:
     """A mechanism in the library of all."""
     texts = {
         file: text for one in NAMES for file, text in weak_form(one).files.items() if not file.endswith("_design_f32.h")
     }
-    return FourierNative(name, model_library("all", texts, raised(sizes_of_all())))
+    return WeakNative(name, model_library("all", texts, raised(sizes_of_all())))

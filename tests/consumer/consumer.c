@@ -9,7 +9,7 @@
 #include "pvid/pvid.h"
 
 static struct {
-    pvid_fourier_f32 identifier;
+    pvid_weak_f32 identifier;
     unsigned char after[64];
 } guarded;
 
@@ -42,22 +42,22 @@ int main(void)
         fprintf(stderr, "header %s, package %s\n", version, package_version());
         return 1;
     }
-    const pvid_fourier_design_f32 design = design_of(&mechanism);
-    const pvid_fourier_config_f32 config = config_of(&design);
+    const pvid_weak_design_f32 design = design_of(&mechanism);
+    const pvid_weak_config_f32 config = config_of(&design);
     memset(&guarded, 0xA5, sizeof guarded);
-    const pvid_status status = pvid_fourier_init_f32(&guarded.identifier, &config);
+    const pvid_status status = pvid_weak_init_f32(&guarded.identifier, &config);
     if (status != PVID_OK) {
         fprintf(stderr, "init: status %d\n", (int)status);
         return 1;
     }
     if (!layouts_agree()) {
-        fprintf(stderr, "library and header disagree on the size of pvid_fourier_f32\n");
+        fprintf(stderr, "library and header disagree on the size of pvid_weak_f32\n");
         return 1;
     }
     uint32_t hash = 0x811C9DC5u;
     for (int tick = 0; tick < 2000; tick++) {
         const float sample[2] = {0.1f * (float)((tick * 13) % 97 - 48), 0.01f * (float)((tick * 29) % 89 - 44)};
-        const pvid_reason reason = pvid_fourier_step_f32(&guarded.identifier, sample);
+        const pvid_reason reason = pvid_weak_step_f32(&guarded.identifier, sample);
         hash = pvid_fnv_estimator_f32(hash, &guarded.identifier.estimator, reason);
     }
     printf("version %s harmonics %d hash %08lx\n", version, PVID_MAX_HARMONICS, (unsigned long)hash);

@@ -1,10 +1,10 @@
 // The headers from C++, each by itself and before the others, and the C library behind them.
 // Prints "version MAJOR.MINOR.PATCH harmonics PVID_MAX_HARMONICS".
-#include "pvid/fourier.h"
+#include "pvid/weak.h"
 
 #include "pvid/strong.h"
 
-#include "pvid/fourier_q31.h"
+#include "pvid/weak_q31.h"
 
 #include "pvid/strong_q31.h"
 
@@ -20,9 +20,9 @@
 namespace
 {
 
-pvid_fourier_f32 weak;
+pvid_weak_f32 weak;
 pvid_strong_f32 strong;
-pvid_fourier_q31 weak_integers;
+pvid_weak_q31 weak_integers;
 pvid_strong_q31 strong_integers;
 
 } // namespace
@@ -31,17 +31,17 @@ int main()
 {
     // Linking is half of the test: without C linkage these are other names than the library's. Empty configurations
     // are refused.
-    pvid_fourier_config_f32 weak_config{};
+    pvid_weak_config_f32 weak_config{};
     weak_config.estimator = pvid_estimator_defaults_f32;
     pvid_strong_config_f32 strong_config{};
     strong_config.estimator = pvid_estimator_defaults_f32;
-    const pvid_fourier_config_q31 weak_config_q31{};
+    const pvid_weak_config_q31 weak_config_q31{};
     const pvid_strong_config_q31 strong_config_q31{};
-    if (pvid_fourier_init_q31(&weak_integers, &weak_config_q31) == PVID_OK ||
+    if (pvid_weak_init_q31(&weak_integers, &weak_config_q31) == PVID_OK ||
         pvid_strong_init_q31(&strong_integers, &strong_config_q31) == PVID_OK) {
         return 1;
     }
-    if (pvid_fourier_init_f32(&weak, &weak_config) == PVID_OK ||
+    if (pvid_weak_init_f32(&weak, &weak_config) == PVID_OK ||
         pvid_strong_init_f32(&strong, &strong_config) == PVID_OK || pvid_arithmetic_faults_f32() != 0) {
         return 1;
     }

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from fourier_rig import engine_rig
 from lanes import assert_lanes_equal
+from weak_rig import engine_rig
 
 from pvid.base.errors import PvidError
 from pvid.cases import CASES, Case
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core.native import Native
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
@@ -68,7 +68,7 @@ def in_fixed_point(dead_zone: float) -> Played:
     engine, rig = engine_for_simulated_rig(compiled_of("kapitza")), engine_rig("kapitza")
     estimator = replace(engine.config.estimator, dead_zone=round(dead_zone * 2**16))
     config = replace(engine.config, estimator=estimator)
-    core = fourier_native_q31(engine.made, engine.parameters, config).identifier()
+    core = weak_native_q31(engine.made, engine.parameters, config).identifier()
     samples = dict(zip(engine.sample_names, rig.samples.T, strict=True))
     record = core.run_samples(engine.counts_of(samples), hashes=False)
     return engine.values(record.p[-1]), engine.values(core.estimate["se"][:4]), core.counters

@@ -1,6 +1,6 @@
 """A frozen identifier of the strong form takes nothing in, and goes on without a bump: the bits of the twin, the state.
 
-The weak form: tests/unit/test_fourier.c and test_fourier_q31.c, tests/twin/test_fourier_f32.py.
+The weak form: tests/unit/test_weak.c and test_weak_q31.c, tests/twin/test_weak_f32.py.
 """
 
 from __future__ import annotations

@@ -12,18 +12,18 @@ import pytest
 
 from pvid.base.errors import PvidError
 from pvid.core import model_library
-from pvid.core.fourier_native import FourierNative
 from pvid.core.sizes import default_sizes, least_sizes, raised, smallest
 from pvid.core.sources import FIRMWARE, PUBLIC_INCLUDES
+from pvid.core.weak_native import WeakNative
 
 MODEL = """
 #include <stddef.h>
-#include "pvid/fourier.h"
-extern const pvid_fourier_model_f32 tiny_fourier_f32;
+#include "pvid/weak.h"
+extern const pvid_weak_model_f32 tiny_weak_f32;
 static void values(const float in[], float out[]) {{ out[0] = {factor} * in[0]; }}
-const pvid_fourier_model_f32 tiny_fourier_f32 = {{.samples = 1, .jets = 1, .gains = 1, .values = values}};
+const pvid_weak_model_f32 tiny_weak_f32 = {{.samples = 1, .jets = 1, .gains = 1, .values = values}};
 """
-HEADER = '#include "pvid/fourier.h"\nextern const pvid_fourier_model_f32 tiny_fourier_f32;\n'
+HEADER = '#include "pvid/weak.h"\nextern const pvid_weak_model_f32 tiny_weak_f32;\n'
 
 
 def texts(factor: str) -> dict[str, str]:
@@ -49,8 +49,8 @@ def test_it_is_compiled_once_for_the_same_content() -> None:
     assert other != first
     wider = model_library.model_library("tiny", texts("2.0f"), {"PVID_MAX_P": 8})
     assert wider not in (first, other)
-    assert np.array_equal(FourierNative("tiny", first).values([[1.5]]), [[3.0]])
-    assert FourierNative("tiny", wider).headers.ffi.sizeof("pvid_estimate_f32") > FourierNative(
+    assert np.array_equal(WeakNative("tiny", first).values([[1.5]]), [[3.0]])
+    assert WeakNative("tiny", wider).headers.ffi.sizeof("pvid_estimate_f32") > WeakNative(
         "tiny", first
     ).headers.ffi.sizeof("pvid_estimate_f32")
 

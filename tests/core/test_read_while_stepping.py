@@ -14,7 +14,7 @@ from pvid.board.boards import BOARDS, BUILD, build, run
 from pvid.core.sources import INCLUDES, core_sources, source
 
 PROGRAM = ROOT / "tests" / "threads" / "read_while_stepping.c"
-ROOMS = ("number", "solve", "judge", "fourier")
+ROOMS = ("number", "solve", "judge", "weak")
 TIMEOUT_S = 40.0
 
 

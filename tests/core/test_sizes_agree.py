@@ -43,31 +43,31 @@ LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
 
 # The first call of each kind of application; the last one represents files without an init.
 FUNCTIONS = (
-    "pvid_fourier_init_f32",
+    "pvid_weak_init_f32",
     "pvid_strong_init_f32",
-    "pvid_fourier_init_q31",
+    "pvid_weak_init_q31",
     "pvid_strong_init_q31",
     "pvid_estimator_init_f32",
     "pvid_estimator_init_q31",
-    "pvid_fourier_estimate_f32",
+    "pvid_weak_estimate_f32",
 )
 USER = """#include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
-static pvid_fourier_f32 fourier; static pvid_fourier_config_f32 fourier_config;
+static pvid_weak_f32 weak; static pvid_weak_config_f32 weak_config;
 static pvid_strong_f32 strong; static pvid_strong_config_f32 strong_config;
-static pvid_fourier_q31 fourier_q31; static pvid_fourier_config_q31 fourier_config_q31;
+static pvid_weak_q31 weak_q31; static pvid_weak_config_q31 weak_config_q31;
 static pvid_strong_q31 strong_q31; static pvid_strong_config_q31 strong_config_q31;
 static pvid_estimator_f32 estimator; static pvid_estimator_config_f32 estimator_config;
 static pvid_estimator_q31 estimator_q31; static pvid_estimator_config_q31 estimator_config_q31;
 int main(void)
 {
-    (void)pvid_fourier_init_f32(&fourier, &fourier_config);
+    (void)pvid_weak_init_f32(&weak, &weak_config);
     (void)pvid_strong_init_f32(&strong, &strong_config);
-    (void)pvid_fourier_init_q31(&fourier_q31, &fourier_config_q31);
+    (void)pvid_weak_init_q31(&weak_q31, &weak_config_q31);
     (void)pvid_strong_init_q31(&strong_q31, &strong_config_q31);
     (void)pvid_estimator_init_f32(&estimator, &estimator_config);
     (void)pvid_estimator_init_q31(&estimator_q31, &estimator_config_q31);
-    return (pvid_fourier_estimate_f32(&fourier) != 0) ? 0 : 1;
+    return (pvid_weak_estimate_f32(&weak) != 0) ? 0 : 1;
 }
 """
 

@@ -1,5 +1,5 @@
 """Saved and restored identifiers of the strong form continue bit for bit; a configuration that differs in any field is
-refused. The weak form: test_snapshot_fourier.py."""
+refused. The weak form: test_snapshot_weak.py."""
 
 from __future__ import annotations
 

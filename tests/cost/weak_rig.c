@@ -5,16 +5,16 @@
 
 #include "pendulum/kapitza_design_f32.h"
 
-static pvid_fourier_f32 identifier;
+static pvid_weak_f32 identifier;
 
 void weak_rig_prepare(float (*noise)(void))
 {
-    pvid_fourier_config_f32 config = kapitza_config_f32;
+    pvid_weak_config_f32 config = kapitza_config_f32;
     config.drive_min = NULL; /* every window is worked off */
     config.range = NULL;
     config.estimator.forgetting_s = 7.4f; /* 9.6 windows: a fold at every one */
     config.estimator.kappa_min = 0.0f;
-    if (pvid_fourier_init_f32(&identifier, &config) != PVID_OK) {
+    if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) {
         exit(2);
     }
     const uint32_t period = (uint32_t)kapitza_design_f32.decimation * kapitza_design_f32.hop;
@@ -26,5 +26,5 @@ void weak_rig_prepare(float (*noise)(void))
 void weak_rig_tick(float phi, float y)
 {
     const float sample[KAPITZA_WEAK_SAMPLES] = {y, phi};
-    (void)pvid_fourier_step_f32(&identifier, sample);
+    (void)pvid_weak_step_f32(&identifier, sample);
 }

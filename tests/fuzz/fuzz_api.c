@@ -14,11 +14,11 @@
 #include "pendulum/kapitza_design_f32.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
-#include "pvid/snapshot_fourier_q31.h"
+#include "pvid/snapshot_weak_q31.h"
 #include "strong_table_q31.h"
 
 #define LAST_REASON PVID_NOT_READY
-#define ROOM ((size_t)PVID_SNAPSHOT_FOURIER_F32 + (size_t)PVID_SNAPSHOT_FOURIER_Q31)
+#define ROOM ((size_t)PVID_SNAPSHOT_WEAK_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
 #define MOST_TOLD 20u
 
 static struct {
@@ -146,13 +146,13 @@ static void spoil_estimator_q31(pvid_estimator_config_q31 *config)
 /* ---- weak, float32 ---- */
 
 static struct {
-    pvid_fourier_f32 self;
-    pvid_fourier_config_f32 config;
-    pvid_fourier_design_f32 design;
+    pvid_weak_f32 self;
+    pvid_weak_config_f32 config;
+    pvid_weak_design_f32 design;
     float circle[sizeof kapitza_circle / sizeof kapitza_circle[0]];
     float range[KAPITZA_WEAK_SAMPLES];
     float variance[KAPITZA_WEAK_KINDS];
-    pvid_fourier_noise_f32 noise[sizeof kapitza_noise / sizeof kapitza_noise[0]];
+    pvid_weak_noise_f32 noise[sizeof kapitza_noise / sizeof kapitza_noise[0]];
 } weak;
 
 static void spoil_tables(void)
@@ -184,7 +184,7 @@ static void spoil_tables(void)
 
 static void configure_weak(bool sound)
 {
-    pvid_fourier_config_f32 *config = &weak.config;
+    pvid_weak_config_f32 *config = &weak.config;
     weak.design = kapitza_design_f32;
     *config = kapitza_config_f32;
     config->design = &weak.design;
@@ -221,24 +221,24 @@ static void configure_weak(bool sound)
 
 static pvid_status init_weak(void)
 {
-    return pvid_fourier_init_f32(&weak.self, &weak.config);
+    return pvid_weak_init_f32(&weak.self, &weak.config);
 }
 
 static pvid_reason step_weak(uint32_t kind, unsigned long tick)
 {
     float sample[KAPITZA_WEAK_SAMPLES]; /* y, phi */
     hostile_sample(kind, tick, &sample[1], &sample[0]);
-    return pvid_fourier_step_f32(&weak.self, sample);
+    return pvid_weak_step_f32(&weak.self, sample);
 }
 
 static void gap_weak(void)
 {
-    pvid_fourier_gap_f32(&weak.self);
+    pvid_weak_gap_f32(&weak.self);
 }
 
 static void freeze_weak(bool frozen)
 {
-    pvid_fourier_freeze_f32(&weak.self, frozen);
+    pvid_weak_freeze_f32(&weak.self, frozen);
 }
 
 static void check_weak(bool published)
@@ -251,9 +251,9 @@ static void check_weak(bool published)
     uint32_t number;
     pvid_kapitza_f32 value;
     pvid_kapitza_f32 se;
-    const pvid_estimate_f32 *estimate = pvid_fourier_estimate_f32(&weak.self);
+    const pvid_estimate_f32 *estimate = pvid_weak_estimate_f32(&weak.self);
     check_estimate_f32(estimate, weak.self.estimator.model->n_p);
-    require(pvid_fourier_read_f32(&weak.self, &copy, &number) && ((number > 0u) == weak.self.trust.published) &&
+    require(pvid_weak_read_f32(&weak.self, &copy, &number) && ((number > 0u) == weak.self.trust.published) &&
                 (memcmp(&copy, estimate, sizeof copy) == 0),
             "a read estimate is the published one");
     if (pvid_kapitza_physical_f32(estimate, 0.3f, &value, &se)) {
@@ -265,12 +265,12 @@ static void check_weak(bool published)
 
 static size_t save_weak(uint8_t image[], size_t room)
 {
-    return pvid_snapshot_save_fourier_f32(&weak.self, &weak.config, any_word(), image, room);
+    return pvid_snapshot_save_weak_f32(&weak.self, &weak.config, any_word(), image, room);
 }
 
 static pvid_snapshot_status restore_weak(const uint8_t image[], size_t length)
 {
-    return pvid_snapshot_restore_fourier_f32(&weak.self, &weak.config, image, length);
+    return pvid_snapshot_restore_weak_f32(&weak.self, &weak.config, image, length);
 }
 
 static bool weak_has_published(void)
@@ -404,19 +404,19 @@ static void clear_strong(void)
 #define PENDULUM_NOISE 21
 
 static struct {
-    pvid_fourier_q31 self;
-    pvid_fourier_config_q31 config;
-    pvid_fourier_design_q31 design;
+    pvid_weak_q31 self;
+    pvid_weak_config_q31 config;
+    pvid_weak_design_q31 design;
     int32_t full_scale[KAPITZA_WEAK_SAMPLES];
     int32_t offset[KAPITZA_WEAK_SAMPLES];
     int32_t drive_min[KAPITZA_WEAK_SAMPLES];
     pvid_scaled_q31 factor[PENDULUM_TERMS];
-    pvid_fourier_noise_q31 noise[PENDULUM_NOISE];
+    pvid_weak_noise_q31 noise[PENDULUM_NOISE];
 } weak_q31;
 
 static void spoil_tables_q31(void)
 {
-    const pvid_fourier_design_q31 *sound = pendulum_config_q31->design;
+    const pvid_weak_design_q31 *sound = pendulum_config_q31->design;
     if (one_in(5)) {
         const size_t i = below(PENDULUM_TERMS);
         memcpy(weak_q31.factor, sound->factor, sizeof weak_q31.factor);
@@ -442,7 +442,7 @@ static void spoil_tables_q31(void)
 
 static void configure_weak_q31(bool sound)
 {
-    pvid_fourier_config_q31 *config = &weak_q31.config;
+    pvid_weak_config_q31 *config = &weak_q31.config;
     *config = *pendulum_config_q31;
     weak_q31.design = *config->design;
     config->design = &weak_q31.design;
@@ -469,7 +469,7 @@ static void configure_weak_q31(bool sound)
     config->trust.renewal = one_in(6) ? (uint32_t)any_size_i32() : config->trust.renewal;
     config->trust.neglected = one_in(4) ? any_size_i32() : config->trust.neglected;
     spoil_tables_q31();
-    pvid_fourier_design_q31 *design = &weak_q31.design;
+    pvid_weak_design_q31 *design = &weak_q31.design;
     design->functions = one_in(8) ? (uint8_t)below(13) : design->functions;
     design->power = one_in(8) ? (uint8_t)below(9) : design->power;
     design->decimation = one_in(8) ? (uint8_t)below((uint32_t)design->decimation + 1u) : design->decimation;
@@ -481,7 +481,7 @@ static void configure_weak_q31(bool sound)
 
 static pvid_status init_weak_q31(void)
 {
-    return pvid_fourier_init_q31(&weak_q31.self, &weak_q31.config);
+    return pvid_weak_init_q31(&weak_q31.self, &weak_q31.config);
 }
 
 static pvid_reason step_weak_q31(uint32_t kind, unsigned long tick)
@@ -490,17 +490,17 @@ static pvid_reason step_weak_q31(uint32_t kind, unsigned long tick)
     static const int32_t full_scale[2] = {782, 6000};
     int32_t reading[KAPITZA_WEAK_SAMPLES]; /* y, phi */
     hostile_counts(kind, tick, lsb, full_scale, &reading[1], &reading[0]);
-    return pvid_fourier_step_q31(&weak_q31.self, reading);
+    return pvid_weak_step_q31(&weak_q31.self, reading);
 }
 
 static void gap_weak_q31(void)
 {
-    pvid_fourier_gap_q31(&weak_q31.self);
+    pvid_weak_gap_q31(&weak_q31.self);
 }
 
 static void freeze_weak_q31(bool frozen)
 {
-    pvid_fourier_freeze_q31(&weak_q31.self, frozen);
+    pvid_weak_freeze_q31(&weak_q31.self, frozen);
 }
 
 static void check_weak_q31(bool published)
@@ -509,9 +509,9 @@ static void check_weak_q31(bool published)
     pvid_estimate_q31 copy;
     uint32_t number;
     if (published) {
-        require(pvid_fourier_read_q31(&weak_q31.self, &copy, &number) &&
+        require(pvid_weak_read_q31(&weak_q31.self, &copy, &number) &&
                     ((number > 0u) == weak_q31.self.trust.published) &&
-                    (memcmp(&copy, pvid_fourier_estimate_q31(&weak_q31.self), sizeof copy) == 0),
+                    (memcmp(&copy, pvid_weak_estimate_q31(&weak_q31.self), sizeof copy) == 0),
                 "a read q31 estimate is the published one");
         pvid_estimator_assess_q31(&weak_q31.self.estimator, &copy);
     }
@@ -519,12 +519,12 @@ static void check_weak_q31(bool published)
 
 static size_t save_weak_q31(uint8_t image[], size_t room)
 {
-    return pvid_snapshot_save_fourier_q31(&weak_q31.self, &weak_q31.config, any_word(), image, room);
+    return pvid_snapshot_save_weak_q31(&weak_q31.self, &weak_q31.config, any_word(), image, room);
 }
 
 static pvid_snapshot_status restore_weak_q31(const uint8_t image[], size_t length)
 {
-    return pvid_snapshot_restore_fourier_q31(&weak_q31.self, &weak_q31.config, image, length);
+    return pvid_snapshot_restore_weak_q31(&weak_q31.self, &weak_q31.config, image, length);
 }
 
 static bool weak_q31_has_published(void)

@@ -11,14 +11,14 @@ from conftest import ROOT
 from pvid.models.drive import Sines
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import SimulatedRig
-from pvid.oracle.fourier import verdict
-from pvid.oracle.fourier.attenuation import other_line
-from pvid.oracle.fourier.choice import chosen
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.errors import uncertainty
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import WeakRows
-from pvid.oracle.fourier.solve import Fit, batch
+from pvid.oracle.weak import verdict
+from pvid.oracle.weak.attenuation import other_line
+from pvid.oracle.weak.choice import chosen
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.rows import WeakRows
+from pvid.oracle.weak.solve import Fit, batch
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
 
@@ -34,8 +34,8 @@ RIG = SimulatedRig(
     substeps=4,
     friction_width=0.3,
 )
-NARROW = FourierDesign(RATE, window_s=2.0, functions=5, rate_taps=15)  # to 1 Hz
-WIDE = FourierDesign(RATE, window_s=1.0, functions=25, rate_taps=15)  # to 12 Hz: the drive has nothing there
+NARROW = WeakDesign(RATE, window_s=2.0, functions=5, rate_taps=15)  # to 1 Hz
+WIDE = WeakDesign(RATE, window_s=1.0, functions=25, rate_taps=15)  # to 12 Hz: the drive has nothing there
 FORCE_NOISE = 0.1  # N m / sqrt(Hz): the motion at 12 Hz is its work alone
 
 
@@ -45,7 +45,7 @@ def run(noise: float, seed: int) -> dict[str, np.ndarray]:
     return RigSimulation.of(MODEL, RIG).run(seed, imperfections)
 
 
-def fitted(noise: float, seed: int, design: FourierDesign) -> Fit:
+def fitted(noise: float, seed: int, design: WeakDesign) -> Fit:
     return batch(WeakRows.of(ready(MODEL), run(noise, seed), design))
 
 
@@ -74,7 +74,7 @@ def test_narrow_band_covers_the_truth_without_an_alarm(seed: int) -> None:
 
 
 @pytest.mark.parametrize("design", [NARROW, WIDE], ids=["narrow", "wide"])
-def test_without_force_noise_both_lines_are_one(design: FourierDesign) -> None:
+def test_without_force_noise_both_lines_are_one(design: WeakDesign) -> None:
     fit = fitted(0.0, 0, design)
     other = other_line(fit)
     assert alarms(fit) == []

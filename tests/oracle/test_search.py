@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pvid.models.mechanisms import compiled_of
-from pvid.oracle.fourier.blur import blur_of, rates_of_drives
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.identify import neglected, ready
-from pvid.oracle.fourier.starts import starts_about
+from pvid.oracle.weak.blur import blur_of, rates_of_drives
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.identify import neglected, ready
+from pvid.oracle.weak.starts import starts_about
 
 PENDULUM = ready(compiled_of("kapitza"))
 MOTOR = ready(compiled_of("dc_motor"))
@@ -36,7 +36,7 @@ def test_starts_are_spread_over_the_positive_parameters_alone() -> None:
 @pytest.mark.parametrize(("taps", "degree"), [(21, 3), (31, 4), (61, 6)])
 def test_blur_is_the_relative_error_of_the_drives_second_derivative(taps: int, degree: int) -> None:
     """Of a sine: one less the filter's gain at its frequency, whatever the noise."""
-    design = FourierDesign(200.0, 1.0, rate_taps=taps, rate_degree=degree)
+    design = WeakDesign(200.0, 1.0, rate_taps=taps, rate_degree=degree)
     hz = 4.0
     run = sine(hz)
     half = taps // 2
@@ -51,7 +51,7 @@ def test_only_measured_drives_blur() -> None:
     assert [(one.of, one.order) for one in rates_of_drives(PENDULUM)] == [("y", 2)]
     assert rates_of_drives(MOTOR) == []
     run = {name: np.random.default_rng(1).normal(size=500) for name in ("V", "i", "phi")}
-    assert blur_of(MOTOR, run, FourierDesign(1000.0, 0.1)) == 0.0
+    assert blur_of(MOTOR, run, WeakDesign(1000.0, 0.1)) == 0.0
 
 
 def test_small_angles_neglect_the_square_of_the_largest() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from bench.mechanisms import design_of, start_of
 from pvid.models.mechanisms import names
-from pvid.oracle.fourier.identify import Identified, identify
+from pvid.oracle.weak.identify import Identified, identify
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 

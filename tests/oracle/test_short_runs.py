@@ -9,8 +9,8 @@ from conftest import ROOT
 from pvid.base.errors import PvidError
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import SimulatedRig
-from pvid.oracle.fourier.choice import chosen
-from pvid.oracle.fourier.identify import identify, ready
+from pvid.oracle.weak.choice import chosen
+from pvid.oracle.weak.identify import identify, ready
 from pvid.sim.simulated_run import RigSimulation
 
 MODEL = compiled_of(ROOT / "tests" / "data" / "recordings" / "free_pendulum.py")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.mechanisms import design_of
-from pvid.oracle.fourier.identify import identify
+from pvid.oracle.weak.identify import identify
 from pvid.sim.simulated_run import PERFECT, simulation_of
 
 

@@ -10,12 +10,12 @@ from conftest import ROOT
 from pvid.models.drive import Sines
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import SimulatedRig
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.errors import uncertainty
-from pvid.oracle.fourier.identify import identify, ready
-from pvid.oracle.fourier.rows import EquationError, WeakRows
-from pvid.oracle.fourier.solve import batch
-from pvid.oracle.fourier.weights import as_white_force
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.identify import identify, ready
+from pvid.oracle.weak.rows import EquationError, WeakRows
+from pvid.oracle.weak.solve import batch
+from pvid.oracle.weak.weights import as_white_force
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
 
@@ -30,7 +30,7 @@ RIG = SimulatedRig(
     substeps=4,
     friction_width=0.3,
 )
-DESIGN = FourierDesign(RATE, window_s=2.0, functions=9, rate_taps=15)
+DESIGN = WeakDesign(RATE, window_s=2.0, functions=9, rate_taps=15)
 
 
 def run(noise: float) -> dict[str, np.ndarray]:

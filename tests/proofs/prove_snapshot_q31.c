@@ -1,37 +1,37 @@
-/* snapshot_strong_q31, snapshot_fourier_q31: any state saved into any room; any bytes of any length
+/* snapshot_strong_q31, snapshot_weak_q31: any state saved into any room; any bytes of any length
  * restored, whose bytes then are the state's but for its pointers. The hash of the configuration is arbitrary. */
 #include "prove.h"
 
-#include "keep/fingerprint_fourier_q31.h"
+#include "keep/fingerprint_weak_q31.h"
 #include "keep/fingerprint_q31.h"
-#include "pvid/snapshot_fourier_q31.h"
+#include "pvid/snapshot_weak_q31.h"
 #include "pvid/snapshot_q31.h"
 #include "pvid/strong_q31.h"
 
-#define FOURIER_BYTES PVID_SNAPSHOT_BYTES(sizeof(pvid_fourier_q31))
+#define WEAK_BYTES PVID_SNAPSHOT_BYTES(sizeof(pvid_weak_q31))
 #define STRONG_BYTES PVID_SNAPSHOT_BYTES(sizeof(pvid_strong_q31))
 
 /*@ assigns \result \from \nothing; */
 uint32_t pvid_fingerprint_strong_q31(const pvid_strong_config_q31 *config);
 
 /*@ assigns \result \from \nothing; */
-uint32_t pvid_fingerprint_fourier_model_q31(const pvid_fourier_model_q31 *model);
+uint32_t pvid_fingerprint_weak_model_q31(const pvid_weak_model_q31 *model);
 
 /*@ assigns \result \from \nothing; */
-uint32_t pvid_fingerprint_fourier_design_q31(const pvid_fourier_design_q31 *design);
+uint32_t pvid_fingerprint_weak_design_q31(const pvid_weak_design_q31 *design);
 
 /*@ assigns \result \from \nothing; */
-uint32_t pvid_fingerprint_fourier_q31(const pvid_fourier_config_q31 *config);
+uint32_t pvid_fingerprint_weak_q31(const pvid_weak_config_q31 *config);
 
 static pvid_strong_q31 strong;
 static pvid_strong_config_q31 strong_config;
-static pvid_fourier_q31 engine;
-static pvid_fourier_config_q31 engine_config;
-static pvid_fourier_design_q31 engine_design;
-static pvid_fourier_model_q31 engine_model;
+static pvid_weak_q31 engine;
+static pvid_weak_config_q31 engine_config;
+static pvid_weak_design_q31 engine_design;
+static pvid_weak_model_q31 engine_model;
 static const pvid_model_q31 model = {.n_theta = 8, .n_p = 4};
 static const int32_t limits[PVID_MAX_SAMPLES] = {0};
-static uint8_t image[FOURIER_BYTES + 4u];
+static uint8_t image[WEAK_BYTES + 4u];
 
 static void any_image(void)
 {
@@ -49,12 +49,11 @@ static void any_engine(void)
     engine.drive_min = limits;
     engine.estimator.model = &model;
     any_image();
-    (void)pvid_snapshot_restore_fourier_q31(&engine, &engine_config, image, any_u32(0, sizeof image));
+    (void)pvid_snapshot_restore_weak_q31(&engine, &engine_config, image, any_u32(0, sizeof image));
     /*@ assert engine.design == &engine_design && engine.collect.design == &engine_design; */
     /*@ assert engine.collect.front.offset == &limits[0] && engine.drive_min == &limits[0]; */
     /*@ assert engine.estimator.model == &model; */
-    (void)pvid_snapshot_save_fourier_q31(&engine, &engine_config, any_u32(0, UINT32_MAX), image,
-                                         any_u32(0, sizeof image));
+    (void)pvid_snapshot_save_weak_q31(&engine, &engine_config, any_u32(0, UINT32_MAX), image, any_u32(0, sizeof image));
 }
 
 void main(void)

@@ -19,12 +19,12 @@ _USE = """
 pvid_reason step(const int32_t reading[]);
 pvid_reason step(const int32_t reading[])
 {
-    static pvid_fourier_q31 identifier;
+    static pvid_weak_q31 identifier;
     static pvid_status status = PVID_BAD_POINTER;
     if (status != PVID_OK) {
-        status = pvid_fourier_init_q31(&identifier, &rigid_body_config_q31);
+        status = pvid_weak_init_q31(&identifier, &rigid_body_config_q31);
     }
-    return pvid_fourier_step_q31(&identifier, reading);
+    return pvid_weak_step_q31(&identifier, reading);
 }
 """
 

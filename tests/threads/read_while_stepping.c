@@ -127,7 +127,7 @@ static tally share_words(void)
 
 /* ---- an identifier ---- */
 
-static pvid_fourier_f32 identifier;
+static pvid_weak_f32 identifier;
 static pvid_estimate_f32 published[MOST_PUBLISHED]; /* by number; written by the stepping thread */
 
 typedef struct {
@@ -143,7 +143,7 @@ static void *read_identifier(void *argument)
     do {
         pvid_estimate_f32 estimate;
         uint32_t number;
-        if (pvid_fourier_read_f32(&identifier, &estimate, &number) && (number > 0u) && (number < MOST_PUBLISHED)) {
+        if (pvid_weak_read_f32(&identifier, &estimate, &number) && (number > 0u) && (number < MOST_PUBLISHED)) {
             seen->reads++;
             if (seen->has[number] == 0u) {
                 seen->estimate[number] = estimate;
@@ -157,9 +157,9 @@ static void *read_identifier(void *argument)
 
 static unsigned long step_identifier(readings *seen)
 {
-    const pvid_fourier_design_f32 design = design_of(&mechanism);
-    const pvid_fourier_config_f32 config = config_of(&design);
-    if (pvid_fourier_init_f32(&identifier, &config) != PVID_OK) {
+    const pvid_weak_design_f32 design = design_of(&mechanism);
+    const pvid_weak_config_f32 config = config_of(&design);
+    if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) {
         return 0;
     }
     pthread_t reader;
@@ -170,10 +170,10 @@ static unsigned long step_identifier(readings *seen)
     for (int tick = 0; tick < 500 * HOP; tick++) {
         float sample[2];
         next_sample(&rig, sample);
-        const pvid_reason reason = pvid_fourier_step_f32(&identifier, sample);
+        const pvid_reason reason = pvid_weak_step_f32(&identifier, sample);
         if ((reason == PVID_UPDATED) || (reason == PVID_MISFIT)) {
             number++;
-            published[number % MOST_PUBLISHED] = *pvid_fourier_estimate_f32(&identifier);
+            published[number % MOST_PUBLISHED] = *pvid_weak_estimate_f32(&identifier);
         }
     }
     set_ended(1);

@@ -40,12 +40,12 @@ int32_t pvid_planted(int32_t kind, const int32_t *values)
 """
 
 
-FAULTY = ("firmware/src/fourier/planted.c", "firmware/ports/host/planted.c")
+FAULTY = ("firmware/src/weak/planted.c", "firmware/ports/host/planted.c")
 STALE = """
 [[deviation]]
 tool = "misra"
 rule = "8.14"
-files = ["firmware/src/fourier/planted.c"]
+files = ["firmware/src/weak/planted.c"]
 line = "restrict"
 reason = "There is none."
 """
@@ -86,7 +86,7 @@ def test_planted_faults_are_found(copy: Path) -> None:
         ):
             assert f"{name}:{expected}" in done.stdout
     # Nor may a deviation outlive its cause.
-    assert "analysis.toml: misra 8.14 firmware/src/fourier/planted.c `restrict` covers nothing" in done.stdout
+    assert "analysis.toml: misra 8.14 firmware/src/weak/planted.c `restrict` covers nothing" in done.stdout
 
 
 def test_required_rule_is_not_deviated_from_more_often_than_written(copy: Path) -> None:

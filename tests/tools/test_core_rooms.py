@@ -12,8 +12,8 @@ import pytest
 from pvid.core.sources import INCLUDES, MODEL, SRC, core_sources
 
 # Each room may use itself and those before it; the forms do not use each other.
-ROOMS = ("number", "solve", "judge", "strong", MODEL.name, "fourier", "refine", "keep")
-FORMS = ("strong", "fourier", "refine")
+ROOMS = ("number", "solve", "judge", "strong", MODEL.name, "weak", "refine", "keep")
+FORMS = ("strong", "weak", "refine")
 STRANGERS = {(a, b) for a in FORMS for b in FORMS if a != b}
 
 Graph = dict[str, set[str]]
@@ -69,7 +69,7 @@ def circles(graph: Graph) -> list[list[str]]:
 
 
 def test_files_form_no_circle(uses: Graph) -> None:
-    assert len(uses) > 50 and "solve/staged_f32" in uses["fourier/fourier_finish_f32"]
+    assert len(uses) > 50 and "solve/staged_f32" in uses["weak/weak_finish_f32"]
     assert circles(uses) == []
 
 

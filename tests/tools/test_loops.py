@@ -119,7 +119,7 @@ def run(copy: Path, *files: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_planted_loops_and_recursion_are_found(copy: Path) -> None:
-    name = "firmware/src/fourier/planted.c"
+    name = "firmware/src/weak/planted.c"
     (copy / name).write_text(PLANTED, encoding="utf-8")
     done = run(copy, name)
     assert done.returncode == 1, done.stderr
@@ -136,7 +136,7 @@ def test_planted_loops_and_recursion_are_found(copy: Path) -> None:
     [
         ("firmware/src/keep/crc32.c", "i < n; i++", "i < n;"),
         ("firmware/src/keep/fnv_q31.c", "i < information->n_sums; i++", "i < information->n_sums; i += 0u"),
-        ("firmware/src/fourier/fourier_front_q31.c", "left > 0u; left--", "left > 0u; left -= 0u"),
+        ("firmware/src/weak/weak_front_q31.c", "left > 0u; left--", "left > 0u; left -= 0u"),
         ("firmware/ports/freestanding/square_root.c", "shift++", ""),
     ],
 )

@@ -7,14 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fourier_rig import EngineRig, engine_rig
+from weak_rig import EngineRig, engine_rig
 
 from pvid.base.errors import PvidError
 from pvid.codegen.build import refine_functions
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.codegen.refine_twin import GeneratedRefine
-from pvid.core.fourier_native import FourierNative, RefinedIdentifier
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_twin import weak_model_of
+from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.run.refine_design import refine_settings
@@ -31,7 +31,7 @@ class Refined:
     """A mechanism with both stages."""
 
     rig: EngineRig
-    library: FourierNative
+    library: WeakNative
     model: GeneratedRefine
     settings: RefineConfig
 
@@ -47,11 +47,11 @@ def refined(name: str = NAME) -> Refined:
     names = made.model
     run = {one: rig.samples[:, k] for k, one in enumerate(_samples(name))}
     settings = refine_settings(made, run, simulated.sample_rate, rig.truth, 2 * simulated.window_s)
-    return Refined(rig, fourier_native(names, rig.config.design, made), GeneratedRefine(made), settings)
+    return Refined(rig, weak_native(names, rig.config.design, made), GeneratedRefine(made), settings)
 
 
 def _samples(name: str) -> tuple[str, ...]:
-    return fourier_model_of(compiled_of(name)).sample_names
+    return weak_model_of(compiled_of(name)).sample_names
 
 
 def kept(one: RefinedIdentifier) -> bytes:
@@ -105,7 +105,7 @@ def test_a_snapshot_keeps_both_stages_and_refuses_other_settings() -> None:
     one.run_both(given.rig.samples[:4321])
     image = ffi.new("uint8_t[]", 200_000)
     n = library.pvid_snapshot_save_refine_f32(one.state, one.config_pointer, 1, image, len(image))
-    assert n > ffi.sizeof("pvid_fourier_f32") + ffi.sizeof("pvid_refine_f32") - 300
+    assert n > ffi.sizeof("pvid_weak_f32") + ffi.sizeof("pvid_refine_f32") - 300
 
     def restored(into: RefinedIdentifier) -> SnapshotStatus:
         return SnapshotStatus(library.pvid_snapshot_restore_refine_f32(into.state, into.config_pointer, image, n))
@@ -120,7 +120,7 @@ def test_a_snapshot_keeps_both_stages_and_refuses_other_settings() -> None:
         assert restored(given.identifier(**({"distance": 0.05} | changes))) is SnapshotStatus.OTHER_CONFIG
     weak = given.library.identifier_of(given.rig.config)
     assert library.pvid_snapshot_save_refine_f32(weak.state, weak.config_pointer, 1, image, len(image)) == 0
-    status = library.pvid_snapshot_restore_fourier_f32(weak.state, weak.config_pointer, image, n)
+    status = library.pvid_snapshot_restore_weak_f32(weak.state, weak.config_pointer, image, n)
     assert SnapshotStatus(status) is SnapshotStatus.OTHER_KIND
 
 

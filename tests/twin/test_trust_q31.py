@@ -11,7 +11,7 @@ from bench.board_engine import PUBLISHED, Answer, FixedBoard
 from bench.hard import CASES, TRUTH, Case
 from pvid.settings.enums import Core, Reason
 from pvid.sim.pendulum import standard_start
-from pvid.twin.fourier_q31 import FourierTwinQ31
+from pvid.twin.weak_q31 import WeakTwinQ31
 
 VERDICTS = (*PUBLISHED, Reason.HELD_NOT_EXCITED, Reason.HELD_PIVOT, Reason.HELD_UNCERTAIN)
 
@@ -110,7 +110,7 @@ def test_the_twin_has_the_same_integers_where_it_is_hard(label: str) -> None:
     readings = board.samples({"phi": run.phi, "y": run.y})
     identifier = board.identifier(start)
     own = identifier.run_samples(readings)
-    twins = FourierTwinQ31(board.config_from(start), board.engine.parameters.model)
+    twins = WeakTwinQ31(board.config_from(start), board.engine.parameters.model)
     twin = twins.run(readings.T.astype(np.int64)).lane()
     for name in ("reason", "p", "sums", "exponent", "published"):
         assert np.array_equal(getattr(own, name), getattr(twin, name)), name

@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "pvid/fourier.h"
+#include "pvid/weak.h"
 
 #define PI 3.14159265358979323846
 
@@ -65,22 +65,22 @@ static const pvid_model_f32 parameters = {
     .jacobian = jacobian_of,
 };
 
-static const pvid_fourier_signal signals[2] = {{0, PVID_SIGNAL_SAMPLED}, {1, PVID_SIGNAL_SAMPLED}};
-static const pvid_fourier_jet jets[2] = {{0, 0}, {1, 0}};
-static const pvid_fourier_channel channels[CHANNELS] = {
-    [U] = {0, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
-    [U_I1] = {0, 0, 1, U, PVID_FOURIER_NONE},
-    [U_T] = {0, PVID_FOURIER_NONE, 1, U, PVID_FOURIER_NONE},
+static const pvid_weak_signal signals[2] = {{0, PVID_SIGNAL_SAMPLED}, {1, PVID_SIGNAL_SAMPLED}};
+static const pvid_weak_jet jets[2] = {{0, 0}, {1, 0}};
+static const pvid_weak_channel channels[CHANNELS] = {
+    [U] = {0, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
+    [U_I1] = {0, 0, 1, U, PVID_WEAK_NONE},
+    [U_T] = {0, PVID_WEAK_NONE, 1, U, PVID_WEAK_NONE},
     [U_I2] = {0, 0, 2, U, U_T},
-    [X] = {1, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
-    [SIGN] = {2, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
-    [ONE] = {PVID_FOURIER_NONE, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    [X] = {1, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
+    [SIGN] = {2, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
+    [ONE] = {PVID_WEAK_NONE, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
 };
-static const pvid_fourier_term_f32 terms[5] = {
+static const pvid_weak_term_f32 terms[5] = {
     {U, 0, 0, 1.0f}, {X, 0, 1, -1.0f}, {ONE, 0, 2, 1.0f}, {SIGN, 0, 3, 1.0f}, {X, 1, 4, 1.0f}};
-static const pvid_fourier_kind kinds[1] = {{4, 0, 0, 5}};
+static const pvid_weak_kind kinds[1] = {{4, 0, 0, 5}};
 
-static const pvid_fourier_model_f32 mechanism = {
+static const pvid_weak_model_f32 mechanism = {
     .samples = 2,
     .signals = 2,
     .jets = 2,
@@ -109,20 +109,20 @@ static const pvid_fourier_model_f32 mechanism = {
 #define SD 1.0e-4
 
 static float circle[(5 * HOP) / 2];
-static const pvid_fourier_filter_f32 filters[2] = {{0, NULL}, {0, NULL}};
-static const pvid_fourier_noise_f32 noise[2] = {{0, 0, 1, 1, (float)(SD * SD)}, {0, 1, 4, 4, (float)(SD * SD)}};
+static const pvid_weak_filter_f32 filters[2] = {{0, NULL}, {0, NULL}};
+static const pvid_weak_noise_f32 noise[2] = {{0, 0, 1, 1, (float)(SD * SD)}, {0, 1, 4, 4, (float)(SD * SD)}};
 static const uint8_t error_order[1] = {0};
 static const float error_variance[1] = {0.0f};
 static const float sign_width[1] = {0.0f};
 static const double truth[4] = {3.0, 2.0, 0.5, 0.2};
 
-static inline pvid_fourier_design_f32 design_of(const pvid_fourier_model_f32 *model)
+static inline pvid_weak_design_f32 design_of(const pvid_weak_model_f32 *model)
 {
     for (int j = 0; j < (5 * HOP) / 2; j++) {
         const double turn = PI * (double)j / (double)HOP;
         circle[j] = ((j % HOP) == 0) ? 0.0f : (float)sin(turn);
     }
-    const pvid_fourier_design_f32 design = {
+    const pvid_weak_design_f32 design = {
         .model = model,
         .functions = FUNCTIONS,
         .power = POWER,
@@ -140,9 +140,9 @@ static inline pvid_fourier_design_f32 design_of(const pvid_fourier_model_f32 *mo
     return design;
 }
 
-static inline pvid_fourier_config_f32 config_of(const pvid_fourier_design_f32 *design)
+static inline pvid_weak_config_f32 config_of(const pvid_weak_design_f32 *design)
 {
-    pvid_fourier_config_f32 config = {
+    pvid_weak_config_f32 config = {
         .sample_rate_hz = (float)RATE,
         .design = design,
         .compensation = true,

@@ -13,7 +13,7 @@
 #include "first_order.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
-#include "pvid/snapshot_fourier_q31.h"
+#include "pvid/snapshot_weak_q31.h"
 #include "strong_table_q31.h"
 
 /* ---- physical parameters in float32 ---- */
@@ -166,14 +166,14 @@ static void a_shifted_derivative_may_be_too_large(void **state)
     assert_largest(&finer, PHI2, limit / 16, 0, 0, 0);
 }
 
-static pvid_fourier_q31 identifier;
+static pvid_weak_q31 identifier;
 
 /* ---- what is remembered ---- */
 
 static void a_weight_beyond_its_counter_is_its_end(void **state)
 {
     (void)state;
-    assert_int_equal(pvid_fourier_init_q31(&identifier, &kapitza_config_q31), PVID_OK);
+    assert_int_equal(pvid_weak_init_q31(&identifier, &kapitza_config_q31), PVID_OK);
     pvid_information_q31 *information = &identifier.estimator.information;
     pvid_estimate_q31 estimate;
     int64_t *weight = &information->sums[information->n_sums - 1u];
@@ -234,14 +234,14 @@ static void a_snapshot_of_another_form_is_of_another_kind(void **state)
 {
     (void)state;
     static pvid_strong_q31 other;
-    static uint8_t image[PVID_SNAPSHOT_FOURIER_Q31];
+    static uint8_t image[PVID_SNAPSHOT_WEAK_Q31];
     static uint8_t strong_image[PVID_SNAPSHOT_STRONG_Q31];
-    assert_int_equal(pvid_fourier_init_q31(&identifier, &kapitza_config_q31), PVID_OK);
+    assert_int_equal(pvid_weak_init_q31(&identifier, &kapitza_config_q31), PVID_OK);
     assert_int_equal(pvid_strong_init_q31(&other, &strong_unit), PVID_OK);
-    const size_t n = pvid_snapshot_save_fourier_q31(&identifier, &kapitza_config_q31, 1, image, sizeof image);
+    const size_t n = pvid_snapshot_save_weak_q31(&identifier, &kapitza_config_q31, 1, image, sizeof image);
     const size_t m = pvid_snapshot_save_strong_q31(&other, &strong_unit, 1, strong_image, sizeof strong_image);
     assert_int_equal(pvid_snapshot_restore_strong_q31(&other, &strong_unit, image, n), PVID_SNAPSHOT_OTHER_KIND);
-    assert_int_equal(pvid_snapshot_restore_fourier_q31(&identifier, &kapitza_config_q31, strong_image, m),
+    assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &kapitza_config_q31, strong_image, m),
                      PVID_SNAPSHOT_OTHER_KIND);
     assert_int_equal(pvid_snapshot_restore_strong_q31(&other, &strong_unit, strong_image, m), PVID_SNAPSHOT_RESTORED);
 }

@@ -11,7 +11,7 @@
 #include "first_order.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
-#include "pvid/snapshot_fourier_q31.h"
+#include "pvid/snapshot_weak_q31.h"
 #include "strong_table_q31.h"
 
 #define TICKS 5000
@@ -21,14 +21,14 @@ static const float derivatives[PVID_ORDERS] = {0.0f};
 static const float sample[2] = {0.01f, 0.001f};
 static const int32_t reading[2] = {1, 2};
 
-static pvid_fourier_f32 weak;
-static pvid_fourier_design_f32 design;
+static pvid_weak_f32 weak;
+static pvid_weak_design_f32 design;
 static pvid_strong_f32 strong;
-static pvid_fourier_q31 weak_q31;
+static pvid_weak_q31 weak_q31;
 static pvid_strong_q31 strong_q31;
-static uint8_t image[PVID_SNAPSHOT_FOURIER_F32 + PVID_SNAPSHOT_FOURIER_Q31];
+static uint8_t image[PVID_SNAPSHOT_WEAK_F32 + PVID_SNAPSHOT_WEAK_Q31];
 
-static pvid_fourier_config_f32 weak_config(void)
+static pvid_weak_config_f32 weak_config(void)
 {
     design = design_of(&mechanism);
     return config_of(&design);
@@ -53,24 +53,24 @@ static pvid_strong_config_f32 strong_config(void)
 }
 
 /* Everything that one may call, on objects that are not ready. */
-static void call_all(pvid_fourier_f32 *one, pvid_strong_f32 *other, pvid_fourier_q31 *third, pvid_strong_q31 *fourth)
+static void call_all(pvid_weak_f32 *one, pvid_strong_f32 *other, pvid_weak_q31 *third, pvid_strong_q31 *fourth)
 {
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     const pvid_strong_config_f32 other_config = strong_config();
     for (int i = 0; i < TICKS; i++) {
-        assert_int_equal(pvid_fourier_step_f32(one, sample), PVID_NOT_READY);
+        assert_int_equal(pvid_weak_step_f32(one, sample), PVID_NOT_READY);
         assert_int_equal(pvid_strong_step_f32(other, 0.01f, 0.001f), PVID_NOT_READY);
         assert_int_equal(pvid_strong_row_step_f32(other, derivatives, starts), PVID_NOT_READY);
-        assert_int_equal(pvid_fourier_step_q31(third, reading), PVID_NOT_READY);
+        assert_int_equal(pvid_weak_step_q31(third, reading), PVID_NOT_READY);
         assert_int_equal(pvid_strong_step_q31(fourth, 1, 2), PVID_NOT_READY);
     }
-    pvid_fourier_gap_f32(one);
+    pvid_weak_gap_f32(one);
     pvid_strong_gap_f32(other);
-    pvid_fourier_gap_q31(third);
+    pvid_weak_gap_q31(third);
     pvid_strong_gap_q31(fourth);
-    pvid_fourier_freeze_f32(one, true);
+    pvid_weak_freeze_f32(one, true);
     pvid_strong_freeze_f32(other, true);
-    pvid_fourier_freeze_q31(third, true);
+    pvid_weak_freeze_q31(third, true);
     pvid_strong_freeze_q31(fourth, true);
 
     pvid_estimate_f32 estimate;
@@ -90,14 +90,14 @@ static void call_all(pvid_fourier_f32 *one, pvid_strong_f32 *other, pvid_fourier
     pvid_kapitza_estimator_assess_q31((fourth == NULL) ? NULL : &fourth->estimator, NULL);
 
     memset(image, 0, sizeof image);
-    assert_int_equal(pvid_snapshot_save_fourier_f32(one, &config, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_f32(one, &config, 1, image, sizeof image), 0);
     assert_int_equal(pvid_snapshot_save_strong_f32(other, &other_config, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_fourier_q31(third, &kapitza_config_q31, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_q31(third, &kapitza_config_q31, 1, image, sizeof image), 0);
     assert_int_equal(pvid_snapshot_save_strong_q31(fourth, &strong_unit, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_restore_fourier_f32(one, &config, image, sizeof image), PVID_SNAPSHOT_NOT_READY);
+    assert_int_equal(pvid_snapshot_restore_weak_f32(one, &config, image, sizeof image), PVID_SNAPSHOT_NOT_READY);
     assert_int_equal(pvid_snapshot_restore_strong_f32(other, &other_config, image, sizeof image),
                      PVID_SNAPSHOT_NOT_READY);
-    assert_int_equal(pvid_snapshot_restore_fourier_q31(third, &kapitza_config_q31, image, sizeof image),
+    assert_int_equal(pvid_snapshot_restore_weak_q31(third, &kapitza_config_q31, image, sizeof image),
                      PVID_SNAPSHOT_NOT_READY);
     assert_int_equal(pvid_snapshot_restore_strong_q31(fourth, &strong_unit, image, sizeof image),
                      PVID_SNAPSHOT_NOT_READY);
@@ -106,7 +106,7 @@ static void call_all(pvid_fourier_f32 *one, pvid_strong_f32 *other, pvid_fourier
 static void static_objects_before_init_do_nothing(void **state)
 {
     (void)state;
-    static const pvid_fourier_f32 none;
+    static const pvid_weak_f32 none;
     memset(&weak, 0, sizeof weak);
     memset(&strong, 0, sizeof strong);
     memset(&weak_q31, 0, sizeof weak_q31);
@@ -119,19 +119,19 @@ static void null_is_an_answer(void **state)
 {
     (void)state;
     call_all(NULL, NULL, NULL, NULL);
-    assert_null(pvid_fourier_estimate_f32(NULL));
-    assert_null(pvid_fourier_estimate_q31(NULL));
+    assert_null(pvid_weak_estimate_f32(NULL));
+    assert_null(pvid_weak_estimate_q31(NULL));
     assert_int_equal(pvid_snapshot_choose(NULL, NULL, 1000).newest, -1);
 }
 
 static void init_refuses_null(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     const pvid_strong_config_f32 other = strong_config();
-    assert_int_equal(pvid_fourier_init_f32(NULL, &config), PVID_BAD_POINTER);
+    assert_int_equal(pvid_weak_init_f32(NULL, &config), PVID_BAD_POINTER);
     assert_int_equal(pvid_strong_init_f32(NULL, &other), PVID_BAD_POINTER);
-    assert_int_equal(pvid_fourier_init_q31(NULL, &kapitza_config_q31), PVID_BAD_POINTER);
+    assert_int_equal(pvid_weak_init_q31(NULL, &kapitza_config_q31), PVID_BAD_POINTER);
     assert_int_equal(pvid_strong_init_q31(NULL, &strong_unit), PVID_BAD_POINTER);
     assert_int_equal(pvid_estimator_init_f32(NULL, &other.estimator), PVID_BAD_POINTER);
     assert_int_equal(pvid_estimator_init_q31(NULL, &kapitza_config_q31.estimator), PVID_BAD_POINTER);
@@ -166,25 +166,25 @@ static void init_refuses_null(void **state)
 static void estimate_is_read_from_a_ready_object_only(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     pvid_estimate_f32 estimate;
     pvid_estimate_q31 estimate_q31;
     memset(&weak, 0, sizeof weak);
     memset(&weak_q31, 0, sizeof weak_q31);
-    assert_false(pvid_fourier_read_f32(NULL, &estimate, NULL));
-    assert_false(pvid_fourier_read_q31(NULL, &estimate_q31, NULL));
-    assert_false(pvid_fourier_read_f32(&weak, &estimate, NULL));
-    assert_false(pvid_fourier_read_q31(&weak_q31, &estimate_q31, NULL));
-    assert_int_equal(pvid_fourier_init_f32(&weak, &config), PVID_OK);
-    assert_int_equal(pvid_fourier_init_q31(&weak_q31, &kapitza_config_q31), PVID_OK);
-    assert_false(pvid_fourier_read_f32(&weak, NULL, NULL));
-    assert_false(pvid_fourier_read_q31(&weak_q31, NULL, NULL));
-    assert_true(pvid_fourier_read_f32(&weak, &estimate, NULL));
-    assert_true(pvid_fourier_read_q31(&weak_q31, &estimate_q31, NULL));
-    assert_int_equal(pvid_snapshot_save_fourier_f32(&weak, NULL, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_fourier_f32(&weak, &config, 1, NULL, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_fourier_q31(&weak_q31, NULL, 1, image, sizeof image), 0);
-    assert_int_equal(pvid_snapshot_save_fourier_q31(&weak_q31, &kapitza_config_q31, 1, NULL, sizeof image), 0);
+    assert_false(pvid_weak_read_f32(NULL, &estimate, NULL));
+    assert_false(pvid_weak_read_q31(NULL, &estimate_q31, NULL));
+    assert_false(pvid_weak_read_f32(&weak, &estimate, NULL));
+    assert_false(pvid_weak_read_q31(&weak_q31, &estimate_q31, NULL));
+    assert_int_equal(pvid_weak_init_f32(&weak, &config), PVID_OK);
+    assert_int_equal(pvid_weak_init_q31(&weak_q31, &kapitza_config_q31), PVID_OK);
+    assert_false(pvid_weak_read_f32(&weak, NULL, NULL));
+    assert_false(pvid_weak_read_q31(&weak_q31, NULL, NULL));
+    assert_true(pvid_weak_read_f32(&weak, &estimate, NULL));
+    assert_true(pvid_weak_read_q31(&weak_q31, &estimate_q31, NULL));
+    assert_int_equal(pvid_snapshot_save_weak_f32(&weak, NULL, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_f32(&weak, &config, 1, NULL, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_q31(&weak_q31, NULL, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_save_weak_q31(&weak_q31, &kapitza_config_q31, 1, NULL, sizeof image), 0);
     const pvid_strong_config_f32 other = strong_config();
     assert_int_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
     assert_int_equal(pvid_strong_init_q31(&strong_q31, &strong_unit), PVID_OK);
@@ -199,14 +199,14 @@ static void a_refused_init_leaves_an_object_that_does_nothing(void **state)
 {
     (void)state;
     for (int how = 0; how < 3; how++) {
-        pvid_fourier_config_f32 config = weak_config();
+        pvid_weak_config_f32 config = weak_config();
         pvid_strong_config_f32 other = strong_config();
-        pvid_fourier_config_q31 third = kapitza_config_q31;
+        pvid_weak_config_q31 third = kapitza_config_q31;
         pvid_strong_config_q31 fourth = strong_unit;
         if (how == 1) { /* it has been at work */
-            assert_int_equal(pvid_fourier_init_f32(&weak, &config), PVID_OK);
+            assert_int_equal(pvid_weak_init_f32(&weak, &config), PVID_OK);
             assert_int_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
-            assert_int_equal(pvid_fourier_init_q31(&weak_q31, &third), PVID_OK);
+            assert_int_equal(pvid_weak_init_q31(&weak_q31, &third), PVID_OK);
             assert_int_equal(pvid_strong_init_q31(&strong_q31, &fourth), PVID_OK);
         } else {
             memset(&weak, 0xFF, sizeof weak);
@@ -215,9 +215,9 @@ static void a_refused_init_leaves_an_object_that_does_nothing(void **state)
             memset(&strong_q31, 0xFF, sizeof strong_q31);
         }
         if (how == 2) {
-            assert_int_equal(pvid_fourier_init_f32(&weak, NULL), PVID_BAD_POINTER);
+            assert_int_equal(pvid_weak_init_f32(&weak, NULL), PVID_BAD_POINTER);
             assert_int_equal(pvid_strong_init_f32(&strong, NULL), PVID_BAD_POINTER);
-            assert_int_equal(pvid_fourier_init_q31(&weak_q31, NULL), PVID_BAD_POINTER);
+            assert_int_equal(pvid_weak_init_q31(&weak_q31, NULL), PVID_BAD_POINTER);
             assert_int_equal(pvid_strong_init_q31(&strong_q31, NULL), PVID_BAD_POINTER);
         } else { /* by the field that is looked at last, and by the first */
             config.iterations = (how == 0) ? 1u : 0u;
@@ -228,9 +228,9 @@ static void a_refused_init_leaves_an_object_that_does_nothing(void **state)
             third.offset = (how == 0) ? NULL : third.offset;
             fourth.gate.sigmas = (how == 0) ? 0u : 1u;
             fourth.u_multiplier[0] = (how == 0) ? 0 : fourth.u_multiplier[0];
-            assert_int_not_equal(pvid_fourier_init_f32(&weak, &config), PVID_OK);
+            assert_int_not_equal(pvid_weak_init_f32(&weak, &config), PVID_OK);
             assert_int_not_equal(pvid_strong_init_f32(&strong, &other), PVID_OK);
-            assert_int_not_equal(pvid_fourier_init_q31(&weak_q31, &third), PVID_OK);
+            assert_int_not_equal(pvid_weak_init_q31(&weak_q31, &third), PVID_OK);
             assert_int_not_equal(pvid_strong_init_q31(&strong_q31, &fourth), PVID_OK);
         }
         call_all(&weak, &strong, &weak_q31, &strong_q31);

@@ -92,8 +92,8 @@ static void versions_come_round_and_numbers_stop(void **state)
 static void null_is_refused(void **state)
 {
     (void)state;
-    static pvid_fourier_f32 weak;
-    static pvid_fourier_q31 weak_q31;
+    static pvid_weak_f32 weak;
+    static pvid_weak_q31 weak_q31;
     pvid_estimate_f32 read = estimate_of(1.0f);
     pvid_estimate_q31 read_q31 = {.weight = 1};
     pvid_publication_put_f32(NULL, &read);
@@ -105,10 +105,10 @@ static void null_is_refused(void **state)
     assert_false(pvid_publication_read_f32(&shared, NULL, NULL));
     assert_false(pvid_publication_read_q31(NULL, &read_q31, NULL));
     assert_false(pvid_publication_read_q31(&shared_q31, NULL, NULL));
-    assert_false(pvid_fourier_read_f32(NULL, &read, NULL));
-    assert_false(pvid_fourier_read_f32(&weak, &read, NULL)); /* before init */
-    assert_false(pvid_fourier_read_q31(NULL, &read_q31, NULL));
-    assert_false(pvid_fourier_read_q31(&weak_q31, &read_q31, NULL));
+    assert_false(pvid_weak_read_f32(NULL, &read, NULL));
+    assert_false(pvid_weak_read_f32(&weak, &read, NULL)); /* before init */
+    assert_false(pvid_weak_read_q31(NULL, &read_q31, NULL));
+    assert_false(pvid_weak_read_q31(&weak_q31, &read_q31, NULL));
 }
 
 int main(void)

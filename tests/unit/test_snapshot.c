@@ -12,34 +12,33 @@
 #include "plant.h"
 #include "pvid/pvid.h"
 
-#define ROOM                                                                                                           \
-    ((PVID_SNAPSHOT_FOURIER_F32 > PVID_SNAPSHOT_STRONG_F32) ? PVID_SNAPSHOT_FOURIER_F32 : PVID_SNAPSHOT_STRONG_F32)
+#define ROOM ((PVID_SNAPSHOT_WEAK_F32 > PVID_SNAPSHOT_STRONG_F32) ? PVID_SNAPSHOT_WEAK_F32 : PVID_SNAPSHOT_STRONG_F32)
 
-static pvid_fourier_f32 identifier;
-static pvid_fourier_f32 restored;
-static pvid_fourier_f32 before;
-static pvid_fourier_design_f32 design;
+static pvid_weak_f32 identifier;
+static pvid_weak_f32 restored;
+static pvid_weak_f32 before;
+static pvid_weak_design_f32 design;
 static uint8_t image[ROOM];
 static uint8_t again[ROOM];
 
-static pvid_fourier_config_f32 weak_config(void)
+static pvid_weak_config_f32 weak_config(void)
 {
     design = design_of(&mechanism);
     return config_of(&design);
 }
 
-static void run(pvid_fourier_f32 *self, first_order *rig, int ticks)
+static void run(pvid_weak_f32 *self, first_order *rig, int ticks)
 {
     for (int i = 0; i < ticks; i++) {
         float sample[2];
         next_sample(rig, sample);
-        (void)pvid_fourier_step_f32(self, sample);
+        (void)pvid_weak_step_f32(self, sample);
     }
 }
 
-static size_t save(const pvid_fourier_config_f32 *config, uint32_t generation, uint8_t to[])
+static size_t save(const pvid_weak_config_f32 *config, uint32_t generation, uint8_t to[])
 {
-    return pvid_snapshot_save_fourier_f32(&identifier, config, generation, to, ROOM);
+    return pvid_snapshot_save_weak_f32(&identifier, config, generation, to, ROOM);
 }
 
 /* ---- continuation ---- */
@@ -48,22 +47,22 @@ static size_t save(const pvid_fourier_config_f32 *config, uint32_t generation, u
 static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
-    assert_int_equal(pvid_fourier_init_f32(&identifier, &config), PVID_OK);
+    const pvid_weak_config_f32 config = weak_config();
+    assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
     first_order rig = {.generator = 1u};
     run(&identifier, &rig, 8 * HOP);
     for (int tick = 0; tick < HOP; tick++) {
         const size_t n = save(&config, 1, image);
-        assert_int_equal(n, PVID_SNAPSHOT_FOURIER_F32);
-        assert_int_equal(pvid_fourier_init_f32(&restored, &config), PVID_OK);
-        assert_int_equal(pvid_snapshot_restore_fourier_f32(&restored, &config, image, n), PVID_SNAPSHOT_RESTORED);
-        assert_int_equal(pvid_snapshot_save_fourier_f32(&restored, &config, 1, again, ROOM), n);
+        assert_int_equal(n, PVID_SNAPSHOT_WEAK_F32);
+        assert_int_equal(pvid_weak_init_f32(&restored, &config), PVID_OK);
+        assert_int_equal(pvid_snapshot_restore_weak_f32(&restored, &config, image, n), PVID_SNAPSHOT_RESTORED);
+        assert_int_equal(pvid_snapshot_save_weak_f32(&restored, &config, 1, again, ROOM), n);
         assert_memory_equal(image, again, n);
         first_order other = rig;
         run(&identifier, &rig, 1);
         run(&restored, &other, 1);
         const size_t later = save(&config, 1, image);
-        assert_int_equal(pvid_snapshot_save_fourier_f32(&restored, &config, 1, again, ROOM), later);
+        assert_int_equal(pvid_snapshot_save_weak_f32(&restored, &config, 1, again, ROOM), later);
         assert_memory_equal(image, again, later);
     }
 }
@@ -72,18 +71,18 @@ static void a_restored_run_continues_bit_for_bit_from_every_tick(void **state)
 static void a_pointer_into_the_object_points_into_the_restored_one(void **state)
 {
     (void)state;
-    pvid_fourier_config_f32 config = weak_config();
+    pvid_weak_config_f32 config = weak_config();
     config.trust.revert_after = 1;
-    assert_int_equal(pvid_fourier_init_f32(&identifier, &config), PVID_OK);
+    assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
     int seen = 0;
     const float still[2] = {0.0f, 0.0f};
     for (int i = 0; i < 8 * HOP; i++) { /* no motion at all: every window is held */
-        (void)pvid_fourier_step_f32(&identifier, still);
+        (void)pvid_weak_step_f32(&identifier, still);
         if (identifier.finish.work.solve.fallback != NULL) {
             seen++;
-            assert_int_equal(pvid_fourier_init_f32(&restored, &config), PVID_OK);
+            assert_int_equal(pvid_weak_init_f32(&restored, &config), PVID_OK);
             const size_t n = save(&config, 1, image);
-            assert_int_equal(pvid_snapshot_restore_fourier_f32(&restored, &config, image, n), PVID_SNAPSHOT_RESTORED);
+            assert_int_equal(pvid_snapshot_restore_weak_f32(&restored, &config, image, n), PVID_SNAPSHOT_RESTORED);
             assert_ptr_equal(restored.finish.work.solve.fallback, restored.trust.estimate.p);
         }
     }
@@ -135,18 +134,18 @@ static void the_strong_form_continues(void **state)
 
 /* ---- refusals ---- */
 
-static void start_and_save(const pvid_fourier_config_f32 *config)
+static void start_and_save(const pvid_weak_config_f32 *config)
 {
-    assert_int_equal(pvid_fourier_init_f32(&identifier, config), PVID_OK);
+    assert_int_equal(pvid_weak_init_f32(&identifier, config), PVID_OK);
     first_order rig = {.generator = 1u};
     run(&identifier, &rig, 3 * HOP);
-    assert_int_equal(save(config, 5, image), PVID_SNAPSHOT_FOURIER_F32);
+    assert_int_equal(save(config, 5, image), PVID_SNAPSHOT_WEAK_F32);
     memcpy(&before, &identifier, sizeof before);
 }
 
-static pvid_snapshot_status restore(const pvid_fourier_config_f32 *config, const uint8_t from[], size_t n)
+static pvid_snapshot_status restore(const pvid_weak_config_f32 *config, const uint8_t from[], size_t n)
 {
-    const pvid_snapshot_status status = pvid_snapshot_restore_fourier_f32(&identifier, config, from, n);
+    const pvid_snapshot_status status = pvid_snapshot_restore_weak_f32(&identifier, config, from, n);
     assert_memory_equal(&identifier, &before, sizeof before);
     return status;
 }
@@ -155,31 +154,31 @@ static pvid_snapshot_status restore(const pvid_fourier_config_f32 *config, const
 static void every_damaged_byte_is_seen_and_nothing_is_changed(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
-    for (size_t at = 0; at < PVID_SNAPSHOT_FOURIER_F32; at++) {
+    for (size_t at = 0; at < PVID_SNAPSHOT_WEAK_F32; at++) {
         const uint8_t flip = (uint8_t)(1u << (at % 8u));
         image[at] = (uint8_t)(image[at] ^ flip);
-        const pvid_snapshot_status status = restore(&config, image, PVID_SNAPSHOT_FOURIER_F32);
+        const pvid_snapshot_status status = restore(&config, image, PVID_SNAPSHOT_WEAK_F32);
         const bool magic = at < 4u;
         const bool length = (at >= 4u) && (at < 8u);
         assert_true((status == PVID_SNAPSHOT_DAMAGED) || (magic && (status == PVID_SNAPSHOT_NONE)) ||
                     (length && (status == PVID_SNAPSHOT_CUT_SHORT)));
         image[at] = (uint8_t)(image[at] ^ flip);
     }
-    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_FOURIER_F32), PVID_SNAPSHOT_RESTORED);
+    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_RESTORED);
 }
 
 static void every_length_that_is_too_short_is_refused(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
-    for (size_t n = 0; n < PVID_SNAPSHOT_FOURIER_F32; n++) {
+    for (size_t n = 0; n < PVID_SNAPSHOT_WEAK_F32; n++) {
         const pvid_snapshot_status expected =
             (n < PVID_SNAPSHOT_HEADER + 4u) ? PVID_SNAPSHOT_NONE : PVID_SNAPSHOT_CUT_SHORT;
         assert_int_equal(restore(&config, image, n), expected);
-        assert_int_equal(pvid_snapshot_save_fourier_f32(&identifier, &config, 1, again, n), 0);
+        assert_int_equal(pvid_snapshot_save_weak_f32(&identifier, &config, 1, again, n), 0);
     }
 }
 
@@ -187,7 +186,7 @@ static void every_length_that_is_too_short_is_refused(void **state)
 static void forge(size_t at, uint32_t word)
 {
     pvid_put_u32(&image[at], word);
-    pvid_put_u32(&image[PVID_SNAPSHOT_FOURIER_F32 - 4u], pvid_crc32(0u, image, PVID_SNAPSHOT_FOURIER_F32 - 4u));
+    pvid_put_u32(&image[PVID_SNAPSHOT_WEAK_F32 - 4u], pvid_crc32(0u, image, PVID_SNAPSHOT_WEAK_F32 - 4u));
 }
 
 static void snapshot_of_another_object_names_its_kind(void **state)
@@ -200,40 +199,40 @@ static void snapshot_of_another_object_names_its_kind(void **state)
         {8, PVID_SNAPSHOT_OTHER_VERSION}, {12, PVID_SNAPSHOT_OTHER_KIND},   {16, PVID_SNAPSHOT_OTHER_LAYOUT},
         {20, PVID_SNAPSHOT_OTHER_MODEL},  {24, PVID_SNAPSHOT_OTHER_DESIGN}, {28, PVID_SNAPSHOT_OTHER_CONFIG},
     };
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     for (size_t i = 0; i < sizeof field / sizeof field[0]; i++) {
         const uint32_t word = pvid_get_u32(&image[field[i].at]);
         forge(field[i].at, word + 1u);
-        assert_int_equal(restore(&config, image, PVID_SNAPSHOT_FOURIER_F32), field[i].status);
+        assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), field[i].status);
         forge(field[i].at, word);
-        assert_int_equal(restore(&config, image, PVID_SNAPSHOT_FOURIER_F32), PVID_SNAPSHOT_RESTORED);
+        assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_RESTORED);
     }
     forge(4, 12u); /* says that it is shorter than its own header */
-    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_FOURIER_F32), PVID_SNAPSHOT_DAMAGED);
+    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_DAMAGED);
 }
 
 static void a_table_that_changed_is_another_design(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     const float kept = circle[1];
     circle[1] = kept + 1.0f;
-    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_FOURIER_F32), PVID_SNAPSHOT_OTHER_DESIGN);
+    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_OTHER_DESIGN);
     circle[1] = kept;
     design.overlap += 1.0f;
-    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_FOURIER_F32), PVID_SNAPSHOT_OTHER_DESIGN);
+    assert_int_equal(restore(&config, image, PVID_SNAPSHOT_WEAK_F32), PVID_SNAPSHOT_OTHER_DESIGN);
 }
 
 /* ---- two slots ---- */
 
-static uint8_t slot[2][PVID_SNAPSHOT_FOURIER_F32];
+static uint8_t slot[2][PVID_SNAPSHOT_WEAK_F32];
 
 static void slots_are_used_in_turn(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     memset(slot, 0xFF, sizeof slot);
     pvid_snapshot_choice choice = pvid_snapshot_choose(slot[0], slot[1], sizeof slot[0]);
@@ -243,7 +242,7 @@ static void slots_are_used_in_turn(void **state)
         assert_int_equal(choice.generation, generation);
         const uint8_t written = choice.next;
         assert_int_equal(
-            pvid_snapshot_save_fourier_f32(&identifier, &config, choice.generation, slot[written], sizeof slot[0]),
+            pvid_snapshot_save_weak_f32(&identifier, &config, choice.generation, slot[written], sizeof slot[0]),
             sizeof slot[0]);
         choice = pvid_snapshot_choose(slot[0], slot[1], sizeof slot[0]);
         assert_int_equal(choice.newest, written);
@@ -254,12 +253,12 @@ static void slots_are_used_in_turn(void **state)
 static void generations_go_round(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
+    const pvid_weak_config_f32 config = weak_config();
     start_and_save(&config);
     for (uint32_t older = UINT32_MAX - 2u; older != 2u; older++) {
         for (int place = 0; place < 2; place++) {
-            (void)pvid_snapshot_save_fourier_f32(&identifier, &config, older, slot[place], sizeof slot[0]);
-            (void)pvid_snapshot_save_fourier_f32(&identifier, &config, older + 1u, slot[1 - place], sizeof slot[0]);
+            (void)pvid_snapshot_save_weak_f32(&identifier, &config, older, slot[place], sizeof slot[0]);
+            (void)pvid_snapshot_save_weak_f32(&identifier, &config, older + 1u, slot[1 - place], sizeof slot[0]);
             const pvid_snapshot_choice choice = pvid_snapshot_choose(slot[0], slot[1], sizeof slot[0]);
             assert_int_equal(choice.newest, 1 - place);
             assert_int_equal(choice.next, place);
@@ -272,13 +271,13 @@ static void generations_go_round(void **state)
 static void a_power_cut_at_any_byte_leaves_the_older_snapshot(void **state)
 {
     (void)state;
-    const pvid_fourier_config_f32 config = weak_config();
-    assert_int_equal(pvid_fourier_init_f32(&identifier, &config), PVID_OK);
+    const pvid_weak_config_f32 config = weak_config();
+    assert_int_equal(pvid_weak_init_f32(&identifier, &config), PVID_OK);
     first_order rig = {.generator = 1u};
-    static uint8_t generation[3][PVID_SNAPSHOT_FOURIER_F32];
+    static uint8_t generation[3][PVID_SNAPSHOT_WEAK_F32];
     for (uint32_t g = 0; g < 3u; g++) {
         run(&identifier, &rig, 2 * HOP);
-        (void)pvid_snapshot_save_fourier_f32(&identifier, &config, g + 1u, generation[g], sizeof generation[g]);
+        (void)pvid_snapshot_save_weak_f32(&identifier, &config, g + 1u, generation[g], sizeof generation[g]);
     }
     const size_t n = sizeof slot[0];
     for (int kind = 0; kind < 4; kind++) {

@@ -10,19 +10,19 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
-from pvid.core.fourier_native import FourierIdentifier, FourierNative
-from pvid.core.fourier_native_q31 import FourierIdentifierQ31, FourierNativeQ31
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core.native import Publisher
+from pvid.core.weak_native import WeakIdentifier, WeakNative
+from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.weak.design import WeakDesign
 from pvid.run.engine_design import engine_config, samples_of
 from pvid.run.engine_design_q31 import FixedEngine, fixed_engine, with_neglected
 from pvid.settings.enums import Core, Reason
-from pvid.settings.fourier import FourierConfig
-from pvid.settings.fourier_q31 import FourierConfigQ31
 from pvid.settings.record import Record
+from pvid.settings.weak import WeakConfig
+from pvid.settings.weak_q31 import WeakConfigQ31
 
 Float = npt.NDArray[np.float64]
 Signals = Mapping[str, npt.ArrayLike]
@@ -79,18 +79,18 @@ class FloatBoard:
     """In float32."""
 
     compiled: CompiledModel
-    config: FourierConfig
+    config: WeakConfig
 
     @cached_property
-    def library(self) -> FourierNative:
+    def library(self) -> WeakNative:
         """Of the mechanism."""
-        return fourier_native(self.compiled, self.config.design)
+        return weak_native(self.compiled, self.config.design)
 
-    def config_from(self, start: Float) -> FourierConfig:
+    def config_from(self, start: Float) -> WeakConfig:
         """With another start [n_p]."""
         return replace(self.config, estimator=replace(self.config.estimator, start=np.asarray(start, np.float32)))
 
-    def identifier(self, start: Float) -> FourierIdentifier:
+    def identifier(self, start: Float) -> WeakIdentifier:
         """Initialised."""
         return self.library.identifier_of(self.config_from(start))
 
@@ -115,16 +115,16 @@ class FixedBoard:
     engine: FixedEngine
 
     @cached_property
-    def library(self) -> FourierNativeQ31:
+    def library(self) -> WeakNativeQ31:
         """Of the mechanism with its settings."""
-        return fourier_native_q31(self.engine.made, self.engine.parameters, self.engine.config)
+        return weak_native_q31(self.engine.made, self.engine.parameters, self.engine.config)
 
-    def config_from(self, start: Float) -> FourierConfigQ31:
+    def config_from(self, start: Float) -> WeakConfigQ31:
         """With another start [n_p]."""
         config, integers = self.engine.config, tuple(self.engine.integers(start).tolist())
         return replace(config, estimator=replace(config.estimator, start=integers))
 
-    def identifier(self, start: Float) -> FourierIdentifierQ31:
+    def identifier(self, start: Float) -> WeakIdentifierQ31:
         """Initialised."""
         return self.library.identifier(self.config_from(start).estimator.start)
 
@@ -148,7 +148,7 @@ def _published(identifier: Publisher, record: Record) -> tuple[npt.NDArray[Any],
 
 
 def board_of(
-    compiled: CompiledModel, run: Signals, design: FourierDesign, p: Float, core: Core, neglected: float = 0.0
+    compiled: CompiledModel, run: Signals, design: WeakDesign, p: Float, core: Core, neglected: float = 0.0
 ) -> FloatBoard | FixedBoard:
     """Settings from a run of the rig, at parameters near its own [n_p]; neglected: as in trust.h."""
     if core == "q31":

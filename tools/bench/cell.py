@@ -19,10 +19,10 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.models.mechanisms import compiled_of
 from pvid.models.model import Channel
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.errors import uncertainty
-from pvid.oracle.fourier.rows import Compiled, WeakRows
-from pvid.oracle.fourier.solve import batch
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.rows import Compiled, WeakRows
+from pvid.oracle.weak.solve import batch
 from pvid.rig.columns import Columns
 from pvid.rig.run import Recording, read_recording, write_recording
 
@@ -165,7 +165,7 @@ def provenance() -> str:
 # ---- RC models on the records
 
 # Ten minutes, up to a period of 100 s.
-DESIGN = FourierDesign(1.0 / STEP, window_s=600.0, functions=12)
+DESIGN = WeakDesign(1.0 / STEP, window_s=600.0, functions=12)
 MODELS = (("2 RC pairs", "battery_2rc"), ("2 RC pairs, reaction", str(DATA / "cell_2rc_reaction.py")))
 HEADER = ("model", "identified on", "mV RMS there", "predicted", "mV RMS there", "R0 mohm", "T1 s", "T2 s")
 

@@ -71,7 +71,7 @@ _SIZES = """#include <stdio.h>
 #include "pvid/pvid.h"
 int main(void) {
     printf("%zu %zu ", sizeof(pvid_estimator_f32), sizeof(pvid_strong_estimator_f32));
-    printf("%zu %zu", sizeof(pvid_strong_f32), sizeof(pvid_fourier_f32));
+    printf("%zu %zu", sizeof(pvid_strong_f32), sizeof(pvid_weak_f32));
     return 0;
 }
 """

@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.mechanisms import design_of, size_of, start_of
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_twin import fourier_model_of
-from pvid.oracle.fourier.errors import uncertainty
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import WeakRows
-from pvid.oracle.fourier.solve import batch
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_twin import weak_model_of
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.rows import WeakRows
+from pvid.oracle.weak.solve import batch
 from pvid.run.engine_design import samples_of
-from pvid.setup.fourier import config_of, design_tables, for_engine
+from pvid.setup.weak import config_of, design_tables, for_engine
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 
@@ -95,7 +95,7 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] | None = No
     """Runs of a case; the tables are those of the first one at the truth, the starts within +-50 % of it."""
     simulation = simulation_of(case.name)
     compiled = simulation.model
-    made, model = ready(compiled), fourier_model_of(compiled)
+    made, model = ready(compiled), weak_model_of(compiled)
     design = for_engine(design_of(simulation, case.law))
     tables: Any = None
     engine, oracle, apart, published = [], [], [], 0
@@ -105,7 +105,7 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] | None = No
         tables = tables or design_tables(model, rows, simulation.truth)
         config = config_of(tables, design.sample_rate, made.parameters)
         own = replace(config.estimator, start=np.clip(start, config.estimator.lower, config.estimator.upper))
-        core = fourier_native(compiled, tables).identifier_of(replace(config, estimator=own))
+        core = weak_native(compiled, tables).identifier_of(replace(config, estimator=own))
         record = core.run_samples(samples_of(config, run), sums=False, hashes=False)
         used = core.counters["rows"] // (design.functions * rows.kinds)
         fit = batch(rows.only(slice(0, used)) if used else rows, start, equation_error=False)

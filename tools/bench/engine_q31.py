@@ -9,9 +9,9 @@ import numpy as np
 
 from bench.engine import Case, cases, rms
 from bench.mechanisms import design_of, size_of
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
-from pvid.oracle.fourier.functions import Float
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.oracle.weak.functions import Float
 from pvid.run.engine_design import engine_config, samples_of
 from pvid.run.engine_design_q31 import fixed_engine
 from pvid.sim.simulated_run import simulation_of
@@ -57,7 +57,7 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] | None = No
     truth = np.asarray(simulation.truth)
     first = simulation.run(0, case.law)
     engine = fixed_engine(simulation.model, first, design, truth)
-    library = fourier_native_q31(engine.made, engine.parameters, engine.config)
+    library = weak_native_q31(engine.made, engine.parameters, engine.config)
     config = engine_config(simulation.model, first, design, truth)
     start = engine.values(engine.config.estimator.start).astype(np.float32)
     config = replace(config, estimator=replace(config.estimator, start=start))
@@ -67,7 +67,7 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] | None = No
         run = dict(zip(engine.sample_names, (counts * np.array(engine.lsb)).T, strict=True))
         mine = library.identifier()
         p = engine.values(mine.run_samples(counts, sums=False, hashes=False).p[-1])
-        theirs = fourier_native(simulation.model, config.design).identifier_of(config)
+        theirs = weak_native(simulation.model, config.design).identifier_of(config)
         other = theirs.run_samples(samples_of(config, run), sums=False, hashes=False).p[-1].astype(np.float64)
         se = np.asarray(theirs.estimate["se"], np.float64)[: len(truth)]
         fixed.append((p - truth) / size_of(simulation))

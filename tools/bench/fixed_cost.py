@@ -20,11 +20,11 @@ STATE_HEADER = ("state", "bytes")
 
 # Sources that a part of the engine has of its own; what is left is arithmetic that all parts share.
 _PARTS = (
-    ("samples to the block sums, schedule", r"fourier_q31|collect_q31"),
-    ("jets at a step", r"fourier_front_q31"),
+    ("samples to the block sums, schedule", r"weak_q31|collect_q31"),
+    ("jets at a step", r"weak_front_q31"),
     ("channels and integrals of a step", r"values_q31|_weak_q31|elementary_q31"),
     ("half-window sums and their join", r"sums_q31"),
-    ("a window: white columns, rows, residuals", r"fourier_finish_q31|columns_q31|white_q31|mirror_q31|rescale_q31"),
+    ("a window: white columns, rows, residuals", r"weak_finish_q31|columns_q31|white_q31|mirror_q31|rescale_q31"),
     ("a window: the sensors' noise", r"noise_q31"),
     (
         "a window: sums, solves, assessment",
@@ -37,23 +37,23 @@ _OTHERS = "division, memcpy, the call"
 
 # Of the state: what it is, and its size in C.
 _STRUCTS = (
-    ("block sums and the line of the compensators", "sizeof(pvid_fourier_front_q31)"),
-    ("inputs, gains and integrals of the last steps", "sizeof(pvid_fourier_values_q31)"),
-    ("sums of two half windows", "sizeof(((pvid_fourier_sums_q31 *)0)->sum)"),
-    ("two blocks of four steps", "sizeof(((pvid_fourier_sums_q31 *)0)->block)"),
-    ("sums of the last whole window", "sizeof(pvid_fourier_window_q31)"),
-    ("rows while they are made, or a solve", "sizeof(pvid_fourier_work_q31)"),
+    ("block sums and the line of the compensators", "sizeof(pvid_weak_front_q31)"),
+    ("inputs, gains and integrals of the last steps", "sizeof(pvid_weak_values_q31)"),
+    ("sums of two half windows", "sizeof(((pvid_weak_sums_q31 *)0)->sum)"),
+    ("two blocks of four steps", "sizeof(((pvid_weak_sums_q31 *)0)->block)"),
+    ("sums of the last whole window", "sizeof(pvid_weak_window_q31)"),
+    ("rows while they are made, or a solve", "sizeof(pvid_weak_work_q31)"),
     (
         "gates, noise, formats of the rows",
-        "sizeof(pvid_fourier_finish_q31) - sizeof(pvid_fourier_work_q31) - sizeof(pvid_estimate_q31)",
+        "sizeof(pvid_weak_finish_q31) - sizeof(pvid_weak_work_q31) - sizeof(pvid_estimate_q31)",
     ),
     ("estimates: candidate, published, its copy", "3 * sizeof(pvid_estimate_q31)"),
     ("sums M, b and rr", "sizeof(pvid_information_q31)"),
     ("the rest of the estimator", "sizeof(pvid_estimator_q31) - sizeof(pvid_information_q31)"),
     ("trust", "sizeof(pvid_trust_q31) - 2 * sizeof(pvid_estimate_q31)"),
-    ("drive", "sizeof(pvid_fourier_drive_q31)"),
+    ("drive", "sizeof(pvid_weak_drive_q31)"),
 )
-_ALL = "sizeof(pvid_fourier_q31)"
+_ALL = "sizeof(pvid_weak_q31)"
 
 
 def tick_rows(model: str) -> list[tuple[str, ...]]:
@@ -87,4 +87,4 @@ def part_of(file: str, named: Parts) -> str:
 def state_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the state by part on a Cortex-M, with the arrays of the sizes that the mechanism needs."""
     sizes = fixed_run(model).sizes
-    return state_table("pvid/fourier_q31.h", _STRUCTS, _ALL, "schedule, pointers, padding", sizes)
+    return state_table("pvid/weak_q31.h", _STRUCTS, _ALL, "schedule, pointers, padding", sizes)

@@ -23,11 +23,11 @@ TEXT_HEADER = ("text", "bytes")
 MECHANISMS_HEADER = ("mechanism", "mean", "longest", "state", "tables", "text")
 
 _PARTS = (
-    ("samples to the block sums, schedule", r"fourier_f32|watch_f32"),
-    ("jets at a step", r"fourier_front_f32"),
-    ("channels and integrals of a step", r"fourier_step_f32|\w+_weak_f32|elementary_f32"),
+    ("samples to the block sums, schedule", r"weak_f32|watch_f32"),
+    ("jets at a step", r"weak_front_f32"),
+    ("channels and integrals of a step", r"weak_step_f32|\w+_weak_f32|elementary_f32"),
     ("half-window sums and their join", r"sums_f32"),
-    ("a window: white columns, rows, residuals", r"fourier_finish_f32|columns_f32|white_f32|products_f32"),
+    ("a window: white columns, rows, residuals", r"weak_finish_f32|columns_f32|white_f32|products_f32"),
     ("a window: the sensors' noise", r"noise_f32"),
     ("a window: scatter of the scores", r"scores_f32"),
     (
@@ -38,17 +38,17 @@ _PARTS = (
     ("checks of the settings at init", r"valid_f32|settings_f32"),
 )
 _STRUCTS = (
-    ("block sums and the line of the compensators", "sizeof(pvid_fourier_front_f32)"),
-    ("inputs, gains and integrals of the last steps", "sizeof(pvid_fourier_history_f32)"),
-    ("range and least motion of the samples", "sizeof(pvid_fourier_watch_f32)"),
-    ("sums of two half windows", "sizeof(((pvid_fourier_sums_f32 *)0)->sum)"),
-    ("blocks of eight steps", "sizeof(((pvid_fourier_sums_f32 *)0)->block)"),
+    ("block sums and the line of the compensators", "sizeof(pvid_weak_front_f32)"),
+    ("inputs, gains and integrals of the last steps", "sizeof(pvid_weak_history_f32)"),
+    ("range and least motion of the samples", "sizeof(pvid_weak_watch_f32)"),
+    ("sums of two half windows", "sizeof(((pvid_weak_sums_f32 *)0)->sum)"),
+    ("blocks of eight steps", "sizeof(((pvid_weak_sums_f32 *)0)->block)"),
     (
         "rows while they are made, with the window's sums if these need a place; or a solve",
-        "sizeof(pvid_fourier_work_f32)",
+        "sizeof(pvid_weak_work_f32)",
     ),
-    ("noise of the rows and their reflections", "sizeof(pvid_fourier_white_f32)"),
-    ("scores of the windows", "sizeof(pvid_fourier_scores_f32)"),
+    ("noise of the rows and their reflections", "sizeof(pvid_weak_white_f32)"),
+    ("scores of the windows", "sizeof(pvid_weak_scores_f32)"),
     ("estimates: candidate, published, its copy", "3 * sizeof(pvid_estimate_f32)"),
     ("sums M, b and rr, two levels", "sizeof(pvid_information_f32)"),
     ("the rest of the estimator", "sizeof(pvid_estimator_f32) - sizeof(pvid_information_f32)"),
@@ -64,7 +64,7 @@ def tick_rows(model: str) -> list[tuple[str, ...]]:
 def state_rows(model: str) -> list[tuple[str, ...]]:
     """Bytes of the state by part, as in STATE_HEADER."""
     sizes = fitted_sizes(mechanism_run(model).config)
-    return state_table("pvid/fourier.h", _STRUCTS, "sizeof(pvid_fourier_f32)", "schedule, pointers, padding", sizes)
+    return state_table("pvid/weak.h", _STRUCTS, "sizeof(pvid_weak_f32)", "schedule, pointers, padding", sizes)
 
 
 def text_rows(model: str) -> list[tuple[str, ...]]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number
-from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.weak_library import weak_native
 from pvid.link import frames as link
 from pvid.link.frames import (
     MAX_P,
@@ -97,7 +97,7 @@ def _settings() -> int:
 def _honest_run() -> tuple[tuple[int, Message], ...]:
     """(tick, message) of a board that does what it should, with the bits of the core on this machine."""
     own = board()
-    identifier = fourier_native(own.compiled, own.config.design).identifier_of(own.config)
+    identifier = weak_native(own.compiled, own.config.design).identifier_of(own.config)
     t = np.arange(TICKS) / RATE
     phi = (0.05 * np.sin(9.0 * t)).astype(np.float32)
     y = (0.004 * np.sin(13.0 * t) + 0.002 * np.sin(31.0 * t)).astype(np.float32)
@@ -161,7 +161,7 @@ class LyingBoard:
         """Who the honest board is, but for these values."""
         own, n_p = board(), len(board().p_names)
         honest: dict[str, Any] = {
-            "form": int(link.Form.FOURIER),
+            "form": int(link.Form.WEAK),
             "core": int(link.Core.F32),
             "n_p": n_p,
             "window": 64,

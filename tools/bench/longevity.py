@@ -22,13 +22,13 @@ import numpy.typing as npt
 
 from bench.longevity_signals import CHUNK, L1, RATE_HZ, Disturbance, Sensing, Signals
 from pvid.base.errors import PvidError
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
-from pvid.core.fourier_native import FourierIdentifier, FourierNative
-from pvid.core.fourier_native_q31 import FourierIdentifierQ31, FourierNativeQ31
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core.headers import Filled, Headers, default_library
 from pvid.core.native import Identifier, Native, Publisher
 from pvid.core.sources import PUBLIC_FOLDERS, ROOT
+from pvid.core.weak_native import WeakIdentifier, WeakNative
+from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
 from pvid.run.engine_design import config_for_simulated_rig
@@ -36,8 +36,8 @@ from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.settings.bounds import SIZES
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig
-from pvid.settings.fourier import FourierConfig
 from pvid.settings.q31 import StrongConfigQ31
+from pvid.settings.weak import WeakConfig
 from pvid.setup.f32 import strong_config
 from pvid.setup.q31 import counts_of_samples, p_of, se_of, strong_config_q31
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Tone
@@ -244,7 +244,7 @@ def _start_of(start: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 @cache
-def weak_of(lane: Lane) -> tuple[FourierNative, FourierConfig]:
+def weak_of(lane: Lane) -> tuple[WeakNative, WeakConfig]:
     """The compiled pendulum and the settings of a lane, with the design of its shipped rig."""
     compiled = compiled_of("kapitza")
     config = config_for_simulated_rig(compiled)
@@ -253,13 +253,13 @@ def weak_of(lane: Lane) -> tuple[FourierNative, FourierConfig]:
     estimator = replace(config.estimator, start=start, forgetting_s=lane.forgetting_s)
     if lane.forgetting_s and lane.gated:
         gate = replace(gate, patience_s=PATIENCE * lane.forgetting_s)
-    return fourier_native(compiled, config.design), replace(config, estimator=estimator, gate=gate)
+    return weak_native(compiled, config.design), replace(config, estimator=estimator, gate=gate)
 
 
 class _WeakInFloat(_Ours):
     """The weak form with the compiled pendulum, in float32."""
 
-    identifier: FourierIdentifier
+    identifier: WeakIdentifier
 
     def __init__(self, lane: Lane) -> None:
         super().__init__(lane)
@@ -276,16 +276,16 @@ class _WeakInFloat(_Ours):
 
 
 @cache
-def weak_q31_of() -> tuple[FixedEngine, FourierNativeQ31]:
+def weak_q31_of() -> tuple[FixedEngine, WeakNativeQ31]:
     """The compiled pendulum in fixed point, with the design of its shipped rig."""
     engine = engine_for_simulated_rig(compiled_of("kapitza"))
-    return engine, fourier_native_q31(engine.made, engine.parameters, engine.config)
+    return engine, weak_native_q31(engine.made, engine.parameters, engine.config)
 
 
-class _ChangedQ31(FourierIdentifierQ31):
+class _ChangedQ31(WeakIdentifierQ31):
     """The identifier with the settings of a lane: a copy of those that its library has."""
 
-    def __init__(self, native: FourierNativeQ31, lane: Lane, hop_s: float) -> None:
+    def __init__(self, native: WeakNativeQ31, lane: Lane, hop_s: float) -> None:
         self._lane, self._hop_s = lane, hop_s
         super().__init__(native)
 
@@ -304,7 +304,7 @@ class _ChangedQ31(FourierIdentifierQ31):
 class _WeakInFixedPoint(_Ours):
     """The weak form in integers, which are always finite."""
 
-    identifier: FourierIdentifierQ31
+    identifier: WeakIdentifierQ31
 
     def __init__(self, lane: Lane) -> None:
         super().__init__(lane)

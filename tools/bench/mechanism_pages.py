@@ -21,8 +21,8 @@ from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
 from pvid.models.mechanisms import compiled_of, path_of
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.identify import identify
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import identify
 from pvid.sim.simulated_run import RigSimulation
 
 SEED = 1

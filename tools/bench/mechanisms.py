@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.model.compiled import CompiledModel, Signal
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.errors import uncertainty
-from pvid.oracle.fourier.identify import Identified, identify
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.identify import Identified, identify
 from pvid.sim.bound import bound
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, RigSimulation, simulation_of
@@ -126,13 +126,13 @@ CASES = (
 )
 
 
-def design_of(simulation: RigSimulation, imperfections: Imperfections) -> FourierDesign:
+def design_of(simulation: RigSimulation, imperfections: Imperfections) -> WeakDesign:
     """The rig's own design; a soft friction is known to be soft."""
     rig = simulation.rig
     design: dict[str, Any] = {**rig.design}
     if rig.friction_width and imperfections.friction == "soft":
         design |= {"reversals": "soft", "soft": rig.friction_width}
-    return FourierDesign(rig.sample_rate, rig.window_s, **design)
+    return WeakDesign(rig.sample_rate, rig.window_s, **design)
 
 
 def start_of(simulation: RigSimulation, seed: int) -> Float:

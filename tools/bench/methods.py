@@ -18,7 +18,7 @@ from bench.mechanisms import design_of, size_of, start_of
 from bench.output_error import output_error
 from bench.replay import Replay
 from pvid.base.errors import PvidError
-from pvid.oracle.fourier.identify import identify
+from pvid.oracle.weak.identify import identify
 from pvid.rig.run import Recording
 from pvid.sim.simulated_run import PERFECT, RigSimulation, simulation_of
 

@@ -14,7 +14,7 @@ from pvid.core.native import Native
 from pvid.model.compiled import CompiledModel
 from pvid.models.kapitza.modes import modes_hz
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.design import FourierDesign
+from pvid.oracle.weak.design import WeakDesign
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.mechanism import model_of
 from pvid.settings.enums import Core
@@ -124,10 +124,10 @@ class Errors:
     since: Float
 
 
-def design_for(rig: Rig) -> FourierDesign:
+def design_for(rig: Rig) -> WeakDesign:
     """That of the shipped rig, with window, decimation and filters in proportion to the period of the slow mode."""
     shipped = simulated_rig("kapitza")
-    design = FourierDesign(RATE_HZ, shipped.window_s, **shipped.design)  # type: ignore[arg-type]
+    design = WeakDesign(RATE_HZ, shipped.window_s, **shipped.design)  # type: ignore[arg-type]
     slower = modes_hz(STANDARD_PENDULUM.linear)[0] / modes_hz(rig.pendulum.linear)[0]
     decimation = max(1, round(design.decimation * slower))
     taps, rates = (round(one * decimation / design.decimation) | 1 for one in (design.taps, design.rate_taps))

@@ -12,11 +12,11 @@ import numpy.typing as npt
 from bench.recordings import PIECES, SOURCES, Source
 from bench.replay import Match, Replay
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.errors import uncertainty
-from pvid.oracle.fourier.identify import identify, ready
-from pvid.oracle.fourier.rows import WeakRows
-from pvid.oracle.fourier.solve import batch
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.identify import identify, ready
+from pvid.oracle.weak.rows import WeakRows
+from pvid.oracle.weak.solve import batch
 from pvid.rig.run import Recording
 from pvid.sim.plant import SHARP, Friction
 
@@ -121,9 +121,9 @@ class Rig:
         return self.replay(1).matches(self.estimates[0].p)
 
 
-def windows_of(run: Recording, design: Design) -> FourierDesign:
+def windows_of(run: Recording, design: Design) -> WeakDesign:
     """At a run's rate."""
-    return FourierDesign(
+    return WeakDesign(
         run.sample_rate,
         design.window_s,
         design.functions,

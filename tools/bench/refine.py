@@ -12,20 +12,20 @@ import numpy.typing as npt
 
 from bench.pendulum import RIGS, design_for
 from pvid.codegen.build import refine_functions
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_twin import fourier_model_of
-from pvid.core.fourier_native import FourierNative, RefinedIdentifier
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_twin import weak_model_of
+from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.design.refine import refine_config
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
 from pvid.models.mechanisms import compiled_of
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import WeakRows
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.rows import WeakRows
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.mechanism import model_of
-from pvid.settings.fourier import FourierConfig
 from pvid.settings.refine import RefineConfig
-from pvid.setup.fourier import config_of, design_tables, for_engine
+from pvid.settings.weak import WeakConfig
+from pvid.setup.weak import config_of, design_tables, for_engine
 from pvid.sim.pendulum import (
     STANDARD_PENDULUM,
     STANDARD_RELEASE,
@@ -167,8 +167,8 @@ class Outcome:
 class Engine:
     """Both stages of the pendulum for an encoder: the library, settings of the weak engine and of the refinement."""
 
-    library: FourierNative
-    weak: FourierConfig
+    library: WeakNative
+    weak: WeakConfig
     refine: RefineConfig
 
     def identifier(self, start: Float, **changes: Any) -> RefinedIdentifier:
@@ -185,13 +185,13 @@ def engine_of(bits: int) -> Engine:
     sensor = {"phi": {"resolution": 2 * np.pi / 2**bits}}
     model = model_of(MechanismRig("kapitza", RATE_HZ, known={"l1": L1}, sensor=sensor))
     phi, y = standard_sensors(bits).measure(*_truth(Case(0.1, bits)), 0)
-    made, engine = ready(model), fourier_model_of(model)
+    made, engine = ready(model), weak_model_of(model)
     rows = WeakRows.of(made, {"phi": phi, "y": y}, for_engine(design_for(rig)))
     weak = config_of(design_tables(engine, rows, np.append(TRUTH, 0.0)), RATE_HZ, made.parameters)
     nominal = RigFile.standard().nominal
     guess = Pendulum(L1, nominal.l2, nominal.rho2, nominal.g).linear
     about = refine_rig(RATE_HZ, L1, guess, sample_sd(bits), y_gain_sd=0.0, samples=("y", "phi"))
-    library = fourier_native(model, weak.design, refine_functions(compiled_of("kapitza")))
+    library = weak_native(model, weak.design, refine_functions(compiled_of("kapitza")))
     return Engine(library, weak, refine_config(about))
 
 

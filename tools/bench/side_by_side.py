@@ -14,15 +14,15 @@ from bench.references import KalmanSettings, kalman, output_error, smoothed_driv
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.models.kapitza.physical import physical
-from pvid.oracle.fourier.errors import uncertainty
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import WeakRows
-from pvid.oracle.fourier.solve import batch
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.rows import WeakRows
+from pvid.oracle.weak.solve import batch
 from pvid.rig.file import Identifier as Settings
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.identify import identify
-from pvid.setup.fourier import for_engine
+from pvid.setup.weak import for_engine
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, is_physical, simulate, standard_sensors, standard_start
 
 Float = npt.NDArray[np.float64]

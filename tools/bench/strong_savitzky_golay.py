@@ -17,7 +17,7 @@ from scipy.signal import savgol_filter
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Part
 from pvid.model.signals import Integral, jets, sgn, total_derivative
-from pvid.oracle.fourier.parameters import Parameters
+from pvid.oracle.weak.parameters import Parameters
 
 Float = npt.NDArray[np.float64]
 Run = Mapping[str, Float]

@@ -112,7 +112,7 @@
 #error "PVID_TEXTS must be 0 or 1"
 #endif
 
-/* ---- sizes of pvid/fourier.h ---- */
+/* ---- sizes of pvid/weak.h ---- */
 
 /* Most samples of a tick. */
 #ifndef PVID_MAX_SAMPLES
@@ -233,7 +233,7 @@
 #if PVID_DEAD_ZONE != 0 && PVID_DEAD_ZONE != 1
 #error "PVID_DEAD_ZONE must be 0 or 1"
 #endif
-#ifndef PVID_REFINEMENT /* second stage of fourier.h */
+#ifndef PVID_REFINEMENT /* second stage of weak.h */
 #define PVID_REFINEMENT 1
 #endif
 #if PVID_REFINEMENT != 0 && PVID_REFINEMENT != 1

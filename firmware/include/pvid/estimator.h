@@ -64,7 +64,7 @@ typedef struct {
     float kappa_min;  /* no step while kappa of S + H0 is smaller, or p[0] has less information from the data than from
                          the start, 0..1; 0: always step */
     float noise_margin; /* no step while S contains less than this many times the information of noise of row_sd alone,
-                           0..1e6; in the weak form alone (fourier.h); 0: no check */
+                           0..1e6; in the weak form alone (weak.h); 0: no check */
     float dead_zone;    /* no step within this many standard errors of the solution, 0..100; 0: no dead zone */
     pvid_law law;
     uint16_t divider; /* groups of rows per solve, 1..65535 */

@@ -12,7 +12,7 @@
  *   - threads, several cores: neither blocks the other. With gcc and clang every access to a word is atomic, with
  *     memory fences for other cores; there is no data race in the sense of C11.
  *
- * The weak form contains a publication (pvid_fourier_read_f32). The strong form computes an estimate only on request:
+ * The weak form contains a publication (pvid_weak_read_f32). The strong form computes an estimate only on request:
  *
  *   static pvid_publication_f32 shared;                     (all zeros: nothing has been published)
  *   in the context that calls step, every N ticks:

@@ -1,6 +1,6 @@
 /* pvid.h - identifies the parameters of a mechanism on the microcontroller that drives it.
  *
- * C99, float32, static memory, no library function but sqrtf. Start with fourier.h or strong.h (samples in,
+ * C99, float32, static memory, no library function but sqrtf. Start with weak.h or strong.h (samples in,
  * parameters out), or with estimator.h and model.h for rows of your own model. Integers only: pvid_q31.h.
  */
 #ifndef PVID_PVID_H
@@ -12,7 +12,7 @@
 #include "pvid/estimator.h"
 #include "pvid/fnv.h"
 #include "pvid/fnv_refine.h"
-#include "pvid/fourier.h"
+#include "pvid/weak.h"
 #include "pvid/gate.h"
 #include "pvid/information.h"
 #include "pvid/little_endian.h"
@@ -22,7 +22,7 @@
 #include "pvid/publication.h"
 #include "pvid/refine.h"
 #include "pvid/snapshot.h"
-#include "pvid/snapshot_fourier.h"
+#include "pvid/snapshot_weak.h"
 #include "pvid/snapshot_refine.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"

@@ -1,7 +1,7 @@
 /* pvid_q31.h - identifies the parameters of a mechanism with integers only, for cores without a floating-point
  * unit.
  *
- * Includes no floating-point type. Start with fourier_q31.h or strong_q31.h (sensor counts in, parameters out), or
+ * Includes no floating-point type. Start with weak_q31.h or strong_q31.h (sensor counts in, parameters out), or
  * with estimator_q31.h and model_q31.h for rows of your own model. In float32: pvid.h.
  */
 #ifndef PVID_PVID_Q31_H
@@ -11,7 +11,7 @@
 #include "pvid/differentiator_q31.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/fnv_q31.h"
-#include "pvid/fourier_q31.h"
+#include "pvid/weak_q31.h"
 #include "pvid/gate_q31.h"
 #include "pvid/mechanism_q31.h"
 #include "pvid/misfit_q31.h"

@@ -11,10 +11,10 @@
  *     best of the last blocks; after two refusals in a row the search begins again.
  *
  *   static pvid_refine_f32 refinement;
- *   static const pvid_fourier_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &refine_config};
+ *   static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &refine_config};
  *   config.refine = &second;
- *   if (pvid_fourier_init_f32(&identifier, &config) != PVID_OK) ...
- *   each tick:     reason = pvid_fourier_step_f32(&identifier, sample);          both stages
+ *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
+ *   each tick:     reason = pvid_weak_step_f32(&identifier, sample);          both stages
  *   same context:  estimate = pvid_refine_latest_f32(&refinement);               NULL: the weak form's stands
  *   other context: if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
@@ -30,7 +30,7 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
-#include "pvid/fourier.h"
+#include "pvid/weak.h"
 #include "pvid/refine_shape.h"
 
 #ifdef __cplusplus
@@ -52,7 +52,7 @@ extern "C" {
 typedef struct {
     uint8_t sample; /* entry of the argument of step */
     uint8_t order;  /* 0: the sample, 2: its second derivative (inputs alone) */
-    uint8_t source; /* PVID_SIGNAL_SAMPLED, or of an input PVID_SIGNAL_HELD (fourier_parts.h) */
+    uint8_t source; /* PVID_SIGNAL_SAMPLED, or of an input PVID_SIGNAL_HELD (weak_parts.h) */
     float scale;    /* factor to the model's unit */
     float range;    /* largest absolute value [model's unit], > 0: it is kept in 16 bits */
 } pvid_refine_signal_f32;
@@ -100,7 +100,7 @@ typedef struct pvid_refine_f32 pvid_refine_f32;
 
 /* The functions below, for the configuration of the weak form, which then calls them: only latest, read and
  * reason are left to the application. */
-extern const pvid_fourier_stage_f32 pvid_refine_stage_f32;
+extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
 
 /* Initialises `self`. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or

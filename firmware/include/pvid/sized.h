@@ -5,7 +5,7 @@
  * set of sizes. An application with other sizes does not link, in C and C++, with a static or a shared library, and
  * the linker's message shows its sizes:
  *
- *     undefined reference to `pvid_fourier_init_f32_window321_theta11_p6_moments55_...'
+ *     undefined reference to `pvid_weak_init_f32_window321_theta11_p6_moments55_...'
  *
  * Solution: set the sizes in one place for the library's sources and yours: a header of yours named by
  * -DPVID_CONFIG_HEADER, the CMake options, or the same -D for all files. Source code uses the plain names; the symbols
@@ -89,22 +89,22 @@
 /* fnv_q31.h */
 #define pvid_fnv_estimator_q31 PVID_SIZED(pvid_fnv_estimator_q31)
 
-/* fourier.h */
-#define pvid_fourier_init_f32 PVID_SIZED(pvid_fourier_init_f32)
-#define pvid_fourier_step_f32 PVID_SIZED(pvid_fourier_step_f32)
-#define pvid_fourier_estimate_f32 PVID_SIZED(pvid_fourier_estimate_f32)
-#define pvid_fourier_read_f32 PVID_SIZED(pvid_fourier_read_f32)
-#define pvid_fourier_gap_f32 PVID_SIZED(pvid_fourier_gap_f32)
-#define pvid_fourier_freeze_f32 PVID_SIZED(pvid_fourier_freeze_f32)
-#define pvid_fourier_candidate_f32 PVID_SIZED(pvid_fourier_candidate_f32)
+/* weak.h */
+#define pvid_weak_init_f32 PVID_SIZED(pvid_weak_init_f32)
+#define pvid_weak_step_f32 PVID_SIZED(pvid_weak_step_f32)
+#define pvid_weak_estimate_f32 PVID_SIZED(pvid_weak_estimate_f32)
+#define pvid_weak_read_f32 PVID_SIZED(pvid_weak_read_f32)
+#define pvid_weak_gap_f32 PVID_SIZED(pvid_weak_gap_f32)
+#define pvid_weak_freeze_f32 PVID_SIZED(pvid_weak_freeze_f32)
+#define pvid_weak_candidate_f32 PVID_SIZED(pvid_weak_candidate_f32)
 
-/* fourier_q31.h */
-#define pvid_fourier_init_q31 PVID_SIZED(pvid_fourier_init_q31)
-#define pvid_fourier_step_q31 PVID_SIZED(pvid_fourier_step_q31)
-#define pvid_fourier_estimate_q31 PVID_SIZED(pvid_fourier_estimate_q31)
-#define pvid_fourier_read_q31 PVID_SIZED(pvid_fourier_read_q31)
-#define pvid_fourier_gap_q31 PVID_SIZED(pvid_fourier_gap_q31)
-#define pvid_fourier_freeze_q31 PVID_SIZED(pvid_fourier_freeze_q31)
+/* weak_q31.h */
+#define pvid_weak_init_q31 PVID_SIZED(pvid_weak_init_q31)
+#define pvid_weak_step_q31 PVID_SIZED(pvid_weak_step_q31)
+#define pvid_weak_estimate_q31 PVID_SIZED(pvid_weak_estimate_q31)
+#define pvid_weak_read_q31 PVID_SIZED(pvid_weak_read_q31)
+#define pvid_weak_gap_q31 PVID_SIZED(pvid_weak_gap_q31)
+#define pvid_weak_freeze_q31 PVID_SIZED(pvid_weak_freeze_q31)
 
 /* gate.h */
 #define pvid_gate_init_f32 PVID_SIZED(pvid_gate_init_f32)
@@ -151,17 +151,17 @@
 /* fnv_refine.h */
 #define pvid_fnv_refine_f32 PVID_SIZED(pvid_fnv_refine_f32)
 
-/* snapshot_fourier.h */
-#define pvid_snapshot_save_fourier_f32 PVID_SIZED(pvid_snapshot_save_fourier_f32)
-#define pvid_snapshot_restore_fourier_f32 PVID_SIZED(pvid_snapshot_restore_fourier_f32)
+/* snapshot_weak.h */
+#define pvid_snapshot_save_weak_f32 PVID_SIZED(pvid_snapshot_save_weak_f32)
+#define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
 
 /* snapshot_refine.h */
 #define pvid_snapshot_save_refine_f32 PVID_SIZED(pvid_snapshot_save_refine_f32)
 #define pvid_snapshot_restore_refine_f32 PVID_SIZED(pvid_snapshot_restore_refine_f32)
 
-/* snapshot_fourier_q31.h */
-#define pvid_snapshot_save_fourier_q31 PVID_SIZED(pvid_snapshot_save_fourier_q31)
-#define pvid_snapshot_restore_fourier_q31 PVID_SIZED(pvid_snapshot_restore_fourier_q31)
+/* snapshot_weak_q31.h */
+#define pvid_snapshot_save_weak_q31 PVID_SIZED(pvid_snapshot_save_weak_q31)
+#define pvid_snapshot_restore_weak_q31 PVID_SIZED(pvid_snapshot_restore_weak_q31)
 
 /* strong.h */
 #define pvid_strong_init_f32 PVID_SIZED(pvid_strong_init_f32)

@@ -23,7 +23,7 @@
  * Layout of a snapshot, all numbers little-endian:
  *    0 magic "PVSS"   4 bytes in all   8 version, that of the library   12 kind   16 layout   20 model   24 design
  *   28 configuration   32 generation   36 the object's bytes, its pointers as 0 (NULL) or 1   and last CRC-32 of all
- *   before it. Model and design are 0 but for the identifiers of snapshot_fourier.h
+ *   before it. Model and design are 0 but for the identifiers of snapshot_weak.h
  */
 #ifndef PVID_SNAPSHOT_H
 #define PVID_SNAPSHOT_H

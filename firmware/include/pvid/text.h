@@ -1,7 +1,7 @@
 /* pvid/text.h - the outcome of a tick and the answer of an init in words, for a log or a terminal.
  *
- *   printf("%s\n", pvid_reason_text(pvid_fourier_step_f32(&identifier, sample)));      "held not excited"
- *   printf("%s\n", pvid_status_text(pvid_fourier_init_f32(&identifier, &config)));     "bad row sd: not finite or ..."
+ *   printf("%s\n", pvid_reason_text(pvid_weak_step_f32(&identifier, sample)));      "held not excited"
+ *   printf("%s\n", pvid_status_text(pvid_weak_init_f32(&identifier, &config)));     "bad row sd: not finite or ..."
  *
  * The texts take 3 kB of flash in an image that calls these functions, and nothing in others. With PVID_TEXTS 0 both
  * return "" and the texts are left out; this is the default on an AVR, which would copy them to RAM.

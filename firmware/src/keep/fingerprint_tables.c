@@ -11,7 +11,7 @@ uint32_t pvid_fingerprint_bytes(uint32_t hash, const uint8_t values[], size_t n)
     return running;
 }
 
-uint32_t pvid_fingerprint_signals(uint32_t hash, const pvid_fourier_signal signal[], size_t n)
+uint32_t pvid_fingerprint_signals(uint32_t hash, const pvid_weak_signal signal[], size_t n)
 {
     uint32_t running = hash;
     for (size_t i = 0; i < n; i++) {
@@ -21,7 +21,7 @@ uint32_t pvid_fingerprint_signals(uint32_t hash, const pvid_fourier_signal signa
     return running;
 }
 
-uint32_t pvid_fingerprint_jets(uint32_t hash, const pvid_fourier_jet jet[], size_t n)
+uint32_t pvid_fingerprint_jets(uint32_t hash, const pvid_weak_jet jet[], size_t n)
 {
     uint32_t running = hash;
     for (size_t i = 0; i < n; i++) {
@@ -31,18 +31,18 @@ uint32_t pvid_fingerprint_jets(uint32_t hash, const pvid_fourier_jet jet[], size
     return running;
 }
 
-uint32_t pvid_fingerprint_channels(uint32_t hash, const pvid_fourier_channel channel[], size_t n)
+uint32_t pvid_fingerprint_channels(uint32_t hash, const pvid_weak_channel channel[], size_t n)
 {
     uint32_t running = hash;
     for (size_t i = 0; i < n; i++) {
-        const pvid_fourier_channel *one = &channel[i];
+        const pvid_weak_channel *one = &channel[i];
         const uint8_t fields[] = {one->gain, one->integrand, one->fold, one->plain, one->ramp};
         running = pvid_fingerprint_bytes(running, fields, sizeof fields);
     }
     return running;
 }
 
-uint32_t pvid_fingerprint_kinds(uint32_t hash, const pvid_fourier_kind kind[], size_t n)
+uint32_t pvid_fingerprint_kinds(uint32_t hash, const pvid_weak_kind kind[], size_t n)
 {
     uint32_t running = hash;
     for (size_t i = 0; i < n; i++) {

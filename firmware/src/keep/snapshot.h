@@ -10,11 +10,10 @@
 
 typedef enum {
     PVID_SNAPSHOT_KIND_STRONG_F32 = 1,
-    PVID_SNAPSHOT_KIND_WEAK_F32 = 2,
-    PVID_SNAPSHOT_KIND_WEAK_Q31 = 3,
+    /* 2 and 3 were the weak form of the pendulum alone */
     PVID_SNAPSHOT_KIND_STRONG_Q31 = 4,
-    PVID_SNAPSHOT_KIND_FOURIER_F32 = 5,
-    PVID_SNAPSHOT_KIND_FOURIER_Q31 = 6,
+    PVID_SNAPSHOT_KIND_WEAK_F32 = 5,
+    PVID_SNAPSHOT_KIND_WEAK_Q31 = 6,
     PVID_SNAPSHOT_KIND_REFINE_F32 = 7
 } pvid_snapshot_kind;
 

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 #include "keep/fingerprint_refine_f32.h"
-#include "keep/snapshot_fourier_f32.h"
+#include "keep/snapshot_weak_f32.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_refine_f32, field))
 
@@ -32,9 +32,9 @@ static const uint32_t layout[] = {
     PVID_REFINE_HALF,
 };
 
-static pvid_snapshot_identity identity_of(const pvid_fourier_config_f32 *config)
+static pvid_snapshot_identity identity_of(const pvid_weak_config_f32 *config)
 {
-    pvid_snapshot_identity identity = pvid_snapshot_fourier_identity_f32(config);
+    pvid_snapshot_identity identity = pvid_snapshot_weak_identity_f32(config);
     identity.kind = PVID_SNAPSHOT_KIND_REFINE_F32;
     identity.layout ^= pvid_snapshot_layout(layout, sizeof layout / sizeof layout[0]);
     identity.model = pvid_fingerprint_refine_model_f32(identity.model);
@@ -43,30 +43,30 @@ static pvid_snapshot_identity identity_of(const pvid_fourier_config_f32 *config)
     return identity;
 }
 
-static bool is_ready(const pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config, const uint8_t image[])
+static bool is_ready(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, const uint8_t image[])
 {
-    return pvid_snapshot_fourier_is_ready_f32(self, config, image) && (self->refine != NULL) &&
+    return pvid_snapshot_weak_is_ready_f32(self, config, image) && (self->refine != NULL) &&
            (config->refine == self->refine);
 }
 
-size_t pvid_snapshot_save_refine_f32(const pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config,
-                                     uint32_t generation, uint8_t image[], size_t room)
+size_t pvid_snapshot_save_refine_f32(const pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t generation,
+                                     uint8_t image[], size_t room)
 {
     if (!is_ready(self, config, image)) {
         return 0;
     }
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_save(image, room, &identity, generation, self, &pvid_snapshot_fourier_shape_f32,
+    return pvid_snapshot_save(image, room, &identity, generation, self, &pvid_snapshot_weak_shape_f32,
                               &self->refine->storage->h);
 }
 
-pvid_snapshot_status pvid_snapshot_restore_refine_f32(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config,
+pvid_snapshot_status pvid_snapshot_restore_refine_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config,
                                                       const uint8_t image[], size_t length)
 {
     if (!is_ready(self, config, image)) {
         return PVID_SNAPSHOT_NOT_READY;
     }
     const pvid_snapshot_identity identity = identity_of(config);
-    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &pvid_snapshot_fourier_shape_f32,
+    return pvid_snapshot_restore(image, length, &identity, (uint8_t *)self, &pvid_snapshot_weak_shape_f32,
                                  &self->refine->storage->h);
 }

@@ -7,7 +7,7 @@ static void step(pvid_refine_f32 *self, const float sample[], const pvid_estimat
     (void)pvid_refine_step_f32(self, sample, weak);
 }
 
-const pvid_fourier_stage_f32 pvid_refine_stage_f32 = {
+const pvid_weak_stage_f32 pvid_refine_stage_f32 = {
     .init = pvid_refine_init_f32,
     .step = step,
     .gap = pvid_refine_gap_f32,

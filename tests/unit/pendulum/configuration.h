@@ -3,10 +3,10 @@
 #ifndef PENDULUM_CONFIGURATION_H
 #define PENDULUM_CONFIGURATION_H
 
-#include "pvid/fourier.h"
-#include "pvid/fourier_q31.h"
+#include "pvid/weak.h"
+#include "pvid/weak_q31.h"
 
-extern const pvid_fourier_config_f32 *const pendulum_config_f32;
-extern const pvid_fourier_config_q31 *const pendulum_config_q31;
+extern const pvid_weak_config_f32 *const pendulum_config_f32;
+extern const pvid_weak_config_q31 *const pendulum_config_q31;
 
 #endif

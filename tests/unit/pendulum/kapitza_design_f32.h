@@ -42,7 +42,7 @@ static const float kapitza_filter_1[2] = {
     -0.129522681f, 0.0116368011f,
 };
 
-static const pvid_fourier_filter_f32 kapitza_filter[KAPITZA_WEAK_JETS] = {
+static const pvid_weak_filter_f32 kapitza_filter[KAPITZA_WEAK_JETS] = {
     {3, kapitza_filter_0},
     {2, kapitza_filter_1},
 };
@@ -66,7 +66,7 @@ static const float kapitza_circle[120] = {
     0.866025388f, 0.896872759f, 0.923879504f, 0.94693011f, 0.965925813f, 0.980785251f, 0.991444886f, 0.997858942f,
 };
 
-static const pvid_fourier_noise_f32 kapitza_noise[21] = {
+static const pvid_weak_noise_f32 kapitza_noise[21] = {
     {0, 2, 0, 0, 1.40937189e-07f},
     {0, 3, 0, 0, 2.01014847e-11f},
     {0, 4, 0, 0, 1.41814957e-14f},
@@ -97,8 +97,8 @@ static const float kapitza_error_variance[1] = {
     0.0f,
 };
 
-static const pvid_fourier_design_f32 kapitza_design_f32 = {
-    .model = &kapitza_fourier_f32,
+static const pvid_weak_design_f32 kapitza_design_f32 = {
+    .model = &kapitza_weak_f32,
     .functions = 7,
     .power = 6,
     .decimation = 16,
@@ -123,7 +123,7 @@ static const float kapitza_drive_min[2] = {
     9.86576561e-06f, 0.0f,
 };
 
-static const pvid_fourier_config_f32 kapitza_config_f32 = {
+static const pvid_weak_config_f32 kapitza_config_f32 = {
     .sample_rate_hz = 1000.0f,
     .design = &kapitza_design_f32,
     .range = kapitza_range,

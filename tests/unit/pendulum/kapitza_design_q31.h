@@ -51,18 +51,18 @@ static const uint8_t kapitza_down[2] = {
     0, 0,
 };
 
-static const pvid_fourier_filter_q31 kapitza_filter[2] = {
+static const pvid_weak_filter_q31 kapitza_filter[2] = {
     {3, 0, {16, 29, 1407374884}, kapitza_weights_0},
     {2, 30, {19, 29, 1686629713}, kapitza_weights_1},
 };
 
-static const pvid_fourier_integral_q31 kapitza_integral[3] = {
+static const pvid_weak_integral_q31 kapitza_integral[3] = {
     {10, 16},
     {11, 16},
     {11, 16},
 };
 
-static const pvid_fourier_format_q31 kapitza_format[9] = {
+static const pvid_weak_format_q31 kapitza_format[9] = {
     {2, 1, 0, 0},
     {32, 4, 34, 30},
     {2, 1, 0, 0},
@@ -90,7 +90,7 @@ static const pvid_scaled_q31 kapitza_factor[13] = {
     {-574946197, -39},
 };
 
-static const pvid_fourier_noise_q31 kapitza_noise[21] = {
+static const pvid_weak_noise_q31 kapitza_noise[21] = {
     {0, 0, 3, 3, {634724672, -52}},
     {0, 0, 3, 5, {-718615040, -70}},
     {0, 0, 5, 5, {883117248, -58}},
@@ -133,8 +133,8 @@ static const PVID_TABLE int32_t kapitza_circle[96] = {
     5931641, 6306889, 6655129, 6974872, 7264747, 7523513, 7750062, 7943425, 8102772, 8227422, 8316841, 8370646,
 };
 
-static const pvid_fourier_design_q31 kapitza_design_q31 = {
-    .model = &kapitza_fourier_q31,
+static const pvid_weak_design_q31 kapitza_design_q31 = {
+    .model = &kapitza_weak_q31,
     .functions = 7,
     .power = 6,
     .decimation = 16,
@@ -161,7 +161,7 @@ static const int32_t kapitza_drive_min[2] = {
     2, 0,
 };
 
-static const pvid_fourier_config_q31 kapitza_config_q31 = {
+static const pvid_weak_config_q31 kapitza_config_q31 = {
     .design = &kapitza_design_q31,
     .offset = kapitza_offset,
     .drive_min = kapitza_drive_min,

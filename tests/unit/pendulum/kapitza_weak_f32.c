@@ -112,29 +112,29 @@ static const pvid_model_f32 kapitza_weak_model_f32 = {
     .jacobian = jacobian,
 };
 
-static const pvid_fourier_signal signal[KAPITZA_WEAK_SIGNALS] = {
+static const pvid_weak_signal signal[KAPITZA_WEAK_SIGNALS] = {
     {0, PVID_SIGNAL_SAMPLED},
     {1, PVID_SIGNAL_SAMPLED},
 };
 
-static const pvid_fourier_jet jet[KAPITZA_WEAK_JETS] = {
+static const pvid_weak_jet jet[KAPITZA_WEAK_JETS] = {
     {0, 2},
     {1, 0},
 };
 
-static const pvid_fourier_channel channel[KAPITZA_WEAK_CHANNELS] = {
-    {0, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+static const pvid_weak_channel channel[KAPITZA_WEAK_CHANNELS] = {
+    {0, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
     {1, 0, 2, 5, 7},
-    {2, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    {2, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
     {1, 1, 2, 5, 7},
     {1, 2, 2, 5, 7},
-    {1, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
-    {1, PVID_FOURIER_NONE, 2, 5, 7},
-    {1, PVID_FOURIER_NONE, 1, 5, PVID_FOURIER_NONE},
-    {PVID_FOURIER_NONE, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    {1, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
+    {1, PVID_WEAK_NONE, 2, 5, 7},
+    {1, PVID_WEAK_NONE, 1, 5, PVID_WEAK_NONE},
+    {PVID_WEAK_NONE, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
 };
 
-static const pvid_fourier_term_f32 term[KAPITZA_WEAK_TERMS] = {
+static const pvid_weak_term_f32 term[KAPITZA_WEAK_TERMS] = {
     {0, 2, 0, -1.0f},
     {1, 2, 1, -1.0f},
     {2, 2, 2, -1.0f},
@@ -150,11 +150,11 @@ static const pvid_fourier_term_f32 term[KAPITZA_WEAK_TERMS] = {
     {7, 2, 10, -1.0f},
 };
 
-static const pvid_fourier_kind kind[KAPITZA_WEAK_KINDS] = {
+static const pvid_weak_kind kind[KAPITZA_WEAK_KINDS] = {
     {8, 2, 0, 13},
 };
 
-const pvid_fourier_model_f32 kapitza_fourier_f32 = {
+const pvid_weak_model_f32 kapitza_weak_f32 = {
     .samples = KAPITZA_WEAK_SAMPLES,
     .signals = KAPITZA_WEAK_SIGNALS,
     .jets = KAPITZA_WEAK_JETS,

@@ -161,29 +161,29 @@ static const pvid_model_q31 kapitza_model_q31 = {
     .formats = kapitza_formats,
 };
 
-static const pvid_fourier_signal kapitza_signal[2] = {
+static const pvid_weak_signal kapitza_signal[2] = {
     {0, 0},
     {1, 0},
 };
 
-static const pvid_fourier_jet kapitza_jet[2] = {
+static const pvid_weak_jet kapitza_jet[2] = {
     {0, 2},
     {1, 0},
 };
 
-static const pvid_fourier_channel kapitza_channel[9] = {
-    {0, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+static const pvid_weak_channel kapitza_channel[9] = {
+    {0, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
     {1, 0, 2, 5, 7},
-    {2, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    {2, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
     {1, 1, 2, 5, 7},
     {1, 2, 2, 5, 7},
-    {1, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
-    {1, PVID_FOURIER_NONE, 2, 5, 7},
-    {1, PVID_FOURIER_NONE, 1, 5, PVID_FOURIER_NONE},
-    {PVID_FOURIER_NONE, PVID_FOURIER_NONE, 0, PVID_FOURIER_NONE, PVID_FOURIER_NONE},
+    {1, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
+    {1, PVID_WEAK_NONE, 2, 5, 7},
+    {1, PVID_WEAK_NONE, 1, 5, PVID_WEAK_NONE},
+    {PVID_WEAK_NONE, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE},
 };
 
-static const pvid_fourier_term_q31 kapitza_term[13] = {
+static const pvid_weak_term_q31 kapitza_term[13] = {
     {0, 2, 0},
     {1, 2, 1},
     {2, 2, 2},
@@ -199,11 +199,11 @@ static const pvid_fourier_term_q31 kapitza_term[13] = {
     {7, 2, 10},
 };
 
-static const pvid_fourier_kind kapitza_kind[1] = {
+static const pvid_weak_kind kapitza_kind[1] = {
     {8, 2, 0, 13},
 };
 
-const pvid_fourier_model_q31 kapitza_fourier_q31 = {
+const pvid_weak_model_q31 kapitza_weak_q31 = {
     .samples = 2,
     .signals = 2,
     .jets = 2,

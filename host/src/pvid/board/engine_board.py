@@ -8,7 +8,7 @@ from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.target import Verdict, verify
 from pvid.core.native import Native
-from pvid.oracle.fourier.choice import Scored
+from pvid.oracle.weak.choice import Scored
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.settings.engine_cores import ENGINE_CORES

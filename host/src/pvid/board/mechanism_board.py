@@ -18,10 +18,10 @@ from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.simulated_sensors import sensor_macros
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
-from pvid.codegen import files_design, files_fourier
-from pvid.codegen.fourier import fourier_functions_of
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.codegen import files_design, files_weak
+from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
@@ -30,7 +30,7 @@ from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.choice import Scored
+from pvid.oracle.weak.choice import Scored
 from pvid.rig.described import rig_of_document
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
@@ -47,10 +47,10 @@ from pvid.run.nominal_run import model_of_rig_file, nominal_run
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
-from pvid.settings.fourier import FourierConfig, FourierDesign32, FourierFilter, FourierNoise
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise
+from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.fourier import FourierTwin
+from pvid.twin.weak import WeakTwin
 
 _COMMAND = "pvid log"
 _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
@@ -78,7 +78,7 @@ class MechanismBoard:
     matrix = "covariance"  # of an estimate
     rig: MechanismRig | RigFile
     compiled: CompiledModel
-    config: FourierConfig
+    config: WeakConfig
     recording: npt.NDArray[np.float32]
 
     @classmethod
@@ -163,7 +163,7 @@ class MechanismBoard:
         return {name: self.compiled.signal(name).resolution for name in self.config.design.model.sample_names}
 
     @property
-    def _shared(self) -> FourierConfig:
+    def _shared(self) -> WeakConfig:
         """The settings of an image: neutral values for what a Configure frame brings."""
         ones = np.ones(len(self.compiled.unknowns), np.float32)
         neutral: dict[str, Any] = {**dict.fromkeys(_PER_PARAMETER, ones), "row_sd": 1.0, "forgetting_s": 0.0}
@@ -174,11 +174,11 @@ class MechanismBoard:
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         model, design = self.config.design.model, self.config.design
-        made = fourier_functions_of(self.compiled)
+        made = weak_functions_of(self.compiled)
         listed = [f"{one.name} [{one.unit or '1'}]" for one in self.compiled.unknowns]
         code = {
-            f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), _COMMAND),
-            f"{made.name}_weak_f32.c": files_fourier.source(made, model, _COMMAND),
+            f"{made.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), _COMMAND),
+            f"{made.name}_weak_f32.c": files_weak.source(made, model, _COMMAND),
             "stream_tables.h": files_design.header(
                 self._shared, sizes_of_design(design), _COMMAND, self.compiled.title, listed
             ),
@@ -187,7 +187,7 @@ class MechanismBoard:
         simulated = isinstance(self.rig, RigFile) and not len(self.recording)
         macros = [
             f"#define STREAM_CORE {int(Core.F32)}",
-            f"#define STREAM_FORM {int(Form.FOURIER)}",
+            f"#define STREAM_FORM {int(Form.WEAK)}",
             f"#define STREAM_CONFIG {made.name}_config_f32",
             f"#define STREAM_N_P {len(self.compiled.unknowns)}u",
             f"#define STREAM_SAMPLES {model.samples}u",
@@ -200,9 +200,9 @@ class MechanismBoard:
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
             macros=macros,
             files={**code, **({} if simulated else {"stream_recording.h": _recording(self.recording)})},
-            form="fourier",
+            form="weak",
             core="f32",
-            identifier="fourier_f32",
+            identifier="weak_f32",
             sensor="sensor.c" if simulated else "sensor_recording.c",
             sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
         )
@@ -218,7 +218,7 @@ class MechanismBoard:
         return Configure(
             session=secrets.randbelow(2**32 - 1) + 1,
             settings=settings,
-            form=int(Form.FOURIER),
+            form=int(Form.WEAK),
             source=int(source),
             hash_every=hash_every,
             estimate_every=estimate_every,
@@ -228,7 +228,7 @@ class MechanismBoard:
             **{name: getattr(own, name) for name in _SINGLE},
         )
 
-    def configured(self, frame: Configuration) -> FourierConfig:
+    def configured(self, frame: Configuration) -> WeakConfig:
         """The settings with the values of a Configure frame.
 
         Raises
@@ -247,9 +247,9 @@ class MechanismBoard:
         single = {name: getattr(frame, name) for name in _SINGLE}
         return replace(self.config, estimator=replace(own, law=Law(frame.law), **places, **single))
 
-    def twin_of(self, frame: Configuration) -> FourierTwin:
+    def twin_of(self, frame: Configuration) -> WeakTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
-        return FourierTwin(self.configured(frame))
+        return WeakTwin(self.configured(frame))
 
     @property
     def without_recording(self) -> MechanismBoard:
@@ -266,7 +266,7 @@ class MechanismBoard:
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the engine on this machine [ticks]."""
-        identifier = fourier_native(self.compiled, self.config.design).identifier_of(self.config)
+        identifier = weak_native(self.compiled, self.config.design).identifier_of(self.config)
         return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     def text(self) -> str:
@@ -288,7 +288,7 @@ class MechanismBoard:
         return cls(rig, compiled, config, _nothing(config))
 
 
-def _nothing(config: FourierConfig) -> npt.NDArray[np.float32]:
+def _nothing(config: WeakConfig) -> npt.NDArray[np.float32]:
     """No recording."""
     return np.zeros((0, config.design.model.samples), np.float32)
 
@@ -349,7 +349,7 @@ def _recording(samples: npt.NDArray[np.float32]) -> str:
 # ---- the text of the settings: numbers as Python writes them, which read back exactly; long tables as their bits
 
 
-def _flat(config: FourierConfig) -> dict[str, Any]:
+def _flat(config: WeakConfig) -> dict[str, Any]:
     """Key -> value; keys of the parts have their names in front."""
     parts: dict[str, Any] = {
         "estimator": config.estimator,
@@ -369,13 +369,13 @@ def _written(value: Any) -> str:
             return str(value).lower()
         case IntEnum():
             return str(int(value))
-        case FourierFilter():
+        case WeakFilter():
             return _written(value.weights)
         case np.ndarray() if value.size > _SHORT:  # the bits
             words = [f"{word:08x}" for word in value.view(np.uint32).tolist()]
             rows = [" ".join(words[k : k + _WORDS]) for k in range(0, len(words), _WORDS)]
             return "\n".join(["'''", *rows, "'''"])
-        case FourierNoise():
+        case WeakNoise():
             return _written([value.kind, value.power, value.a, value.b, float(value.factor)])
         case np.ndarray():
             return _written(value.tolist())
@@ -392,7 +392,7 @@ def _array(value: Any, kind: type[np.generic] = np.float32) -> npt.NDArray[Any]:
     return np.array(value, kind)
 
 
-def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> FourierConfig:
+def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> WeakConfig:
     def part(name: str) -> dict[str, Any]:
         return {key.removeprefix(f"{name}_"): value for key, value in engine.items() if key.startswith(f"{name}_")}
 
@@ -403,16 +403,16 @@ def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> FourierConfig
         }
 
     design = part("design")
-    filters = tuple(FourierFilter(_array(one)) for one in design.pop("filter"))
+    filters = tuple(WeakFilter(_array(one)) for one in design.pop("filter"))
     at_steps = design.pop("compensator", None)
-    compensators = filters if at_steps is None else tuple(FourierFilter(_array(one)) for one in at_steps)
-    noise = tuple(FourierNoise(kind, power, a, b, np.float32(x)) for kind, power, a, b, x in design.pop("noise"))
-    made = FourierDesign32(
-        model=fourier_model_of(compiled), filter=filters, compensator=compensators, noise=noise, **arrays(design)
+    compensators = filters if at_steps is None else tuple(WeakFilter(_array(one)) for one in at_steps)
+    noise = tuple(WeakNoise(kind, power, a, b, np.float32(x)) for kind, power, a, b, x in design.pop("noise"))
+    made = WeakDesign32(
+        model=weak_model_of(compiled), filter=filters, compensator=compensators, noise=noise, **arrays(design)
     )
     estimator = arrays(part("estimator"))
-    own = {one.name: engine[one.name] for one in fields(FourierConfig) if one.name in engine}
-    return FourierConfig(
+    own = {one.name: engine[one.name] for one in fields(WeakConfig) if one.name in engine}
+    return WeakConfig(
         **arrays(own),
         design=made,
         estimator=EstimatorConfig(**{**estimator, "law": Law(estimator["law"])}),

@@ -15,18 +15,18 @@ from pvid.base.errors import PvidError
 from pvid.board.simulated_sensors import sensor_macros
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
-from pvid.codegen import files_fourier_q31
-from pvid.codegen.fourier import fourier_functions_of
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
-from pvid.codegen.fourier_q31 import JetReaches, fixed_fourier
+from pvid.codegen import files_weak_q31
+from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_q31 import JetReaches, fixed_weak
 from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
-from pvid.design.fourier_q31 import circle_of
+from pvid.design.weak_q31 import circle_of
 from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
 from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.choice import Scored
+from pvid.oracle.weak.choice import Scored
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
@@ -40,18 +40,18 @@ from pvid.run.engine_design_q31 import (
 )
 from pvid.run.mechanism import model_of
 from pvid.run.nominal_run import model_of_rig_file, nominal_run
-from pvid.settings.fourier_q31 import (
-    FourierConfigQ31,
-    FourierDesignQ31,
-    FourierFilterQ31,
-    FourierFormatQ31,
-    FourierNoiseQ31,
-    Rescale,
-)
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
-from pvid.setup.fourier_sizes import sizes_of_q31
+from pvid.settings.weak_q31 import (
+    Rescale,
+    WeakConfigQ31,
+    WeakDesignQ31,
+    WeakFilterQ31,
+    WeakFormatQ31,
+    WeakNoiseQ31,
+)
+from pvid.setup.weak_sizes import sizes_of_q31
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.fourier_q31 import FourierTwinQ31
+from pvid.twin.weak_q31 import WeakTwinQ31
 
 _COMMAND = "pvid log"
 _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
@@ -108,7 +108,7 @@ class MechanismBoardQ31:
             raise PvidError(f"the sample rate is {self.engine.sample_rate:g} Hz, and a board streams at 1 Hz and more")
 
     @property
-    def config(self) -> FourierConfigQ31:
+    def config(self) -> WeakConfigQ31:
         """Settings and tables."""
         return self.engine.config
 
@@ -149,7 +149,7 @@ class MechanismBoardQ31:
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the engine on this machine [ticks]."""
-        identifier = fourier_native_q31(self.engine.made, self.engine.parameters, self.engine.config).identifier()
+        identifier = weak_native_q31(self.engine.made, self.engine.parameters, self.engine.config).identifier()
         return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     @property
@@ -163,14 +163,14 @@ class MechanismBoardQ31:
         engine, name, sizes = self.engine, self.engine.name, self._sizes
         simulated = isinstance(self.rig, RigFile) and not len(self.recording)
         code = {
-            f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, _COMMAND),
-            f"{name}_weak_q31.c": files_fourier_q31.source(engine.made, engine.parameters, _COMMAND),
-            "stream_tables.h": files_fourier_q31.design_header(self.config, name, sizes, _COMMAND, []),
+            f"{name}_weak_q31.h": files_weak_q31.header(engine.made, sizes, _COMMAND),
+            f"{name}_weak_q31.c": files_weak_q31.source(engine.made, engine.parameters, _COMMAND),
+            "stream_tables.h": files_weak_q31.design_header(self.config, name, sizes, _COMMAND, []),
         }
         units = ", ".join(float_literal(np.float32(2.0**-bits)) for bits in engine.parameters.p_bits)
         macros = [
             f"#define STREAM_CORE {int(Core.Q31)}",
-            f"#define STREAM_FORM {int(Form.FOURIER)}",
+            f"#define STREAM_FORM {int(Form.WEAK)}",
             f"#define STREAM_CONFIG {name}_config_q31",
             f"#define STREAM_N_P {len(engine.parameters.p_bits)}u",
             f"#define STREAM_SAMPLES {self.config.design.model.samples}u",
@@ -184,8 +184,8 @@ class MechanismBoardQ31:
             macros=macros,
             files={**code, **({} if simulated else {"stream_recording.h": _recording(self.recording)})},
             core="q31",
-            form="fourier",
-            identifier="fourier_q31",
+            form="weak",
+            identifier="weak_q31",
             sensor="sensor.c" if simulated else "sensor_recording.c",
             sizes={macro: str(value) for macro, value in raised(sizes).items()},
         )
@@ -201,7 +201,7 @@ class MechanismBoardQ31:
         return ConfigureQ31(
             session=secrets.randbelow(2**32 - 1) + 1,
             settings=settings,
-            form=int(Form.FOURIER),
+            form=int(Form.WEAK),
             source=int(source),
             hash_every=hash_every,
             estimate_every=estimate_every,
@@ -212,7 +212,7 @@ class MechanismBoardQ31:
             **{name: getattr(own, name) for name in _SINGLE},
         )
 
-    def twin_of(self, frame: Configuration) -> FourierTwinQ31:
+    def twin_of(self, frame: Configuration) -> WeakTwinQ31:
         """The twin with the values of a Configure frame.
 
         Raises
@@ -226,7 +226,7 @@ class MechanismBoardQ31:
         places: dict[str, Any] = {name: tuple(getattr(frame, name)[: len(own.start)]) for name in _PER_PARAMETER}
         single = {name: getattr(frame, name) for name in _SINGLE}
         config = replace(self.config, estimator=replace(own, **places, **single))
-        return FourierTwinQ31(config, self.engine.parameters.model)
+        return WeakTwinQ31(config, self.engine.parameters.model)
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `of_tables` gives the same board back."""
@@ -243,9 +243,9 @@ class MechanismBoardQ31:
             Where it is damaged.
         """
         compiled = model_of_rig_file(rig) if isinstance(rig, RigFile) else model_of(rig)
-        functions = fourier_functions_of(compiled)
+        functions = weak_functions_of(compiled)
         of_jets = dict(zip(functions.jet_names, map(float, engine["jet_reach"]), strict=True))
-        made = fixed_fourier(functions, JetReaches(run_s=float(engine["run_s"]), of=of_jets))
+        made = fixed_weak(functions, JetReaches(run_s=float(engine["run_s"]), of=of_jets))
 
         def part(name: str) -> dict[str, Any]:
             keys = {key: value for key, value in engine.items() if key.startswith(f"{name}_")}
@@ -254,15 +254,15 @@ class MechanismBoardQ31:
         design = part("design")
         kinds = {"filter": _filter, "run": _rescale, "format": _format, "noise": _noise}
         design |= {key: tuple(make(one) for one in design[key]) for key, make in kinds.items()}
-        tables = FourierDesignQ31(model=made.model, circle=circle_of(design["hop"]), units=(), margins={}, **design)
-        config = FourierConfigQ31(
+        tables = WeakDesignQ31(model=made.model, circle=circle_of(design["hop"]), units=(), margins={}, **design)
+        config = WeakConfigQ31(
             design=tables,
             estimator=EstimatorConfigQ31(**part("estimator")),
             trust=TrustConfigQ31(**part("trust")),
             gate=GateConfigQ31(**part("gate")),
             **{
                 one.name: _tuples(engine[one.name])
-                for one in fields(FourierConfigQ31)
+                for one in fields(WeakConfigQ31)
                 if one.name in engine and one.name not in ("design", "estimator", "trust", "gate")
             },
         )
@@ -325,12 +325,12 @@ def _written(value: Any) -> str:
             return str(value).lower()
         case str():
             return f'"{value}"'
-        case FourierFilterQ31():
+        case WeakFilterQ31():
             one = value.rescale
             return _written([value.bits, one.down, one.shift, one.multiplier, *value.weights.tolist()])
-        case Rescale() | FourierFormatQ31():
+        case Rescale() | WeakFormatQ31():
             return _written([getattr(value, one.name) for one in fields(value)])
-        case FourierNoiseQ31():
+        case WeakNoiseQ31():
             return _written([value.kind, value.power, value.a, value.b, *value.factor])
         case tuple() | list():
             words = [_written(one) for one in value]
@@ -345,19 +345,19 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(one) for one in value) if isinstance(value, list | tuple) else value
 
 
-def _filter(given: tuple[int, ...]) -> FourierFilterQ31:
+def _filter(given: tuple[int, ...]) -> WeakFilterQ31:
     bits, down, shift, multiplier, *weights = given
-    return FourierFilterQ31(np.array(weights, np.int32), bits, Rescale(down, shift, multiplier))
+    return WeakFilterQ31(np.array(weights, np.int32), bits, Rescale(down, shift, multiplier))
 
 
 def _rescale(given: tuple[int, ...]) -> Rescale:
     return Rescale(*given)
 
 
-def _format(given: tuple[int, ...]) -> FourierFormatQ31:
-    return FourierFormatQ31(*given)
+def _format(given: tuple[int, ...]) -> WeakFormatQ31:
+    return WeakFormatQ31(*given)
 
 
-def _noise(given: tuple[int, ...]) -> FourierNoiseQ31:
+def _noise(given: tuple[int, ...]) -> WeakNoiseQ31:
     kind, power, a, b, m, e = given
-    return FourierNoiseQ31(kind, power, a, b, (m, e))
+    return WeakNoiseQ31(kind, power, a, b, (m, e))

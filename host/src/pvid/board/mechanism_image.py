@@ -14,10 +14,10 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header
 from pvid.board.replay_image import REPORT_EVERY
-from pvid.codegen import files_design, files_fourier
+from pvid.codegen import files_design, files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
-from pvid.codegen.fourier import fourier_functions_of
-from pvid.codegen.fourier_library import fourier_native
+from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.weak_library import weak_native
 from pvid.core.sizes import smallest
 from pvid.core.sources import left_out
 from pvid.design.c_tables import float_literal
@@ -26,11 +26,11 @@ from pvid.models import mechanisms
 from pvid.models.simulated_rig import simulated_rig
 from pvid.run.engine_design import config_for_simulated_rig, samples_of
 from pvid.settings.enums import Core
-from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+from pvid.settings.weak import WeakConfig
+from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin import fnv
-from pvid.twin.fourier import FourierTwin
+from pvid.twin.weak import WeakTwin
 
 Float32 = npt.NDArray[np.float32]
 
@@ -54,7 +54,7 @@ class MechanismRun:
     """
 
     compiled: CompiledModel
-    config: FourierConfig
+    config: WeakConfig
     counts: npt.NDArray[np.int32]
     lsb: Float32
     measure_from: int
@@ -100,12 +100,12 @@ def mechanism_run(name: str, ticks: int | None = None) -> MechanismRun:
 
 def native_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
-    return fourier_native(run.compiled, run.config.design).identifier_of(run.config).run_samples(run.samples).hash
+    return weak_native(run.compiled, run.config.design).identifier_of(run.config).run_samples(run.samples).hash
 
 
 def twin_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]."""
-    return fnv.running_hashes(FourierTwin(run.config).run(run.samples).lane())
+    return fnv.running_hashes(WeakTwin(run.config).run(run.samples).lane())
 
 
 def header(run: MechanismRun) -> str:
@@ -124,16 +124,16 @@ def header(run: MechanismRun) -> str:
             '#include "pvid/fnv.h"',
             f'#include "{run.name}_design_f32.h"',
             "",
-            "#define REPLAY_TYPE pvid_fourier_f32",
-            "#define REPLAY_INIT pvid_fourier_init_f32",
-            "#define REPLAY_STEP pvid_fourier_step_f32",
+            "#define REPLAY_TYPE pvid_weak_f32",
+            "#define REPLAY_INIT pvid_weak_init_f32",
+            "#define REPLAY_STEP pvid_weak_step_f32",
             "#define REPLAY_HASH pvid_fnv_estimator_f32",
             "#define REPLAY_SAMPLE float",
             "#define REPLAY_COUNT int32_t",
             f"#define REPLAY_CHANNELS {run.counts.shape[1]}u",
             "#define REPLAY_FAULTS pvid_arithmetic_faults_f32()",
             "#define REPLAY_IS_FLOAT 1",
-            f'#define REPLAY_FORM "{run.name}, fourier"',
+            f'#define REPLAY_FORM "{run.name}, weak"',
             f"#define REPLAY_TICKS {len(run.counts)}u",
             f"#define REPLAY_MEASURE_FROM {run.measure_from}u",
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
@@ -154,12 +154,12 @@ def header(run: MechanismRun) -> str:
 
 def files_of(run: MechanismRun) -> dict[str, str]:
     """What the image consists of besides the core: name -> text."""
-    made, model = fourier_functions_of(run.compiled), run.config.design.model
+    made, model = weak_functions_of(run.compiled), run.config.design.model
     names = [f"{one.name} [{one.unit or '1'}]" for one in run.compiled.unknowns]
     needed = sizes_of_design(run.config.design)
     return {
-        f"{run.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), MADE_BY),
-        f"{run.name}_weak_f32.c": files_fourier.source(made, model, MADE_BY),
+        f"{run.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), MADE_BY),
+        f"{run.name}_weak_f32.c": files_weak.source(made, model, MADE_BY),
         f"{run.name}_design_f32.h": files_design.header(run.config, needed, MADE_BY, run.compiled.title, names),
         "replay_run.h": header(run),
     }
@@ -176,9 +176,7 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
         raise PvidError(
             f"{target.name}: float32 has no bits of the twin on an AVR: its division differs at the extremes"
         )
-    return build_with(
-        target, f"{run.name}-fourier-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32"
-    )
+    return build_with(target, f"{run.name}-weak-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32")
 
 
 def build_with(
@@ -187,7 +185,7 @@ def build_with(
     files: Mapping[str, str],
     sizes: Mapping[str, int],
     core: Core,
-    room: str = "fourier",
+    room: str = "weak",
     *,
     refined: bool = False,
 ) -> tuple[Path, Path]:

@@ -13,13 +13,13 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.models import mechanisms
 from pvid.run import engine_files_q31
 from pvid.run.engine_design import simulated_run_of
 from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.twin import fnv
-from pvid.twin.fourier_q31 import FourierTwinQ31
+from pvid.twin.weak_q31 import WeakTwinQ31
 
 MADE_BY = "pvid.board.mechanism_image_q31"
 
@@ -73,13 +73,13 @@ def fixed_run(name: str, ticks: int | None = None) -> FixedRun:
 def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
     """Running hash of the C core on this machine after every tick, [ticks]."""
     engine = run.engine
-    identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
     return identifier.run_samples(run.counts).hash
 
 
 def twin_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]."""
-    return fnv.running_hashes(FourierTwinQ31(run.engine.config, run.engine.parameters.model).run(run.counts.T).lane())
+    return fnv.running_hashes(WeakTwinQ31(run.engine.config, run.engine.parameters.model).run(run.counts.T).lane())
 
 
 def header(run: FixedRun) -> str:
@@ -98,16 +98,16 @@ def header(run: FixedRun) -> str:
             "",
             *IN_FLASH,
             "",
-            "#define REPLAY_TYPE pvid_fourier_q31",
-            "#define REPLAY_INIT pvid_fourier_init_q31",
-            "#define REPLAY_STEP pvid_fourier_step_q31",
+            "#define REPLAY_TYPE pvid_weak_q31",
+            "#define REPLAY_INIT pvid_weak_init_q31",
+            "#define REPLAY_STEP pvid_weak_step_q31",
             "#define REPLAY_HASH pvid_fnv_estimator_q31",
             "#define REPLAY_SAMPLE int32_t",
             f"#define REPLAY_COUNT {count}",
             f"#define REPLAY_CHANNELS {samples}u",
             "#define REPLAY_FAULTS 0u",
             "#define REPLAY_IS_FLOAT 0",
-            f'#define REPLAY_FORM "{run.name}, fourier"',
+            f'#define REPLAY_FORM "{run.name}, weak"',
             f"#define REPLAY_TICKS {len(run.counts)}u",
             f"#define REPLAY_MEASURE_FROM {run.measure_from}u",
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
@@ -137,4 +137,4 @@ def build_fixed_image(target: Board, run: FixedRun) -> tuple[Path, Path]:
     -------
     The image, and the tree it was built in.
     """
-    return build_with(target, f"{run.name}-fourier-q31-{len(run.counts)}", files_of(run), run.sizes, "q31")
+    return build_with(target, f"{run.name}-weak-q31-{len(run.counts)}", files_of(run), run.sizes, "q31")

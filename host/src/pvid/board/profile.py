@@ -102,7 +102,7 @@ def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
 
 def _weak(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
     made = engine_image(board, model, core)
-    return made.image, f"pvid_fourier_step_{core}", made.measure_from
+    return made.image, f"pvid_weak_step_{core}", made.measure_from
 
 
 _PLAYED = dict(zip(FORMS, (_weak, _strong), strict=True))

@@ -15,9 +15,9 @@ from pvid.board.mechanism_image import MADE_BY, MechanismRun, build_with, files_
 from pvid.codegen import files_refine
 from pvid.codegen.build import refine_functions
 from pvid.codegen.fitted_sizes import fitted_sizes
-from pvid.codegen.fourier_library import fourier_native
 from pvid.codegen.refine import RefineFunctions
-from pvid.core.fourier_native import RefinedIdentifier
+from pvid.codegen.weak_library import weak_native
+from pvid.core.weak_native import RefinedIdentifier
 from pvid.design.c_tables import float_literal
 from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
@@ -26,7 +26,7 @@ from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.sim.pendulum import simulate, standard_sensors
 
-_START = "#define REPLAY_INIT pvid_fourier_init_f32"
+_START = "#define REPLAY_INIT pvid_weak_init_f32"
 _HASH = "#define REPLAY_HASH pvid_fnv_estimator_f32"
 
 
@@ -40,7 +40,7 @@ class RefinedRun:
 
     def native(self) -> RefinedIdentifier:
         """Both stages in C on this machine."""
-        return fourier_native(self.weak.compiled, self.weak.config.design, self.made).refined_of(
+        return weak_native(self.weak.compiled, self.weak.config.design, self.made).refined_of(
             self.weak.config, self.settings
         )
 
@@ -128,14 +128,14 @@ def header(run: RefinedRun, text: str) -> str:
             "",
             settings_text(run.settings, "replay_refine_config"),
             "static pvid_refine_f32 replay_refinement;",
-            "static const pvid_fourier_refine_f32 replay_second = {",
+            "static const pvid_weak_refine_f32 replay_second = {",
             "    &pvid_refine_stage_f32, &replay_refinement, &replay_refine_config};",
             "",
-            "static pvid_status replay_init(pvid_fourier_f32 *self, const pvid_fourier_config_f32 *config)",
+            "static pvid_status replay_init(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)",
             "{",
-            "    pvid_fourier_config_f32 both = *config;",
+            "    pvid_weak_config_f32 both = *config;",
             "    both.refine = &replay_second;",
-            "    return pvid_fourier_init_f32(self, &both);",
+            "    return pvid_weak_init_f32(self, &both);",
             "}",
             "",
             "static uint32_t replay_hash(uint32_t hash, const pvid_estimator_f32 *estimator, pvid_reason reason)",

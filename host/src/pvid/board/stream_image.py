@@ -79,7 +79,7 @@ class StreamImage:
     number : CRC-32 of all that the bits depend on
     macros : lines of stream_rig.h
     files : generated headers and sources by name
-    form : weak, strong, or fourier for the engine of any mechanism
+    form : weak, strong, or weak for the engine of any mechanism
     core : arithmetic
     identifier : firmware/apps/stream/identifier_<identifier>.c
     sensor : a file of firmware/apps/stream

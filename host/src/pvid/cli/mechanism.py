@@ -18,7 +18,7 @@ from pvid.base.rounding import with_error
 from pvid.board.compare_on import Outcome
 from pvid.cli.input import print_notes, read_input
 from pvid.log.rig import LOG_SUFFIX, recording_of_log
-from pvid.oracle.fourier.weights import Weights
+from pvid.oracle.weak.weights import Weights
 from pvid.rig.columns import parsed
 from pvid.rig.described import described
 from pvid.rig.file import RigFile
@@ -91,7 +91,7 @@ def identify_run(
 
     Parameters
     ----------
-    weights : of the rows, as in pvid.oracle.fourier.identify
+    weights : of the rows, as in pvid.oracle.weak.identify
     refine : the equations are fitted to the whole run, from the answer on
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused

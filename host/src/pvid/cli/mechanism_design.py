@@ -13,7 +13,7 @@ from rich.table import Table
 from pvid.base.console import DONE, NOTHING_IDENTIFIED, write_stderr
 from pvid.base.rounding import with_error
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.choice import Scored
+from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
 from pvid.run.mechanism_design import EngineReport, designs_tried, report_for_recording, report_for_rig
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.models.simulated_rig import SimulatedRig
     from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
-    from pvid.settings.fourier import FourierConfig
+    from pvid.settings.weak import WeakConfig
 
 _MODEL = click.argument("model", metavar="MODEL")
 _ABOVE_0 = click.FloatRange(min=0.0, min_open=True)
@@ -318,7 +318,7 @@ def _design_of(
     run_path: Path | None,
     columns: str | None,
     functions: int | None,
-) -> FourierConfig | None:
+) -> WeakConfig | None:
     from pvid.codegen.build import weak_refusal
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.run.engine_design import config_for_recording, config_for_simulated_rig

@@ -12,11 +12,11 @@ from pvid.base.errors import PvidError
 from pvid.codegen import (
     files_design,
     files_f32,
-    files_fourier,
     files_q31,
     files_refine,
     files_strong,
     files_strong_design,
+    files_weak,
     refine_twin,
     self_test,
     twin_file,
@@ -24,19 +24,19 @@ from pvid.codegen import (
 from pvid.codegen.banner import banner
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.fixed_model import fixed_model
-from pvid.codegen.fourier import fourier_functions_of
-from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches, reaches_of
 from pvid.codegen.refine import RefineFunctions, default_widths, has_skew, refine_functions_of, without_optional
 from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.codegen.strong_twin import StrongModelConfig
+from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.weak_twin import weak_model_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
-from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier import with_soft_signs
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+from pvid.settings.weak import WeakConfig
+from pvid.setup.weak import with_soft_signs
+from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 
 _CMAKE = """\
 # {banner}
@@ -67,7 +67,7 @@ if({upper}_STRONG AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_f32.c)
   target_sources({name} PRIVATE {name}_strong_f32.c)
 endif()
 
-# {name}_weak.h, the model for pvid/fourier.h: needs a pvid of the sizes that its header names.
+# {name}_weak.h, the model for pvid/weak.h: needs a pvid of the sizes that its header names.
 option({upper}_WEAK "Build the weak form of {name}" OFF)
 if({upper}_WEAK AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_weak_f32.c)
   target_sources({name} PRIVATE {name}_weak_f32.c)
@@ -85,7 +85,7 @@ endif()
 """
 
 _CMAKE_Q31 = """\
-# {name}_weak_q31.h, the same for pvid/fourier_q31.h, integers only, with the formats of a rig.
+# {name}_weak_q31.h, the same for pvid/weak_q31.h, integers only, with the formats of a rig.
 option({upper}_WEAK_Q31 "Build the fixed-point weak form of {name}" OFF)
 if({upper}_WEAK_Q31 AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_weak_q31.c)
   target_sources({name} PRIVATE {name}_weak_q31.c)
@@ -111,7 +111,7 @@ class Options:
     reaches: Reaches = field(default_factory=Reaches)
     soft_signs: Mapping[str, float] = field(default_factory=dict)
     strong: bool = False
-    design: FourierConfig | None = None
+    design: WeakConfig | None = None
     fixed_weak: Mapping[str, str] = field(default_factory=dict)
     strong_design: StrongModelConfig | None = None
 
@@ -168,10 +168,10 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
 
 
 def _weak_files(compiled: CompiledModel, command: str, options: Options) -> dict[str, str]:
-    made, model = fourier_functions_of(compiled), fourier_model_of(compiled)
+    made, model = weak_functions_of(compiled), weak_model_of(compiled)
     files = {
-        f"{made.name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), command),
-        f"{made.name}_weak_f32.c": files_fourier.source(made, model, command),
+        f"{made.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), command),
+        f"{made.name}_weak_f32.c": files_weak.source(made, model, command),
     }
     if options.design is not None:
         design = with_soft_signs(options.design, options.soft_signs)
@@ -201,7 +201,7 @@ def refine_refusal(compiled: CompiledModel) -> str | None:
 def weak_refusal(compiled: CompiledModel) -> str | None:
     """Why a model gets no files for the weak engine; None where it gets them."""
     try:
-        fourier_model_of(compiled)
+        weak_model_of(compiled)
     except PvidError as error:
         return str(error)
     return None

@@ -1,4 +1,4 @@
-"""NAME_design_f32.h: the tables of a rig for pvid/fourier.h, and a configuration that is ready for its init."""
+"""NAME_design_f32.h: the tables of a rig for pvid/weak.h, and a configuration that is ready for its init."""
 
 from __future__ import annotations
 
@@ -8,23 +8,21 @@ import numpy as np
 
 from pvid.codegen import describe
 from pvid.codegen.files_f32 import guarded
-from pvid.codegen.files_fourier import size_check, table
+from pvid.codegen.files_weak import size_check, table
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.design.c_tables import float_literal
 from pvid.settings.f32 import EstimatorConfig
-from pvid.settings.fourier import Float32, FourierConfig, FourierDesign32
+from pvid.settings.weak import Float32, WeakConfig, WeakDesign32
 
 _WIDTH = 8  # numbers a line
 
 
-def header(
-    config: FourierConfig, needed: Mapping[str, int], command: str, title: str, parameters: Sequence[str]
-) -> str:
+def header(config: WeakConfig, needed: Mapping[str, int], command: str, title: str, parameters: Sequence[str]) -> str:
     """The file.
 
     Parameters
     ----------
-    needed : sizes of the core that the design needs (pvid.setup.fourier_sizes)
+    needed : sizes of the core that the design needs (pvid.setup.weak_sizes)
     command : that makes it; no date, so that the same command makes the same file
     parameters : name and unit of each, as in "w [1/s^2]"
     """
@@ -77,7 +75,7 @@ def _floats(name: str, values: Float32, comment: str) -> str:
     return "\n".join([f"/* {comment} */", f"static const float {name}[{values.size}] = {{", *lines, "};"])
 
 
-def _tables(design: FourierDesign32) -> list[str]:
+def _tables(design: WeakDesign32) -> list[str]:
     name = design.model.name
     upper = f"{name.upper()}_WEAK"
     arrays: dict[bytes, str] = {}
@@ -94,11 +92,11 @@ def _tables(design: FourierDesign32) -> list[str]:
         filters.append(f"{{{one.half}, {arrays[key]}}}")
     noise = [f"{{{x.kind}, {x.power}, {x.a}, {x.b}, {float_literal(x.factor)}}}" for x in design.noise]
     parts += [
-        table("pvid_fourier_filter_f32", f"{name}_filter", f"{upper}_JETS", filters),
+        table("pvid_weak_filter_f32", f"{name}_filter", f"{upper}_JETS", filters),
         _floats(f"{name}_circle", design.circle, "sin(pi j / hop)"),
     ]
     if noise:
-        parts.append(table("pvid_fourier_noise_f32", f"{name}_noise", str(len(noise)), noise))
+        parts.append(table("pvid_weak_noise_f32", f"{name}_noise", str(len(noise)), noise))
     orders = ", ".join(map(str, design.error_order.tolist()))
     parts += [
         f"static const uint8_t {name}_error_order[{upper}_KINDS] = {{{orders}}};",
@@ -109,10 +107,10 @@ def _tables(design: FourierDesign32) -> list[str]:
     return ["\n\n".join(parts)]
 
 
-def _design(design: FourierDesign32) -> str:
+def _design(design: WeakDesign32) -> str:
     name = design.model.name
     fields = {
-        "model": f"&{name}_fourier_f32",
+        "model": f"&{name}_weak_f32",
         "functions": design.functions,
         "power": design.power,
         "decimation": design.decimation,
@@ -126,10 +124,10 @@ def _design(design: FourierDesign32) -> str:
         "sign_width": f"{name}_sign_width" if design.model.signs else "NULL",
         "overlap": float_literal(np.float32(design.overlap)),
     }
-    return initialised(f"static const pvid_fourier_design_f32 {name}_design_f32", fields)
+    return initialised(f"static const pvid_weak_design_f32 {name}_design_f32", fields)
 
 
-def _checks(config: FourierConfig) -> list[str]:
+def _checks(config: WeakConfig) -> list[str]:
     name = config.design.model.name
     given = {"range": config.range, "drive_min": config.drive_min}
     return [
@@ -140,7 +138,7 @@ def _checks(config: FourierConfig) -> list[str]:
     ]
 
 
-def _config(config: FourierConfig) -> str:
+def _config(config: WeakConfig) -> str:
     name = config.design.model.name
     trust, gate = config.trust, config.gate
     fields = {
@@ -164,7 +162,7 @@ def _config(config: FourierConfig) -> str:
         ),
         "gate": inner({"sigmas": number(gate.sigmas), "patience_s": number(gate.patience_s)}),
     }
-    return initialised(f"static const pvid_fourier_config_f32 {name}_config_f32", fields)
+    return initialised(f"static const pvid_weak_config_f32 {name}_config_f32", fields)
 
 
 def estimator_fields(config: EstimatorConfig) -> dict[str, object]:

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 from pvid.codegen.files_f32 import guarded
 from pvid.core.sizes import smallest
-from pvid.settings.fourier import NONE, FourierConfig
-from pvid.settings.fourier_q31 import FourierConfigQ31
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_q31
-from pvid.twin.fourier import FourierTwin
+from pvid.settings.weak import NONE, WeakConfig
+from pvid.settings.weak_q31 import WeakConfigQ31
+from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
+from pvid.twin.weak import WeakTwin
 
 
-def fitted_sizes(config: FourierConfig, *, refined: bool = False) -> dict[str, int]:
+def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]:
     """None below what the core accepts, and without parts that the settings do without.
 
     Where all are those of the design also loops of constant length (PVID_EXACT) and no check of its tables.
@@ -36,15 +36,15 @@ def fitted_sizes(config: FourierConfig, *, refined: bool = False) -> dict[str, i
     return fitted | {"PVID_CHECK_TABLES": 0, "PVID_EXACT": 1, "PVID_EXACT_CHANNELS": summed} | exact
 
 
-def fitted_sizes_q31(config: FourierConfigQ31, n_p: int, n_c: int) -> dict[str, int]:
+def fitted_sizes_q31(config: WeakConfigQ31, n_p: int, n_c: int) -> dict[str, int]:
     """The same in fixed point, of a model with n_p parameters and n_c non-zeros of d theta / d p."""
     parts = {"PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0), "PVID_CHECK_TABLES": 0}
     return smallest(sizes_of_q31(config.design, n_p, n_c)) | parts
 
 
-def _shares_place(config: FourierConfig) -> bool:
+def _shares_place(config: WeakConfig) -> bool:
     """Whether a window's sums may take the place of the older half's."""
-    twin = FourierTwin(config)
+    twin = WeakTwin(config)
     return twin.schedule.room_for(twin.finish.stages_of_columns, twin.stages_per_tick)
 
 

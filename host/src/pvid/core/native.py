@@ -400,7 +400,7 @@ class Publisher(Stepper):
         return float(self.estimate["misfit"]) * self._arithmetic.misfit_unit or math.nan
 
     def freeze(self, frozen: bool) -> None:
-        """Freezes (True) or resumes (False) the identifier: pvid_fourier_freeze_f32."""
+        """Freezes (True) or resumes (False) the identifier: pvid_weak_freeze_f32."""
         self._call("freeze", frozen)
 
     def gap(self) -> None:

@@ -19,7 +19,7 @@ FOLDERS = (*PUBLIC_FOLDERS, SRC, MODEL)
 PUBLIC_INCLUDES = [f"-I{folder}" for folder in PUBLIC_FOLDERS]
 INCLUDES = [f"-I{folder}" for folder in FOLDERS]
 _CORES = ("_f32", "_q31")
-_FORMS = ("strong", "fourier", "refine")  # rooms of a form's own
+_FORMS = ("strong", "weak", "refine")  # rooms of a form's own
 
 
 def build_folder() -> Path:

@@ -11,7 +11,7 @@ from pvid.core.sources import FIRMWARE, SRC
 from pvid.deploy.arithmetic import Arithmetic
 from pvid.deploy.deployment import Deployment, Files
 
-_ROOMS = ("number", "solve", "judge", "fourier", "keep")
+_ROOMS = ("number", "solve", "judge", "weak", "keep")
 _INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 _OWN_CONFIG = "#ifdef PVID_CONFIG_HEADER\n#include PVID_CONFIG_HEADER\n#endif\n"
 SIZES = "pvid/rig_sizes.h"

@@ -21,7 +21,7 @@ _REST = 1024  # for the stack and Arduino itself
 def state_bytes(d: Deployment) -> int | None:
     """Size of the identifier [bytes] on this computer, whose pointers are longer than those of a microcontroller; None
     where there is no compiler."""
-    program = f'#include "{d.arithmetic.header}"\nchar pvid_state[sizeof(pvid_fourier_{d.core})];\n'
+    program = f'#include "{d.arithmetic.header}"\nchar pvid_state[sizeof(pvid_weak_{d.core})];\n'
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         for name, text in core_files(d).items():

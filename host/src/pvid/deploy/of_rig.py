@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen import files_design, files_fourier
+from pvid.codegen import files_design, files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
-from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak import WeakFunctions, weak_functions_of
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.deploy.arithmetic import FIXED, FLOAT
 from pvid.deploy.deployment import Deployment, Playback, Quantity
 from pvid.model.compiled import CompiledModel
@@ -19,9 +19,9 @@ from pvid.run.engine_design import Run, samples_of
 from pvid.run.engine_design_q31 import FixedEngine
 from pvid.run.engine_files_q31 import files_of, fitted_of
 from pvid.settings.enums import Reason
-from pvid.settings.fourier import FourierConfig, Source
 from pvid.settings.record import Record
-from pvid.setup.fourier_sizes import sizes_of_design, sizes_of_model
+from pvid.settings.weak import Source, WeakConfig
+from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 
 _MOST_NUMBERS = 30_000  # of the example's motion: 60 kB of flash
 _LONGER = 3  # half windows behind the first estimate
@@ -29,7 +29,7 @@ _LARGEST = 30_000  # count of a signal without a resolution
 _PUBLISHED = (Reason.UPDATED, Reason.MISFIT)
 
 
-def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, command: str) -> Deployment:
+def deployment_f32(compiled: CompiledModel, config: WeakConfig, run: Run, command: str) -> Deployment:
     """In float32.
 
     Parameters
@@ -43,7 +43,7 @@ def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, com
     PvidError
         Where the engine does not have what the model needs.
     """
-    made, design = fourier_functions_of(compiled), config.design
+    made, design = weak_functions_of(compiled), config.design
     model, name = design.model, design.model.name
     units = {one.name: one.unit for one in compiled.signals}
     resolution = {one.name: one.resolution for one in compiled.signals}
@@ -57,7 +57,7 @@ def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, com
     )
     counts = np.rint(samples.astype(np.float64) / lsb).astype(np.int32)[: _most_ticks(model.samples)]
     record = (
-        fourier_native(compiled, design)
+        weak_native(compiled, design)
         .identifier_of(config)
         .run_samples(counts.astype(np.float32) * lsb, sums=False, hashes=False)
     )
@@ -71,8 +71,8 @@ def deployment_f32(compiled: CompiledModel, config: FourierConfig, run: Run, com
         parameters=tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
         sizes=fitted_sizes(config),
         generated={
-            f"{name}_weak.h": files_fourier.header(made, model, sizes_of_model(model), command),
-            f"{name}_weak_f32.c": files_fourier.source(made, model, command),
+            f"{name}_weak.h": files_weak.header(made, model, sizes_of_model(model), command),
+            f"{name}_weak_f32.c": files_weak.source(made, model, command),
             f"{name}_design_f32.h": files_design.header(config, needed, command, compiled.title, titles),
         },
         command=command,
@@ -86,7 +86,7 @@ def deployment_q31(engine: FixedEngine, run: Run, command: str) -> Deployment:
     compiled, design = engine.compiled, engine.config.design
     units = {one.name: one.unit for one in compiled.signals}
     counts = engine.counts_of(run)[: _most_ticks(len(engine.lsb))]
-    native = fourier_native_q31(engine.made, engine.parameters, engine.config)
+    native = weak_native_q31(engine.made, engine.parameters, engine.config)
     record = native.identifier().run_samples(counts, sums=False, hashes=False)
     scale = engine.values(np.ones(len(compiled.unknowns)))
     notes = [
@@ -113,7 +113,7 @@ def deployment_q31(engine: FixedEngine, run: Run, command: str) -> Deployment:
     )
 
 
-def _note(made: FourierFunctions, place: int) -> str:
+def _note(made: WeakFunctions, place: int) -> str:
     held = any(one.sample == place and one.source is Source.HELD for one in made.signal)
     return "held until the next" if held else ""
 

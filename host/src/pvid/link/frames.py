@@ -181,8 +181,7 @@ class Form(IntEnum):
     """Which identifier an image holds."""
 
     STRONG = 0
-    WEAK = 1
-    FOURIER = 2  # the weak form of any mechanism (fourier.h)
+    WEAK = 2  # 1 was the weak form of the pendulum alone
 
 
 class Core(IntEnum):
@@ -239,7 +238,7 @@ class Hello(Message):
     @property
     def form_name(self) -> Literal["weak", "strong"]:
         """The form in words; "strong" for a number that none has."""
-        return "weak" if self.form in (Form.WEAK, Form.FOURIER) else "strong"
+        return "weak" if self.form == Form.WEAK else "strong"
 
 
 @dataclass(frozen=True)

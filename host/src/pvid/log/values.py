@@ -252,7 +252,7 @@ class Values:
         if measured.shape[1] != len(channels):  # samples of something else
             measured = np.full((len(measured), len(channels)), np.nan)
         order = self._named if sorted(self._named) == sorted(channels) else channels
-        if not self._named and hello is not None and hello.form == Form.FOURIER:  # not named yet
+        if not self._named and hello is not None and hello.form == Form.WEAK:  # not named yet
             measured = np.full(measured.shape, np.nan)
         return Rows("samples", {**columns, **dict(zip(order, measured.T, strict=True))})
 

@@ -46,8 +46,8 @@ from pvid.settings.enums import Reason
 from pvid.settings.kinds import Settings
 from pvid.settings.record import HASHED_TYPES
 from pvid.twin import fnv
-from pvid.twin.fourier import FourierTwin
-from pvid.twin.fourier_q31 import FourierTwinQ31
+from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
 
 Check = Estimate | EstimateQ31 | Hash | Credit
 
@@ -64,7 +64,7 @@ class EngineBoard(Protocol):
     @property
     def matrix(self) -> str: ...
 
-    def twin_of(self, frame: Configuration) -> FourierTwin | FourierTwinQ31: ...
+    def twin_of(self, frame: Configuration) -> WeakTwin | WeakTwinQ31: ...
 
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
@@ -399,7 +399,7 @@ class _StrongTwin:
 class _EngineTwin:
     """The engine of any mechanism, in either arithmetic, which reports what it publishes."""
 
-    def __init__(self, twin: FourierTwin | FourierTwinQ31, matrix: str) -> None:
+    def __init__(self, twin: WeakTwin | WeakTwinQ31, matrix: str) -> None:
         self._twin, self.matrix = twin, matrix
         self.samples, self.reach, self.estimator = twin.samples, twin.reach, twin.estimator
 

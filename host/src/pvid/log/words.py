@@ -45,7 +45,7 @@ def board_words(hello: Hello | None, account: Account) -> str:
         kinds(number).name.lower() if number in list(kinds) else str(number)
         for kinds, number in ((Form, hello.form), (Core, hello.core))
     )
-    of = f"weak form of {_mechanism(account)}" if hello.form == Form.FOURIER else f"{form} form"
+    of = f"weak form of {_mechanism(account)}" if hello.form == Form.WEAK else f"{form} form"
     text = f"{hello.board}: {of}, core {core}, {hello.sample_rate:g} samples per second"
     status = account.lasting.get(Status)
     if isinstance(status, Status) and status.code != Code.RUNNING and status.code in list(Code):
@@ -118,7 +118,7 @@ def kappa_share(kappa: float) -> float:
 
 def residual_words(hello: Hello | None) -> str:
     """What the residuals are so many times of."""
-    if hello is not None and hello.form == Form.FOURIER:
+    if hello is not None and hello.form == Form.WEAK:
         return "times the noise of the sensors"
     weak = hello is not None and FORMS[hello.form_name].publishes
     return "times the encoder's noise" if weak else "times the row_sd that was configured"

@@ -1,7 +1,7 @@
 """The strong form of any described mechanism in float64: a differentiator bank, a row at every tick, either law.
 
 The derivatives of the signals come from a least-squares polynomial (Savitzky-Golay); their noise is in the regressors,
-and no averaging takes the bias of that away. The weak form (oracle.fourier) has none; this is the paper's form of the
+and no averaging takes the bias of that away. The weak form (oracle.weak) has none; this is the paper's form of the
 same equations, for comparison and for signals with little noise.
 """
 
@@ -20,13 +20,13 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Integral, Jet, jets, sgn
 from pvid.model.strong import strong_form
-from pvid.oracle.fourier.channels import broadcast, running_integrals
-from pvid.oracle.fourier.errors import clustered_variance
-from pvid.oracle.fourier.front import filtered, of_hold, samples_of
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.parameters import Parameters
-from pvid.oracle.fourier.polynomials import polynomial_weights
-from pvid.oracle.fourier.solve import inverse, solved
+from pvid.oracle.weak.channels import broadcast, running_integrals
+from pvid.oracle.weak.errors import clustered_variance
+from pvid.oracle.weak.front import filtered, of_hold, samples_of
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.polynomials import polynomial_weights
+from pvid.oracle.weak.solve import inverse, solved
 
 _STEP_LIMIT = 0.3  # of log p, or of p over its reach
 _REWEIGHTINGS = 30

@@ -9,19 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.fourier_twin import fourier_model_of
+from pvid.codegen.weak_twin import weak_model_of
 from pvid.model.compiled import CompiledModel
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.choice import MODEL_ERROR, Scored, ranked, ranked_for_engine, score_of
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.gate import gated
-from pvid.oracle.fourier.identify import neglected, ready
-from pvid.oracle.fourier.rows import Compiled, EquationError, WeakRows
-from pvid.oracle.fourier.verdict import UNKNOWN
+from pvid.oracle.weak.choice import MODEL_ERROR, Scored, ranked, ranked_for_engine, score_of
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.gate import gated
+from pvid.oracle.weak.identify import neglected, ready
+from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.weak.verdict import UNKNOWN
 from pvid.rig.run import Recording
-from pvid.settings.fourier import FourierConfig, FourierDesign32
-from pvid.setup.fourier import LONGEST_HOP, config_of, design_tables, for_engine
+from pvid.settings.weak import WeakConfig, WeakDesign32
+from pvid.setup.weak import LONGEST_HOP, config_of, design_tables, for_engine
 from pvid.sim.simulated_run import RigSimulation
 
 Run = Mapping[str, npt.ArrayLike]
@@ -38,8 +38,8 @@ _SHORT = 15  # taps, for which the lower degree is
 
 
 def engine_config(
-    compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None, *, start_there: bool = False
-) -> FourierConfig:
+    compiled: CompiledModel, run: Run, design: WeakDesign, p: Float | None = None, *, start_there: bool = False
+) -> WeakConfig:
     """Settings of the engine for a rig, from a run of it.
 
     Parameters
@@ -75,12 +75,12 @@ class EngineTables:
     rows: WeakRows
     p: Float
     errors: list[EquationError]
-    tables: FourierDesign32
+    tables: WeakDesign32
 
 
-def engine_tables(compiled: CompiledModel, run: Run, design: FourierDesign, p: Float | None = None) -> EngineTables:
+def engine_tables(compiled: CompiledModel, run: Run, design: WeakDesign, p: Float | None = None) -> EngineTables:
     """Tables of the engine for a rig, from a run of it; parameters as of engine_config."""
-    tables_of = fourier_model_of(compiled)
+    tables_of = weak_model_of(compiled)
     rows = WeakRows.of(ready(compiled), run, for_engine(design))
     fit = gated(rows, p)
     return EngineTables(rows, fit.p, list(fit.errors), design_tables(tables_of, rows, fit.p, fit.errors))
@@ -88,7 +88,7 @@ def engine_tables(compiled: CompiledModel, run: Run, design: FourierDesign, p: F
 
 def config_for_recording(
     compiled: CompiledModel, recording: Recording, functions: int | None = None, ranking: Sequence[Scored] = ()
-) -> FourierConfig:
+) -> WeakConfig:
     """Settings for the rig that made a recording; the estimate starts at what the recording shows.
 
     The standard errors that a microcontroller publishes contain what linearised equations neglect at the largest motion
@@ -111,13 +111,13 @@ def neglected_part(compiled: CompiledModel, run: Run) -> float:
 
 def design_and_p(
     compiled: CompiledModel, recording: Recording, functions: int | None = None, ranking: Sequence[Scored] = ()
-) -> tuple[FourierDesign, Float, bool]:
+) -> tuple[WeakDesign, Float, bool]:
     """The design that is chosen for a recording, the parameters that it was chosen at [n_p], whether to start there."""
     best = design_for_recording(ready(compiled), recording.signals, recording.sample_rate, ranking)
     return _with(best.design, functions), best.p, best.known
 
 
-def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FourierConfig:
+def config_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> WeakConfig:
     """The same, to identify the recording itself: the limit of a standard error is that of the analysis, whose verdict
     judges the answer and whose standard errors contain what the equations neglect, not that of a microcontroller on its
     own."""
@@ -137,7 +137,7 @@ def design_for_recording(model: Compiled, run: Run, sample_rate: float, ranking:
     tried = ranked_for_engine(model, ranking) or ranked(model, run, sample_rate, reversals="averaged")
     best = tried[0]
 
-    def scored(designs: Iterable[FourierDesign]) -> list[Scored]:
+    def scored(designs: Iterable[WeakDesign]) -> list[Scored]:
         tried = (score_of(model, run, one, best.p, best.chi2 > MODEL_ERROR) for one in designs)
         return [one for one in tried if one is not None]
 
@@ -158,7 +158,7 @@ def _cheapest(tried: Sequence[Scored], best: Scored) -> Scored:
     return good[-1] if good else min(possible, key=lambda one: one.score)
 
 
-def _decimated(design: FourierDesign) -> Iterator[FourierDesign]:
+def _decimated(design: WeakDesign) -> Iterator[WeakDesign]:
     """With fewer steps a second, behind filters that let nothing fold into the band of the test functions."""
     for decimation in _DECIMATIONS:
         taps = round(_TAPS_A_STEP * decimation) | 1
@@ -171,13 +171,13 @@ def _decimated(design: FourierDesign) -> Iterator[FourierDesign]:
             return
 
 
-def _with_fewer_functions(design: FourierDesign) -> Iterator[FourierDesign]:
+def _with_fewer_functions(design: WeakDesign) -> Iterator[WeakDesign]:
     for count in _FEWER:
         if count < design.functions:
             yield replace(design, functions=count)
 
 
-def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = None) -> FourierConfig:
+def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = None) -> WeakConfig:
     """Settings for the shipped rig of a mechanism, with its own design.
 
     Raises
@@ -189,18 +189,18 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
     return engine_config(compiled, run, design, p)
 
 
-def simulated_run_of(compiled: CompiledModel, functions: int | None = None) -> tuple[Run, FourierDesign, Float]:
+def simulated_run_of(compiled: CompiledModel, functions: int | None = None) -> tuple[Run, WeakDesign, Float]:
     """A run of the shipped rig of a mechanism, the rig's own design, and its parameters [n_p]."""
     rig = simulated_rig(compiled.name)
     simulation = RigSimulation.of(compiled, rig)
-    design = FourierDesign(rig.sample_rate, rig.window_s, **rig.design)  # type: ignore[arg-type]
+    design = WeakDesign(rig.sample_rate, rig.window_s, **rig.design)  # type: ignore[arg-type]
     return simulation.run(), _with(design, functions), np.asarray(simulation.truth)
 
 
-def samples_of(config: FourierConfig, run: Run) -> npt.NDArray[np.float32]:
+def samples_of(config: WeakConfig, run: Run) -> npt.NDArray[np.float32]:
     """The argument of step at every tick [ticks, samples]."""
     return np.stack([np.asarray(run[name], np.float32) for name in config.design.model.sample_names], axis=1)
 
 
-def _with(design: FourierDesign, functions: int | None) -> FourierDesign:
+def _with(design: WeakDesign, functions: int | None) -> WeakDesign:
     return design if functions is None else replace(design, functions=functions)

@@ -9,22 +9,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.fourier import FourierFunctions, fourier_functions_of
-from pvid.codegen.fourier_q31 import FixedFourier, JetReaches, fixed_fourier
 from pvid.codegen.parameters_q31 import ParametersQ31, fixed_parameters
-from pvid.design.fourier_q31 import Sensing, fixed_design, most_counts
+from pvid.codegen.weak import WeakFunctions, weak_functions_of
+from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_weak
+from pvid.design.weak_q31 import Sensing, fixed_design, most_counts
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.choice import Scored
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.parameters import Parameters
-from pvid.oracle.fourier.verdict import UNKNOWN
+from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.verdict import UNKNOWN
 from pvid.rig.run import Recording
 from pvid.run.engine_design import Run, design_and_p, engine_tables, neglected_part, simulated_run_of
-from pvid.settings.fourier_q31 import FourierConfigQ31
-from pvid.setup.fourier import drive_min_of, with_soft_widths
-from pvid.setup.fourier_q31 import config_of_q31, row_formats
+from pvid.settings.weak_q31 import WeakConfigQ31
+from pvid.setup.weak import drive_min_of, with_soft_widths
+from pvid.setup.weak_q31 import config_of_q31, row_formats
 
 _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
 _HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
@@ -51,9 +51,9 @@ class FixedEngine:
     """
 
     compiled: CompiledModel
-    made: FixedFourier
+    made: FixedWeak
     parameters: ParametersQ31
-    config: FourierConfigQ31
+    config: WeakConfigQ31
     sample_rate: float
     lsb: tuple[float, ...]
 
@@ -95,7 +95,7 @@ class FixedEngine:
 def fixed_engine(
     compiled: CompiledModel,
     run: Run,
-    design: FourierDesign,
+    design: WeakDesign,
     p: Float | None = None,
     *,
     start_there: bool = False,
@@ -119,7 +119,7 @@ def fixed_engine(
     PvidError
         Where fixed point, or the engine, does not have what the model or the design needs.
     """
-    functions = fourier_functions_of(compiled)
+    functions = weak_functions_of(compiled)
     found = engine_tables(compiled, run, design, p)
     known = {one.name: one for one in compiled.signals}
     lsb = lsb_of(compiled, functions.samples)
@@ -137,7 +137,7 @@ def fixed_engine(
     of_jets = {str(jet): x for jet, x in found.rows.record.grid.jets.items()}
     reaches = {one: _HIGHEST_JET * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in functions.jet_names}
     seconds = len(next(iter(of_jets.values()))) * found.tables.decimation / design.sample_rate
-    made = fixed_fourier(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
+    made = fixed_weak(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
     parameters_of = found.rows.compiled.parameters
     parameters = _parameters(functions, parameters_of)
     sizes = with_soft_widths(found.tables, soft_signs or {})
@@ -174,14 +174,12 @@ def lsb_of(compiled: CompiledModel, samples: Sequence[str]) -> tuple[float, ...]
     return tuple(known[one].resolution or known[one].reach / 2**_INPUT_BITS for one in samples)
 
 
-def _parameters(functions: FourierFunctions, known: Parameters) -> ParametersQ31:
+def _parameters(functions: WeakFunctions, known: Parameters) -> ParametersQ31:
     bounds = [(min(one.low, x), max(one.high, x)) for one, x in zip(known.model.unknowns, known.guess, strict=True)]
     return fixed_parameters(functions.functions, bounds)
 
 
-def engine_of_parts(
-    compiled: CompiledModel, made: FixedFourier, config: FourierConfigQ31, sample_rate: float
-) -> FixedEngine:
+def engine_of_parts(compiled: CompiledModel, made: FixedWeak, config: WeakConfigQ31, sample_rate: float) -> FixedEngine:
     """An engine whose formats and settings are known, as from a log."""
     parameters = _parameters(made.functions, ready(compiled).parameters)
     lsb = lsb_of(compiled, made.functions.samples)

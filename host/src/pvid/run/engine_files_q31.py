@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pvid.codegen import describe, files_fourier_q31
+from pvid.codegen import describe, files_weak_q31
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.run.engine_design_q31 import FixedEngine
-from pvid.setup.fourier_sizes import sizes_of_q31
+from pvid.setup.weak_sizes import sizes_of_q31
 
 
 def files_of(engine: FixedEngine, command: str) -> dict[str, str]:
@@ -18,9 +18,9 @@ def files_of(engine: FixedEngine, command: str) -> dict[str, str]:
     sizes = _sizes(engine)
     name = engine.name
     return {
-        f"{name}_weak_q31.h": files_fourier_q31.header(engine.made, sizes, command),
-        f"{name}_weak_q31.c": files_fourier_q31.source(engine.made, engine.parameters, command),
-        f"{name}_design_q31.h": files_fourier_q31.design_header(engine.config, name, sizes, command, about(engine)),
+        f"{name}_weak_q31.h": files_weak_q31.header(engine.made, sizes, command),
+        f"{name}_weak_q31.c": files_weak_q31.source(engine.made, engine.parameters, command),
+        f"{name}_design_q31.h": files_weak_q31.design_header(engine.config, name, sizes, command, about(engine)),
     }
 
 

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.oracle.fourier.choice import MODEL_ERROR
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.verdict import UNKNOWN
+from pvid.oracle.weak.choice import MODEL_ERROR
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.verdict import UNKNOWN
 from pvid.rig.described import described, refuse_strong
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run

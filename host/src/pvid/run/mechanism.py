@@ -1,4 +1,4 @@
-"""Identification of any mechanism with a compiled model, in float64 (pvid.oracle.fourier)."""
+"""Identification of any mechanism with a compiled model, in float64 (pvid.oracle.weak)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
-from pvid.oracle.fourier.choice import Scored
-from pvid.oracle.fourier.identify import Identified, given
-from pvid.oracle.fourier.identify import identify as identified_by
-from pvid.oracle.fourier.weights import Weights
+from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.identify import Identified, given
+from pvid.oracle.weak.identify import identify as identified_by
+from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 
@@ -107,7 +107,7 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
 
     Parameters
     ----------
-    weights : of the rows, as in pvid.oracle.fourier.identify
+    weights : of the rows, as in pvid.oracle.weak.identify
 
     Raises
     ------

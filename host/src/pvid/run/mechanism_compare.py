@@ -7,21 +7,21 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.choice import Scored
+from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, first_difference
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import FixedEngine, engine_to_identify
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
-from pvid.settings.fourier import FourierConfig
-from pvid.setup.fourier_sizes import sizes_of_model
+from pvid.settings.weak import WeakConfig
+from pvid.setup.weak_sizes import sizes_of_model
 from pvid.twin import fnv
-from pvid.twin.fourier import FourierTwin
-from pvid.twin.fourier_q31 import FourierTwinQ31
+from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
 
 Progress = Callable[[int], None]
 
@@ -65,12 +65,12 @@ _COMPARISONS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True)
 
 
 def compare_samples(
-    compiled: CompiledModel, config: FourierConfig, samples: npt.ArrayLike, progress: Progress | None = None
+    compiled: CompiledModel, config: WeakConfig, samples: npt.ArrayLike, progress: Progress | None = None
 ) -> Comparison:
     """The same for samples [ticks, samples] and settings."""
-    identifier = fourier_native(compiled, config.design).identifier_of(config)
+    identifier = weak_native(compiled, config.design).identifier_of(config)
     record = identifier.run_samples(samples)
-    twin = FourierTwin(config).run(samples, progress=progress).lane()
+    twin = WeakTwin(config).run(samples, progress=progress).lane()
     hashes = fnv.running_hashes(twin)
     moments = sizes_of_model(config.design.model)["PVID_MAX_MOMENTS"]
     return Comparison(
@@ -83,9 +83,9 @@ def compare_samples(
 
 def compare_counts(engine: FixedEngine, readings: npt.ArrayLike, progress: Progress | None = None) -> Comparison:
     """The same in fixed point, for readings [ticks, samples]."""
-    identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
     record = identifier.run_samples(readings)
-    twin = FourierTwinQ31(engine.config, engine.parameters.model).run(np.asarray(readings).T).lane()
+    twin = WeakTwinQ31(engine.config, engine.parameters.model).run(np.asarray(readings).T).lane()
     hashes = fnv.running_hashes(twin)
     if progress is not None:
         progress(len(record.reason))

@@ -15,11 +15,11 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
-from pvid.codegen.fourier_library import fourier_native
-from pvid.codegen.fourier_library_q31 import fourier_native_q31
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core.native import Publisher
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.verdict import Reason, Verdict
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import engine_to_identify
 from pvid.run.identify import Publications, counted
@@ -172,7 +172,7 @@ def identify_in_c(answer: MechanismAnswer, core: Core = "f32") -> CoreAnswer:
 def _in_float(answer: MechanismAnswer) -> _Run:
     config = config_to_identify(answer.model, answer.recording, answer.ranking)
     design = config.design
-    identifier = fourier_native(answer.model, design).identifier_of(config)
+    identifier = weak_native(answer.model, design).identifier_of(config)
     record = identifier.run_samples(samples_of(config, answer.recording.signals), sums=False)
     last, n_p = identifier.estimate, len(answer.found.p)
     return _Run(
@@ -192,7 +192,7 @@ def _in_float(answer: MechanismAnswer) -> _Run:
 def _in_fixed_point(answer: MechanismAnswer) -> _Run:
     engine = engine_to_identify(answer.model, answer.recording, answer.ranking)
     design = engine.config.design
-    identifier = fourier_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
     record = identifier.run_samples(engine.counts_of(answer.recording.signals), sums=False)
     last, n_p = identifier.estimate, len(answer.found.p)
     se = engine.values(np.maximum(last["se"][:n_p], 1))  # an error below the format's step counts as a step

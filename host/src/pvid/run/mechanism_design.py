@@ -11,12 +11,12 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import names as names_of_shipped
 from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.fourier.choice import Scored, ranked, score_of
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.identify import ready
+from pvid.oracle.weak.choice import Scored, ranked, score_of
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.identify import ready
 from pvid.rig.run import Recording
 from pvid.run.engine_design import design_for_recording
-from pvid.setup.fourier import for_engine
+from pvid.setup.weak import for_engine
 from pvid.sim.simulated_run import RigSimulation
 
 
@@ -97,7 +97,7 @@ def report_for_rig(compiled: CompiledModel) -> EngineReport:
     rig = simulated_rig(compiled.name)
     simulation = RigSimulation.of(compiled, rig)
     run = simulation.run()
-    design = for_engine(FourierDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
+    design = for_engine(WeakDesign(rig.sample_rate, rig.window_s, **rig.design))  # type: ignore[arg-type]
     found = score_of(ready(simulation.model), run, design, np.asarray(simulation.truth), False)
     assert found is not None  # a rig that is shipped has a design that suits it
     return EngineReport(compiled, found, rig.duration)

@@ -20,15 +20,15 @@ from pvid.models import mechanisms
 from pvid.models.drive import Sines
 from pvid.models.model import Mechanism
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
-from pvid.oracle.fourier.choice import score_of
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.identify import ready
+from pvid.oracle.weak.choice import score_of
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import ready
 from pvid.rig.described import described, refuse_strong
 from pvid.rig.file import RigFile
 from pvid.run.engine_design import Run, design_for_recording
 from pvid.run.mechanism import model_of
-from pvid.setup.fourier import for_engine
+from pvid.setup.weak import for_engine
 from pvid.sim.pendulum import standard_sensors
 from pvid.sim.simulated_run import RigSimulation
 
@@ -55,7 +55,7 @@ class NominalRun:
 
     compiled: CompiledModel
     run: Run
-    design: FourierDesign
+    design: WeakDesign
     p: Float
 
 
@@ -142,7 +142,7 @@ def _rigs(rig: RigFile, compiled: CompiledModel, modes: tuple[float, ...]) -> It
         )
 
 
-def _design(rig: RigFile, compiled: CompiledModel, run: Run, p: Float, modes: tuple[float, ...]) -> FourierDesign:
+def _design(rig: RigFile, compiled: CompiledModel, run: Run, p: Float, modes: tuple[float, ...]) -> WeakDesign:
     """The shipped rig's, scaled; where that does not suit the guess, the one with the least predicted errors."""
     shipped = simulated_rig(rig.model.name)
     slow, fast = _shipped_modes(rig, shipped)[2]
@@ -157,9 +157,9 @@ def _design(rig: RigFile, compiled: CompiledModel, run: Run, p: Float, modes: tu
     return design_for_recording(ready(compiled), run, rig.sample_rate).design
 
 
-def _scaled(shipped: SimulatedRig, rate: float, longer: float, slower: float) -> FourierDesign:
+def _scaled(shipped: SimulatedRig, rate: float, longer: float, slower: float) -> WeakDesign:
     """The shipped rig's design with windows that are `longer`, and steps and filters that are `slower`, than there."""
-    of = FourierDesign(shipped.sample_rate, shipped.window_s, **shipped.design)  # type: ignore[arg-type]
+    of = WeakDesign(shipped.sample_rate, shipped.window_s, **shipped.design)  # type: ignore[arg-type]
     raw = slower * rate / shipped.sample_rate  # samples a sample of the shipped rig
     decimation = max(1, round(raw * of.decimation))
     band = of.highest * longer / slower  # harmonics up to the same multiple of the fast mode

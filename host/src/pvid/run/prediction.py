@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.identify import identify
-from pvid.oracle.fourier.verdict import partner_of
+from pvid.oracle.weak.identify import identify
+from pvid.oracle.weak.verdict import partner_of
 from pvid.sim.simulated_run import RigSimulation
 
 Float = npt.NDArray[np.float64]

@@ -10,13 +10,13 @@ import numpy.typing as npt
 import sympy as sp
 
 from pvid.base.errors import PvidError
-from pvid.codegen.fourier_twin import fourier_model_of
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.refine_twin import GeneratedRefine
+from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
 from pvid.model.signals import Jet
-from pvid.settings.fourier import Source
 from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
+from pvid.settings.weak import Source
 
 Float = npt.NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def refine_settings(
         Where the refinement in C does not have an input of the model, or samples are too slow for the motion.
     """
     model = made.model
-    engine = fourier_model_of(model)
+    engine = weak_model_of(model)
     names, sources = engine.sample_names, {one.sample: one.source for one in engine.signal if one.source is Source.HELD}
     inputs = [_input(made, jet) for jet in made.inputs]
     samples = [*inputs, *((name, 0, 1.0) for name in made.outputs)]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.oracle import strong as oracle
-from pvid.oracle.fourier.rows import EquationError
+from pvid.oracle.weak.rows import EquationError
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.trial import rows_near

@@ -18,9 +18,9 @@ from pvid.codegen.strong_twin import Float32, StrongModelConfig, StrongModelTwin
 from pvid.design.fir import MAX_DEGREE, savitzky_golay
 from pvid.model.compiled import CompiledModel
 from pvid.model.strong import strong_form
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.parameters import Parameters
 from pvid.oracle.strong_described import StrongModel, StrongSettings, all_rows, standard_errors
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.parameters import Parameters
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig

@@ -11,8 +11,8 @@ import numpy as np
 from pvid.base.wording import listed
 from pvid.codegen.strong_library import strong_native
 from pvid.model.compiled import CompiledModel
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.verdict import UNKNOWN
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.verdict import UNKNOWN
 from pvid.rig.run import Recording
 from pvid.run.mechanism import Value, own_keys, refuse_constant, values_of
 from pvid.run.strong_design import StrongDesign, strong_design

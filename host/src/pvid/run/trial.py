@@ -13,12 +13,12 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.models.model import Model
-from pvid.oracle.fourier.choice import Scored, lengths, made, power_of, score_of
-from pvid.oracle.fourier.design import FourierDesign
-from pvid.oracle.fourier.functions import Float
-from pvid.oracle.fourier.identify import ready
-from pvid.oracle.fourier.rows import Compiled, WeakRows
-from pvid.oracle.fourier.starts import starts_about
+from pvid.oracle.weak.choice import Scored, lengths, made, power_of, score_of
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.rows import Compiled, WeakRows
+from pvid.oracle.weak.starts import starts_about
 from pvid.rig.described import described
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -92,12 +92,12 @@ def _signals(run: Run) -> dict[str, Float]:
     return {"phi": run.phi, "y": run.y}
 
 
-def _designs(model: Compiled, run: Run) -> list[FourierDesign]:
+def _designs(model: Compiled, run: Run) -> list[WeakDesign]:
     """Windows of about a period of the motion; in a long run the longest ones would not see it."""
     wanted = np.log(_PERIODS / dominant_hz(run))
     possible = lengths(len(run.t), run.sample_rate)
     near = sorted(sorted(possible, key=lambda one: abs(np.log(one) - wanted))[:_LENGTHS], reverse=True)
-    basis = FourierDesign(run.sample_rate, 64 / run.sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
+    basis = WeakDesign(run.sample_rate, 64 / run.sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
     return [
         made(basis, window_s=length, rate_taps=taps, rate_degree=degree) for taps, degree in _FILTERS for length in near
     ]
@@ -114,7 +114,7 @@ def _best(model: Compiled, run: Run) -> Scored | None:
 
 
 def _scored(
-    model: Compiled, signals: dict[str, Float], designs: list[FourierDesign], start: Float | None
+    model: Compiled, signals: dict[str, Float], designs: list[WeakDesign], start: Float | None
 ) -> Iterator[Scored]:
     for design in designs:
         one = score_of(model, signals, design, start, False, _FEWEST)

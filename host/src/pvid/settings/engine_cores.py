@@ -25,16 +25,16 @@ class EngineCore:
     words: str
     replay: str | None
     without: tuple[str, ...]
-    room: str = "fourier"
+    room: str = "weak"
 
 
-FLOAT = EngineCore("f32", "float32", "replay_fourier", ("_q31", "_strong_f32"))
-FIXED = EngineCore("q31", "fixed point", "replay_fourier_q31", ("_f32", "_strong_q31", "fingerprint_q31"))
+FLOAT = EngineCore("f32", "float32", "replay_weak", ("_q31", "_strong_f32"))
+FIXED = EngineCore("q31", "fixed point", "replay_weak_q31", ("_f32", "_strong_q31", "fingerprint_q31"))
 STRONG = EngineCore(
     "f32",
     "float32",
     None,
-    ("_q31", "_strong_f32", "_fourier_f32", "_refine_f32", "fingerprint_f32"),
+    ("_q31", "_strong_f32", "_weak_f32", "_refine_f32", "fingerprint_f32"),
     "strong",
 )
 STRONG_CORES = (STRONG.name, "f64")  # of a described mechanism: in C, and its analysis in float64

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.settings.fourier import Source
+from pvid.settings.weak import Source
 
 Float32 = npt.NDArray[np.float32]
 

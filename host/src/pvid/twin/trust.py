@@ -63,7 +63,7 @@ class TrustTwin(ABC):
             self.estimate["se"][:, a] = sd
 
     def steps(self, iterations: int) -> int:
-        """Gauss-Newton steps of the present window: pvid_fourier_steps of steps.h."""
+        """Gauss-Newton steps of the present window: pvid_weak_steps of steps.h."""
         return iterations if self.groups < _EARLY_WINDOWS else 1
 
     def place(self) -> None:

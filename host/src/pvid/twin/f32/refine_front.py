@@ -6,8 +6,8 @@ from enum import Enum
 
 import numpy as np
 
-from pvid.settings.fourier import Source
 from pvid.settings.refine import RefineConfig
+from pvid.settings.weak import Source
 from pvid.twin.f32.refine_model import Float32, RefineShape
 from pvid.twin.f32.refine_pass import Signals
 

@@ -1,0 +1,217 @@
+/* pvid/detail/weak_state.h - the state behind weak.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_WEAK_STATE_H
+#define PVID_DETAIL_WEAK_STATE_H
+
+#include "pvid/weak.h"
+
+/* Steps that are added to the sums together. */
+#define PVID_WEAK_BLOCK 8u
+
+/* The front end: block sums of the signals, and their outputs at the last steps. */
+typedef struct {
+    uint32_t wait;   /* ticks until the block is complete */
+    uint8_t signals; /* of the model */
+    bool plain;      /* signal i is sample i */
+    uint8_t needs;   /* samples of other ticks that the signals need; with the next one all signals are those of the
+                        tick before */
+    bool seen;       /* there is a sample since the restart, and `before` contains it */
+    uint8_t decimation;
+    uint16_t half;                     /* of the longest compensator [steps] */
+    uint16_t missing;                  /* outputs until the line is full, at least 1 */
+    uint16_t head;                     /* place of the next outputs */
+    float ticks;                       /* D */
+    float scale;                       /* 1 / D^2 */
+    float jump_scale;                  /* dt/12, dt the tick [s] */
+    uint32_t limit[PVID_MAX_SAMPLES];  /* largest absolute value of each sample that needs no attention: its bits,
+                                          shifted left by one */
+    float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
+    float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
+                                  twice */
+} pvid_weak_front_f32;
+
+/* From the jets of a step to the values of its channels, two steps later. */
+typedef struct {
+    uint8_t known;  /* steps since the restart, 0..4 */
+    uint8_t latest; /* place in `out` of the step before the last one */
+    bool ran;       /* the runs have begun */
+    float lead;     /* from a run's first sample to its first step [s] */
+    uint8_t newest; /* place in `inputs` of the newest step; the other is of the last step before it */
+    float inputs[2][PVID_MAX_INPUTS]; /* of `values` */
+    float rate[PVID_MAX_INTEGRANDS];  /* derivatives of the runs there */
+    float v[2][PVID_MAX_INTEGRANDS];  /* arguments of sgn at that step and the one before it */
+    float run[PVID_MAX_INTEGRANDS];   /* integrals since the start of the run, and what rounding took off */
+    float run_low[PVID_MAX_INTEGRANDS];
+    float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
+                                                              the next ones */
+    float f[2][PVID_MAX_INTEGRANDS];         /* integrands at the two steps before that one, latest first */
+    float integral[2 * PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of each since the start of the half */
+    float edge[2][PVID_MAX_INTEGRANDS];      /* I^1 and I^2 of the half before, at its end */
+} pvid_weak_history_f32;
+
+/* What a half window has seen of a sample. */
+typedef struct {
+    float reference; /* the half's first sample */
+    float sum;       /* of the samples less that, one a step */
+    float square;    /* of their squares */
+} pvid_weak_spread_f32;
+
+/* Whether a window is to be used. */
+typedef struct {
+    const float *range; /* of the configuration; NULL: no check */
+    const float *drive_min;
+    uint16_t delay;                                   /* steps from a sample to the last step that it is part of */
+    uint16_t beyond;                                  /* steps that may yet contain a sample beyond its range */
+    bool out[2];                                      /* of each half: contains such a step */
+    bool still;                                       /* a sample moved too little in the last two halves */
+    pvid_weak_spread_f32 spread[2][PVID_MAX_SAMPLES]; /* of each half, if a sample has a least deviation */
+} pvid_weak_watch_f32;
+
+/* The sums of the two halves of a window, and the block of steps that is being added to them. */
+typedef struct {
+    uint8_t half;                       /* that fills, 0 or 1 */
+    uint8_t halves;                     /* complete since the restart, 0..2 */
+    uint8_t filling;                    /* block that fills */
+    uint8_t target;                     /* half to which the other block is being added */
+    uint8_t harmonic;                   /* next one to which it is added; all: none */
+    uint8_t joined;                     /* next one to be joined; all: none */
+    uint16_t index;                     /* of the next step in its half */
+    uint16_t start;                     /* of the first step of that block in its half */
+    float edge[2][PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of the window's first half at its end */
+    float block[PVID_MAX_BLOCKS][PVID_WEAK_BLOCK][PVID_MAX_CHANNELS]; /* steps, then their sums and differences:
+                                                                           sums_f32.c */
+    float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2];           /* A_h and B_h, real and imaginary part */
+} pvid_weak_sums_f32;
+
+/* Most parts of a window's sums that its rows are made of. */
+#define PVID_WEAK_PARTS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+
+/* The noise of a kind's rows: D_h, the directions that the test functions leave out, and what follows from the inverse.
+ */
+typedef struct {
+    uint8_t cosines;                                       /* real parts; the others are imaginary parts */
+    uint8_t parts;                                         /* K + n */
+    uint8_t vectors;                                       /* n/2: reflections of each family */
+    uint8_t powers;                                        /* of omega^2 in use */
+    float omega;                                           /* 2 pi / T [rad/s] */
+    float weight[PVID_MAX_POWER];                          /* c_j of the sensors, variance at the power j of omega^2 */
+    float floor;                                           /* least D_h */
+    float scale[PVID_MAX_HARMONICS];                       /* D_h, then 1 / sqrt(D_h) */
+    float reflection[PVID_MAX_POWER / 2][PVID_WEAK_PARTS]; /* v of I - v v^T, one of each family in a row */
+    float share[PVID_MAX_POWER];                           /* Q_j = tr(R^-1 dR/dc_j) */
+} pvid_weak_white_f32;
+
+/* Products of two parameters. */
+#define PVID_WEAK_PAIRS ((PVID_MAX_P * (PVID_MAX_P + 1)) / 2)
+
+/* Mean products of the windows' scores s = C^T (sum N e), of a window with itself and with the one before. */
+typedef struct {
+    uint16_t windows; /* in the means */
+    bool known;       /* the window before has a score */
+    float memory;     /* windows in the means; 0: all */
+    float residual;   /* mean square of their residuals */
+    float own[PVID_MAX_P];
+    float before[PVID_MAX_P];
+    float same[PVID_WEAK_PAIRS]; /* upper triangle, row by row */
+    float neighbour[PVID_WEAK_PAIRS];
+} pvid_weak_scores_f32;
+
+/* Orthonormal directions that the test functions leave out, one of each family in a row. */
+typedef struct {
+    float norm[2];                    /* of the present direction of each family, before it was divided by it */
+    float slope[2];                   /* mean of (h/H)^2 over its squares */
+    float direction[PVID_WEAK_PARTS]; /* the present one */
+    float before[PVID_WEAK_PARTS];
+    float leverage[PVID_WEAK_PARTS]; /* sum of the squares of all */
+} pvid_weak_basis_f32;
+
+/* C at p, and the places of the non-zeros of each row of a kind. */
+typedef struct {
+    float c[PVID_MAX_THETA * PVID_MAX_P];
+    uint8_t count[PVID_MAX_THETA];
+    uint8_t place[PVID_MAX_THETA][PVID_MAX_P];
+} pvid_weak_slopes_f32;
+
+/* What the columns of a kind need before they are formed, one after the other, and they themselves. */
+typedef union {
+    pvid_weak_basis_f32 basis;
+    pvid_weak_slopes_f32 slopes;
+    float column[PVID_MAX_COLUMNS][PVID_MAX_FUNCTIONS]; /* white rows: theta's, Y and then e, nuisances */
+} pvid_weak_columns_f32;
+
+/* What the rows of a window need until the last of them is added. */
+typedef struct {
+    pvid_reason reason; /* of the solve, with its pointers: they keep their place (pvid/snapshot_weak.h) */
+    const void *pointer[3];
+#if PVID_MAX_WINDOWS > 0
+    float window[PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* S_h: real and imaginary part */
+#endif
+    float own[PVID_MAX_COLUMNS];    /* square of each nuisance before projection, then inverse of what remains; then
+                                       squares of theta's columns */
+    float pull[PVID_MAX_THETA];     /* g: what the sensors' noise takes from B */
+    float score[PVID_MAX_THETA];    /* sum N e + g of the window */
+    float gradient[PVID_MAX_THETA]; /* sum N e of the kind */
+    float part[PVID_WEAK_PARTS];    /* of the present column */
+    pvid_weak_columns_f32 of_kind;
+} pvid_weak_rows_f32;
+
+/* The rows of a window, and behind them the solve and the assessment. */
+typedef union {
+    pvid_weak_rows_f32 rows;
+    pvid_estimator_solve_f32 solve;
+} pvid_weak_work_f32;
+
+/* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
+typedef struct {
+    bool compensation;
+    bool shares; /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
+    bool alone;  /* the next window has no neighbour before it */
+    uint8_t stage;
+    uint8_t phase; /* of a column's stages */
+    uint8_t kind;
+    uint8_t theta;      /* first one of the kind */
+    uint8_t used;       /* kinds whose rows have been added */
+    uint8_t live;       /* nuisances of the kind that are projected out */
+    uint8_t iteration;  /* solves done for this window */
+    uint8_t verdict;    /* of trust.h on the candidate, a pvid_reason */
+    uint8_t other;      /* column of the next product */
+    uint16_t index;     /* within the stage */
+    uint16_t term;      /* next one of the kind */
+    uint16_t moment;    /* next one of the kind */
+    pvid_reason reason; /* of the last solve, then of the window */
+    float size;         /* of the last step, relative */
+    float rss;          /* of the kind's rows before the steps */
+    float expected;     /* sum over the kinds of the rows' variance by the sensors alone */
+    float free;         /* rows less nuisances of the kinds that were added */
+    float square;       /* sum of squares of their residuals before the steps */
+    pvid_gate_f32 gate[PVID_MAX_KINDS];
+    pvid_weak_white_f32 white;
+    pvid_weak_scores_f32 scores;
+    pvid_weak_work_f32 work;
+    pvid_estimate_f32 candidate; /* the assessed estimate, published if it is trusted */
+} pvid_weak_finish_f32;
+
+/* Only the functions of weak.h write to it. */
+struct pvid_weak_f32 {
+    const pvid_weak_design_f32 *design;
+    const pvid_weak_refine_f32 *refine; /* second stage; NULL: none */
+    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: weak_f32.c */
+    bool warm;         /* a window has been complete since the restart */
+    bool frozen;       /* complete windows are dropped */
+    bool watches;      /* samples are compared with their range, or their deviation with the least one */
+    uint8_t harmonics; /* H + 1 */
+    uint8_t channels;  /* that are summed */
+    uint8_t iterations;
+    uint8_t items_per_tick;  /* harmonics that a tick adds or joins */
+    uint8_t stages_per_tick; /* stages of a whole window per tick */
+    float dt;                /* between steps [s] */
+    pvid_weak_front_f32 front;
+    pvid_weak_history_f32 history;
+    pvid_weak_watch_f32 watch;
+    pvid_weak_sums_f32 sums;
+    pvid_weak_finish_f32 finish;
+    pvid_estimator_f32 estimator;
+    pvid_trust_f32 trust;
+};
+
+#endif

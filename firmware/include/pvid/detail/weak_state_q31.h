@@ -1,0 +1,184 @@
+/* pvid/detail/weak_state_q31.h - the state behind weak_q31.h. Not API: it may change with any release. */
+#ifndef PVID_DETAIL_WEAK_STATE_Q31_H
+#define PVID_DETAIL_WEAK_STATE_Q31_H
+
+#include "pvid/weak_q31.h"
+
+/* Steps that are added to the sums together. */
+#define PVID_WEAK_BLOCK_Q31 4
+
+/* The front end: the block sums of the signals, and their outputs at the last steps. */
+typedef struct {
+    bool plain;    /* signal i is sample i */
+    bool seen;     /* a sample since the restart */
+    uint8_t needs; /* samples beside those of a tick */
+    uint8_t signals;
+    uint8_t decimation;                  /* D */
+    uint16_t wait;                       /* ticks until the block ends */
+    uint16_t half;                       /* of the longest compensator */
+    uint16_t missing;                    /* outputs until there is a step, this one included */
+    uint16_t head;                       /* place of the next output */
+    const int32_t *offset;               /* of the configuration */
+    int32_t before[3][PVID_MAX_SAMPLES]; /* counts of the last three ticks, latest first */
+    int32_t line[PVID_MAX_RING];         /* [signals][2] sums, [signals] of the block before, 2 [2 half + 1][signals] */
+} pvid_weak_front_q31;
+
+/* From the jets of a step to the channels of the second one before it. */
+typedef struct {
+    uint8_t known;                     /* steps since the restart, 0..4 */
+    int32_t now[PVID_MAX_INPUTS];      /* inputs of `values` at the step before the newest; runs and signs last */
+    int32_t rate[PVID_MAX_INTEGRANDS]; /* derivatives of the runs there */
+    int32_t v[2][PVID_MAX_INTEGRANDS]; /* arguments of sgn there and at the step before */
+    int64_t run[PVID_MAX_INTEGRANDS];  /* twice the sum of the derivatives of the runs up to there, by trapezoids */
+    int32_t gain[PVID_MAX_CHANNELS];   /* at the step before that */
+    int32_t f[3][PVID_MAX_INTEGRANDS]; /* integrands there and at the two steps before it, latest first */
+    int64_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
+    int64_t twice[PVID_MAX_INTEGRANDS];
+    int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end, rounded */
+    uint16_t index;                          /* of the step whose channels come next, in its half */
+    uint8_t half;                            /* that fills, 0 or 1 */
+    uint16_t lead;                           /* ticks from the first sample to the first step */
+    bool ran;                                /* there was a step: the runs have begun */
+} pvid_weak_values_q31;
+
+/* The sums of the two halves of a window, and the block of steps that is being added to them. */
+typedef struct {
+    uint8_t filling; /* block that fills */
+    uint8_t left;    /* items until the other one is added and joined; 0: it is */
+    uint8_t item;    /* the next one */
+    uint8_t target;  /* half to which it is added */
+    bool joins;      /* it completes a window */
+    uint8_t halves;  /* complete since the restart, 0..2 */
+    uint16_t start;  /* of its first step in its half */
+    uint16_t angle;  /* of the next harmonic at this step */
+    int32_t block[PVID_MAX_BLOCKS][PVID_WEAK_BLOCK_Q31][PVID_MAX_CHANNELS];
+    int32_t sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
+} pvid_weak_sums_q31;
+
+/* S_h of a window, real and imaginary part. */
+typedef struct {
+    uint8_t length[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS]; /* bits of the larger part */
+    int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
+} pvid_weak_window_q31;
+
+/* Most parts of the sums of a window: K + n. */
+#define PVID_WEAK_ROWS_Q31 (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
+
+/* The noise of a kind's sums, and the reflections that leave its white rows. */
+typedef struct {
+    uint8_t cosines;                                        /* real parts; the others are imaginary parts */
+    uint8_t powers;                                         /* of h^2 in use */
+    pvid_scaled_q31 weight[PVID_MAX_POWER];                 /* c_j, variance at the power j of h^2 */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];              /* D_h, then 1 / sqrt(D_h) */
+    int32_t mirror[PVID_MAX_POWER / 2][PVID_WEAK_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
+} pvid_weak_white_q31;
+
+/* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
+typedef struct {
+    int32_t exponent[PVID_MAX_COLUMNS];
+    int32_t x[PVID_MAX_COLUMNS][PVID_WEAK_ROWS_Q31];
+} pvid_weak_columns_q31;
+
+/* From counts to the S_h of windows. */
+typedef struct {
+    const pvid_weak_design_q31 *design;
+    uint8_t items_per_tick; /* harmonics that a tick adds or joins */
+    pvid_weak_front_q31 front;
+    pvid_weak_values_q31 values;
+    pvid_weak_sums_q31 sums;
+    pvid_weak_window_q31 window;
+} pvid_weak_collect_q31;
+
+/* Sums of a sample over the steps of each half [counts], for the check of the drive. */
+typedef struct {
+    int64_t sum[2][PVID_MAX_SAMPLES];
+    int64_t square[2][PVID_MAX_SAMPLES];
+} pvid_weak_drive_q31;
+
+/* While the noise of a kind's rows is computed anew. */
+typedef struct {
+    int32_t u[PVID_WEAK_ROWS_Q31];         /* a direction that the test functions leave out, Q30 */
+    int32_t leverage[PVID_WEAK_ROWS_Q31];  /* sum of the squares of all of them, Q30 */
+    pvid_scaled_q31 share[PVID_MAX_POWER]; /* Q_j */
+    int32_t c[PVID_MAX_C_Q31];             /* C at p: C_k = c_k 2^f_column */
+    int16_t f[PVID_MAX_P];
+} pvid_weak_noise_work_q31;
+
+/* The columns begin behind that.
+ * MISRA deviation: 19.2; as of pvid_weak_work_q31. */
+typedef union {
+    pvid_weak_noise_work_q31 noise;
+    pvid_weak_columns_q31 columns;
+} pvid_weak_parts_q31;
+
+/* The rows of a kind while they are made. */
+typedef struct {
+    pvid_weak_white_q31 white;
+    pvid_scaled_q31 least;                        /* D_h */
+    pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
+    uint64_t whole[PVID_MAX_COLUMNS];             /* square of each nuisance before those before it are off */
+    pvid_weak_parts_q31 parts;
+} pvid_weak_rows_q31;
+
+/* The rows of all kinds are in the estimator before the solves begin: they use the same memory.
+ * MISRA deviation: 19.2; what a stage reads, a stage of the same part has written. */
+typedef union {
+    pvid_weak_rows_q31 rows;
+    pvid_estimator_solve_q31 solve;
+} pvid_weak_work_q31;
+
+/* What the sensors' noise does to the rows, at the p of one of the last windows. */
+typedef struct {
+    bool used;               /* anything needs it */
+    bool renewed;            /* in the present window */
+    uint8_t age;             /* windows since it was computed */
+    bool compensates;        /* `pull` is added to b */
+    pvid_scaled_q31 sensors; /* part of the rows' variance that the sensors explain, summed over kinds */
+    pvid_scaled_q31 pull[PVID_MAX_THETA_Q31]; /* what it takes from b in a window, in units of b */
+} pvid_weak_known_q31;
+
+/* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
+typedef struct {
+    uint8_t stage;
+    uint8_t kind;
+    uint8_t theta;                     /* first one of the kind */
+    uint8_t used;                      /* kinds whose rows have been added */
+    uint8_t live;                      /* nuisances of the kind that are projected out */
+    uint8_t iteration;                 /* solves done for this window */
+    uint8_t part;                      /* of a column's stages */
+    bool kept;                         /* the present nuisance is */
+    bool saturated;                    /* a row of the kind does not fit: none of them is used */
+    uint16_t index;                    /* within the stage */
+    uint16_t free;                     /* rows less nuisances of the kinds that were added */
+    pvid_reason reason;                /* of the last solve, then of the window */
+    int64_t size;                      /* of the last step, relative, Q22 */
+    int64_t rss;                       /* of the kind's rows before the steps */
+    int32_t fade_factor;               /* factor on the sums before this window's rows, Q31; 0: none */
+    pvid_scaled_q31 expected;          /* variance of a row */
+    int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
+    int8_t y_bits;
+    pvid_gate_q31 gate[PVID_MAX_KINDS];
+    pvid_weak_known_q31 known;
+    pvid_weak_work_q31 work;
+    pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
+} pvid_weak_finish_q31;
+
+/* Only the functions of weak_q31.h write to it. */
+struct pvid_weak_q31 {
+    const pvid_weak_design_q31 *design;
+    const int32_t *drive_min;
+    uint8_t plain; /* samples, if each is a signal; else 0 */
+    uint8_t rest;  /* reason of a tick that ends no step and has no work; 255: there is work */
+    uint8_t iterations;
+    uint8_t stages_per_tick; /* stages of a whole window per tick */
+    bool warm;               /* a window has been complete since the restart */
+    bool frozen;             /* complete windows are dropped */
+    bool driven;             /* the last two halves had enough drive */
+    pvid_weak_drive_q31 drive;
+    pvid_weak_collect_q31 collect;
+    pvid_weak_finish_q31 finish;
+    pvid_estimator_q31 estimator;
+    pvid_trust_q31 trust;
+};
+
+#endif

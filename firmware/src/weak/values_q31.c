@@ -1,0 +1,205 @@
+/* As in weak_step_f32.c: with the jets of step k the gains and integrands of step k - 1 follow, and with those the
+ * channels of step k - 2.
+ *
+ *   sgn_(k-1)  from the arguments v at k - 2, k - 1, k: the mean of sgn over the step, v linear there
+ *   I^1        I_j = I_(j-1) + (-f_(j-2) + 13 f_(j-1) + 13 f_j - f_(j+1)) dt/24, the integral of a cubic
+ *   I^2        its trapezoids with end correction: += dt/2 (I_j + I_(j-1)) - dt^2/12 (f_j - f_(j-1))
+ *
+ * In dt/24 and dt^2/48 both are exact integers. Before the first step v and f go on in a straight line. */
+#include "weak/values_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "weak/rescale_q31.h"
+#include "pvid/elementary_q31.h"
+
+void pvid_weak_values_init_q31(pvid_weak_values_q31 *self, uint16_t lead)
+{
+    memset(self, 0, sizeof *self);
+    self->lead = lead;
+}
+
+void pvid_weak_values_reset_q31(pvid_weak_values_q31 *self)
+{
+    self->known = 0;
+    self->index = 0;
+    self->half = 0;
+}
+
+/* Mean of sgn over a step: v 2/|g| within +-1, with the slope g = (after - before)/2; 0 for 0. Q30. */
+static int32_t mean_sign(int64_t before, int32_t v, int32_t after)
+{
+    const int64_t part = 4 * (int64_t)pvid_fixed_magnitude_q31(v);
+    const int64_t whole = (int64_t)pvid_magnitude_q31(after - before);
+    if (part >= whole) {
+        return pvid_sign_q31(v);
+    }
+    const int32_t mean = (int32_t)((part * PVID_ONE_Q30) / whole);
+    return (v < 0) ? -mean : mean;
+}
+
+/* Signs and runs at the step before the newest, whose arguments and derivatives are `newest`; then moves on. */
+static void complete_inputs(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t newest[])
+{
+    const pvid_weak_model_q31 *model = design->model;
+    int32_t *run = &self->now[model->jets];
+    int32_t *sign = &run[model->runs];
+    for (size_t i = 0; i < model->runs; i++) {
+        run[i] = pvid_weak_rescaled_q31(self->run[i], &design->run[i]);
+    }
+    for (size_t i = 0; i < model->signs; i++) {
+        const int32_t v = self->v[0][i];
+        const int32_t width = design->sign_width[i];
+        const int32_t next = newest[model->runs + i];
+        const int64_t before = (self->known > 1u) ? self->v[1][i] : ((2 * (int64_t)v) - next);
+        sign[i] = (width > 0) ? pvid_tanh_q31(v, width) : mean_sign(before, v, next);
+    }
+}
+
+static void take_newest(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t jet[],
+                        const int32_t newest[])
+{
+    const pvid_weak_model_q31 *model = design->model;
+    for (size_t i = 0; i < model->runs; i++) {
+        int64_t rise = 0; /* over a gap */
+        if (self->known > 0u) {
+            rise = (int64_t)self->rate[i] + newest[i];
+        } else if (!self->ran) { /* from the first sample to the first step */
+            rise = (2 * ((int64_t)newest[i] * (int64_t)self->lead)) / (int64_t)design->decimation;
+        } else {
+            /* the run stays */
+        }
+        self->run[i] = pvid_clamp_q31(self->run[i] + rise, PVID_WIDE);
+        self->rate[i] = newest[i];
+    }
+    for (size_t i = 0; i < model->signs; i++) {
+        self->v[1][i] = self->v[0][i];
+        self->v[0][i] = newest[model->runs + i];
+    }
+    for (size_t i = 0; i < model->jets; i++) {
+        self->now[i] = jet[i];
+    }
+    self->ran = true;
+}
+
+/* x 2^-s rounded half up, s >= 1, within 2^30, beyond which the tables of the design tool let nothing. */
+static inline int32_t rounded(int64_t x, uint32_t s)
+{
+    const int64_t twice = pvid_clamp_q31(pvid_floor_shift_q31(x, s - 1u), INT32_MAX - 1);
+    return pvid_floor_shift_32_q31((int32_t)twice + 1, 1);
+}
+
+/* The same of a product whose factors are within 2^30; its upper part is enough where the shift is long. */
+static inline int32_t rounded_product(int32_t a, int32_t b, uint32_t s)
+{
+    const int64_t product = pvid_product_q31(a, b);
+    if (s < 32u) {
+        return rounded(product, s);
+    }
+    const int32_t upper = (int32_t)pvid_floor_shift_q31(product, 31);
+    return (s < 63u) ? pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(upper, s - 32u) + 1, 1) : 0;
+}
+
+/* Integrals at the step before that of the integrands f; at the first step of a half they begin anew. */
+static void integrate(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t f[])
+{
+    const size_t ended = (size_t)self->half ^ 1u;
+    for (size_t i = 0; i < design->model->integrands; i++) {
+        const pvid_weak_integral_q31 shift = design->integral[i];
+        const int64_t now = self->f[0][i];
+        const int64_t last = self->f[1][i];
+        const int64_t before = (self->known > 3u) ? self->f[2][i] : ((2 * last) - now);
+        int64_t once = 0;
+        int64_t twice = 0;
+        if (self->known > 2u) {
+            once = self->once[i] + ((13 * (last + now)) - (before + f[i]));
+            twice = self->twice[i] + ((self->once[i] + once) - (4 * (now - last)));
+        }
+        if (self->index == 0u) {
+            self->edge[ended][0][i] = rounded(once, shift.once);
+            self->edge[ended][1][i] = rounded(twice, shift.twice);
+            once = 0;
+            twice = 0;
+        }
+        self->once[i] = once;
+        self->twice[i] = twice;
+    }
+}
+
+/* I^fold of a channel at the present step, rounded; that of 1 in dt/2, dt^2/48. */
+static int32_t integral_of(const pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design,
+                           const pvid_weak_channel *channel)
+{
+    const int32_t steps = (int32_t)self->index;
+    const bool first = channel->fold == 1u;
+    const size_t i = channel->integrand;
+    if (i == PVID_WEAK_NONE) {
+        return first ? (2 * steps) : (24 * steps * steps);
+    }
+    return first ? rounded(self->once[i], design->integral[i].once)
+                 : rounded(self->twice[i], design->integral[i].twice);
+}
+
+static void write_channels(const pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, int32_t channel[])
+{
+    const size_t summed = pvid_weak_summed_q31(design->model);
+    for (size_t k = 0; k < summed; k++) {
+        const pvid_weak_channel *one = &design->model->channel[k];
+        const int32_t gain = self->gain[one->gain];
+        const uint32_t shift = design->format[k].value;
+        int32_t value = 0;
+        if (one->fold == 0u) {
+            value = rounded(gain, shift);
+        } else {
+            value = rounded_product(gain, integral_of(self, design, one), shift);
+        }
+        channel[k] = (value > PVID_WEAK_LIMIT_Q31) ? PVID_WEAK_LIMIT_Q31
+                                                   : ((value < -PVID_WEAK_LIMIT_Q31) ? -PVID_WEAK_LIMIT_Q31 : value);
+    }
+}
+
+pvid_weak_outcome pvid_weak_values_step_q31(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design,
+                                            const int32_t jet[], int32_t channel[])
+{
+    const pvid_weak_model_q31 *model = design->model;
+    int32_t newest[2 * PVID_MAX_INTEGRANDS]; /* `prepare` and `values` write all that is read */
+    int32_t out[PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS];
+    if ((model->prepare != NULL) && !model->prepare(jet, newest)) {
+        return PVID_WEAK_BEYOND;
+    }
+    const bool complete = self->known > 1u;
+    if (self->known > 0u) {
+        complete_inputs(self, design, newest);
+        if (!model->values(self->now, out)) {
+            return PVID_WEAK_BEYOND;
+        }
+        const int32_t *f = &out[model->gains];
+        if (complete) {
+            integrate(self, design, f);
+            write_channels(self, design, channel);
+            for (size_t i = 0; i < model->integrands; i++) {
+                self->f[2][i] = self->f[1][i];
+                self->f[1][i] = self->f[0][i];
+            }
+        }
+        for (size_t i = 0; i < model->gains; i++) {
+            self->gain[i] = out[i];
+        }
+        for (size_t i = 0; i < model->integrands; i++) {
+            self->f[0][i] = f[i];
+        }
+    }
+    take_newest(self, design, jet, newest);
+    self->known = (uint8_t)((self->known < 4u) ? (self->known + 1u) : 4u);
+    return complete ? PVID_WEAK_CHANNELS : PVID_WEAK_NO_CHANNELS;
+}
+
+void pvid_weak_values_next_q31(pvid_weak_values_q31 *self, uint16_t hop)
+{
+    self->index++;
+    if (self->index == hop) {
+        self->index = 0;
+        self->half ^= 1u;
+    }
+}

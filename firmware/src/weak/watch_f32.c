@@ -1,0 +1,68 @@
+#include "number/uncontracted.h"
+
+/* Every tick compares each sample with its range (weak_front_f32.h). A sample beyond it counts for the present step
+ * and for all later ones that contain it.
+ *
+ * At every step each sample x adds x - r and (x - r)^2 to its half, r the half's first sample. With d = r_B - r_A the
+ * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps
+ * is (q - s^2/N) / N of both halves together. */
+#include "weak/watch_f32.h"
+
+#include "number/exact.h"
+
+void pvid_weak_watch_init_f32(pvid_weak_watch_f32 *self, const pvid_weak_config_f32 *config, uint16_t delay)
+{
+    self->range = config->range;
+    self->drive_min = config->drive_min;
+    self->delay = delay;
+    pvid_weak_watch_reset_f32(self);
+}
+
+void pvid_weak_watch_reset_f32(pvid_weak_watch_f32 *self)
+{
+    self->beyond = 0;
+    self->out[0] = false;
+    self->out[1] = false;
+}
+
+void pvid_weak_watch_step_f32(pvid_weak_watch_f32 *self, size_t samples, const float sample[], size_t half, bool first)
+{
+    self->out[half] = (!first && self->out[half]) || (self->beyond > 0u);
+    self->beyond = (uint16_t)((self->beyond > 0u) ? (self->beyond - 1u) : 0u);
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, samples);
+    if (self->drive_min != NULL) {
+        PVID_UNROLL_EXACT
+        for (size_t i = 0; i < count; i++) {
+            pvid_weak_spread_f32 *spread = &self->spread[half][i];
+            if (first) {
+                spread->reference = sample[i];
+                spread->sum = 0.0f;
+                spread->square = 0.0f;
+            }
+            const float x = sample[i] - spread->reference;
+            spread->sum += x;
+            spread->square += x * x;
+        }
+    }
+}
+
+bool pvid_weak_watch_beyond_f32(const pvid_weak_watch_f32 *self)
+{
+    return self->out[0] || self->out[1];
+}
+
+void pvid_weak_watch_half_f32(pvid_weak_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
+{
+    bool still = false;
+    const float n = (float)hop;
+    for (size_t i = 0; (self->drive_min != NULL) && (i < samples); i++) {
+        const pvid_weak_spread_f32 *a = &self->spread[later ^ 1u][i];
+        const pvid_weak_spread_f32 *b = &self->spread[later][i];
+        const float d = b->reference - a->reference;
+        const float sum = (a->sum + b->sum) + (n * d);
+        const float square = (a->square + (b->square + ((2.0f * d) * b->sum))) + ((n * d) * d);
+        const float variance = (square - ((sum * sum) / (2.0f * n))) / (2.0f * n);
+        still = still || (variance < (self->drive_min[i] * self->drive_min[i]));
+    }
+    self->still = still;
+}

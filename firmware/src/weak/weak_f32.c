@@ -1,0 +1,467 @@
+#include "number/uncontracted.h"
+
+#include "pvid/weak.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "weak/weak_finish_f32.h"
+#include "weak/weak_front_f32.h"
+#include "weak/weak_step_f32.h"
+#include "weak/sums_f32.h"
+#include "weak/ticks_f32.h"
+#include "weak/valid_f32.h"
+#include "weak/watch_f32.h"
+#include "weak/white_f32.h"
+#include "judge/publication.h"
+#include "number/count.h"
+#include "number/finite_f32.h"
+#include "number/init.h"
+#include "number/unroll.h"
+
+/* The largest finite number. */
+#define LARGEST 3.40282347e38f
+
+/* No reasons of a tick: a window is being processed; a block is being added, or a window joined; the channels of a step
+ * are to be formed. */
+#define PROCESS 255u
+#define ADD 254u
+#define FORM 253u
+
+static inline bool all_finite(const float values[], size_t n)
+{
+    bool finite = true;
+    for (size_t i = 0; i < n; i++) {
+        finite = finite && pvid_finite_f32(values[i]);
+    }
+    return finite;
+}
+
+static pvid_status limits_are_valid(const pvid_weak_config_f32 *config)
+{
+    for (size_t i = 0; i < config->design->model->samples; i++) {
+        if ((config->range != NULL) && !pvid_within_f32(config->range[i], 1.0e-30f, 3.4e38f)) {
+            return PVID_BAD_ANGLE_LIMIT;
+        }
+        if ((config->drive_min != NULL) && !pvid_within_f32(config->drive_min[i], 0.0f, 1.0e9f)) {
+            return PVID_BAD_DRIVE_MIN;
+        }
+    }
+    return PVID_OK;
+}
+
+static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+{
+    const pvid_weak_design_f32 *design = config->design;
+    const pvid_weak_model_f32 *model = design->model;
+    float nuisances = 0.0f;
+    for (size_t i = 0; i < model->kinds; i++) {
+        nuisances += (float)model->kind[i].nuisances;
+    }
+    const float functions = (float)design->functions * (float)model->kinds;
+    pvid_estimator_config_f32 estimator = config->estimator;
+    estimator.model = model->model;
+    estimator.update_rate_hz = config->sample_rate_hz / ((float)design->decimation * (float)design->hop);
+    estimator.row_weight = (functions - nuisances) / functions;
+    estimator.correlation = design->overlap;
+    return pvid_estimator_init_f32(&self->estimator, &estimator);
+}
+
+/* Channels that are summed: up to the last one that is not the constant. */
+static uint8_t summed_channels(const pvid_weak_model_f32 *model)
+{
+    uint8_t channels = 0;
+    for (size_t i = 0; i < model->channels; i++) {
+        channels = (model->channel[i].gain != PVID_WEAK_NONE) ? (uint8_t)(i + 1u) : channels;
+    }
+    return channels;
+}
+
+/* Steps from a sample to the last step that contains it: its own block and the next, the compensator, two more before
+ * the channels; signals of several samples. */
+static uint16_t delay_of(const pvid_weak_design_f32 *design)
+{
+    return (uint16_t)((2u * pvid_weak_front_half_f32(design)) + 8u);
+}
+
+/* Returns whether init has accepted a configuration. */
+static inline bool is_ready(const pvid_weak_f32 *self)
+{
+    const bool ready = (self != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+/* Returns whether there is a second stage. */
+static inline bool refines(const pvid_weak_f32 *self)
+{
+    return (PVID_REFINEMENT != 0) && (self->refine != NULL);
+}
+
+/* Reason of a tick without anything else to report. */
+static inline pvid_reason idle(const pvid_weak_f32 *self)
+{
+    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+}
+
+/* What a tick without a step does from now on. */
+static void rest(pvid_weak_f32 *self)
+{
+    if (pvid_weak_sums_is_busy_f32(&self->sums, self->harmonics)) {
+        self->rest = ADD;
+    } else {
+        self->rest = pvid_weak_finish_is_busy_f32(&self->finish) ? PROCESS : (uint8_t)idle(self);
+    }
+}
+
+static void restart(pvid_weak_f32 *self)
+{
+    pvid_weak_front_reset_f32(&self->front);
+    pvid_weak_step_reset_f32(&self->history);
+    pvid_weak_sums_reset_f32(&self->sums, self->harmonics);
+    pvid_weak_watch_reset_f32(&self->watch);
+    pvid_weak_finish_skip_f32(&self->finish);
+    self->warm = false;
+    rest(self);
+}
+
+static pvid_status init_refinement(pvid_weak_f32 *self, const pvid_weak_refine_f32 *refine)
+{
+    if (refine == NULL) {
+        return PVID_OK;
+    }
+    if ((PVID_REFINEMENT == 0) || (refine->stage == NULL)) {
+        return PVID_BAD_POINTER;
+    }
+    self->refine = refine;
+    return refine->stage->init(refine->storage, refine->config);
+}
+
+/* Returns whether the sums of a window have a place of their own, or are used before the next half's first block. */
+static bool window_has_place(const pvid_weak_f32 *self, uint32_t free_ticks)
+{
+#if PVID_MAX_WINDOWS > 0
+    (void)self;
+    (void)free_ticks;
+    return true;
+#else
+    const uint32_t adding = ((2u * (uint32_t)self->harmonics) + (self->items_per_tick - 1u)) / self->items_per_tick;
+    return pvid_weak_finish_columns_f32(self) <= (self->stages_per_tick * (free_ticks - adding));
+#endif
+}
+
+static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+{
+    const pvid_weak_design_f32 *design = config->design;
+    if (!pvid_within_f32(config->sample_rate_hz, 1.0e-3f, 1.0e6f)) {
+        return PVID_BAD_SAMPLE_RATE;
+    }
+    pvid_status status = pvid_weak_valid_f32(design);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = limits_are_valid(config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    memset(self, 0, sizeof *self);
+    status = init_estimator(self, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_trust_init_f32(&self->trust, &config->trust, &self->estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if ((config->iterations < 1u) || (config->iterations > PVID_MAX_ITERATIONS)) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->dt = (float)design->decimation / config->sample_rate_hz;
+    status = pvid_weak_finish_init_f32(&self->finish, config, self->dt);
+    if (status != PVID_OK) {
+        return status;
+    }
+    self->design = design;
+    self->harmonics = (uint8_t)((design->functions / 2u) + (design->power / 2u) + 1u);
+    self->channels = summed_channels(design->model);
+    if ((PVID_EXACT != 0) && (self->channels != PVID_EXACT_CHANNELS)) {
+        return PVID_BAD_DESIGN;
+    }
+    self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
+    pvid_weak_front_init_f32(&self->front, design, config->sample_rate_hz);
+    pvid_weak_step_init_f32(&self->history, (float)pvid_weak_front_lead_f32(&self->front) / config->sample_rate_hz);
+    pvid_weak_watch_init_f32(&self->watch, config, delay_of(design));
+    self->watches = (config->range != NULL) || (config->drive_min != NULL);
+    self->plain = self->front.plain ? design->model->samples : 0u;
+    for (size_t i = 0; i < design->model->samples; i++) {
+        self->front.limit[i] = pvid_weak_front_limit_f32((config->range != NULL) ? config->range[i] : LARGEST);
+    }
+    const uint32_t free_ticks = pvid_weak_free_ticks_f32(design->decimation);
+    if (pvid_weak_blocks_f32(free_ticks, self->harmonics) > (uint32_t)PVID_MAX_BLOCKS) {
+        return PVID_BAD_DESIGN;
+    }
+    self->items_per_tick = pvid_weak_items_f32(free_ticks, self->harmonics);
+    self->stages_per_tick =
+        pvid_weak_stages_f32(pvid_weak_finish_stages_f32(self), design->hop, free_ticks, self->harmonics);
+    if (self->stages_per_tick == 0u) {
+        return PVID_BAD_ITERATIONS;
+    }
+    if (!window_has_place(self, free_ticks)) {
+        return PVID_BAD_DESIGN;
+    }
+    restart(self);
+    return init_refinement(self, config->refine);
+}
+
+pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+{
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
+}
+
+void pvid_weak_gap_f32(pvid_weak_f32 *self)
+{
+    if (is_ready(self)) {
+        restart(self);
+        if (refines(self)) {
+            self->refine->stage->gap(self->refine->storage);
+        }
+    }
+}
+
+void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen)
+{
+    if (is_ready(self)) {
+        self->frozen = frozen;
+        if (refines(self)) {
+            self->refine->stage->freeze(self->refine->storage, frozen);
+        }
+    }
+}
+
+/* The reason why a complete window is dropped; PVID_ACCUMULATED if it is used. */
+static pvid_reason drop_reason(pvid_weak_f32 *self)
+{
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    if (pvid_weak_watch_beyond_f32(&self->watch)) {
+        pvid_count_up(&self->estimator.counters.held_out_of_range);
+        return PVID_HELD_OUT_OF_RANGE;
+    }
+    if (self->watch.still) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    return PVID_ACCUMULATED;
+}
+
+/* Behind the channels of a step, the block's end; if they complete a window that is dropped, returns the reason; else
+ * PVID_ACCUMULATED. */
+PVID_SELDOM static pvid_reason end_half(pvid_weak_f32 *self)
+{
+    if (self->sums.halves < 2u) {
+        return PVID_ACCUMULATED;
+    }
+    self->warm = true;
+    const pvid_reason reason = drop_reason(self);
+    if (reason == PVID_ACCUMULATED) {
+        pvid_weak_sums_join_f32(&self->sums, self->history.edge);
+    } else {
+        pvid_weak_finish_skip_f32(&self->finish);
+    }
+    return reason;
+}
+
+/* The channels of a step to the present block. */
+PVID_SELDOM static pvid_reason form(pvid_weak_f32 *self)
+{
+    const pvid_weak_design_f32 *design = self->design;
+    const uint16_t index = self->sums.index;
+    pvid_reason dropped = PVID_ACCUMULATED;
+    if (pvid_weak_step_take_f32(&self->history, design, self->dt, index, pvid_weak_sums_place_f32(&self->sums))) {
+        if (pvid_weak_sums_count_f32(&self->sums, design->hop, self->channels)) {
+            dropped = end_half(self);
+        }
+    }
+    rest(self);
+    return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
+}
+
+/* A sample that is not finite. */
+PVID_SELDOM static pvid_reason reject(pvid_weak_f32 *self)
+{
+    restart(self);
+    pvid_count_up(&self->estimator.counters.rejected_not_finite);
+    return PVID_REJECTED_NOT_FINITE;
+}
+
+/* Some harmonics of the last block are added, or of the last window joined. */
+static pvid_reason add(pvid_weak_f32 *self)
+{
+    pvid_weak_sums_f32 *sums = &self->sums;
+    for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
+        if (pvid_weak_sums_joins_f32(sums)) {
+            pvid_weak_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_weak_window_f32(self));
+            if (sums->joined == self->harmonics) {
+                pvid_weak_finish_begin_f32(&self->finish);
+                rest(self);
+            }
+        } else {
+            pvid_weak_sums_add_f32(sums, self->design, self->channels);
+            if (!pvid_weak_sums_is_busy_f32(sums, self->harmonics)) {
+                rest(self);
+            }
+        }
+    }
+    return idle(self);
+}
+
+/* Some stages of the last whole window. */
+static pvid_reason process(pvid_weak_f32 *self)
+{
+    pvid_reason reason = idle(self);
+    uint32_t left = self->stages_per_tick;
+    do {
+        pvid_weak_finish_step_f32(self, &reason);
+        left--;
+    } while (left > 0u);
+    if (!pvid_weak_finish_is_busy_f32(&self->finish)) {
+        rest(self);
+    }
+    return reason;
+}
+
+/* The samples of the tick of a step, whose channels follow. */
+static void watch(pvid_weak_f32 *self, const float sample[])
+{
+    const pvid_weak_design_f32 *design = self->design;
+    const uint16_t index = self->sums.index;
+    const size_t half = self->sums.half;
+    pvid_weak_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
+    if (index + 1u == design->hop) {
+        pvid_weak_watch_half_f32(&self->watch, design->model->samples, half, design->hop);
+    }
+}
+
+/* The last tick of a block. */
+PVID_SELDOM static pvid_reason end_block(pvid_weak_f32 *self, const float sample[])
+{
+    const uint8_t decimation = self->front.decimation;
+    const bool steps = pvid_weak_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
+    if (steps && self->watches && (self->history.known > 1u)) {
+        watch(self, sample);
+    }
+    if (steps && (decimation >= PVID_WEAK_TWO_TICKS)) {
+        self->rest = FORM;
+        return idle(self);
+    }
+    const pvid_reason formed = steps ? form(self) : idle(self);
+    if ((decimation > 1u) || (self->rest <= FORM)) {
+        return formed;
+    }
+    const pvid_reason worked = (self->rest == ADD) ? add(self) : process(self);
+    return (formed == idle(self)) ? worked : formed;
+}
+
+/* A tick with something to do. */
+PVID_SELDOM static pvid_reason due(pvid_weak_f32 *self)
+{
+    if (self->rest == ADD) {
+        return add(self);
+    }
+    return (self->rest == PROCESS) ? process(self) : form(self);
+}
+
+/* Behind the samples of a tick. */
+static inline pvid_reason follow(pvid_weak_f32 *self, const float sample[])
+{
+    self->front.wait--;
+    if (self->front.wait == 0u) {
+        return end_block(self, sample);
+    }
+    const uint32_t rested = self->rest;
+    return (rested >= FORM) ? due(self) : (pvid_reason)rested;
+}
+
+/* Of samples with one that is not finite or beyond its range: returns whether all are finite. */
+PVID_SELDOM static bool are_finite(pvid_weak_f32 *self, const float sample[])
+{
+    const bool finite = all_finite(sample, self->design->model->samples);
+    if (finite) {
+        self->watch.beyond = self->watch.delay;
+    }
+    return finite;
+}
+
+/* A tick whose signals are not the samples. */
+PVID_SELDOM static pvid_reason other_tick(pvid_weak_f32 *self, const float sample[])
+{
+    if (!is_ready(self) || (sample == NULL)) {
+        return PVID_NOT_READY;
+    }
+    const pvid_weak_model_f32 *model = self->design->model;
+    if (!pvid_weak_front_fits_f32(&self->front, model->samples, sample) && !are_finite(self, sample)) {
+        return reject(self);
+    }
+    pvid_weak_front_derive_f32(&self->front, model, sample);
+    return follow(self, sample);
+}
+
+/* A tick with a sample that is not finite or beyond its range. */
+PVID_SELDOM static pvid_reason odd_tick(pvid_weak_f32 *self, const float sample[])
+{
+    if (!are_finite(self, sample)) {
+        return reject(self);
+    }
+    pvid_weak_front_add_f32(&self->front, self->plain, sample);
+    return follow(self, sample);
+}
+
+/* A tick of the weak form. */
+static inline pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
+{
+    if ((self == NULL) || (sample == NULL) || (self->plain == 0u)) {
+        return other_tick(self, sample);
+    }
+    if (!pvid_weak_front_fits_f32(&self->front, self->plain, sample)) {
+        return odd_tick(self, sample);
+    }
+    pvid_weak_front_add_f32(&self->front, self->plain, sample);
+    return follow(self, sample);
+}
+
+/* A tick of both stages. */
+PVID_SELDOM static pvid_reason both_ticks(pvid_weak_f32 *self, const float sample[])
+{
+    const pvid_reason reason = weak_tick(self, sample);
+    const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
+    if (sample != NULL) {
+        self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL);
+    }
+    return reason;
+}
+
+pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, const float sample[])
+{
+    return ((self != NULL) && refines(self)) ? both_ticks(self, sample) : weak_tick(self, sample);
+}
+
+const pvid_estimate_f32 *pvid_weak_candidate_f32(const pvid_weak_f32 *self)
+{
+    return (self != NULL) ? &self->finish.candidate : NULL;
+}
+
+const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self)
+{
+    return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_weak_read_f32(const pvid_weak_f32 *self, pvid_estimate_f32 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_f32 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
+}

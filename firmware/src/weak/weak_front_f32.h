@@ -1,0 +1,67 @@
+/* Front end: from samples to signals, to their block sums, to jets at a step. Private to the core. */
+#ifndef PVID_WEAK_FRONT_F32_H
+#define PVID_WEAK_FRONT_F32_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "number/exact.h"
+#include "number/finite_f32.h"
+#include "pvid/weak.h"
+
+/* Half of the longest compensator [steps]. */
+uint16_t pvid_weak_front_half_f32(const pvid_weak_design_f32 *design);
+
+/* Numbers in the line: block sums of each signal, and the steps for the compensators, twice. */
+uint32_t pvid_weak_front_length_f32(const pvid_weak_design_f32 *design);
+
+/* Requires a valid design. */
+void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design, float sample_rate_hz);
+
+/* Ticks from the first sample after a restart to the instant of the first step. */
+uint16_t pvid_weak_front_lead_f32(const pvid_weak_front_f32 *self);
+
+/* An empty line. */
+void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self);
+
+/* Adds the finite samples of a tick, where signals need samples of other ticks or are not one a sample. */
+void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvid_weak_model_f32 *model, const float sample[]);
+
+/* At the end of a block: its outputs to the line. Returns true if the line is full: then `jet` contains the step's
+ * jets.
+ */
+bool pvid_weak_front_step_f32(pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design, float jet[]);
+
+/* What the bits of a sample without its sign, shifted left by one, are compared with. */
+static inline uint32_t pvid_weak_front_limit_f32(float largest)
+{
+    return pvid_bits_f32(largest) << 1u;
+}
+
+/* Returns whether none of this number of samples, at least 1, is beyond its limit. */
+static inline bool pvid_weak_front_fits_f32(const pvid_weak_front_f32 *self, uint32_t number, const float sample[])
+{
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        if ((pvid_bits_f32(sample[i]) << 1u) > self->limit[i]) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Adds this number of finite samples of a tick to the block. */
+static inline void pvid_weak_front_add_f32(pvid_weak_front_f32 *self, uint32_t number, const float sample[])
+{
+    const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
+    float *sums = self->line;
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        const float once = sums[2u * i] + sample[i];
+        sums[2u * i] = once;
+        sums[(2u * i) + 1u] += once;
+    }
+}
+
+#endif

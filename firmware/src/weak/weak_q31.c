@@ -1,0 +1,274 @@
+#include "pvid/weak_q31.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "weak/collect_q31.h"
+#include "weak/weak_finish_q31.h"
+#include "weak/weak_front_q31.h"
+#include "weak/valid_q31.h"
+#include "judge/publication.h"
+#include "number/count.h"
+#include "number/init.h"
+#include "number/integer_q31.h"
+#include "number/unroll.h"
+
+#define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
+#define OFFSET_LIMIT ((int32_t)1 << 30)
+#define STAGES_MAX 64u
+#define ONE_Q16 65536u
+
+/* No reason of a tick: there is work. */
+#define BUSY 255u
+
+static bool is_ready(const pvid_weak_q31 *self)
+{
+    const bool ready = (self != NULL) && (self->design != NULL);
+    PVID_ASSERT(ready);
+    return ready;
+}
+
+static pvid_reason idle_reason(const pvid_weak_q31 *self)
+{
+    return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
+}
+
+/* What a tick does from now on that ends no step. */
+static void rest(pvid_weak_q31 *self)
+{
+    const bool busy = (self->collect.sums.left > 0u) || pvid_weak_finish_is_busy_q31(&self->finish);
+    self->rest = busy ? BUSY : (uint8_t)idle_reason(self);
+}
+
+static void restart(pvid_weak_q31 *self)
+{
+    pvid_weak_collect_reset_q31(&self->collect);
+    self->warm = false;
+    rest(self);
+}
+
+static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
+{
+    const pvid_weak_design_q31 *design = config->design;
+    pvid_status status = pvid_weak_valid_q31(design);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if ((config->offset == NULL) || !pvid_weak_blocks_fit_q31(design)) {
+        return PVID_BAD_DESIGN;
+    }
+    for (size_t i = 0; i < design->model->samples; i++) {
+        if ((config->offset[i] < -OFFSET_LIMIT) || (config->offset[i] > OFFSET_LIMIT)) {
+            return PVID_BAD_DESIGN;
+        }
+    }
+    for (size_t i = 0; (config->drive_min != NULL) && (i < design->model->samples); i++) {
+        if ((config->drive_min[i] < 0) || (config->drive_min[i] > COUNTS_LIMIT)) {
+            return PVID_BAD_DRIVE_MIN;
+        }
+    }
+    memset(self, 0, sizeof *self);
+    pvid_estimator_config_q31 estimator = config->estimator;
+    estimator.model = design->model->model;
+    estimator.row_weight = ONE_Q16;
+    status = pvid_estimator_init_q31(&self->estimator, &estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_trust_init_q31(&self->trust, &config->trust, &self->estimator);
+    if (status != PVID_OK) {
+        return status;
+    }
+    status = pvid_weak_finish_init_q31(&self->finish, config);
+    if (status != PVID_OK) {
+        return status;
+    }
+    if ((config->iterations < 1u) || (config->iterations > PVID_MAX_ITERATIONS)) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->design = design;
+    self->drive_min = config->drive_min;
+    self->driven = config->drive_min == NULL;
+    self->iterations = (uint8_t)((self->estimator.settings.gain < PVID_ONE_Q30) ? 1u : config->iterations);
+    pvid_weak_collect_init_q31(&self->collect, design, config->offset);
+    const uint32_t ticks = pvid_weak_free_ticks_q31(design);
+    const uint32_t stages = pvid_weak_finish_stages_q31(self);
+    const uint32_t each = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
+    self->stages_per_tick = (uint8_t)((each <= STAGES_MAX) ? each : 0u);
+    if (self->stages_per_tick == 0u) {
+        return PVID_BAD_ITERATIONS;
+    }
+    self->plain = self->collect.front.plain ? design->model->samples : 0u;
+    rest(self);
+    return PVID_OK;
+}
+
+pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
+{
+    const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
+    return pvid_init_end(self, sizeof *self, status);
+}
+
+/* The counts of the tick in which the channels of step `index` of a half were made. */
+static void watch_drive(pvid_weak_q31 *self, size_t half, bool begins, const int32_t reading[])
+{
+    pvid_weak_drive_q31 *drive = &self->drive;
+    for (size_t i = 0; i < self->design->model->samples; i++) {
+        if (self->drive_min[i] > 0) {
+            const int32_t x = pvid_weak_count_q31(reading[i], self->collect.front.offset[i]);
+            drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
+            drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_square_q31(x);
+        }
+    }
+}
+
+/* Whether every sample of the last two halves moved as much as it must. |counts| <= 2^24 and 2 hop <= 2^13: nothing
+ * overflows.
+ */
+static bool is_driven(const pvid_weak_q31 *self)
+{
+    const int64_t n = 2 * (int64_t)self->design->hop;
+    bool driven = true;
+    for (size_t i = 0; (self->drive_min != NULL) && (i < self->design->model->samples); i++) {
+        const int64_t sum = self->drive.sum[0][i] + self->drive.sum[1][i];
+        const int64_t square = self->drive.square[0][i] + self->drive.square[1][i];
+        const int64_t mean = sum / n;
+        const int64_t spread = square - (mean * ((2 * sum) - (n * mean)));
+        const int64_t least = self->drive_min[i];
+        driven = driven && (spread >= (n * (least * least)));
+    }
+    return driven;
+}
+
+/* A whole window. Returns PVID_ACCUMULATED, or the reason why it is dropped. */
+static pvid_reason hand_over(pvid_weak_q31 *self)
+{
+    self->warm = true;
+    if (self->frozen) {
+        return PVID_HELD_FROZEN;
+    }
+    if (!self->driven) {
+        pvid_count_up(&self->estimator.counters.held_not_excited);
+        return PVID_HELD_NOT_EXCITED;
+    }
+    pvid_weak_finish_begin_q31(&self->finish, self->design);
+    return PVID_ACCUMULATED;
+}
+
+PVID_SELDOM static pvid_reason reject(pvid_weak_q31 *self)
+{
+    restart(self);
+    pvid_count_up(&self->estimator.counters.rejected_saturated);
+    return PVID_REJECTED_SATURATED;
+}
+
+PVID_SELDOM static pvid_reason advance_finish(pvid_weak_q31 *self)
+{
+    pvid_reason reason = idle_reason(self);
+    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_weak_finish_is_busy_q31(&self->finish); i++) {
+        pvid_weak_finish_step_q31(self, &reason);
+    }
+    return reason;
+}
+
+/* The last tick of a step. */
+PVID_SELDOM static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t reading[])
+{
+    const uint16_t index = self->collect.values.index;
+    const uint8_t half = self->collect.values.half;
+    const pvid_weak_tick tick = pvid_weak_collect_end_q31(&self->collect);
+    if ((tick != PVID_WEAK_REJECTED) && (self->drive_min != NULL) && (self->collect.values.index != index)) {
+        watch_drive(self, half, index == 0u, reading);
+        if (self->collect.values.index == 0u) { /* the half is complete */
+            self->driven = is_driven(self);
+        }
+    }
+    return tick;
+}
+
+/* Behind the work of a tick. */
+static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
+{
+    pvid_reason reason = idle_reason(self);
+    if (tick == PVID_WEAK_REJECTED) {
+        reason = reject(self);
+    } else if (tick == PVID_WEAK_WINDOW) {
+        reason = hand_over(self);
+    } else if ((tick == PVID_WEAK_FREE) && pvid_weak_finish_is_busy_q31(&self->finish)) {
+        reason = advance_finish(self);
+    } else {
+        /* the tick is full, or there is nothing to do */
+    }
+    rest(self);
+    return reason;
+}
+
+/* A tick that ends no step, with work. */
+PVID_SELDOM static pvid_reason work(pvid_weak_q31 *self)
+{
+    pvid_weak_collect_q31 *collect = &self->collect;
+    return after(self, (collect->sums.left > 0u) ? pvid_weak_collect_work_q31(collect) : PVID_WEAK_FREE);
+}
+
+/* Behind the readings of a tick. */
+static inline pvid_reason end_tick(pvid_weak_q31 *self, const int32_t reading[])
+{
+    self->collect.front.wait--;
+    if (self->collect.front.wait == 0u) {
+        return after(self, end_step(self, reading));
+    }
+    const uint32_t rested = self->rest;
+    return (rested == BUSY) ? work(self) : (pvid_reason)rested;
+}
+
+/* A tick whose readings need more than to be added. */
+PVID_SELDOM static pvid_reason other_tick(pvid_weak_q31 *self, const int32_t reading[])
+{
+    if (!is_ready(self) || (reading == NULL)) {
+        return PVID_NOT_READY;
+    }
+    if (!pvid_weak_front_derive_q31(&self->collect.front, self->design, reading)) {
+        return reject(self);
+    }
+    return end_tick(self, reading);
+}
+
+pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, const int32_t reading[])
+{
+    const uint32_t plain = (self != NULL) ? self->plain : 0u;
+    if ((plain == 0u) || (reading == NULL)) {
+        return other_tick(self, reading);
+    }
+    if (!pvid_weak_front_plain_q31(&self->collect.front, self->design, plain, reading)) {
+        return reject(self);
+    }
+    return end_tick(self, reading);
+}
+
+const pvid_estimate_q31 *pvid_weak_estimate_q31(const pvid_weak_q31 *self)
+{
+    return (self != NULL) ? &self->trust.estimate : NULL;
+}
+
+bool pvid_weak_read_q31(const pvid_weak_q31 *self, pvid_estimate_q31 *estimate, uint32_t *number)
+{
+    if (!is_ready(self) || (estimate == NULL)) {
+        return false;
+    }
+    const pvid_trust_q31 *trust = &self->trust;
+    return pvid_publication_read(&trust->mark, &trust->estimate, &trust->copy, estimate, sizeof *estimate, number);
+}
+
+void pvid_weak_gap_q31(pvid_weak_q31 *self)
+{
+    if (is_ready(self)) {
+        restart(self);
+    }
+}
+
+void pvid_weak_freeze_q31(pvid_weak_q31 *self, bool frozen)
+{
+    if (is_ready(self)) {
+        self->frozen = frozen;
+    }
+}

@@ -1,0 +1,37 @@
+"""The fixed-point weak form of a mechanism in C, on this computer: generated, compiled, loaded."""
+
+from __future__ import annotations
+
+from pvid.codegen import files_weak_q31
+from pvid.codegen.parameters_q31 import ParametersQ31
+from pvid.codegen.weak_q31 import FixedWeak
+from pvid.core.model_library import model_library
+from pvid.core.sizes import raised
+from pvid.core.weak_native_q31 import WeakNativeQ31
+from pvid.settings.engine_cores import FIXED
+from pvid.settings.weak_q31 import WeakConfigQ31
+from pvid.setup.weak_sizes import sizes_of_q31
+
+_MADE_BY = "identification"
+
+
+def weak_native_q31(made: FixedWeak, parameters: ParametersQ31, config: WeakConfigQ31) -> WeakNativeQ31:
+    """The library of a model, a design and its settings.
+
+    Raises
+    ------
+    PvidError
+        When there is no compiler.
+    """
+    name = made.functions.name
+    needed = sizes_of_q31(config.design, parameters.model.n_p, len(parameters.model.c_row))
+    texts = {
+        f"{name}_weak_q31.h": files_weak_q31.header(made, needed, _MADE_BY),
+        f"{name}_weak_q31.c": files_weak_q31.source(made, parameters, _MADE_BY),
+        f"{name}_design_q31.h": files_weak_q31.design_header(config, name, needed, _MADE_BY, []),
+        "configuration.c": f'#include "{name}_design_q31.h"\n#include "configuration.h"\n\n'
+        f"const pvid_weak_config_q31 *{name}_settings_q31 = &{name}_config_q31;\n",
+        "configuration.h": f'#include "pvid/weak_q31.h"\nextern const pvid_weak_config_q31 *{name}_settings_q31;\n',
+    }
+    headers = ("configuration.h",)
+    return WeakNativeQ31(name, model_library(name, texts, raised(needed), FIXED, headers), config)

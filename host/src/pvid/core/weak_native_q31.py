@@ -1,0 +1,60 @@
+"""The fixed-point weak form of a mechanism in C: its library, and an identifier that is stepped through runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.core.headers import Filled
+from pvid.core.native import Native, Publisher
+from pvid.settings.record import Record
+from pvid.settings.weak_q31 import WeakConfigQ31
+
+
+class WeakNativeQ31(Native):
+    """A library of pvid.core.model_library, which contains a configuration as well.
+
+    Parameters
+    ----------
+    name : of the mechanism, in C
+    path : of the library
+    config : the configuration that it contains
+    """
+
+    def __init__(self, name: str, path: Path, config: WeakConfigQ31) -> None:
+        super().__init__(path)
+        self.name, self.config = name, config
+
+    def identifier(self, start: npt.ArrayLike | None = None) -> WeakIdentifierQ31:  # type: ignore[override]
+        """An initialised identifier.
+
+        Parameters
+        ----------
+        start : p in the core's formats [n_p]; None: that of the configuration
+        """
+        return WeakIdentifierQ31(self, start)
+
+
+class WeakIdentifierQ31(Publisher):
+    """The identifier: readings of every tick in counts."""
+
+    def __init__(self, native: WeakNativeQ31, start: npt.ArrayLike | None = None) -> None:
+        given = getattr(native.library, f"{native.name}_settings_q31")[0]  # a constant of the library
+        self._owned = native.headers.ffi.new("pvid_weak_config_q31 *", given)
+        self._config = self._owned[0]
+        for place, one in enumerate([] if start is None else np.asarray(start, np.int32).tolist()):
+            self._config.estimator.start[place] = one
+        super().__init__(native, "weak", "q31", native.config, replay="weak")
+
+    def _filled_with(self, native: Native, kind: str, config: object) -> Filled:
+        """A copy of the configuration in the library."""
+        return Filled(self._config, {}, {}, [])
+
+    def run_samples(
+        self, readings: npt.ArrayLike, *, sums: bool = True, hashes: bool = True, estimate_every: int = 0
+    ) -> Record:
+        """Steps through readings [ticks, samples]."""
+        given = np.ascontiguousarray(readings, np.int32)
+        return self._recorded(len(given), [given], sums, hashes, estimate_every)

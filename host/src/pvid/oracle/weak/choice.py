@@ -1,0 +1,263 @@
+"""The design of a weak form for a model and a run: the one with the least predicted errors.
+
+The score of a design is the geometric mean over the parameters of predicted s.e. x sqrt(max(1, chi^2)), both from the
+run. Measured: where chi^2 is about 1 the score is the true error; where it is large the best by score is within 20 % of
+the best by truth.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.oracle.weak import verdict
+from pvid.oracle.weak.attenuation import other_line
+from pvid.oracle.weak.blur import blur_of, rates_of_drives
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.front import samples_of
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.gate import gated
+from pvid.oracle.weak.rows import Compiled, WeakRows
+from pvid.oracle.weak.starts import starts_about
+
+_FEWEST_WINDOWS = 18
+_SHORT_RUN = 10  # windows of a run that has no more: its halves are not compared
+_SEARCHED = 1  # lengths of window, the longest ones, with other starts than the guesses
+_SHORTEST_STEPS = 40  # of a window
+_LENGTHS = 6
+_FUNCTIONS = (12, 24, 40)
+_FEW_FUNCTIONS = (5, 8)  # of runs with motion that the equations do not explain: it is above the drive's frequencies
+_RATES = ((11, 2), (15, 2), (31, 4), (41, 4), (61, 6), (101, 6))
+_FLAT_RATES = (
+    (11, 4),
+    (21, 6),
+    (41, 8),
+    (81, 8),
+    (141, 8),
+)  # for a drive that is measured: see pvid.oracle.weak.blur
+
+# Enough to compare designs, each from the best p so far.
+_PASSES = 10
+
+# Above this the equations' own errors are estimated when designs are compared.
+MODEL_ERROR = 5.0
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A design with its score, and p there.
+
+    error : predicted, of each parameter [n_p]
+    known : every parameter has a value that means something, within the range of the model
+    """
+
+    design: WeakDesign
+    score: float
+    p: Float
+    chi2: float
+    error: Float
+    known: bool
+
+
+_KEPT = 4096
+_scores: dict[tuple[object, ...], Scored | None] = {}
+
+
+def score_of(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    design: WeakDesign,
+    start: Float | None,
+    errors: bool,
+    fewest: int = 1,
+) -> Scored | None:
+    """None where the design does not fit the run, or has not the fewest windows that are wanted.
+
+    Kept for the last few thousand arguments: both cores, a comparison and a second command ask for the same scores.
+    """
+    samples = hashlib.blake2b()
+    for name in sorted(run):
+        samples.update(name.encode())
+        samples.update(np.ascontiguousarray(run[name], np.float64).data)
+    begun = None if start is None else tuple(np.asarray(start, np.float64).tolist())
+    key = (model.number, samples.digest(), design, begun, errors, fewest)
+    if key not in _scores:
+        _scores[key] = _scored(model, run, design, start, errors, fewest)
+        while len(_scores) > _KEPT:
+            del _scores[next(iter(_scores))]
+    return _scores[key]
+
+
+def _scored(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    design: WeakDesign,
+    start: Float | None,
+    errors: bool,
+    fewest: int,
+) -> Scored | None:
+    try:
+        rows = WeakRows.of(model, run, design)
+        if rows.windows < fewest:
+            return None
+        fit = gated(rows, start, equation_error=errors, passes=_PASSES)
+        found = uncertainty(fit)
+    except (PvidError, np.linalg.LinAlgError):
+        return None
+    size = np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd)
+    other = other_line(fit)
+    apart = np.zeros(len(fit.p)) if other is None else other - fit.p
+    relative = np.hypot(np.hypot(found.predicted, apart) / size, blur_of(model, run, design))
+    if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
+        return None
+    known = not verdict.not_identified(model.bare, fit, found) and not verdict.of_range(model.bare, fit.p)
+    return Scored(design, float(np.exp(np.mean(np.log(relative)))), fit.p, found.chi2, relative * size, known)
+
+
+def power_of(model: Compiled) -> int:
+    """n of sin^n: even, 2 above the highest order, 6 at least."""
+    return max(6, 2 * ((model.channels.top + 3) // 2), 8 if model.channels.top >= 4 else 6)
+
+
+def lengths(samples: int, sample_rate: float, fewest: int = _FEWEST_WINDOWS) -> list[float]:
+    """Windows to try [s], the longest first."""
+    longest = 2 * samples / sample_rate / (fewest + 1)
+    shortest = _SHORTEST_STEPS / sample_rate
+    if longest < shortest:
+        return []
+    count = min(_LENGTHS, 1 + int(np.log2(max(longest / shortest, 1.0))))
+    return [float(f"{longest / 2**k:.2g}") for k in range(count)]
+
+
+def chosen(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    sample_rate: float,
+    start: Float | None = None,
+    equation_error: bool = True,
+) -> WeakDesign:
+    """The design of least score, one choice after the other: length, smoothing of rates, number of functions.
+
+    Parameters
+    ----------
+    equation_error : estimate the error of each equation where the sensors do not explain the residuals
+    """
+    return ranked(model, run, sample_rate, start, equation_error)[0].design
+
+
+def ranked(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    sample_rate: float,
+    start: Float | None = None,
+    equation_error: bool = True,
+    reversals: Literal["located", "averaged"] = "located",
+) -> list[Scored]:
+    """All designs tried, the best first.
+
+    Parameters
+    ----------
+    equation_error : as in `chosen`
+    reversals : how signs are summed; "averaged": of the weak engine in C, which whitens the kinds of rows one by one
+    """
+    plain = {name: x for name, x in run.items()}
+    samples = next(iter(samples_of(model.bare, plain).values())).size
+    rates = any(jet.order for jet in model.channels.needed)
+    basis = WeakDesign(
+        sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3, reversals=reversals
+    )
+    tried: list[Scored] = []
+    errors = False
+    fewest = _FEWEST_WINDOWS
+
+    def attempt(designs: Iterable[WeakDesign]) -> None:
+        for design in designs:
+            best = min(tried, key=_order, default=None)
+            found = score_of(model, run, design, best.p if best else start, errors, fewest - 2)
+            if found is not None:
+                tried.append(found)
+
+    windows: list[float] = []
+    for fewest in (_FEWEST_WINDOWS, _SHORT_RUN):
+        longer = lengths(samples, sample_rate, fewest)
+        windows = sorted({*windows, *longer}, reverse=True)
+        attempt(made(basis, window_s=one) for one in longer)
+        if not any(one.known for one in tried):
+            tried += _searched(model, run, [made(basis, window_s=one) for one in longer[:_SEARCHED]], start, fewest - 2)
+        if any(one.known for one in tried):
+            break
+    if not tried:
+        raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
+    best = min(tried, key=_order)
+    if best.chi2 > MODEL_ERROR and equation_error:
+        errors = True
+        tried.clear()
+        attempt([best.design])
+        attempt(made(basis, window_s=one) for one in windows)
+        best = min(tried, key=_order)
+    if rates:
+        filters = _RATES + (_FLAT_RATES if rates_of_drives(model) else ())
+        attempt(made(best.design, rate_taps=taps, rate_degree=degree) for taps, degree in filters)
+        best = min(tried, key=_order)
+    place = windows.index(best.design.window_s)
+    near = windows[max(place - 1, 0) : place + 2]
+    attempt(
+        made(best.design, window_s=length, functions=count)
+        for length in near
+        for count in ((*_FEW_FUNCTIONS, *_FUNCTIONS) if errors else _FUNCTIONS)
+        if (length, count) != (best.design.window_s, best.design.functions)
+    )
+    if len(model.model.rows) > 1 and reversals == "located":
+        best = min(tried, key=_order)
+        attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
+    return sorted(tried, key=_order)
+
+
+def ranked_for_engine(model: Compiled, tried: Sequence[Scored]) -> list[Scored] | None:
+    """What `ranked` finds with averaged signs, from what it has found with located ones, all else at its default; None
+    where signs make a difference."""
+    if model.channels.signs:
+        return None
+    alone = [one for one in tried if not one.design.joint]
+    return [replace(one, design=replace(one.design, reversals="averaged")) for one in alone]
+
+
+def _order(one: Scored) -> tuple[bool, float]:
+    return not one.known, one.score
+
+
+def _searched(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    designs: Iterable[WeakDesign],
+    start: Float | None,
+    fewest: int,
+) -> list[Scored]:
+    """Of each design the minimum of least chi^2 that other starts than the guesses lead to, if any is plausible."""
+    starts = list(starts_about(model.parameters, model.parameters.checked(start)))
+    out = []
+    for design in designs:
+        tried = [score_of(model, run, design, other, False, fewest) for other in starts]
+        known = [one for one in tried if one is not None and one.known]
+        if known:
+            out.append(min(known, key=lambda one: one.chi2))
+    return out
+
+
+def made(design: WeakDesign, **changes: float) -> WeakDesign:
+    """A changed design; one that is impossible gets fewer functions."""
+    while True:
+        try:
+            return replace(design, **changes)  # type: ignore[arg-type]
+        except PvidError:
+            count = int(changes.get("functions", design.functions)) - 2
+            if count < 2:
+                raise
+            changes["functions"] = count

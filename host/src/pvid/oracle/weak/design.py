@@ -1,0 +1,108 @@
+"""What a weak form is made with: window, test functions, front end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+from pvid.base.errors import PvidError
+from pvid.oracle.weak.comb import nodes_of
+from pvid.oracle.weak.functions import TestFunctions
+from pvid.oracle.weak.polynomials import edge_of
+
+_BAND = 1.2  # highest frequency of the motion over that of the test functions
+
+
+@dataclass(frozen=True)
+class WeakDesign:
+    """Design of a weak form.
+
+    Attributes
+    ----------
+    sample_rate : [Hz]
+    window_s : [s]; windows overlap by half
+    functions : K
+    power : n of sin^n, even; at least 2 above the highest order of the rows
+    decimation : raw samples a step
+    taps, degree : of the polynomial smoother of values; 1 tap: none
+    rate_taps, rate_degree : of the polynomial that gives the derivatives; 0 taps: those of the values
+    reversals
+        how sgn(v) is summed: "located" finds when v changes sign and gives the samples around it the weights of the
+        exact integral; "averaged" takes the mean of sgn over a step, v linear there; "soft" is tanh(v / soft)
+    soft : width of the soft sign [unit of the velocity]
+    joint : whiten all row kinds together; noise that they share then counts once
+    comb
+        values and derivatives from block sums and compensators at the steps (pvid.oracle.weak.comb) in place of
+        polynomials at the samples, with about as many taps. Needs a decimation above 1
+    """
+
+    sample_rate: float
+    window_s: float
+    functions: int = 16
+    power: int = 6
+    decimation: int = 1
+    taps: int = 1
+    degree: int = 6
+    rate_taps: int = 21
+    rate_degree: int = 3
+    reversals: Literal["located", "averaged", "soft"] = "located"
+    soft: float = 0.0
+    joint: bool = False
+    comb: bool = False
+
+    def __post_init__(self) -> None:
+        for name, taps, degree in (("taps", self.taps, self.degree), ("rate_taps", self.rate_taps, self.rate_degree)):
+            if taps > 1 and (taps % 2 == 0 or taps <= degree):
+                raise PvidError(f"{name} of a design must be odd and above the degree {degree}, not {taps}")
+        if self.hop < self.highest + 1:
+            raise PvidError(
+                f"a window of {self.window_s:g} s has {2 * self.hop} steps, too few for {self.functions} functions:"
+                " make it longer, decimate less, or take fewer functions"
+            )
+        if self.reversals == "soft" and self.soft <= 0:
+            raise PvidError("a soft sign needs a width above 0")
+        if self.comb and self.decimation < 2:
+            raise PvidError("block sums need a decimation above 1")
+
+    @property
+    def dt(self) -> float:
+        """Step of the decimated samples [s]."""
+        return self.decimation / self.sample_rate
+
+    @property
+    def hop(self) -> int:
+        """Steps from window to window, half a window."""
+        return max(2, round(self.window_s / (2 * self.dt)))
+
+    @property
+    def highest(self) -> int:
+        """Highest harmonic."""
+        return self.functions // 2 + self.power // 2
+
+    def band_of(self, order: int) -> float:
+        """Highest frequency that the compensator of a derivative is made for [Hz].
+
+        A little above the test functions', but not above where the polynomial of as many taps is right.
+        """
+        found = _BAND * self.highest / self.window_s
+        taps, degree = self._polynomial_of(order)
+        return min(found, edge_of(taps, max(degree, order), order) * self.sample_rate) if taps > 1 else found
+
+    def _polynomial_of(self, order: int) -> tuple[int, int]:
+        rates = order > 0 and self.rate_taps > 1
+        return (self.rate_taps, self.rate_degree) if rates else (self.taps, self.degree)
+
+    def compensator_of(self, order: int) -> tuple[int, int]:
+        """Of a derivative: steps on either side, about as long as the polynomial; frequencies at which it is exact."""
+        taps, degree = self._polynomial_of(order)
+        count = nodes_of(order, degree)
+        return max(round((taps + 1 - 2 * self.decimation) / (2 * self.decimation)), count), count
+
+    @property
+    def test_functions(self) -> TestFunctions:
+        """Those of this design: kept for the last few designs, since their tables are large and designs are many."""
+        return _functions(self.functions, self.power, self.hop, self.dt)
+
+
+_functions = lru_cache(maxsize=16)(TestFunctions)

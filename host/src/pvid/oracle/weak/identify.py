@@ -1,0 +1,268 @@
+"""From a compiled model and a recorded run to parameters, standard errors and a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.base.recent import Recent
+from pvid.model.compiled import CompiledModel, Known
+from pvid.oracle.weak import verdict
+from pvid.oracle.weak.attenuation import other_line
+from pvid.oracle.weak.choice import Scored, ranked
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.gate import gated
+from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.weak.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
+from pvid.oracle.weak.solve import Fit, batch, compensated, gauss_newton, online
+from pvid.oracle.weak.verdict import Halves, Verdict
+from pvid.oracle.weak.weights import Weights, as_white_force
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What a run says about a mechanism.
+
+    Attributes
+    ----------
+    names, units : of the parameters
+    p : [n_p]
+    se : published standard errors, those of gains included [n_p]
+    by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
+    by_known : of each constant with a standard deviation, what p is off by over the constant's error [n_p]
+    by_neglect : what p may be off by because equations are linearised [n_p]
+    sensor_error : the systematic error of a sensor that explains residuals; None: there is none
+    predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
+    covariance : of p, that of `predicted` [n_p, n_p]
+    chi2 : mean square of the residuals over what the sensors alone explain
+    verdict : whether to trust it
+    r2 : of each row kind
+    times, history : end of each window [s]; p after it, window by window [windows, n_p]
+    design : of the windows
+    equation_errors : of each row kind
+    halves : p of either half; None: too short
+    fit : rows and residuals, for plots
+    ranking : designs that were tried, the best first; () where the design was given
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    p: Float
+    se: Float
+    predicted: Float
+    clustered: Float
+    covariance: Float
+    chi2: float
+    verdict: Verdict
+    r2: dict[str, float]
+    times: Float
+    history: Float
+    design: WeakDesign
+    equation_errors: dict[str, EquationError]
+    halves: Halves | None
+    fit: Fit
+    ranking: tuple[Scored, ...]
+    by_gain: dict[str, Float]
+    by_known: dict[str, Float]
+    by_neglect: Float
+    sensor_error: SensorError | None
+
+    @property
+    def values(self) -> dict[str, tuple[float, float]]:
+        """name -> (value, standard error)."""
+        return {name: (float(p), float(se)) for name, p, se in zip(self.names, self.p, self.se, strict=True)}
+
+
+_SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
+_STEPS_OF_KNOWN = 10
+
+ready = Recent(Compiled)  # a model with its functions
+
+
+def start_of(model: CompiledModel, start: Mapping[str, float] | npt.ArrayLike | None) -> Float | None:
+    """A start as an array; names that a mapping leaves out start at their guess."""
+    if start is None:
+        return None
+    if isinstance(start, Mapping):
+        unknown = [name for name in start if name not in model.p_names]
+        if unknown:
+            raise PvidError(f"{model.name} has no unknown {unknown[0]}; its unknowns are {', '.join(model.p_names)}")
+        return np.array([float(start.get(one.name, one.guess)) for one in model.unknowns])
+    return np.asarray(start, np.float64)
+
+
+def identify(
+    compiled: CompiledModel,
+    run: Mapping[str, npt.ArrayLike],
+    sample_rate: float,
+    start: Mapping[str, float] | npt.ArrayLike | None = None,
+    design: WeakDesign | None = None,
+    compensate: bool = True,
+    weights: Weights = "residuals",
+) -> Identified:
+    """Parameters of a mechanism from a run.
+
+    Parameters
+    ----------
+    run : name of each signal -> samples [n], in the model's units
+    sample_rate : [Hz]
+    start : of p, by name or in order; the guesses of the model where none is given
+    design : None: chosen by predicted errors and chi^2 on this run
+    compensate : take the bias of noisy regressors off
+    weights
+        "residuals": of the sensors and an error of the equations, estimated from the residuals; "sensors": of the
+        sensors alone
+    """
+    model = ready(compiled)
+    begun = start_of(compiled, start)
+    with_error = weights == "residuals"
+    ranking: tuple[Scored, ...] = ()
+    if design is None:
+        ranking = tuple(ranked(model, run, sample_rate, begun, with_error))
+        used, near = ranking[0].design, ranking[0].p
+    else:
+        used, near = design, None
+    rows = WeakRows.of(model, run, used)
+    fit = gated(rows, begun, with_error, compensate)
+    if near is not None and not _found(compiled, fit):  # the guesses lead elsewhere
+        fit = replace(gated(rows, near, with_error, compensate), start=fit.start)
+    found = uncertainty(fit)
+    halves = verdict.halves_of(fit)
+    reasons = {
+        "not_identified": verdict.not_identified(compiled, fit, found),
+        "not_settled": verdict.settled(fit),
+        "halves": verdict.of_halves(compiled, fit, halves),
+        "attenuation": verdict.of_attenuation(compiled, fit, found, other_line(fit)),
+        "feedback": verdict.of_feedback(compiled, fit),
+        "residuals": verdict.of_residuals(found, with_error),
+        "range": verdict.of_range(compiled, fit.p),
+        "left_out": verdict.of_spoiled(rows, fit),
+    }
+    sensors_only = by_sensors(fit)
+    if sensors_only is not None:
+        reasons["weights"] = verdict.of_weights(compiled, fit, found, sensors_only, uncertainty(sensors_only))
+    other = other_length(model, run, used, fit.p, with_error)
+    if other is not None:
+        reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
+    shorter = shorter_rates(model, run, used, fit.p, with_error)
+    if shorter is not None:
+        reasons["smoothing"] = verdict.of_smoothing(compiled, fit, found, shorter, uncertainty(shorter))
+    sensors = SensorErrors(run, used, fit)
+    by_gain = {one.name: sensors.by_gain(one) for one in compiled.signals if one.gain_sd > 0 or one.unit != "rad"}
+    error = sensors.found(found.se)
+    reasons["sensors"] = of_sensors(compiled, error, found.se)
+    reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
+    by_known = {one.name: of_known(compiled, run, fit, one) for one in compiled.knowns if one.sd > 0}
+    by_neglect = fit.parameters.positive * fit.p * neglected(compiled, run)
+    white = as_white_force(fit)
+    by_weights = [] if white is None else [white - fit.p]
+    history = online(fit.rows, begun, with_error)
+    return Identified(
+        names=compiled.p_names,
+        units=tuple(one.unit for one in compiled.unknowns),
+        p=fit.p,
+        se=np.sqrt(
+            np.sum(
+                np.square(
+                    [verdict.widened(found.se, halves), *given(compiled, by_gain, by_known), by_neglect, *by_weights]
+                ),
+                axis=0,
+            )
+        ),
+        predicted=found.predicted,
+        clustered=found.clustered,
+        covariance=found.covariance,
+        chi2=found.chi2,
+        verdict=Verdict(verdict.named(reasons)),
+        r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},
+        times=fit.rows.end_times(),
+        history=history,
+        design=used,
+        equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
+        halves=halves,
+        fit=fit,
+        ranking=ranking,
+        by_gain=by_gain,
+        by_known=by_known,
+        by_neglect=by_neglect,
+        sensor_error=error,
+    )
+
+
+def _found(model: CompiledModel, fit: Fit) -> bool:
+    """Whether a search came to rest at plausible parameters."""
+    return (
+        fit.settled and not verdict.not_identified(model, fit, uncertainty(fit)) and not verdict.of_range(model, fit.p)
+    )
+
+
+def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float]) -> list[Float]:
+    """Errors of p [n_p] for one standard deviation of each gain and constant that has any."""
+    gains = [one.gain_sd * by_gain[one.name] for one in model.signals if one.gain_sd > 0]
+    return gains + [one.sd * by_known[one.name] for one in model.knowns if one.sd > 0]
+
+
+def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:
+    """Largest relative error of linearised equations on a run."""
+    errors = [0.0]
+    for one in model.signals:
+        if one.neglected:
+            x = np.asarray(run[one.name], np.float64)
+            errors.append(one.neglected * float(np.max(np.abs(x - np.mean(x)))) ** 2)
+    return max(errors)
+
+
+def of_known(compiled: CompiledModel, run: Mapping[str, npt.ArrayLike], fit: Fit, known: Known) -> Float:
+    """d p / d constant [n_p], with the weights of the fit: one standard deviation more, and p again."""
+    moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in compiled.knowns)
+    rows = WeakRows.of(ready(replace(compiled, knowns=moved)), run, fit.rows.record.grid.design)
+    rows = rows.only(np.isin(rows.numbers, fit.rows.numbers))
+    p, prior = fit.p, fit.parameters.prior(fit.start)
+    theta = rows.compiled.parameters.theta(p)
+    moments = compensated(rows, [rows.white(group, theta, fit.errors) for group in rows.groups], theta)
+    p, _ = gauss_newton(rows.compiled.parameters, moments, p, prior, _STEPS_OF_KNOWN)
+    return np.asarray((p - fit.p) / known.sd)
+
+
+def by_sensors(fit: Fit) -> Fit | None:
+    """The same with the weights of the sensors alone, of a model with unmeasured coordinates.
+
+    The error of an equation that is left when these are eliminated is no force: its cause may be an error of a signal.
+    None: nothing was eliminated, or the weights are those of the sensors.
+    """
+    model = fit.rows.compiled.bare
+    hidden = {jet.of for jet in model.hidden} - {jet.of for jet in model.opaque}
+    if not hidden or not any(one.variance for one in fit.errors):
+        return None
+    return batch(fit.rows, fit.p, equation_error=False)
+
+
+def shorter_rates(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign, p: Float, equation_error: bool = True
+) -> Fit | None:
+    """The same with derivatives over fewer samples; None where there are none, or too few samples for the degree."""
+    taps = 2 * round(_SHORTER * design.rate_taps / 2) + 1
+    if not any(jet.order for jet in model.channels.needed) or taps <= design.rate_degree + 2:
+        return None
+    return gated(WeakRows.of(model, run, replace(design, rate_taps=taps)), p, equation_error)
+
+
+def other_length(
+    model: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign, p: Float, equation_error: bool = True
+) -> Fit | None:
+    """The same with windows of another length, twice if the run has enough of them, else half; None: neither fits."""
+    for factor in (2.0, 0.5):
+        try:
+            other = replace(design, window_s=factor * design.window_s)
+            rows = WeakRows.of(model, run, other)
+        except PvidError:
+            continue
+        if rows.windows >= 8:
+            return gated(rows, p, equation_error)
+    return None

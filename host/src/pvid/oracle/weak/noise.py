@@ -1,0 +1,337 @@
+"""The noise of a window's rows: filters from the channels' symbolic derivatives, covariances by harmonics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+
+from pvid.model.signals import Integral, jets
+from pvid.oracle.weak.channels import Channels, Record, broadcast
+from pvid.oracle.weak.front import density
+from pvid.oracle.weak.functions import Float
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A sensor's noise n enters column `column` as sum chi^(order) gain(t) n."""
+
+    column: int
+    order: int
+    values: Float
+
+
+class NoiseFilters:
+    """How the noise of each sensor enters the columns of each row kind, to first order, from the symbolic derivatives.
+
+    D^m[psi(z, z')] with noise n in z: sum over d of (-1)^m (-D)^d [chi^(m) dpsi/dz^(d)] n. Running integrals smooth
+    their noise away and are left out. Noise of a velocity enters through a soft sign by its slope; where reversals are
+    located it is in their times (`ReversalNoise`).
+    """
+
+    def __init__(self, channels: Channels) -> None:
+        self.channels = channels
+        marks = channels.sign_marks.values()
+        self._arguments = dict(zip(marks, channels.signs, strict=True))
+        self._sign_slopes = {mark: sp.Symbol(f"slope_of_{mark}", real=True) for mark in marks}
+        self.entries: list[tuple[int, str, int]] = []  # channel, sensor, order of the jet
+        expressions: list[sp.Expr] = []
+        auxiliary = {jet: expression for jet, expression in channels.opaque.items() if not expression.has(Integral)}
+        for place, one in enumerate(channels.channels):
+            if one.fold:
+                continue
+            full = one.gain.xreplace(auxiliary).xreplace(channels.sign_marks)
+            inside = {mark: sp.diff(full, mark) * slope for mark, slope in self._sign_slopes.items() if full.has(mark)}
+            arguments = {mark: argument for mark, argument in self._arguments.items() if mark in inside}
+            for jet in sorted(jets(full).union(*(jets(one) for one in arguments.values())), key=str):
+                slope = sp.diff(full, jet)
+                slope += sum(inside[mark] * sp.diff(argument, jet) for mark, argument in arguments.items())
+                if slope != 0 and jet.of not in {a.of for a in channels.model.opaque}:
+                    if channels.model.signal(jet.of).sd > 0:
+                        self.entries.append((place, jet.of, jet.order))
+                        expressions.append(slope)
+        given = (*channels.plain, *self._sign_slopes.values())
+        self._function = sp.lambdify(given, expressions, "numpy", cse=True)
+
+    def gains(self, record: Record) -> list[dict[str, list[Gain]]]:
+        """Of each row kind: sensor -> gains. (Nuisances are left out: their noise is second order.)"""
+        size, design = record.grid.size, record.grid.design
+        slopes = [
+            broadcast(one, size) for one in self._function(*record.arguments, *(one.slopes for one in record.signs))
+        ]
+        smooth = max(design.rate_taps // (2 * design.decimation), 1)
+        chains = []
+        for (_, _, depth), slope in zip(self.entries, slopes, strict=True):
+            chain = [slope]
+            for _ in range(depth):
+                chain.append(slope_of(chain[-1], smooth, design.dt))
+            chains.append(chain)
+        out = []
+        for row in self.channels.rows:
+            found: dict[tuple[str, int, int], Float] = {}
+            for term in row.terms:
+                if term.column > row.thetas:
+                    continue
+                for (place, sensor, depth), chain in zip(self.entries, chains, strict=True):
+                    if place != term.channel:
+                        continue
+                    # (-1)^m (-D)^d [chi^(m) g] = (-1)^(m + d) sum_i C(d, i) chi^(m + d - i) g^(i)
+                    for i, g in enumerate(chain):
+                        factor = (-1.0) ** (term.order + depth) * float(sp.binomial(depth, i)) * term.factor
+                        key = (sensor, term.column, term.order + depth - i)
+                        found[key] = found.get(key, np.zeros(size)) + factor * g
+            of_row: dict[str, list[Gain]] = {}
+            for (sensor, column, order), values in found.items():
+                if values.any():
+                    of_row.setdefault(sensor, []).append(Gain(column, order, values))
+            out.append(of_row)
+        return out
+
+
+def slope_of(g: Float, reach: int, dt: float) -> Float:
+    """Derivative over +-reach steps; at the ends over what there is."""
+    if not np.any(g != g[0]):
+        return np.zeros(g.shape)
+    k = np.arange(len(g))
+    high, low = np.minimum(k + reach, len(g) - 1), np.maximum(k - reach, 0)
+    return np.asarray((g[high] - g[low]) / (dt * (high - low)))
+
+
+class NoiseModel:
+    """Covariances of the rows of a window, R0(p), and of neighbours, R1(p), of each pair of row kinds.
+
+    With gains averaged over the run, R0 = sum over pairs of orders P_mn(theta) gram(m, n), gram from the harmonics.
+    """
+
+    def __init__(self, filters: NoiseFilters, record: Record) -> None:
+        self.functions = record.grid.design.test_functions
+        of_kinds = filters.gains(record)
+        self._columns = max(row.thetas + 1 for row in filters.channels.rows)
+        self._sensors: list[_SensorGains] = []
+        for sensor in sorted(set().union(*of_kinds)):
+            own = [(kind, gain) for kind, row in enumerate(of_kinds) for gain in row.get(sensor, [])]
+            stack = np.array([gain.values for _, gain in own])
+            stack = stack[:, np.isfinite(stack).all(axis=0)]
+            variance = density(filters.channels.model.signal(sensor), record.grid.design)
+            self._sensors.append(
+                _SensorGains(
+                    variance * (stack @ stack.T) / stack.shape[1],
+                    np.array([kind for kind, _ in own]),
+                    np.array([gain.column for _, gain in own]),
+                    np.array([gain.order for _, gain in own]),
+                )
+            )
+        self._pairs: dict[tuple[int, int], list[_Pairs]] = {}
+        self._gram: dict[tuple[int, int], Float] = {}
+        self._overlap: dict[tuple[int, int], Float] = {}
+
+    @cached_property
+    def _orders(self) -> int:
+        """One more than the highest order."""
+        return 1 + max((int(np.max(one.orders)) for one in self._sensors), default=0)
+
+    def _of_orders(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """Weights P of the pairs of orders of two kinds [orders, orders]."""
+        left, right = np.append(theta_a, -1.0), np.append(theta_b, -1.0)
+        out = np.zeros(self._orders**2)
+        for one in self._pairs_of(a, b):
+            weights = left[one.first][:, np.newaxis] * one.products * right[one.second]
+            out += np.bincount(one.places, weights.reshape(-1), len(out))
+        return out.reshape(self._orders, self._orders)
+
+    def _pairs_of(self, a: int, b: int) -> list[_Pairs]:
+        """Pairs of gains of two kinds, of each sensor."""
+        if (a, b) not in self._pairs:
+            found = []
+            for one in self._sensors:
+                i, j = np.flatnonzero(one.kinds == a), np.flatnonzero(one.kinds == b)
+                places = one.orders[i][:, np.newaxis] * self._orders + one.orders[j]
+                found.append(_Pairs(one.columns[i], one.columns[j], one.products[np.ix_(i, j)], places.reshape(-1)))
+            self._pairs[a, b] = found
+        return self._pairs[a, b]
+
+    def of_harmonics(self, kind: int) -> Float:
+        """P [powers, columns, columns] with D_h = sum_j omega_h^(2 j) theta^T P_j theta, theta = -1 for Y's column.
+
+        D_h is the variance a step of the noise at harmonic h. It is that of `covariance`, because gram(m, n) is
+        (-1)^((m - n)/2) times the one of m + n halved, and those of odd sums cancel.
+        """
+        out = np.zeros((self._orders, self._columns, self._columns))
+        for one in self._sensors:
+            own = np.flatnonzero(one.kinds == kind)
+            for i in own:
+                for j in own:
+                    m, n = int(one.orders[i]), int(one.orders[j])
+                    if (m + n) % 2 == 0:
+                        sign = (-1.0) ** ((m - n) // 2)
+                        out[(m + n) // 2, one.columns[i], one.columns[j]] += sign * one.products[i, j]
+        return out
+
+    def gram(self, m: int, n: int) -> Float:
+        """Of the test functions."""
+        if (m, n) not in self._gram:
+            self._gram[m, n] = self.functions.gram(m, n)
+        return self._gram[m, n]
+
+    def overlap(self, m: int, n: int) -> Float:
+        """Of the test functions of neighbours."""
+        if (m, n) not in self._overlap:
+            self._overlap[m, n] = self.functions.overlap(m, n)
+        return self._overlap[m, n]
+
+    def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """R0 [K, K] of two row kinds in one window."""
+        return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._grams)
+
+    def with_next(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
+        """R1 [K, K]: of the rows of a kind with those of another in the next window."""
+        return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._overlaps)
+
+    def pull(self, a: int, b: int, theta_b: Float, weight: Float) -> Float:
+        """1/2 tr(weight dR0/d theta) with the thetas of kind a; weight [K, K] stands at the rows of a and b."""
+        right = np.append(theta_b, -1.0)
+        out = np.zeros(self._columns)
+        traces = np.einsum("mnkl,kl->mn", self._grams, weight, optimize=True)
+        for one in self._pairs_of(a, b):
+            shares = one.products * right[one.second] * traces.reshape(-1)[one.places].reshape(one.products.shape)
+            out += np.bincount(one.first, shares.sum(axis=1), self._columns)
+        return out
+
+    @cached_property
+    def _grams(self) -> Float:
+        """Of all pairs of orders [orders, orders, K, K]."""
+        return self._of_all(self.gram)
+
+    @cached_property
+    def _overlaps(self) -> Float:
+        """The same of neighbours."""
+        return self._of_all(self.overlap)
+
+    def _of_all(self, of: Callable[[int, int], Float]) -> Float:
+        orders = range(self._orders)
+        return np.array([[of(m, n) for n in orders] for m in orders])
+
+
+@dataclass(frozen=True)
+class _SensorGains:
+    """Mean products of the gains of one sensor [gains, gains] times its noise, and where each gain belongs."""
+
+    products: Float
+    kinds: npt.NDArray[np.int64]
+    columns: npt.NDArray[np.int64]
+    orders: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Pairs of gains of one sensor in two kinds [gains, gains]: their columns, mean products, and flat places in a
+    table of the pairs of orders."""
+
+    first: npt.NDArray[np.int64]
+    second: npt.NDArray[np.int64]
+    products: Float
+    places: npt.NDArray[np.int64]
+
+
+class ReversalNoise:
+    """The errors of the located times of reversals in the rows.
+
+    A time that is off by dt moves the sum of a test function times sgn(v) by 2 chi dt: one direction in the rows of
+    each window that holds the reversal.
+
+    Attributes
+    ----------
+    windows : of each entry, rising [entries]; an entry is a reversal in one of the two windows that hold it
+    events : reversal of each entry [entries]
+    shapes : of each row kind, 2 sd chi^(order) of the columns that hold sgn [entries, columns, K]
+    """
+
+    def __init__(self, channels: Channels, record: Record) -> None:
+        functions = record.grid.design.test_functions
+        auxiliary = dict(channels.opaque)
+        full = [one.gain.xreplace(auxiliary).xreplace(channels.sign_marks) for one in channels.channels]
+        windows, events = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        shapes = [[np.zeros((0, row.thetas + 1, functions.count))] for row in channels.rows]
+        first = 0
+        for mark, signs in zip(channels.sign_marks.values(), record.signs, strict=True):
+            holders = {k: sp.diff(one, mark) for k, one in enumerate(full) if one.has(mark)}
+            if not len(signs.times) or not holders:
+                continue
+            slopes = sp.lambdify(channels.plain, list(holders.values()), "numpy", cse=True)(*record.arguments)
+            at = np.clip(np.round(signs.times).astype(np.int64), 0, record.grid.size - 1)
+            weight = {k: broadcast(one, record.grid.size)[at] for k, one in zip(holders, slopes, strict=True)}
+            half = np.floor(signs.times / functions.hop).astype(np.int64)
+            for back in (0, 1):
+                window = half - back
+                inside = (window >= 0) & (window < record.grid.size // functions.hop - 1)
+                t = functions.dt * (signs.times - functions.hop * window)[inside]
+                turns = np.exp(1j * np.outer(t, functions.rates))
+                scale = 2 * np.sqrt(signs.variances[inside])
+                for row, own in zip(channels.rows, shapes, strict=True):
+                    shape = np.zeros((len(t), row.thetas + 1, functions.count))
+                    for term in row.terms:
+                        if term.channel not in holders or term.column > row.thetas:
+                            continue
+                        rates = ((1j * functions.rates) ** term.order)[:, np.newaxis]
+                        chi = np.real(turns @ (functions.coefficients * rates))
+                        factor = (-1.0) ** term.order * term.factor * weight[term.channel][inside] * scale
+                        shape[:, term.column] += factor[:, np.newaxis] * chi
+                    own.append(shape)
+                windows.append(window[inside])
+                events.append(first + np.flatnonzero(inside))
+            first += len(signs.times)
+        order = np.argsort(np.concatenate(windows), kind="stable")
+        self.windows, self.events = np.concatenate(windows)[order], np.concatenate(events)[order]
+        self.shapes = [np.concatenate(own)[order] for own in shapes]
+
+    def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
+        """In the rows of some kinds, one standard deviation long [entries, K of each kind]."""
+        return np.concatenate(
+            [np.einsum("ejk,j->ek", self.shapes[kind], np.append(theta[kind], -1.0)) for kind in kinds], axis=1
+        )
+
+    def places(self, windows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Entries of each of some windows, by their numbers [windows, most entries]; -1 where there are fewer."""
+        if not len(self.windows):
+            return np.zeros((len(windows), 0), np.int64)
+        first, behind = np.searchsorted(self.windows, windows), np.searchsorted(self.windows, windows + 1)
+        steps = np.arange(int(np.max(behind - first, initial=0)))
+        found = first[:, np.newaxis] + steps
+        return np.where(found < behind[:, np.newaxis], found, -1)
+
+    def slopes(self, kinds: Sequence[int], pulled: Float, places: npt.NDArray[np.int64]) -> Float:
+        """1/2 tr(R^-1 d covariance / d theta) over some windows [thetas of the kinds].
+
+        Parameters
+        ----------
+        pulled : R^-1 times the directions of each window [windows, entries, R]
+        places : of those entries
+        """
+        k = self.shapes[0].shape[2]
+        there = places >= 0
+        own = pulled[there]
+        return np.concatenate(
+            [
+                np.einsum("ejk,ek->j", self.shapes[kind][places[there], :-1], own[:, place * k : (place + 1) * k])
+                for place, kind in enumerate(kinds)
+            ]
+        )
+
+    def shared(self, scores: Float, places: npt.NDArray[np.int64]) -> Float:
+        """Sum over the reversals that two neighbours hold of the earlier's score times the later's [n, n].
+
+        Parameters
+        ----------
+        scores : of each entry of each window [windows, entries, n]
+        places : of those entries
+        """
+        there = places >= 0
+        entries, own = places[there], scores[there]
+        order = np.lexsort((self.windows[entries], self.events[entries]))
+        entries, own = entries[order], own[order]
+        pairs = np.flatnonzero(self.events[entries][1:] == self.events[entries][:-1])
+        return np.asarray(own[pairs].T @ own[pairs + 1])

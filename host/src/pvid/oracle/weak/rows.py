@@ -1,0 +1,234 @@
+"""Windows of a run as rows: columns, noise, and whitened rows without nuisances."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.model.compiled import CompiledModel
+from pvid.model.corners import with_corners
+from pvid.oracle.weak.channels import Channels, Record
+from pvid.oracle.weak.corners import with_jumps
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.front import grid_of
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.noise import NoiseFilters, NoiseModel, ReversalNoise
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.whitener import Whitener
+
+# Rows that are numerically dependent get this part of the mean variance.
+_RIDGE = 1e-10
+
+
+class Compiled:
+    """A model made ready for numbers, once: channels, noise filters, theta(p).
+
+    Attributes
+    ----------
+    bare : as compiled
+    model : its rows with the corners of sampled signals
+    jumps : name of a signal in them -> input whose scaled jump it is
+    number : of the object in this process
+    """
+
+    _numbers = itertools.count()
+
+    def __init__(self, model: CompiledModel) -> None:
+        self.number = next(Compiled._numbers)
+        self.bare = model
+        model, self.jumps = with_corners(model)
+        self.model = model
+        self.channels = Channels(model)
+        self.filters = NoiseFilters(self.channels)
+        self.parameters = Parameters(model)
+
+
+@dataclass(frozen=True)
+class EquationError:
+    """White noise of the equation itself in one row kind: variance (per step) of D^order of it."""
+
+    variance: float = 0.0
+    order: int = 0
+
+
+@dataclass(frozen=True)
+class WhiteRows:
+    """Rows of a group of kinds with unit covariance, nuisances projected out; R is the number of rows of a window.
+
+    Attributes
+    ----------
+    kinds : of the group
+    regressors : of all thetas of the group [windows, thetas, R]
+    known : [windows, R]
+    whitener : of every window
+    free : rows less nuisances, of all windows
+    """
+
+    kinds: tuple[int, ...]
+    regressors: Float
+    known: Float
+    whitener: Whitener
+    free: int
+
+    def only(self, windows: slice) -> WhiteRows:
+        """Some of the windows."""
+        n = self.regressors[windows]
+        free = round(self.free * len(n) / len(self.regressors))
+        return WhiteRows(self.kinds, n, self.known[windows], self.whitener.only(windows), free)
+
+    def moments(self) -> tuple[Float, Float]:
+        """M [thetas, thetas] and B [thetas]."""
+        flat = self.regressors.transpose(1, 0, 2).reshape(self.regressors.shape[1], -1)
+        return flat @ flat.T, flat @ self.known.reshape(-1)
+
+    def residuals(self, theta: Sequence[Float]) -> Float:
+        """At the thetas of all kinds [windows, R]."""
+        own = np.concatenate([theta[kind] for kind in self.kinds])
+        return np.asarray(self.known - np.einsum("wjk,j->wk", self.regressors, own))
+
+    def slopes(self, jacobian: Sequence[Float]) -> Float:
+        """d rows / d step, from d theta / d step of all kinds [windows, R, n_p]."""
+        own = np.concatenate([jacobian[kind] for kind in self.kinds])
+        return np.asarray(self.regressors.transpose(0, 2, 1) @ own)
+
+
+def record_of(compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> Record:
+    """Channels of a run (name -> samples) at every step."""
+    whole = with_jumps(run, compiled.jumps, design.sample_rate)
+    return compiled.channels.record(grid_of(compiled.model, whole, design, compiled.channels.needed))
+
+
+class WeakRows:
+    """All windows of a run.
+
+    Attributes
+    ----------
+    compiled : the model
+    record : channels at every step
+    columns : of each row kind [windows, columns, K]; theta's, then Y, then the nuisances
+    numbers : of the windows in the run; those with a missing sample are left out
+    noise, reversals : covariances
+    groups : of kinds that are whitened together
+    """
+
+    def __init__(self, compiled: Compiled, record: Record) -> None:
+        self.compiled, self.record = compiled, record
+        self.functions = record.grid.design.test_functions
+        columns = record.columns(self.functions)
+        whole = np.all([np.isfinite(one).all(axis=(1, 2)) for one in columns], axis=0)
+        if not whole.any():
+            raise PvidError("no window of the run is whole: every one has a missing sample")
+        self.numbers = np.flatnonzero(whole)
+        self.columns = [one[whole] for one in columns]
+        self.noise = NoiseModel(compiled.filters, record)
+        self.reversals = ReversalNoise(compiled.channels, record)
+        alone = [(kind,) for kind in range(len(columns))]
+        self.groups: list[tuple[int, ...]] = [tuple(range(len(columns)))] if record.grid.design.joint else [*alone]
+
+    @classmethod
+    def of(cls, compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> WeakRows:
+        """Those of a run: name -> samples."""
+        return cls(compiled, record_of(compiled, run, design))
+
+    @property
+    def windows(self) -> int:
+        """Whole ones."""
+        return len(self.columns[0])
+
+    @property
+    def kinds(self) -> int:
+        """Row kinds."""
+        return len(self.columns)
+
+    def only(self, windows: slice | npt.NDArray[np.bool_]) -> WeakRows:
+        """Some of the windows; the noise stays that of the run."""
+        out = copy.copy(self)
+        out.columns = [one[windows] for one in self.columns]
+        out.numbers = self.numbers[windows]
+        return out
+
+    def end_times(self) -> Float:
+        """Time [s] of the last sample of each window, from the run's first one."""
+        grid = self.record.grid
+        first = grid.places[0] / grid.design.sample_rate
+        return np.asarray(first + self.functions.dt * self.functions.hop * (2 + self.numbers))
+
+    def covariance(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
+        """R0(p) and the equations' errors [R, R]; located reversals come on top, in each window its own."""
+        blocks = [[self.noise.covariance(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
+        for place, kind in enumerate(kinds):
+            error = errors[kind]
+            blocks[place][place] = blocks[place][place] + error.variance * self.noise.gram(error.order, error.order)
+        return np.block(blocks)
+
+    def with_next(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
+        """The same between a window and the next one [R, R]."""
+        blocks = [[self.noise.with_next(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
+        for place, kind in enumerate(kinds):
+            error = errors[kind]
+            blocks[place][place] = blocks[place][place] + error.variance * self.noise.overlap(error.order, error.order)
+        return np.block(blocks)
+
+    @property
+    def places(self) -> npt.NDArray[np.int64]:
+        """Entries of `reversals` in each window."""
+        return self.reversals.places(self.numbers)
+
+    def directions(self, kinds: Sequence[int], theta: Sequence[Float]) -> Float:
+        """Of located reversals, one standard deviation long [windows, entries, R]."""
+        places = self.places
+        return (
+            np.where(
+                (places >= 0)[:, :, np.newaxis], self.reversals.directions(kinds, theta)[np.maximum(places, 0)], 0.0
+            )
+            if places.size
+            else np.zeros((*places.shape, len(kinds) * self.functions.count))
+        )
+
+    def whitener(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Whitener:
+        """Of the covariance of every window; rows of a model without noise are scaled to their size."""
+        r = self.covariance(kinds, theta, errors)
+        k = self.functions.count
+        diagonal = np.diag(r).reshape(len(kinds), k).mean(axis=1)
+        for place, kind in enumerate(kinds):
+            if diagonal[place] == 0.0:
+                diagonal[place] = float(np.mean(self.columns[kind][:, :-1] ** 2)) * 1e-12
+                own = slice(place * k, (place + 1) * k)
+                r[own, own] += diagonal[place] * self.noise.gram(0, 0)
+        r = r + np.diag(np.repeat(_RIDGE * diagonal, k))
+        return Whitener.of_covariance(r, self.directions(kinds, theta))
+
+    def white(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> WhiteRows:
+        """Whitened rows of a group at the thetas of all kinds."""
+        whitener = self.whitener(kinds, theta, errors)
+        k, plans = self.functions.count, [self.compiled.channels.rows[kind] for kind in kinds]
+        parts = self._whitened(kinds, whitener)
+        regressors = np.concatenate([x[:, : row.thetas] for x, row in zip(parts, plans, strict=True)], axis=1)
+        known = sum((x[:, row.thetas] for x, row in zip(parts, plans, strict=True)), np.zeros(regressors[:, 0].shape))
+        nuisances = np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
+        gone = 0
+        if nuisances.shape[1]:
+            q, r = np.linalg.qr(nuisances.transpose(0, 2, 1))
+            live = np.abs(np.diagonal(r, axis1=1, axis2=2)) > 1e-12 * np.max(np.abs(r), axis=(1, 2))[:, np.newaxis]
+            q = q * live[:, np.newaxis]
+            regressors = regressors - (regressors @ q) @ q.transpose(0, 2, 1)
+            known = known - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, known))
+            gone = int(live.sum())
+        return WhiteRows(tuple(kinds), regressors, known, whitener, self.windows * len(kinds) * k - gone)
+
+    def white_nuisances(self, kinds: Sequence[int], whitener: Whitener) -> Float:
+        """Nuisance columns of a group [windows, nuisances, R]."""
+        parts = self._whitened(kinds, whitener)
+        plans = [self.compiled.channels.rows[kind] for kind in kinds]
+        return np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
+
+    def _whitened(self, kinds: Sequence[int], whitener: Whitener) -> list[Float]:
+        """Columns of each kind [windows, columns, R]: they fill the kind's own rows."""
+        k = self.functions.count
+        return [whitener.of(self.columns[kind], slice(place * k, (place + 1) * k)) for place, kind in enumerate(kinds)]

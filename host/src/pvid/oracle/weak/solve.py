@@ -1,0 +1,364 @@
+"""Estimates of p from the rows of a run: all windows at once, and window by window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.rows import EquationError, WeakRows, WhiteRows
+
+_STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
+PASSES = 25  # of whitening at the present p
+_STEPS = 30  # of Gauss-Newton between two whitenings
+_SETTLED = 1e-8  # a step below this ends the search
+
+# An error of the equation is taken for real if it raises twice the logarithm of the likelihood by this much.
+_EVIDENCE = 10.0
+_HINT = 2.0  # with the mean of the windows' weights, below which the exact likelihood is not computed
+
+_SEARCHES = (2, 6)  # passes that look for an error of the equation; the others improve its variance
+_SHARPENING = 3  # steps of a variance at a time
+
+_PASSES_ANEW = 12  # of whitening at most, window by window
+_STAYS = 1e-3  # a step below this ends them
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Normal equations of all groups of row kinds: M and B of each."""
+
+    kinds: list[tuple[int, ...]]
+    m: list[Float]
+    b: list[Float]
+
+    @classmethod
+    def of(cls, white: list[WhiteRows]) -> Moments:
+        """Of whitened rows."""
+        pairs = [one.moments() for one in white]
+        return cls([one.kinds for one in white], [m for m, _ in pairs], [b for _, b in pairs])
+
+    def plus(self, other: Moments) -> Moments:
+        """Of the windows of both."""
+        return Moments(
+            self.kinds,
+            [a + b for a, b in zip(self.m, other.m, strict=True)],
+            [a + b for a, b in zip(self.b, other.b, strict=True)],
+        )
+
+    def grouped(self, of_kinds: Sequence[Float]) -> list[Float]:
+        """What each kind has, by group."""
+        return [np.concatenate([of_kinds[kind] for kind in group]) for group in self.kinds]
+
+
+def normal(parameters: Parameters, moments: Moments, p: Float, theta: list[Float]) -> tuple[Float, Float]:
+    """S [n_p, n_p] and F [n_p] at p and its thetas of each group, in units of a step."""
+    jacobian = moments.grouped(parameters.jacobian(p))
+    n = len(p)
+    s, f = np.zeros((n, n)), np.zeros(n)
+    for m, b, th, c in zip(moments.m, moments.b, theta, jacobian, strict=True):
+        s += c.T @ m @ c
+        f += c.T @ (b - m @ th)
+    return s, f
+
+
+def misfit(moments: Moments, theta: list[Float]) -> float:
+    """Sum of squared residuals at the thetas of each group, but for a constant."""
+    total = 0.0
+    for m, b, th in zip(moments.m, moments.b, theta, strict=True):
+        total += float(th @ m @ th - 2 * th @ b)
+    return total
+
+
+def solved(s: Float, f: Float) -> Float:
+    """S^-1 f with S scaled to a unit diagonal."""
+    scale = 1 / np.sqrt(np.maximum(s.diagonal(), 1e-300))
+    return np.asarray(scale * np.linalg.solve(s * (scale[:, np.newaxis] * scale) + _ridge(len(s)), scale * f))
+
+
+@cache
+def _ridge(n: int) -> Float:
+    return 1e-13 * np.eye(n)
+
+
+def inverse(s: Float) -> Float:
+    """S^-1, S scaled to a unit diagonal."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
+    scaled = s * np.outer(scale, scale) + 1e-13 * np.eye(len(s))
+    return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
+
+
+def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Float, steps: int) -> tuple[Float, float]:
+    """p after up to `steps` limited steps, and the size of the first one."""
+    reach, weak = parameters.reach(), np.diag(prior)
+    first = 0.0
+    theta = moments.grouped(parameters.theta(p))
+    after = misfit(moments, theta)
+    for k in range(steps):
+        s, f = normal(parameters, moments, p, theta)
+        step = solved(s + weak, f)
+        size = float(np.max(np.abs(step) / reach))
+        step *= min(1.0, _STEP_LIMIT / max(size, 1e-300))
+        first = size if k == 0 else first
+        before = after
+        for _ in range(8):
+            moved = parameters.moved(p, step)
+            theta = moments.grouped(parameters.theta(moved))
+            after = misfit(moments, theta)
+            if after <= before + 1e-9 * abs(before):
+                break
+            step = step / 2
+        p = moved
+        if size < _SETTLED:
+            break
+    return p, first
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An estimate and what is needed to judge it.
+
+    Attributes
+    ----------
+    p : [n_p]
+    rows, white : the windows; whitened at p
+    errors : of each row kind
+    start : where the search began
+    settled : the last step was tiny
+    """
+
+    p: Float
+    rows: WeakRows
+    white: list[WhiteRows]
+    errors: list[EquationError]
+    start: Float
+    settled: bool
+
+    @property
+    def parameters(self) -> Parameters:
+        """Of its model."""
+        return self.rows.compiled.parameters
+
+    def only(self, windows: slice) -> Fit:
+        """The same estimate and weights, with some of the windows."""
+        return replace(self, rows=self.rows.only(windows), white=[one.only(windows) for one in self.white])
+
+    def at(self, p: Float) -> Fit:
+        """Another estimate from the same weights."""
+        return replace(self, p=p)
+
+    def alone(self, kind: int) -> WhiteRows:
+        """Rows of one kind, whitened by themselves."""
+        own = [one for one in self.white if one.kinds == (kind,)]
+        return own[0] if own else self.rows.white((kind,), self.parameters.theta(self.p), self.errors)
+
+    def designs(self) -> list[Float]:
+        """d rows / d step of each group [windows, R, n_p]."""
+        jacobian = self.parameters.jacobian(self.p)
+        return [one.slopes(jacobian) for one in self.white]
+
+    def residuals(self) -> list[Float]:
+        """Whitened, of each group [windows, R]."""
+        theta = self.parameters.theta(self.p)
+        return [one.residuals(theta) for one in self.white]
+
+
+def batch(
+    rows: WeakRows,
+    start: Float | None = None,
+    equation_error: bool = True,
+    compensate: bool = True,
+    passes: int = PASSES,
+) -> Fit:
+    """All windows at once: whiten at p, step, and again until p stays.
+
+    Parameters
+    ----------
+    rows : windows of a run
+    start : of p; None: the guesses
+    equation_error : estimate the error of each equation from its residuals and weight with it
+    compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R / d theta
+    passes : of whitening at the present p, at most
+    """
+    parameters = rows.compiled.parameters
+    p = begun = parameters.checked(start)
+    prior = parameters.prior(begun)
+    errors = [EquationError()] * rows.kinds
+    settled = False
+    for turn in range(passes):
+        theta = parameters.theta(p)
+        white = [rows.white(group, theta, errors) for group in rows.groups]
+        moments = compensated(rows, white, theta) if compensate else Moments.of(white)
+        p, size = gauss_newton(parameters, moments, p, prior, 3 if turn < 4 else _STEPS)
+        changed = False
+        if equation_error and turn >= 2:
+            now = parameters.theta(p)
+            found = [improved(rows, kind, now, errors[kind], turn) for kind in range(rows.kinds)]
+            changed = any(differs(a, b) for a, b in zip(errors, found, strict=True))
+            errors = found
+        if size < _SETTLED and turn >= 3 and not changed:
+            settled = True
+            break
+        settled = size < 1e-4
+    theta = parameters.theta(p)
+    white = [rows.white(group, theta, errors) for group in rows.groups]
+    return Fit(p, rows, white, errors, begun, settled)
+
+
+def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) -> Moments:
+    """Moments with what noise in the regressors takes from B put back: 1/2 d log det R / d theta, of all windows.
+
+    Without it a row with Y = 0 pulls its own scale towards 0 by one for each of its rows, since a smaller theta leaves
+    smaller residuals at the weights of the theta before.
+    """
+    moments = Moments.of(white)
+    k = rows.functions.count
+    for place, one in enumerate(white):
+        total = one.whitener.total_inverse()
+        pulls = []
+        for a, kind in enumerate(one.kinds):
+            blocks = [total[a * k : (a + 1) * k, b * k : (b + 1) * k] for b in range(len(one.kinds))]
+            own = [
+                rows.noise.pull(kind, other, theta[other], block)
+                for other, block in zip(one.kinds, blocks, strict=True)
+            ]
+            pulls.append(np.sum(own, axis=0)[: len(theta[kind])])
+        moments.b[place] += np.concatenate(pulls)
+        if rows.places.size:
+            moments.b[place] += rows.reversals.slopes(one.kinds, one.whitener.inverse_of_directions(), rows.places)
+    return moments
+
+
+def differs(a: EquationError, b: EquationError) -> bool:
+    """By more than a part in a thousand."""
+    return a.order != b.order or abs(a.variance - b.variance) > 1e-3 * max(a.variance, b.variance)
+
+
+def improved(rows: WeakRows, kind: int, theta: Sequence[Float], last: EquationError, turn: int) -> EquationError:
+    """The equation's error at a pass of the search for p."""
+    if turn in _SEARCHES:
+        return error_of(rows, kind, theta)
+    return sharpened(rows, kind, theta, last, 1) if last.variance else last
+
+
+def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError:
+    """The equation's error of most likelihood: white noise of order 0.. in the row, beside that of the sensors.
+
+    With R0 = L L^T, L^-1 Q L^-T = U diag(q) U^T and z = U^T L^-1 e the likelihood of the variance v is that of
+    independent z_i of variances 1 + v q_i. That is where a variance starts; orders are compared with the weights of
+    each window, reversals and all.
+    """
+    plain = rows.white((kind,), theta, [EquationError()] * rows.kinds)
+    e = plain.residuals(theta)
+    best, gain = EquationError(), _EVIDENCE
+    # What the projection on the complement of the nuisances took out of the residuals.
+    share = plain.free / (rows.windows * rows.functions.count)
+    moment = e.T @ e / (len(e) * share)
+    whitener = plain.whitener.base
+    without = _unlikely(plain, e)
+    for order in range(rows.compiled.channels.rows_top(kind) + 1):
+        white = whitener @ rows.noise.gram(order, order) @ whitener.T
+        if not np.isfinite(white).all():  # sensors of no size that a number holds
+            continue
+        q, u = np.linalg.eigh(white)
+        q = np.maximum(q, 0.0)
+        z = np.einsum("ij,ik,kj->j", u, moment, u)
+        v, rise = most_likely(q, z)
+        if rise * len(e) * share < _HINT:
+            continue
+        found = sharpened(rows, kind, theta, EquationError(v, order))
+        # Neighbours share half of their samples: rows count half.
+        rise = (without - unlikely(rows, kind, theta, found)) / 2
+        if rise > gain:
+            best, gain = found, rise
+    return best
+
+
+def unlikely(rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError) -> float:
+    """Minus twice the logarithm of the likelihood of one kind's residuals, but for a constant."""
+    white = rows.white((kind,), theta, [error] * rows.kinds)
+    return _unlikely(white, white.residuals(theta))
+
+
+def _unlikely(white: WhiteRows, e: Float) -> float:
+    return float(np.sum(e**2)) + white.whitener.log_determinant() * white.free / e.size
+
+
+def sharpened(
+    rows: WeakRows, kind: int, theta: Sequence[Float], error: EquationError, steps: int = _SHARPENING
+) -> EquationError:
+    """The variance with the weights of each window in place of their mean.
+
+    Where the likelihood is at its maximum, sum e^T R^-1 Q R^-1 e = sum tr(R^-1 Q): v is scaled by their ratio.
+    """
+    q = rows.noise.gram(error.order, error.order)
+    for _ in range(steps):
+        errors = [error] * rows.kinds
+        white = rows.white((kind,), theta, errors)
+        e = white.residuals(theta)
+        ratio = white.whitener.energy(q, e) / (white.whitener.trace(q) * white.free / e.size)
+        error = EquationError(error.variance * ratio, error.order)
+        if abs(ratio - 1) < 1e-3:
+            break
+    return error
+
+
+def most_likely(q: Float, z: Float) -> tuple[float, float]:
+    """v >= 0 that makes sum log(1 + v q) + z/(1 + v q) least, and by how much less it is than at 0."""
+    top = float(np.max(q))
+    if top <= 0:
+        return 0.0, 0.0
+    grid = np.concatenate([[0.0], np.logspace(-3, 1, 25) * max(float(np.mean(z)), 1.0) / top])
+    floor = float(np.min(q[q > 1e-9 * top]))
+    grid = np.concatenate(
+        [grid, np.logspace(np.log10(grid[-1]), np.log10(10 * max(float(np.max(z)), 1.0) / floor), 60)]
+    )
+
+    def cost(v: Float) -> Float:
+        spread = 1 + v[:, np.newaxis] * q
+        return np.asarray(np.sum(np.log(spread) + z / spread, axis=1))
+
+    for _ in range(3):
+        values = cost(grid)
+        k = int(np.argmin(values))
+        low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+        grid = np.concatenate([[0.0, grid[k]], np.linspace(low, high, 30)])
+    values = cost(grid)
+    k = int(np.argmin(values))
+    return float(grid[k]), float(values[0] - values[k])
+
+
+def online(rows: WeakRows, start: Float | None = None, equation_error: bool = True) -> Float:
+    """p after each window [windows, n_p]: every window whitened at the p of its moment, three steps each.
+
+    The sums of rows that were whitened at a poor p weigh wrongly. Here all rows are whitened anew when their number is
+    a power of two, and again until p stays: three steps from a start that is 50 % off are too few. An engine that keeps
+    no rows lets its first sums fade instead.
+    """
+    parameters = rows.compiled.parameters
+    p = parameters.checked(start)
+    prior = parameters.prior(p)
+    errors = [EquationError()] * rows.kinds
+    moments = Moments([], [], [])
+    history = np.empty((rows.windows, len(p)))
+    for w in range(rows.windows):
+        anew = w & (w + 1) == 0
+        if anew and equation_error and w >= 3:
+            past = rows.only(slice(0, w))
+            theta = parameters.theta(p)
+            errors = [error_of(past, kind, theta) for kind in range(rows.kinds)]
+        own = rows.only(slice(0 if anew else w, w + 1))
+        for _ in range(_PASSES_ANEW if anew else 1):
+            theta = parameters.theta(p)
+            new = compensated(own, [own.white(group, theta, errors) for group in rows.groups], theta)
+            whole = new if anew else moments.plus(new)
+            p, size = gauss_newton(parameters, whole, p, prior, 3)
+            if size < _STAYS:
+                break
+        moments = whole
+        history[w] = p
+    return history

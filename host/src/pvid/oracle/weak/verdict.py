@@ -1,0 +1,386 @@
+"""Is an estimate to be trusted? Each doubt has a name and a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import sympy as sp
+
+from pvid.base.wording import listed, with_unit
+from pvid.model.compiled import CompiledModel
+from pvid.model.signals import Jet
+from pvid.oracle.weak.errors import Uncertainty, uncertainty
+from pvid.oracle.weak.front import filtered, weights_of
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.rows import WeakRows
+from pvid.oracle.weak.solve import Fit, Moments, gauss_newton, inverse, normal
+
+Name = Literal[
+    "not_identified",
+    "not_settled",
+    "chi2",
+    "shape",
+    "halves",
+    "windows",
+    "smoothing",
+    "attenuation",
+    "feedback",
+    "short",
+    "left_out",
+    "range",
+    "unexplained",
+    "sensor",
+    "friction",
+    "scale",
+    "weights",
+    "misfit",
+    "core",
+    "held",
+]
+Status = Literal["good", "warning", "not_identified"]
+
+# A standard error of a positive parameter beyond this part of it, or of another one beyond this part of its range,
+# means that the run does not determine it.
+UNKNOWN = 0.3
+_UNKNOWN_OF_RANGE = 0.5
+
+# Two estimates disagree if they differ by so many standard errors of the difference ...
+_CLASH = 4.0
+# ... and by this part of the value, so that a rig whose noise is tiny is not blamed for what nobody sees.
+_VISIBLE = 1e-3
+
+# Residuals above this many times what the sensors explain are reported.
+_CHI2 = 2.0
+_CHI2_WEIGHTED = 3.0
+
+# An input is explained by the outputs if a static law of them leaves less than this part of it, and less than this many
+# times what the model leaves.
+_LAW = 0.02
+_NO_BETTER = 3.0
+
+_FEW_WINDOWS = 8
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A doubt.
+
+    Attributes
+    ----------
+    name : for programs
+    text : a sentence
+    alarm : the standard errors may not cover it
+    """
+
+    name: Name
+    text: str
+    alarm: bool = True
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether p may be used.
+
+    Attributes
+    ----------
+    reasons : doubts, the gravest first
+    """
+
+    reasons: tuple[Reason, ...] = ()
+
+    @property
+    def identified(self) -> bool:
+        """Every parameter has a value that means something."""
+        return not any(one.name == "not_identified" for one in self.reasons)
+
+    @property
+    def status(self) -> Status:
+        """In a word."""
+        if not self.identified:
+            return "not_identified"
+        return "warning" if any(one.alarm for one in self.reasons) else "good"
+
+    @property
+    def warning(self) -> str | None:
+        """The alarms in plain sentences; None: there is none."""
+        return " ".join(one.text for one in self.reasons if one.alarm) or None
+
+
+@dataclass(frozen=True)
+class Halves:
+    """Estimates from the windows of each half of a run, and how they differ [n_p] in their standard errors."""
+
+    first: Float
+    second: Float
+    clash: Float
+
+
+def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[Reason]:
+    """Parameters that the run does not determine, and with what the worst is mixed."""
+    p, parameters = fit.p, fit.parameters
+    # an offset of exactly 0 has an error all the same
+    relative = found.se / np.where(parameters.positive, UNKNOWN * np.abs(p), _UNKNOWN_OF_RANGE * parameters.sd)
+    bad = [k for k in np.argsort(-relative) if relative[k] > 1 or not np.isfinite(relative[k])]
+    if not bad:
+        return []
+    names = [model.p_names[k] for k in bad]
+    partner = partner_of(fit, int(bad[0]))
+    together = f"{names[0]} and {model.p_names[partner]}" if partner is not None else ""
+    mixed = f"; {together} are not identifiable together" if together else ""
+    worst = with_unit(found.se[bad[0]], model.unknowns[bad[0]].unit, 2)
+    error = f"the standard error of {names[0]} is {worst}"
+    return [Reason("not_identified", f"The run does not determine {listed(names)}: {error}{mixed}.")]
+
+
+def partner_of(fit: Fit, worst: int) -> int | None:
+    """The parameter that compensates a change of the worst one best; None where none does much."""
+    moments = Moments.of(fit.white)
+    information, _ = normal(fit.parameters, moments, fit.p, moments.grouped(fit.parameters.theta(fit.p)))
+    covariance = inverse(information + np.diag(fit.parameters.prior(fit.start)))
+    scale = np.sqrt(np.diag(covariance))
+    correlation = np.abs(covariance[worst] / (scale[worst] * scale))
+    correlation[worst] = 0.0
+    best = int(np.argmax(correlation))
+    return best if correlation[best] > 0.7 else None
+
+
+def halves_of(fit: Fit) -> Halves | None:
+    """The run's two halves, each from its own windows; None where there are too few."""
+    count = fit.rows.windows
+    if count < 2 * _FEW_WINDOWS:
+        return None
+    parts = []
+    for windows in (slice(0, count // 2), slice(count - count // 2, None)):
+        own = fit.only(windows)
+        p, _ = gauss_newton(own.parameters, Moments.of(own.white), own.p, own.parameters.prior(own.start), 30)
+        moved = own.at(p)
+        parts.append((p, uncertainty(moved).se))
+    spread = np.hypot(parts[0][1], parts[1][1])
+    return Halves(parts[0][0], parts[1][0], np.abs(parts[0][0] - parts[1][0]) / spread)
+
+
+def disagreement(
+    name: Name, model: CompiledModel, parameters: Parameters, one: Float, other: Float, clash: Float, text: str
+) -> list[Reason]:
+    """Two estimates [n_p] that are `clash` [n_p] standard errors apart disagree.
+
+    Parameters
+    ----------
+    text
+        Of the sentence, with {names} of the parameters in question, and of the first one {name}, {one} and {other}.
+    """
+    size = np.where(parameters.positive, np.maximum(np.abs(one), np.abs(other)), parameters.sd)
+    apart = np.flatnonzero((clash > _CLASH) & (np.abs(one - other) > _VISIBLE * size))
+    if not len(apart):
+        return []
+    k = int(apart[0])
+    names = listed(model.p_names[bad] for bad in apart)
+    values = [with_unit(value, model.unknowns[k].unit, 4) for value in (one[k], other[k])]
+    shown = text.format(names=names, name=model.p_names[k], one=values[0], other=values[1])
+    return [Reason(name, shown)]
+
+
+def of_halves(model: CompiledModel, fit: Fit, halves: Halves | None) -> list[Reason]:
+    """The halves of a run disagree."""
+    if halves is None:
+        return [Reason("short", "The run is too short to compare its halves.", alarm=False)]
+    text = (
+        "The halves of the run disagree on {names} ({name}: {one} and {other}): something changed, or the equations "
+        "lack a term."
+    )
+    return disagreement("halves", model, fit.parameters, halves.first, halves.second, halves.clash, text)
+
+
+def of_windows(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+    """Two lengths of window disagree."""
+    lengths = [one.rows.functions.length for one in (fit, other)]
+    text = (
+        f"Windows of {lengths[0]:.3g} s and {lengths[1]:.3g} s disagree on {{names}} ({{name}}: {{one}} and "
+        "{other}): noise in the regressors or a missing term biases the estimate."
+    )
+    return _of_same_samples("windows", model, fit, found, other, of_other, text)
+
+
+def of_smoothing(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+    """Two lengths of the filter that gives derivatives disagree: one blurs the motion, which no residual shows."""
+    taps = [one.rows.record.grid.design.rate_taps for one in (fit, other)]
+    text = (
+        f"Derivatives over {taps[0]} and over {taps[1]} samples disagree on {{names}} ({{name}}: {{one}} and "
+        "{other}): the longer filter attenuates the motion, or the shorter one passes too much noise."
+    )
+    return _of_same_samples("smoothing", model, fit, found, other, of_other, text)
+
+
+def _of_same_samples(
+    name: Name, model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty, text: str
+) -> list[Reason]:
+    """Two estimates from the same samples disagree: the larger error bounds that of the difference."""
+    clash = np.abs(fit.p - other.p) / np.maximum(found.se, of_other.se)
+    return disagreement(name, model, fit.parameters, fit.p, other.p, clash, text)
+
+
+def of_attenuation(model: CompiledModel, fit: Fit, found: Uncertainty, other: Float | None) -> list[Reason]:
+    """The same rows with the highest derivative as the dependent signal disagree."""
+    if other is None:
+        return []
+    text = (
+        "Motion that the equations do not explain biases {names} ({name} is {one}, and {other} with the highest "
+        "derivative as the dependent signal): excite more strongly, or take longer windows and fewer functions."
+    )
+    return disagreement("attenuation", model, fit.parameters, fit.p, other, np.abs(fit.p - other) / found.se, text)
+
+
+def of_weights(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, of_other: Uncertainty) -> list[Reason]:
+    """The same rows, weighted by the sensors' noise alone, disagree: a note, as no residual tells which is right."""
+    text = (
+        "With the weights of the sensors alone (--weights sensors) {names} would differ ({name}: {other} in place of "
+        "{one}): use the values that predict another run of this mechanism better."
+    )
+    reasons = _of_same_samples("weights", model, fit, found, other, of_other, text)
+    return [replace(one, alarm=False) for one in reasons]
+
+
+def of_residuals(found: Uncertainty, equation_error: bool = True) -> list[Reason]:
+    """Residuals beyond what the sensors explain, and beyond what they and an error of the equations explain."""
+    out = []
+    if equation_error and found.weighted_chi2 > _CHI2_WEIGHTED:
+        out.append(
+            Reason(
+                "shape",
+                f"The residuals are {found.weighted_chi2:.3g} times what sensors and a white error of the equations "
+                "explain: they are correlated with the motion, and a term is probably missing.",
+            )
+        )
+    if found.chi2 > _CHI2:
+        out.append(
+            Reason(
+                "chi2",
+                f"The residuals are {found.chi2:.3g} times what the sensors explain; standard errors are from their "
+                "scatter.",
+                alarm=False,
+            )
+        )
+    return out
+
+
+def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
+    """Inputs that a static law of the outputs explains as well as the model explains them.
+
+    Of an output the law has derivatives below the highest one of the equations: all of them are the mechanism itself.
+    """
+    rows, functions = fit.rows, fit.rows.functions
+    grid = rows.record.grid
+    chi = functions.combine(0)
+
+    def sums(x: Float) -> Float:
+        halves = functions.half_sums(functions.halves(x))
+        return np.asarray((functions.joined(halves[:-1], halves[1:]) @ chi)[rows.numbers].reshape(-1))
+
+    outputs = [np.ones(grid.size)]
+    for one in model.signals:
+        if one.kind == "sensor" and not one.driven:
+            z = filtered(grid.raw[one.name], weights_of(grid.design, 0))[grid.places]
+            order = _order_of(model, one.name)
+            if order < 1:
+                continue
+            outputs.append(z)
+            if order > 1 and (grid.design.rate_taps > 1 or grid.design.taps > 1):
+                outputs.append(filtered(grid.raw[one.name], weights_of(grid.design, 1))[grid.places])
+            if one.unit == "rad":
+                outputs += [np.sin(z), np.cos(z)]
+    basis = np.stack([sums(x) for x in outputs], axis=1)
+    basis = basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+    out = []
+    for one in model.signals:
+        if one.kind != "input" or one.name not in grid.raw:
+            continue
+        u = sums(grid.raw[one.name][grid.places])
+        total = float(u @ u)
+        if total == 0:
+            continue
+        rest = u - basis @ np.linalg.lstsq(basis, u, rcond=1e-10)[0]
+        left = float(rest @ rest) / total
+        model_leaves = unexplained(model, fit, one.jet, total)
+        if left < _LAW and (model_leaves is None or left < _NO_BETTER * model_leaves):
+            out.append(
+                Reason(
+                    "feedback",
+                    f"{one.name} is a function of the measured outputs ({100 * (1 - left):.4g} % explained): the "
+                    "estimate may describe the controller, not the mechanism. Add an excitation that does not depend "
+                    "on the outputs.",
+                )
+            )
+    return out
+
+
+def _order_of(model: CompiledModel, name: str) -> int:
+    """Highest derivative of a signal in the rows."""
+    orders = [0]
+    for row in model.rows:
+        for part in (*row.regressors, row.known):
+            for order, psi in part.items():
+                for jet in sp.sympify(psi).atoms(Jet):
+                    below = model.opaque.get(Jet(jet.of), Jet(jet.of)).atoms(Jet)
+                    orders += [order + jet.order + one.order for one in below if one.of == name]
+    return max(orders)
+
+
+def unexplained(model: CompiledModel, fit: Fit, jet: Jet, total: float) -> float | None:
+    """Part of an input's sums that the row in which it is known leaves; None where there is no such row."""
+    parts = []
+    for row, columns, th in zip(model.rows, fit.rows.columns, fit.parameters.theta(fit.p), strict=True):
+        gain = sp.diff(sp.sympify(row.known.get(0, 0)), jet)
+        gain = model.with_knowns(gain) if gain != 0 else gain
+        if gain != 0 and gain.is_number:
+            e = columns[:, len(th)] - np.einsum("wjk,j->wk", columns[:, : len(th)], th)
+            parts.append(float(np.sum(e**2)) / float(gain) ** 2 / total)
+    return min(parts) if parts else None
+
+
+def of_range(model: CompiledModel, p: Float) -> list[Reason]:
+    """Values beyond what the model calls plausible."""
+    out = [
+        one.name
+        for one, value in zip(model.unknowns, p, strict=True)
+        if one.high > one.low and not one.low <= value <= one.high
+    ]
+    return [Reason("range", f"Outside the range (low, high): {listed(out)}.", alarm=True)] if out else []
+
+
+def of_spoiled(rows: WeakRows, fit: Fit) -> list[Reason]:
+    """Windows that were left out of those of a run."""
+    bad = np.setdiff1d(rows.numbers, fit.rows.numbers)
+    if not len(bad):
+        return []
+    first = float(rows.end_times()[np.searchsorted(rows.numbers, bad[0])]) - rows.functions.length
+    return [
+        Reason(
+            "left_out",
+            f"{len(bad)} of {rows.windows} windows are left out, the first at {max(first, 0.0):.3g} s: their residuals "
+            "are far above those of the others.",
+            alarm=False,
+        )
+    ]
+
+
+def settled(fit: Fit) -> list[Reason]:
+    """The search did not come to rest."""
+    return [] if fit.settled else [Reason("not_settled", "The iteration for the parameters did not converge.")]
+
+
+def widened(se: Float, halves: Halves | None) -> Float:
+    """Standard errors that cover half the distance of the halves where that is beyond chance."""
+    if halves is None:
+        return se
+    apart = np.abs(halves.first - halves.second) / 2
+    return np.where(apart > 2 * se, apart, se)
+
+
+def named(reasons: Mapping[str, list[Reason]]) -> tuple[Reason, ...]:
+    """All reasons, alarms first."""
+    every = [one for group in reasons.values() for one in group]
+    return tuple(sorted(every, key=lambda one: not one.alarm))

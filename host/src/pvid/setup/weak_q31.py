@@ -1,0 +1,111 @@
+"""Settings of the fixed-point weak engine for a rig: formats of its rows from those of a run, start and bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.rows import EquationError, WeakRows
+from pvid.settings.f32 import GateConfig
+from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
+from pvid.setup.q31 import forgetting_groups_q31, gate_config_q31
+
+_NOISE_MARGIN = 16  # as in float32
+_ROW_BITS = 28  # of an entry of a row
+_MARGIN_BITS = 3  # that the entries of a run leave free
+_MOST_Y_BITS = 12
+_LEAST_Y_BITS = 0  # a row's noise is one standard deviation: rounding by one of them is too much
+
+
+def row_formats(rows: WeakRows, p: Float, errors: Sequence[EquationError] | None = None) -> tuple[tuple[int, ...], int]:
+    """n_bits of all kinds and y_bits, from the white rows of a run at p.
+
+    Parameters
+    ----------
+    errors : of the equations themselves, of each kind; None by default
+
+    Raises
+    ------
+    PvidError
+        Where rows are so large beside their noise that fixed point has no digit for it.
+    """
+    theta = rows.compiled.parameters.theta(p)
+    found = list(errors or [EquationError()] * rows.kinds)
+    n_bits: list[int] = []
+    largest = 1.0
+    for kind in range(rows.kinds):
+        white = rows.white((kind,), theta, found)
+        entries = np.abs(white.regressors).max(axis=(0, 2))
+        terms = entries * np.abs(theta[kind])
+        largest = max(largest, float(np.abs(white.known).max()), float(terms.max()))
+        n_bits += [_bits(float(one)) for one in entries]
+    y_bits = min(_bits(largest), _MOST_Y_BITS)
+    if y_bits < _LEAST_Y_BITS:
+        raise PvidError(
+            f"{rows.compiled.model.name}: the residual Y - N theta is {largest:.3g} of its standard deviations large,"
+            " too much for the rows of the fixed-point core"
+        )
+    return tuple(n_bits), y_bits
+
+
+def _bits(largest: float) -> int:
+    return max(min(_ROW_BITS - _MARGIN_BITS - math.frexp(largest)[1], 64), -64) if largest > 0 else 0
+
+
+def config_of_q31(
+    design: WeakDesignQ31,
+    parameters: Parameters,
+    formats: tuple[Sequence[int], int],
+    p_bits: Sequence[int],
+    offset: Sequence[int],
+    sample_rate: float,
+    start: Float | None = None,
+    overlap: float = 1.0,
+) -> WeakConfigQ31:
+    """Settings ready for the engine: the guesses, their standard deviations and bounds.
+
+    Parameters
+    ----------
+    formats : as of row_formats
+    overlap : inflation of variances because windows share samples, as in float32
+    """
+    p = parameters.checked(start)
+    unknowns, following = parameters.model.unknowns, parameters.model.following
+    windows_hz = sample_rate / (design.hop * design.decimation)
+    start_sd = np.abs(parameters.unit(p)) / np.sqrt(parameters.prior(p))
+    lower = [min(one.low, value) for one, value in zip(unknowns, p, strict=True)]
+    upper = [max(one.high, value) for one, value in zip(unknowns, p, strict=True)]
+    n_bits, y_bits = formats
+
+    def whole(values: Sequence[float] | Float, least: int = -(2**31)) -> tuple[int, ...]:
+        return tuple(
+            max(min(round(float(x) * 2.0**bits), 2**31 - 1), least) for x, bits in zip(values, p_bits, strict=True)
+        )
+
+    positive = [1 if one.positive else -(2**31) for one in unknowns]
+    low = tuple(max(x, least) for x, least in zip(whole(lower), positive, strict=True))
+    return WeakConfigQ31(
+        design=design,
+        estimator=EstimatorConfigQ31(
+            start=tuple(max(x, y) for x, y in zip(whole(p), low, strict=True)),
+            start_sd=whole(start_sd, 1),
+            lower=low,
+            upper=whole(upper),
+            p_bits=tuple(p_bits),
+            n_bits=tuple(n_bits),
+            y_bits=y_bits,
+            row_sd=2 ** (8 + y_bits),
+            correlation=max(round(overlap * 2**16), 2**16),
+            noise_margin=_NOISE_MARGIN << 16,
+            forgetting_groups=forgetting_groups_q31(following.forgetting_s, windows_hz),
+            dead_zone=round(following.dead_zone * 2**16),
+        ),
+        offset=tuple(offset),
+        gate=gate_config_q31(GateConfig(following.outlier_gate, following.patience_s(1 / windows_hz)), windows_hz),
+    )

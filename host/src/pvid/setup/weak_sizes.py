@@ -1,0 +1,69 @@
+"""Which PVID_MAX_ sizes of the core a model and a design of the weak engine need."""
+
+from __future__ import annotations
+
+from pvid.settings.weak import NONE, WeakDesign32, WeakModel
+from pvid.settings.weak_q31 import WeakDesignQ31
+
+
+def sizes_of_model(model: WeakModel) -> dict[str, int]:
+    """Macro -> least value."""
+    thetas = [one.thetas for one in model.kind]
+    return {
+        "PVID_MAX_THETA": model.model.n_theta,
+        "PVID_MAX_P": model.model.n_p,
+        "PVID_MAX_MOMENTS": sum(n * (n + 1) // 2 for n in thetas),
+        "PVID_MAX_SAMPLES": model.samples,
+        "PVID_MAX_INPUTS": model.jets + model.runs + model.signs,
+        "PVID_MAX_CHANNELS": max(sum(one.gain != NONE for one in model.channel), model.gains),
+        "PVID_MAX_INTEGRANDS": max(model.integrands, model.runs, model.signs),
+        "PVID_MAX_KINDS": model.kinds,
+        "PVID_MAX_COLUMNS": max(one.columns for one in model.kind),
+    }
+
+
+def sizes_of_design(design: WeakDesign32) -> dict[str, int]:
+    """Those of its model among them."""
+    return sizes_of_model(design.model) | {
+        "PVID_MAX_RING": design.model.signals * (4 * design.half_steps + 5),
+        "PVID_MAX_HARMONICS": design.highest + 1,
+        "PVID_MAX_FUNCTIONS": design.functions,
+        "PVID_MAX_POWER": design.power,
+        "PVID_MAX_DECIMATION": design.decimation,
+        "PVID_MAX_BLOCKS": _blocks(_used_ticks(design.decimation), 8, design),
+    }
+
+
+def _used_ticks(decimation: int) -> int:
+    """Ticks of a step that neither add harmonics nor run stages."""
+    return 0 if decimation == 1 else 2 if decimation >= 4 else 1
+
+
+def _blocks(used: int, steps: int, design: WeakDesign32 | WeakDesignQ31) -> int:
+    """Blocks of so many steps that the sums need: one where the other ticks of a step add and join all harmonics."""
+    free, items = design.decimation - used, 2 * (design.highest + 1)
+    return 1 if free * -(-items // (steps * free)) >= items else 2
+
+
+def sizes_of_q31(design: WeakDesignQ31, n_p: int, n_c: int) -> dict[str, int]:
+    """Those of a fixed-point design and its model with n_p parameters and n_c non-zeros of d theta / d p."""
+    model = design.model
+    thetas = [one.thetas for one in model.kind]
+    return {
+        "PVID_MAX_THETA_Q31": sum(thetas),
+        "PVID_MAX_P": n_p,
+        "PVID_MAX_MOMENTS_Q31": sum(n * (n + 1) // 2 for n in thetas),
+        "PVID_MAX_C_Q31": n_c,
+        "PVID_MAX_SAMPLES": model.samples,
+        "PVID_MAX_INPUTS": len(model.jet) + model.runs + model.signs,
+        "PVID_MAX_CHANNELS": max(sum(one.gain != NONE for one in model.channel), model.gains),
+        "PVID_MAX_INTEGRANDS": max(model.integrands, model.runs, model.signs),
+        "PVID_MAX_KINDS": len(model.kind),
+        "PVID_MAX_COLUMNS": max(one.columns for one in model.kind),
+        "PVID_MAX_RING": len(model.signal) * (4 * design.half + 5),
+        "PVID_MAX_HARMONICS": design.highest + 1,
+        "PVID_MAX_FUNCTIONS": design.functions,
+        "PVID_MAX_POWER": design.power,
+        "PVID_MAX_DECIMATION": design.decimation,
+        "PVID_MAX_BLOCKS": _blocks(min(design.decimation - 1, 1), 4, design),
+    }

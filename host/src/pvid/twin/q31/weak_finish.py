@@ -1,0 +1,204 @@
+"""Twin of weak_finish_q31.c: a window of the weak engine to rows, to steps of p, to the published estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.settings.enums import Reason
+from pvid.settings.weak import WeakKind
+from pvid.settings.weak_q31 import WeakDesignQ31
+from pvid.twin.play import Work
+from pvid.twin.q31 import weak_noise, weak_white
+from pvid.twin.q31.estimator import ROW_LIMIT, EstimatorQ31
+from pvid.twin.q31.gate import GateQ31
+from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
+from pvid.twin.q31.scaled import Scaled, scaled
+from pvid.twin.q31.trust import TrustQ31
+from pvid.twin.record import Mask, of_all_lanes
+
+_ENTRIES_PER_STAGE = 4
+_HARMONICS_PER_STAGE = 2
+_ROOTS_PER_STAGE = 4
+_UNITS_PER_STAGE = 2
+_RESIDUALS_PER_STAGE = 2
+_SHARES_PER_STAGE = 1
+_NOISE_WINDOWS = 16
+_END_PARTS = 2
+_VARIANCE_RATIO_BITS = 24
+_SMALL_STEP = 2**15
+_MOST = 2**31 - 1
+
+
+def _parts(count: int, few: int) -> int:
+    return max(-(-count // few), 1)
+
+
+def _noise_stages(design: WeakDesignQ31) -> int:
+    """Of a kind, where the noise is computed anew."""
+    harmonics = design.highest + 1
+    return design.power + _parts(harmonics, _SHARES_PER_STAGE) + 2 + len(design.noise)
+
+
+def _stages_before_gate(design: WeakDesignQ31, kind: WeakKind, live: int = 0) -> int:
+    """Up to the residuals, these included."""
+    harmonics = design.highest + 1
+    project = sum(kind.columns - i for i in range(kind.nuisances)) or 1
+    return (
+        _parts(len(design.noise), _ENTRIES_PER_STAGE)
+        + _parts(harmonics, _HARMONICS_PER_STAGE)
+        + _parts(harmonics, _ROOTS_PER_STAGE)
+        + design.power
+        + _parts(harmonics, _UNITS_PER_STAGE)
+        + harmonics
+        + kind.columns
+        + project
+        + kind.thetas
+        + 1
+        + _parts(design.functions - live, _RESIDUALS_PER_STAGE)
+    )
+
+
+def number_of_stages(design: WeakDesignQ31, iterations: int, estimator: EstimatorQ31, uses_noise: bool) -> int:
+    """Of a window, at most."""
+    rows = len(design.model.kind) * (_noise_stages(design) if uses_noise else 0)
+    rows += sum(_stages_before_gate(design, kind) + _END_PARTS + design.functions + 1 for kind in design.model.kind)
+    solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
+    return rows + solves + estimator.assessment_stages + 1
+
+
+def _rows(made: weak_white.Columns, first: int, n_bits: Sequence[int], y_bits: int) -> tuple[Int, Int]:
+    """N of the kind [K, thetas, lanes], and Y [K, lanes]."""
+    thetas = len(made.x) - 1
+
+    def entries(place: int, bits: int) -> Int:
+        shift = np.broadcast_to(-(made.exponent[place] + bits), made.x[place].shape)
+        return clamp(round_shift(made.x[place], np.clip(shift, 0, 63)) << np.clip(-shift, 0, 31), _MOST)
+
+    n = np.stack([entries(j, n_bits[first + j]) for j in range(thetas)], axis=1)
+    return n, entries(thetas, y_bits)
+
+
+def _of_all_lanes(live: Int) -> int:
+    if (live != live[0]).any():
+        raise PvidError("lanes of one twin must leave out the same nuisances: their estimates differ too much")
+    return int(live[0])
+
+
+def _ratio(rss: Int, freedom: Int, expected: Scaled) -> Scaled:
+    return scaled(rss, 0).over(scaled(freedom, 0).times(expected))
+
+
+def _of_kind(pull: Sequence[Scaled], own: slice, used: Mask) -> Scaled:
+    """What the noise takes from b of a kind [n_theta, lanes]; nothing of other kinds and in lanes without rows."""
+    places = range(own.start, own.stop)
+    m = [np.where(used, one.m, 0) if j in places else np.zeros_like(one.m) for j, one in enumerate(pull)]
+    return Scaled(np.stack(m), np.stack([one.e if j in places else np.zeros_like(one.e) for j, one in enumerate(pull)]))
+
+
+class NoiseOfWindows:
+    """When the noise is computed anew, and what was found."""
+
+    def __init__(self, design: WeakDesignQ31, estimator: EstimatorQ31, compensation: bool) -> None:
+        self.known = weak_noise.Known(estimator)
+        self.is_used = weak_noise.is_used(design, estimator.noise_margin, compensation)
+        self.compensates = compensation and bool(design.noise)
+        self.size = np.zeros(estimator.lanes, np.int64)  # of the last step
+        self._age = _NOISE_WINDOWS
+
+    def begin(self) -> bool:
+        """A window; whether it is computed in it."""
+        large = of_all_lanes(self.size > _SMALL_STEP)
+        renewed = self.is_used and (self._age >= _NOISE_WINDOWS or large)
+        self._age = 1 if renewed else self._age + self.is_used
+        return renewed
+
+
+def stages(
+    window: Int,
+    design: WeakDesignQ31,
+    iterations: int,
+    estimator: EstimatorQ31,
+    trust: TrustQ31,
+    gates: Sequence[GateQ31],
+    formats: tuple[Sequence[int], int],
+    noise: NoiseOfWindows,
+) -> Work:
+    """Processes a window, S_h [channels, H + 1, 2]; yields the reason to report [lanes], or None, after each stage.
+
+    formats : n_bits, y_bits
+    """
+    lanes = estimator.lanes
+    expected = scaled(estimator.row_sd * estimator.row_sd, -16)
+    sums = np.broadcast_to(window, (lanes, *window.shape))
+    renewed, known = noise.begin(), noise.known
+    used, first = 0, 0
+    free = np.zeros(lanes, np.int64)
+    for place, kind in enumerate(design.model.kind):
+        own = slice(first, first + kind.thetas)
+        theta = scaled(estimator.theta[own], -integers(estimator.theta_bits[own])[:, np.newaxis])
+        white = weak_white.white(design, place, theta)
+        if renewed:
+            if not place:
+                known.begin(design)
+            known.take(white, design, place, first, theta, formats)
+            for _ in range(_noise_stages(design)):
+                yield None
+        made = weak_white.columns(white, place, sums)
+        n, y = _rows(made, first, *formats)
+        first += kind.thetas
+        live = _of_all_lanes(made.live)
+        freedom = np.full(lanes, max(design.functions - live, 1))
+        saturated = np.zeros(lanes, np.bool_)
+        rss = np.zeros(lanes, np.int64)
+        innovations = {}
+        for k in range(live, design.functions):
+            e, fits = estimator.innovation(n[k], y[k], place)
+            innovations[k] = clamp(e, ROW_LIMIT)
+            saturated = saturated | ~fits
+            rss = clamp(rss + innovations[k] * innovations[k], WIDE)
+        for _ in range(_stages_before_gate(design, kind, live) - 1):
+            yield None
+        gate = gates[place]
+        if gate.is_on:
+            passes, opens = gate.judge(_ratio(rss, freedom, expected), ~saturated)
+            if not of_all_lanes(passes):
+                estimator.counters["rejected_outlier"] += 1
+                yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
+                continue
+            if of_all_lanes(opens):
+                trust.begin_anew()
+        yield None
+        if used:
+            yield None
+        else:
+            yield from estimator.fade(trust.next_fade_factor())
+        for k in range(live, design.functions):
+            added = estimator.take_row(n[k], innovations[k], ~saturated, place)
+            yield None if (added == Reason.ACCUMULATED).all() else added
+        if noise.compensates:
+            estimator.add_to_b(_of_kind(known.pull, own, ~saturated))
+        yield None
+        used += 1
+        free = free + freedom
+    if not used:
+        return
+    sensors = known.expected(expected, len(design.model.kind))
+    estimator.set_expected(sensors)
+    reason = np.full(lanes, Reason.ACCUMULATED, np.uint8)
+    for iteration in range(trust.steps(iterations)):
+        fallback = trust.fallback if iteration == 0 else None
+        for solved in estimator.solve(ends_group=iteration == 0, fallback=fallback):
+            yield None
+            if solved is not None:
+                reason = solved
+        if not estimator.was_due:
+            break
+    size = noise.size = estimator.size
+    for _ in range(estimator.assessment_stages):
+        yield None
+    candidate, above_noise = estimator.judged()
+    ratio = _ratio(estimator.group_rss, free, sensors).fixed(_VARIANCE_RATIO_BITS)
+    yield trust.judge(reason, size, above_noise, ratio, candidate)

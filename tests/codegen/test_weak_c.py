@@ -1,0 +1,88 @@
+"""The generated C of the weak form: its bits are those of the twin, and it compiles without a warning."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from generated import WARNINGS
+from weak_forms import NAMES, native, sizes_of_all, weak_form
+
+from pvid.core.sizes import raised
+from pvid.core.sources import PUBLIC_INCLUDES
+from pvid.settings.weak import Float32
+
+VECTORS = 2000
+
+USE = """
+#include "{name}_design_f32.h"
+const pvid_weak_config_f32 *use(void);
+const pvid_weak_config_f32 *use(void)
+{{
+    return &{name}_config_f32;
+}}
+"""
+
+
+def inputs(count: int) -> Float32:
+    """Numbers of every size [VECTORS, count], and some zeros."""
+    random = np.random.default_rng(17)
+    sized = random.normal(size=(VECTORS, count)) * 10.0 ** random.uniform(-4, 2, (VECTORS, count))
+    return np.where(random.random((VECTORS, count)) < 0.05, 0.0, sized).astype(np.float32)
+
+
+def assert_bits(core: Float32, twin: Float32) -> None:
+    """The twin's are [results, vectors]."""
+    assert np.array_equal(core.view(np.uint32), np.ascontiguousarray(twin.T).view(np.uint32))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_functions_have_the_bits_of_their_twins(name: str) -> None:
+    model, core = weak_form(name).model, native(name)
+    given = inputs(model.jets + model.runs + model.signs)
+    assert_bits(core.values(given), model.values(given.T))
+    if model.prepare is not None:
+        jets = inputs(model.jets)
+        assert_bits(core.prepared(jets), model.prepare(jets.T))
+    p = np.abs(inputs(model.model.n_p)) + np.float32(0.1)
+    assert_bits(core.theta(p), model.model.theta(p.T))
+    assert_bits(core.jacobian(p), model.model.jacobian(p.T))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_values_are_the_gains_of_the_oracle(name: str) -> None:
+    """On the jets of a run: of each channel without an integral, to float32."""
+    form = weak_form(name)
+    record = form.rows.record
+    arguments = dict(zip(map(str, record.channels.plain), record.arguments, strict=True))
+    opaque = [jet for jet, value in record.channels.opaque.items() if form.model.runs and value.atoms()]
+    runs = [arguments[str(jet)] for jet in opaque[: form.model.runs]]
+    signs = [arguments[str(mark)] for mark in record.channels.sign_marks.values()]
+    given = np.stack([*(arguments[one] for one in form.model.jet_names), *runs, *signs], axis=1)
+    out = native(name).values(given.astype(np.float32))
+    # The engine has the constant behind all others, and behind the oracle's what shifts integrals.
+    oracle = [(one, gains) for one, gains in zip(record.channels.channels, record.gains, strict=True) if one.gain != 1]
+    for own, (channel, gains) in zip(form.model.channel, oracle, strict=False):
+        assert own.fold == channel.fold
+        assert np.max(np.abs(out[:, own.gain] - gains)) <= 3e-6 * np.max(np.abs(gains))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_generated_files_compile_without_a_warning(name: str, tmp_path: Path) -> None:
+    files = {**weak_form(name).files, "use.c": USE.format(name=name)}
+    for file, text in files.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    sizes = [f"-D{macro}={size}" for macro, size in raised(sizes_of_all()).items()]
+    options = ["-std=c99", "-O1", *WARNINGS, *PUBLIC_INCLUDES, f"-I{tmp_path}", *sizes]
+    for source in (f"{name}_weak_f32.c", "use.c"):
+        subprocess.run(["gcc", *options, "-c", str(tmp_path / source), "-o", str(tmp_path / "x.o")], check=True)
+
+
+def test_a_library_of_smaller_arrays_is_refused_by_the_compiler(tmp_path: Path) -> None:
+    for file, text in weak_form("two_link_arm").files.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    command = ["gcc", "-std=c99", *PUBLIC_INCLUDES, f"-I{tmp_path}", "-c", str(tmp_path / "two_link_arm_weak_f32.c")]
+    done = subprocess.run([*command, "-o", str(tmp_path / "x.o")], capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "compile pvid and this file with -DPVID_MAX_P=8" in done.stderr

@@ -1,0 +1,126 @@
+"""The shipped mechanisms on their simulated rigs with the weak engine: tables, settings, samples, library, twin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_twin import weak_model_of
+from pvid.core.weak_native import WeakIdentifier, WeakNative
+from pvid.models import mechanisms
+from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.rows import WeakRows
+from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.record import Record
+from pvid.settings.weak import WeakConfig
+from pvid.setup.weak import circle_of, config_of, design_tables, for_engine
+from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
+from pvid.twin import fnv
+from pvid.twin.weak import WeakTwin
+
+Float = npt.NDArray[np.float64]
+Float32 = npt.NDArray[np.float32]
+Mask = npt.NDArray[np.bool_]
+
+FUNCTIONS = 24  # where the rig's design does not give a number
+
+
+@dataclass(frozen=True)
+class EngineRig:
+    """A mechanism with its engine.
+
+    Attributes
+    ----------
+    config : settings of the float engine for the rig's own design, from the guesses of the description
+    samples : of a simulated run [ticks, samples]
+    truth : p of the rig
+    rows : of the float64 oracle, of the same run and design
+    native : the library
+    """
+
+    config: WeakConfig
+    samples: Float32
+    truth: Float
+    rows: WeakRows
+    native: WeakNative
+
+    def resized(self, *, functions: int, hop: int, decimation: int) -> WeakConfig:
+        """The settings with other sizes than those of the rig's design; the tables of its noise stay."""
+        sizes: dict[str, Any] = {"functions": functions, "hop": hop, "decimation": decimation, "circle": circle_of(hop)}
+        return replace(self.config, design=replace(self.config.design, **sizes))
+
+
+@cache
+def engine_rig(name: str, seed: int = 0, soft: bool = False) -> EngineRig:
+    """A shipped mechanism; soft: its friction, where it has one, has the soft sign in simulation and design."""
+    compiled, rig, law = mechanisms.compiled_of(name), simulated_rig(name), SOFT if soft else PERFECT
+    given: dict[str, Any] = {"functions": FUNCTIONS, **rig.design}
+    if rig.friction_width and soft:
+        given |= {"reversals": "soft", "soft": rig.friction_width}
+    design = for_engine(WeakDesign(rig.sample_rate, rig.window_s, **given))
+    simulation, made, model = simulation_of(name), ready(compiled), weak_model_of(compiled)
+    run = simulation.run(seed, law)
+    rows = WeakRows.of(made, run, design)
+    tables = design_tables(model, rows, simulation.truth)
+    samples = np.stack([np.asarray(run[one], np.float32) for one in model.sample_names], axis=1)
+    config = config_of(tables, rig.sample_rate, made.parameters)
+    largest = replace(tables, decimation=max(tables.decimation, 16))  # that `resized` may get
+    return EngineRig(config, samples, simulation.truth, rows, weak_native(compiled, largest))
+
+
+def in_pieces(core: WeakIdentifier, samples: Float32, frozen: Mask) -> Record:
+    """A run of the core that is frozen and resumed as `frozen` [ticks] wants it."""
+    edges = [0, *(np.flatnonzero(np.diff(frozen)) + 1).tolist(), len(samples)]
+    parts = []
+    for first, last in zip(edges, edges[1:], strict=False):
+        core.freeze(bool(frozen[first]))
+        parts.append(core.run_samples(samples[first:last]))
+    names = ("p", "sums", "reason", "published", "published_se", "hash")
+    joined = {name: np.concatenate([getattr(one, name) for one in parts]) for name in names}
+    return Record(**joined)
+
+
+def assert_equals_the_twin(
+    native: WeakNative,
+    config: WeakConfig,
+    samples: Float32,
+    lanes: Sequence[EstimatorConfig] | None = None,
+    frozen: Mask | None = None,
+) -> list[Record]:
+    """Asserts that the library has the twin's bits after every tick: p, sums, reason, published p, running hash; and in
+    the end its counters and its estimate. One lane for each of `lanes`, by default the settings' own estimator.
+
+    Returns the records of the core.
+    """
+    lanes = [config.estimator] if lanes is None else lanes
+    twin = WeakTwin(config, lanes)
+    twin.frozen = frozen
+    found = twin.run(samples)
+    records = []
+    for lane, estimator in enumerate(lanes):
+        core = native.identifier_of(replace(config, estimator=estimator))
+        record = core.run_samples(samples) if frozen is None else in_pieces(core, samples, frozen)
+        expected, own = found.lane(lane).words(), record.words()
+        for part in ("status", "p", "sums", "published"):
+            different = np.flatnonzero((own[part] != expected[part]).any(axis=1))
+            assert not len(different), f"lane {lane}, {part}, first at tick {different[0]}"
+        assert core.running_hash == int(fnv.running_hashes(found.lane(lane))[-1])
+        assert core.counters == {name: int(of[lane]) for name, of in twin.estimator.counters.items()}
+        assert core.is_published == twin.trust.published[lane]
+        estimate, n_p = twin.trust.estimate[lane], twin.estimator.model.n_p
+        for name in ("p", "se"):
+            assert core.estimate[name][:n_p].tobytes() == estimate[name][:n_p].tobytes(), name
+        assert core.estimate["covariance"][:n_p, :n_p].tobytes() == estimate["covariance"][:n_p, :n_p].tobytes()
+        for name in ("kappa", "least_pivot", "residual_sd", "weight", "misfit"):
+            assert core.estimate[name].tobytes() == estimate[name].tobytes(), name
+        assert np.isfinite(record.p).all() and np.isfinite(record.sums).all()
+        records.append(record)
+    return records
