@@ -95,7 +95,11 @@ def test_a_file_may_import_what_lies_beside_it(tmp_path: Path) -> None:
         ("model.lagrange(m * x.d()**2 / 2, [x], [])", "line 6: lagrange: 1 coordinates but 0 generalised forces"),
         ("model.output('z', 'm', x)", "line 6: the output z contains a signal"),
         ("model.equation(m * x.d(9) - u)", "line 6: derivative 9 of x would be needed: at most 8"),
-        ("model = 3", "the file leaves no variable `model`"),
+        ("model = 3", "the file leaves no pvid.model.Model in a variable `model`"),
+        (
+            "a = model; model = Model('2'); b = Model('3'); del model",
+            "the file leaves 2 models and none of them in a var",
+        ),
         ("", "mine: the model has no equation"),
         ("import sympy; model.equation(b * sympy.exp(x * b) - u)", "line 6: equation 1"),
         ("model.equation(m * sgn(b) * x.d(2) - u)", "line 6: sgn(b) is not supported: make it the unknown itself"),
@@ -110,6 +114,11 @@ def test_errors_name_line_symbol_and_cause(tmp_path: Path, line: str, said: str)
         compiled_of(written(tmp_path, FINE_LINES + line + "\n"))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_only_model_of_a_file_may_have_any_name(tmp_path: Path) -> None:
+    compiled = compiled_of(written(tmp_path, FINE_LINES + FINE_EQUATION + "rig = model\ndel model\n"))
+    assert [unknown.name for unknown in compiled.unknowns] == ["m", "b"]
 
 
 def test_names_that_are_no_model_are_refused_with_the_list() -> None:

@@ -45,7 +45,7 @@ def described(name_or_path: str | Path) -> Model:
     Raises
     ------
     PvidError
-        Where the file cannot be read or run, or leaves no `model`; the sentence contains the line.
+        Where the file cannot be read or run, or leaves no model; the sentence contains the line.
     """
     _, path = path_of(name_or_path)
     space: dict[str, Any] = {"__name__": "pvid_model_file", "__file__": str(path)}
@@ -66,10 +66,19 @@ def described(name_or_path: str | Path) -> Model:
         raise PvidError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}{_import(error)}") from None
     finally:
         sys.path.remove(folder)
+    return _left_in(space, path)
+
+
+def _left_in(space: dict[str, Any], path: Path) -> Model:
+    """The model that a file leaves: its variable `model`, or the only Model that it has, whatever its name."""
     model = space.get("model")
-    if not isinstance(model, Model):
-        raise PvidError(f"{path.name}: the file leaves no variable `model` that is a pvid.model.Model")
-    return model
+    if isinstance(model, Model):
+        return model
+    others = {id(value): value for value in space.values() if isinstance(value, Model)}
+    if len(others) == 1 and model is None:
+        return next(iter(others.values()))
+    found = "no pvid.model.Model" if not others else f"{len(others)} models and none of them"
+    raise PvidError(f"{path.name}: the file leaves {found} in a variable `model`")
 
 
 def _import(error: BaseException) -> str:
