@@ -3,9 +3,9 @@
  *
  *   sgn_(k-1)  from the arguments v at k - 2, k - 1, k: the mean of sgn over the step, v linear there
  *   I^1        I_j = I_(j-1) + (-f_(j-2) + 13 f_(j-1) + 13 f_j - f_(j+1)) dt/24, the integral of a cubic
- *   I^2        its trapezoids with end correction: += dt/2 (I_j + I_(j-1)) - dt^2/12 (f_j - f_(j-1))
+ *   I^2        += dt/2 (I_j + I_(j-1)) + dt^2/60 (f_(j+1) - f_(j-2) - 8 (f_j - f_(j-1)))
  *
- * In dt/24 and dt^2/48 both are exact integers. Before the first step v and f go on in a straight line. */
+ * In dt/120 and dt^2/240 both are exact integers. Before the first step v and f go on in a straight line. */
 #include "weak/values_q31.h"
 
 #include <stddef.h>
@@ -113,8 +113,8 @@ static void integrate(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *de
         int64_t once = 0;
         int64_t twice = 0;
         if (self->known > 2u) {
-            once = self->once[i] + ((13 * (last + now)) - (before + f[i]));
-            twice = self->twice[i] + ((self->once[i] + once) - (4 * (now - last)));
+            once = self->once[i] + (5 * ((13 * (last + now)) - (before + f[i])));
+            twice = self->twice[i] + ((self->once[i] + once) + (4 * ((f[i] - before) - (8 * (now - last)))));
         }
         if (self->index == 0u) {
             self->edge[ended][0][i] = rounded(once, shift.once);

@@ -10,9 +10,10 @@
  *   run         + dt/2 (r_(k-1) + r_k), r its derivative, with what rounding takes off kept (Kahan); from the first
  *               sample to the first step r stays that of the first step
  *   I^1_k       I^1_(k-1) + dt/24 (-f_(k-2) + 13 f_(k-1) + 13 f_k - f_(k+1))
- *   I^2_k       I^2_(k-1) + dt/2 (I^1_(k-1) + I^1_k) - dt^2/12 (f_k - f_(k-1))
+ *   I^2_k       I^2_(k-1) + dt/2 (I^1_(k-1) + I^1_k) + dt^2/60 (f_(k+1) - f_(k-2) - 8 (f_k - f_(k-1)))
  *   of 1:       t and t^2/2
  *
+ * The last term of I^2 removes the error of the trapezoids and that of I^1: I^2 is exact to order 6, I^1 to order 4.
  * Both integrals are 0 at the first step of a half window; their values there without that are the `edge`. */
 #include "weak/weak_step_f32.h"
 
@@ -79,7 +80,7 @@ static void integrate(pvid_weak_history_f32 *self, size_t integrands, float dt, 
 {
     const float part = dt / 24.0f;
     const float half = 0.5f * dt;
-    const float end = (dt * dt) / 12.0f;
+    const float bend = (dt * dt) / 60.0f;
     const bool starts = self->known <= 2u;
     const bool second = self->known == 3u;
     PVID_UNROLL_EXACT
@@ -90,7 +91,8 @@ static void integrate(pvid_weak_history_f32 *self, size_t integrands, float dt, 
         const float rise = part * (((-before + (13.0f * last)) + (13.0f * f)) - next[i]);
         const float from = self->integral[2u * i];
         const float once = from + rise;
-        const float twice = self->integral[(2u * i) + 1u] + ((half * (from + once)) - (end * (f - last)));
+        const float outside = (next[i] - before) - (8.0f * (f - last));
+        const float twice = self->integral[(2u * i) + 1u] + ((half * (from + once)) + (bend * outside));
         self->integral[2u * i] = starts ? 0.0f : once;
         self->integral[(2u * i) + 1u] = starts ? 0.0f : twice;
         self->f[1][i] = last;

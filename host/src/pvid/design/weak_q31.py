@@ -133,8 +133,7 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
         raise PvidError("the width of a soft sign is below the resolution of its velocity")
     integral = []
     for most in formats.integrand_most:
-        once = 28.0 * sizes.hop * most
-        twice = 28.0 * sizes.hop**2 * most + 8.0 * sizes.hop * most
+        once, twice = most_integrals(sizes.hop, most)
         margins.take("a double integral", twice, 62)
         integral.append((max(1, shift_to(once, _WORD)), max(1, shift_to(twice, _WORD))))
     sum_shift = max(1, shift_to(sizes.hop * (2.0 ** (CHANNEL_BITS + 23 - DOWN) + 2), _WORD - 1e-6))
@@ -243,6 +242,11 @@ def _run(reach: float, rate_bits: int, bits: int, dt: float, margins: _Margins) 
     return rescale_to(reach / unit, unit * 2.0**bits, "an integral since the start of the run")
 
 
+def most_integrals(hop: int, most: float) -> tuple[float, float]:
+    """Largest I^1 [dt/120] and I^2 [dt^2/240] of half a window, of integrands up to `most` (values_q31.c)."""
+    return 140.0 * hop * most, (140.0 * hop + 72.0) * hop * most
+
+
 class _Channels:
     """Shifts and bounds of the channels and their sums."""
 
@@ -263,8 +267,7 @@ class _Channels:
         if one.integrand == NONE:
             return 24.0 * self.hop**2 if fold == 2 else 24.0 * self.hop
         most = self.formats.integrand_most[one.integrand]
-        size = 28.0 * self.hop * most if fold == 1 else (28.0 * self.hop + 8.0) * self.hop * most
-        return size / 2.0 ** self.integral[one.integrand][fold - 1] + 1
+        return most_integrals(self.hop, most)[fold - 1] / 2.0 ** self.integral[one.integrand][fold - 1] + 1
 
     def most(self, k: int) -> float:
         """Largest gain times integral."""
@@ -312,6 +315,8 @@ class _Channels:
             unit *= dt / 2 if one.fold == 1 else dt**2 / 48
         elif one.fold:
             shift = self.integral[one.integrand][one.fold - 1]
-            unit *= (dt / 24 if one.fold == 1 else dt**2 / 48) * 2.0 ** (shift - self.formats.integrands[one.integrand])
+            unit *= (dt / 120 if one.fold == 1 else dt**2 / 240) * 2.0 ** (
+                shift - self.formats.integrands[one.integrand]
+            )
         form = self.format(k)
         return unit * 2.0 ** (form.value + form.own + DOWN + self.sum_shift) / CIRCLE

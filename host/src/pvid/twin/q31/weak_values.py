@@ -99,8 +99,8 @@ def _integrals(f: Int, design: WeakDesignQ31) -> tuple[Int, Int, Int]:
     hop, count = design.hop, f.shape[1] - 1
     last, now, behind = f[:, :-2], f[:, 1:-1], f[:, 2:]
     before = np.concatenate([2 * last[:, :1] - now[:, :1], last[:, :-1]], axis=1)
-    rise = integers(13 * (last + now) - (before + behind))
-    bend = integers(4 * (now - last))
+    rise = integers(5 * (13 * (last + now) - (before + behind)))
+    bend = integers(4 * (behind - before - 8 * (now - last)))
     once: Int = np.zeros((len(f), count), np.int64)
     twice: Int = np.zeros((len(f), count), np.int64)
     edges = np.zeros((2, len(f), max((count - 1) // hop, 0)), np.int64)
@@ -109,7 +109,7 @@ def _integrals(f: Int, design: WeakDesignQ31) -> tuple[Int, Int, Int]:
     second: Int = twice[:, 0]
     for k in range(1, count):
         next_first = first + rise[:, k - 1]
-        second = integers(second + (first + next_first - bend[:, k - 1]))
+        second = integers(second + (first + next_first + bend[:, k - 1]))
         first = next_first
         if k % hop == 0:
             edges[0, :, k // hop - 1] = round_shift(first, shifts[:, 0])
