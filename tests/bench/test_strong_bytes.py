@@ -1,14 +1,21 @@
-"""Where the bytes of the strong form go: every part has some, none swallows the others; a small build is small."""
+"""Where the bytes of the strong form go: every part has some, none swallows the others; and the limits of all."""
 
 from __future__ import annotations
 
-from bench.strong_bytes import TEXT_HEADER, measured, state_rows, text_rows
+from dataclasses import replace
+
+from bench.strong_bytes import BOARD, TEXT_HEADER, measured, state_rows, text_rows
+from bench.tick_methods import VARIANTS
+from pvid.board.boards import BOARDS
+from pvid.board.replay_image import build_image, play, standard_run
+from pvid.board.sizes import TICKS, TIMEOUT_S
+from pvid.settings.f32 import StrongConfig
 
 
 def test_every_member_of_the_state_has_bytes_and_they_add_up() -> None:
     *parts, whole = [int(size) for _, size in state_rows()]
     assert sum(parts) == whole and min(parts) > 0
-    assert max(parts) < 0.55 * whole  # the sums are half of the state
+    assert max(parts) < 0.6 * whole  # the sums are more than half of the state
 
 
 def test_every_part_of_the_code_has_bytes_and_they_add_up() -> None:
@@ -22,8 +29,15 @@ def test_every_part_of_the_code_has_bytes_and_they_add_up() -> None:
         assert max(parts) < 0.4 * whole
 
 
-def test_a_small_build_has_a_solve_at_every_row_in_10_kB() -> None:
-    fast, small = measured("f32"), measured("f32", {"PVID_SMALL": "1"})
-    assert small.report.hash == fast.report.hash
-    assert small.parts.total() <= 10_000
-    assert small.report.instructions_mean <= 720
+def test_one_build_keeps_all_limits_of_bytes_and_instructions() -> None:
+    """Text and state of an image of the strong form, and a tick of each schedule, gate and verdict on."""
+    run = standard_run(TICKS)
+    assert isinstance(run.config, StrongConfig) and run.config.gate.sigmas > 0
+    images = [build_image(BOARDS[BOARD], replace(run, config=one.of(run.config)))[0] for one in VARIANTS]
+    exact, lazy, staged = [play(BOARDS[BOARD], image, TIMEOUT_S) for image in images]
+    text = measured("f32").parts.total()
+    assert text <= 10_000
+    assert max(one.state_bytes for one in (exact, lazy, staged)) <= 820
+    assert exact.instructions_mean <= 1200
+    assert lazy.instructions_mean <= 720
+    assert staged.instructions_mean <= 560 and staged.instructions_longest <= 950

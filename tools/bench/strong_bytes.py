@@ -13,7 +13,7 @@ from pvid.board.sizes import ARITHMETIC, CODE, CORE, TICKS, TIMEOUT_S, sections
 from pvid.settings.enums import Core
 
 BOARD = "mps2-an386"
-TEXT_HEADER = ("code", "float32", "float32, PVID_SMALL", "fixed point")
+TEXT_HEADER = ("code", "float32", "fixed point")
 STATE_HEADER = ("state", "bytes")
 
 # What a function belongs to, by its source and its name; the first that fits.
@@ -37,16 +37,16 @@ _OTHERS = "hash, text, the rest"
 
 _STATE = (
     ("58 sums at two levels", "sizeof(pvid_strong_sums_f32)"),
-    ("block of four rows", "PVID_STRONG_ROWS * sizeof(pvid_strong_row_f32)"),
+    ("block of rows", "(PVID_STRONG_ROWS - 1) * sizeof(pvid_strong_row_f32)"),
     ("window of five points", "sizeof(((pvid_strong_window_f32 *)0)->samples)"),
-    ("bank, factors, places of the window", "sizeof(pvid_strong_window_f32) - PVID_MAX_WINDOW * 8"),
+    ("factors and places of the window", "sizeof(pvid_strong_window_f32) - PVID_MAX_WINDOW * 8"),
     ("counters", "sizeof(pvid_counters)"),
     ("gate", "sizeof(pvid_gate_f32)"),
     ("verdict", "sizeof(pvid_misfit_f32)"),
     (
-        "p, bounds, prior, equations of the next step, settings",
+        "p, prior, equations of the next step, schedule",
         "sizeof(pvid_strong_estimator_f32) - sizeof(pvid_strong_sums_f32) - sizeof(pvid_counters) - "
-        "PVID_STRONG_ROWS * sizeof(pvid_strong_row_f32)",
+        "(PVID_STRONG_ROWS - 1) * sizeof(pvid_strong_row_f32)",
     ),
 )
 
@@ -60,9 +60,9 @@ class Build(NamedTuple):
     report: ReplayReport
 
 
-def measured(core: Core, macros: dict[str, str] | None = None) -> Build:
+def measured(core: Core) -> Build:
     """Builds and runs the standard image of the strong form, without a dead zone."""
-    image, _ = build_image(BOARDS[BOARD], standard_run(TICKS, core), macros)
+    image, _ = build_image(BOARDS[BOARD], standard_run(TICKS, core))
     parts: Counter[str] = Counter()
     compiler = application = 0
     for section, size, file in sections(image.with_suffix(".map").read_text(encoding="utf-8")):
@@ -79,7 +79,7 @@ def measured(core: Core, macros: dict[str, str] | None = None) -> Build:
 
 def text_rows() -> list[tuple[str, ...]]:
     """Bytes of code and constants by part, and instructions a tick, as in TEXT_HEADER."""
-    builds = (measured("f32"), measured("f32", {"PVID_SMALL": "1"}), measured("q31"))
+    builds = (measured("f32"), measured("q31"))
     titles = [*dict.fromkeys(title for title, _, _ in _PARTS), _OTHERS]
     rows = [(title, *(str(build.parts[title]) for build in builds)) for title in titles]
     return [

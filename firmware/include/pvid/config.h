@@ -247,15 +247,6 @@
 #error "PVID_CHECK_TABLES must be 0 or 1"
 #endif
 
-/* 1: the strong form in float32 has loops and calls instead of written-out sums: a fifth less flash, and a tenth more
- * instructions; the same bits. */
-#ifndef PVID_SMALL
-#define PVID_SMALL 0
-#endif
-#if PVID_SMALL != 0 && PVID_SMALL != 1
-#error "PVID_SMALL must be 0 or 1"
-#endif
-
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your
  * own trap or reset here; by default the misused function does nothing and returns PVID_NOT_READY or
  * PVID_BAD_POINTER. */

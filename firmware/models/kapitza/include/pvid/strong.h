@@ -13,13 +13,16 @@
  *                             rows of their own (any multiple of 4 from 8 to 64)
  *
  *   static pvid_strong_f32 identifier;
- *   pvid_strong_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .bank = ...,
- *                                     .estimator = pvid_estimator_defaults_f32 };
+ *   static pvid_strong_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .bank = ... };
+ *   config.estimator = pvid_estimator_defaults_f32; ...
  *   if (pvid_strong_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_strong_step_f32(&identifier, phi, y);
  *
+ * The identifier reads its configuration where it is: it must stay there, unchanged, as long as the identifier is used.
+ * A constant one, as `pvid tables --form strong` prints it, takes no RAM.
+ *
  * Never allocates; every input is allowed. Call all functions of an object from one context; publication.h passes
- * estimates to other contexts. RAM: sizeof(pvid_strong_f32), mostly the two windows.
+ * estimates to other contexts. RAM: sizeof(pvid_strong_f32), mostly the windows.
  */
 #ifndef PVID_STRONG_H
 #define PVID_STRONG_H
@@ -39,7 +42,7 @@ typedef struct {
     float l1;             /* length of rod 1 [m], > 0 */
     float drive_min; /* least rms of u = y_A''/l1 over the last second [1/s^2], >= 0: with less drive no row is used.
                         Choose ten times the noise of u. 0: every row is used */
-    pvid_fir_bank_f32 bank;    /* filters of both channels; the weights must outlive the identifier */
+    pvid_fir_bank_f32 bank;    /* filters of both channels */
     pvid_gate_config_f32 gate; /* outlier gate on the innovation of a row */
     uint16_t exact_every;      /* rows from one exact projection to the next if divider is 1, 1..255; 0: 8, with the law
                                   pseudovelocity or a dead zone 1 */
@@ -51,7 +54,7 @@ typedef struct {
 typedef struct pvid_strong_f32 pvid_strong_f32;
 typedef struct pvid_strong_estimator_f32 pvid_strong_estimator_f32;
 
-/* Initialises `self`. Fails iff
+/* Initialises `self`. config and its tables must outlive the identifier, unchanged. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or
  *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config);
