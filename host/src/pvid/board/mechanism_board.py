@@ -40,7 +40,9 @@ from pvid.run.engine_design import (
     config_for_simulated_rig,
     config_to_identify,
     engine_config,
+    neglected_part,
     samples_of,
+    with_neglected,
 )
 from pvid.run.mechanism import model_of
 from pvid.run.nominal_run import model_of_rig_file, nominal_run
@@ -129,6 +131,7 @@ class MechanismBoard:
         """
         made = nominal_run(rig)
         config = engine_config(made.compiled, made.run, made.design, made.p)
+        config = with_neglected(config, neglected_part(made.compiled, made.run))
         # What the rig really reads is not known: a height from the floor is no fault.
         config = replace(config, range=None)
         return cls(rig, made.compiled, config, _nothing(config))

@@ -30,6 +30,7 @@ from pvid.oracle.weak.choice import Scored
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
+from pvid.run.engine_design import neglected_part
 from pvid.run.engine_design_q31 import (
     FixedEngine,
     engine_for_recording,
@@ -37,6 +38,7 @@ from pvid.run.engine_design_q31 import (
     engine_of_parts,
     engine_to_identify,
     fixed_engine,
+    with_neglected,
 )
 from pvid.run.mechanism import model_of
 from pvid.run.nominal_run import model_of_rig_file, nominal_run
@@ -101,6 +103,7 @@ class MechanismBoardQ31:
         """As MechanismBoard.of_rig_file."""
         made = nominal_run(rig)
         engine = fixed_engine(made.compiled, made.run, made.design, made.p)
+        engine = with_neglected(engine, neglected_part(made.compiled, made.run))
         return cls(rig, engine, _nothing(len(engine.lsb)))
 
     def __post_init__(self) -> None:

@@ -81,8 +81,8 @@ def _deployment(
 ) -> Deployment:
     from pvid.deploy.of_rig import deployment_f32, deployment_q31
     from pvid.models.mechanisms import names as names_of_shipped
-    from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, simulated_run_of
-    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
+    from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
+    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_rig_like_the_shipped
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     if run_path is not None:
@@ -94,5 +94,5 @@ def _deployment(
         raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
     run = simulated_run_of(compiled)[0]
     if is_integer:
-        return deployment_q31(engine_for_simulated_rig(compiled, functions), run, title)
-    return deployment_f32(compiled, config_for_simulated_rig(compiled, functions), run, title)
+        return deployment_q31(engine_for_rig_like_the_shipped(compiled, functions), run, title)
+    return deployment_f32(compiled, config_for_rig_like_the_shipped(compiled, functions), run, title)

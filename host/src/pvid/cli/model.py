@@ -321,7 +321,7 @@ def _design_of(
 ) -> WeakConfig | None:
     from pvid.codegen.build import weak_refusal
     from pvid.models.mechanisms import names as names_of_shipped
-    from pvid.run.engine_design import config_for_recording, config_for_simulated_rig
+    from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped
 
     if columns is not None and run_path is None:
         raise PvidError("--columns needs --run")
@@ -330,7 +330,7 @@ def _design_of(
     if run_path is not None:
         return config_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions)
     if model in names_of_shipped():
-        return config_for_simulated_rig(compiled, functions)
+        return config_for_rig_like_the_shipped(compiled, functions)
     if functions is not None:
         raise PvidError("--functions needs --run: there is no rig to make a design for")
     return None
@@ -346,12 +346,12 @@ def _fixed_weak(
     title: str,
 ) -> tuple[dict[str, str], str | None]:
     """Files of the fixed-point weak form, or why there are none."""
-    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
+    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_rig_like_the_shipped
     from pvid.run.engine_files_q31 import config_of, files_of
 
     try:
         if run_path is None:
-            engine = engine_for_simulated_rig(compiled, functions, soft_signs)
+            engine = engine_for_rig_like_the_shipped(compiled, functions, soft_signs)
         else:
             engine = engine_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions, soft_signs)
     except PvidError as error:
