@@ -141,5 +141,5 @@ def test_without_a_second_stage_the_weak_form_has_the_same_bits() -> None:
 def test_a_running_integral_is_no_input() -> None:
     made, rig = refine_functions(compiled_of("battery_2rc")), engine_rig("battery_2rc")
     run = {one: rig.samples[:, k] for k, one in enumerate(_samples("battery_2rc"))}
-    with pytest.raises(PvidError, match="the refinement in C has no input"):
+    with pytest.raises(PvidError, match=r"battery_2rc has the input Integral\(i, 1\)"):
         refine_settings(made, run, 10.0, rig.truth, 100.0)
