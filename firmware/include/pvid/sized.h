@@ -146,6 +146,7 @@
 /* refine.h */
 #define pvid_refine_init_f32 PVID_REFINED(pvid_refine_init_f32)
 #define pvid_refine_step_f32 PVID_REFINED(pvid_refine_step_f32)
+#define pvid_refine_best_f32 PVID_REFINED(pvid_refine_best_f32)
 #define pvid_refine_latest_f32 PVID_REFINED(pvid_refine_latest_f32)
 #define pvid_refine_read_f32 PVID_REFINED(pvid_refine_read_f32)
 #define pvid_refine_gap_f32 PVID_REFINED(pvid_refine_gap_f32)

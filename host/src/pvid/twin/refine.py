@@ -108,7 +108,8 @@ class RefineTwin:
         self.start, self.expected = np.zeros(shape.states, _F), np.zeros(shape.states, _F)
         self.covariance = np.zeros((n, n), _F)
         self.verdict = Reason.UPDATED
-        self.estimate: RefineEstimate | None = None
+        self.told = Reason.WARMING_UP  # of the last block
+        self.estimate: RefineEstimate | None = None  # published, not withdrawn
         self.hash = START
 
     # ---- blocks ----
@@ -358,6 +359,11 @@ class RefineTwin:
             self._begin_anew()
             self._begin_block()
 
+    def _withdraw(self) -> None:
+        """The published estimate, if the last block refutes it."""
+        if self.verdict != Reason.UPDATED and not (self.verdict == Reason.HELD_BLOCK and self.taken > 0):
+            self.estimate = None
+
     def _do(self) -> Reason:
         match self.phase:
             case Phase.WAIT:
@@ -386,7 +392,8 @@ class RefineTwin:
                     self.estimate = self.candidate
                 self.phase = Phase.NEXT
             case Phase.NEXT:
-                reason = self.verdict
+                reason = self.told = self.verdict
+                self._withdraw()
                 self._next_block()
                 return reason
         return Reason.ACCUMULATED
