@@ -586,20 +586,19 @@ static void test_the_published_estimate_outlives_one_refused_block_and_not_the_l
 static void test_the_best_estimate_is_the_refined_one_while_it_stands(void **state)
 {
     (void)state;
-    static pvid_weak_f32 identifier;
     pvid_estimate_f32 best;
-    identifier.trust.estimate = weak_estimate();
+    pvid_estimate_f32 weak = weak_estimate();
     for (size_t i = 0; i < PVID_MAX_P; i++) {
         for (size_t j = 0; j < PVID_MAX_P; j++) {
-            identifier.trust.estimate.covariance[i][j] = 0.25f;
+            weak.covariance[i][j] = 0.25f;
         }
     }
-    identifier.trust.estimate.kappa = 0.125f;
+    weak.kappa = 0.125f;
     begin_run();
-    assert_int_equal(pvid_refine_best_f32(&identifier, &refinement, &best), PVID_STAGE_WEAK);
-    assert_memory_equal(&best, &identifier.trust.estimate, sizeof best);
+    assert_int_equal(pvid_refine_best_f32(&refinement, &weak, &best), PVID_STAGE_WEAK);
+    assert_memory_equal(&best, &weak, sizeof best);
     (void)run_until(is_published, 0);
-    assert_int_equal(pvid_refine_best_f32(&identifier, &refinement, &best), PVID_STAGE_REFINED);
+    assert_int_equal(pvid_refine_best_f32(&refinement, &weak, &best), PVID_STAGE_REFINED);
     static const size_t places[PVID_REFINE_P] = {0, 1, 2, 6}; /* w, d1, d2, c */
     for (size_t i = 0; i < PVID_REFINE_P; i++) {
         assert_memory_equal(&best.p[i], &refinement.estimate.r[places[i]], sizeof best.p[i]);
@@ -615,11 +614,11 @@ static void test_the_best_estimate_is_the_refined_one_while_it_stands(void **sta
     assert_true(fabsf((best.covariance[0][3] / expected) - 1.0f) < 1.0e-6f);
     assert_true((best.kappa >= 0.125f) && (best.kappa <= 0.125f));
     best.kappa = 7.0f;
-    assert_int_equal(pvid_refine_best_f32(NULL, &refinement, &best), PVID_STAGE_WEAK);
+    assert_int_equal(pvid_refine_best_f32(&refinement, NULL, &best), PVID_STAGE_WEAK);
     assert_true((best.kappa >= 7.0f) && (best.kappa <= 7.0f));
-    assert_int_equal(pvid_refine_best_f32(&identifier, &refinement, NULL), PVID_STAGE_WEAK);
-    assert_int_equal(pvid_refine_best_f32(&identifier, NULL, &best), PVID_STAGE_WEAK);
-    assert_memory_equal(&best, &identifier.trust.estimate, sizeof best);
+    assert_int_equal(pvid_refine_best_f32(&refinement, &weak, NULL), PVID_STAGE_WEAK);
+    assert_int_equal(pvid_refine_best_f32(NULL, &weak, &best), PVID_STAGE_WEAK);
+    assert_memory_equal(&best, &weak, sizeof best);
 }
 
 static void test_a_gap_ends_a_longer_block_of_used_samples(void **state)

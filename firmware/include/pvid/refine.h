@@ -15,7 +15,7 @@
  *   config.refine = &second;
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick:     reason = pvid_weak_step_f32(&identifier, sample);          both stages
- *   same context:  stage = pvid_refine_best_f32(&identifier, &refinement, &estimate);    of both stages the better one
+ *   same context:  stage = pvid_refine_best_f32(&refinement, pvid_weak_estimate_f32(&identifier), &estimate);
  *   other context: pvid_publication_put_f32 of that estimate (publication.h), or
  *                  if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
@@ -133,12 +133,12 @@ const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *se
 pvid_reason pvid_refine_reason_f32(const pvid_refine_f32 *self);
 
 /* The estimate that both stages publish, for the context that calls step: p, standard errors and covariance of the
- * refinement while its estimate stands (see latest), else the published one of the weak form, whose kappa, least_pivot,
- * residual_sd, weight and misfit it contains in either case, and its parameters that r does not have. Returns
- * whose it is; pvid_refine_reason_f32 is the reason: PVID_UPDATED, or why the last block gave no new estimate. The
- * weak form's without `refine` or its init. Nothing is copied iff `weak` or `estimate` is NULL. Cost on a Cortex-M4F:
- * 500 instructions. */
-pvid_stage pvid_refine_best_f32(const pvid_weak_f32 *weak, const pvid_refine_f32 *refine, pvid_estimate_f32 *estimate);
+ * refinement while its estimate stands (see latest), else those of the weak form's published one, `weak`, which the
+ * rest of *estimate always has. Returns whose it is; pvid_refine_reason_f32 is the reason: PVID_UPDATED, or why the
+ * last block gave no new estimate. The weak form's without init. Nothing is copied iff `weak` or `estimate` is NULL.
+ * Cost on a Cortex-M4F: 500 instructions. */
+pvid_stage pvid_refine_best_f32(const pvid_refine_f32 *self, const pvid_estimate_f32 *weak,
+                                pvid_estimate_f32 *estimate);
 
 /* Copies the published estimate from any context (publication.h). *number: estimates published so far, 0: there is
  * none, or it was withdrawn; may be NULL. Fails iff

@@ -13,13 +13,13 @@ static float scale_of(const pvid_refine_estimate_f32 *refined, size_t place)
     return pvid_refine_is_logarithmic_f32(place) ? refined->r[place] : 1.0f;
 }
 
-pvid_stage pvid_refine_best_f32(const pvid_weak_f32 *weak, const pvid_refine_f32 *refine, pvid_estimate_f32 *estimate)
+pvid_stage pvid_refine_best_f32(const pvid_refine_f32 *self, const pvid_estimate_f32 *weak, pvid_estimate_f32 *estimate)
 {
     if ((weak == NULL) || (estimate == NULL)) {
         return PVID_STAGE_WEAK;
     }
-    *estimate = *pvid_weak_estimate_f32(weak);
-    const pvid_refine_estimate_f32 *refined = pvid_refine_latest_f32(refine);
+    *estimate = *weak;
+    const pvid_refine_estimate_f32 *refined = pvid_refine_latest_f32(self);
     if (refined == NULL) {
         return PVID_STAGE_WEAK;
     }

@@ -124,8 +124,8 @@ class RefinedIdentifier(WeakIdentifier):
     @property
     def best(self) -> tuple[Stage, npt.NDArray[np.void]]:
         """Whose estimate is published, and the estimate."""
-        estimate = self.native.headers.ffi.new("pvid_estimate_f32 *")
-        stage = self.native.library.pvid_refine_best_f32(self.state, self.refinement, estimate)
+        library, estimate = self.native.library, self.native.headers.ffi.new("pvid_estimate_f32 *")
+        stage = library.pvid_refine_best_f32(self.refinement, library.pvid_weak_estimate_f32(self.state), estimate)
         return Stage(stage), self.native.headers.viewed(estimate[0]).copy()
 
     def run_both(self, samples: npt.ArrayLike) -> RefinedRecord:
