@@ -10,7 +10,7 @@
 
 /* Steps an initialised refinement through samples[ticks][n_samples]. weak_p, weak_se [ticks][PVID_REFINE_P]: estimates
  * of the weak form that are new at a tick, NaN at all others. Results, each NULL or [ticks]: the reason; the running
- * hash (pvid/fnv_refine.h); r and standard errors [parameters] as published, 0 before the first publication. */
+ * hash (pvid/fnv_refine.h); r and standard errors [parameters] as published, 0 where there is none. */
 void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_samples, const float samples[],
                             const float weak_p[], const float weak_se[], uint32_t *running_hash, uint8_t reason[],
                             uint32_t hash[], float r[], float se[]);

@@ -140,9 +140,9 @@ def test_every_function_that_takes_a_struct_has_its_sizes_in_its_name() -> None:
     pointer = re.compile(rf"\b({'|'.join(sorted(structs))}) \*")
     prototypes = re.findall(r"^(?!static|typedef|extern)([a-z][\w *]*?(pvid_\w+)\([^;{]*\));", all_text, re.MULTILINE)
     given = {name for prototype, name in prototypes if pointer.search(prototype)}
-    listed = re.findall(r"^#define (pvid_\w+) PVID_SIZED\((pvid_\w+)\)$", all_text, re.MULTILINE)
-    assert all(one == other for one, other in listed)
-    assert given and given | {"pvid_estimator_defaults_f32", "pvid_refine_stage_f32"} == {one for one, _ in listed}
+    listed = re.findall(r"^#define (pvid_\w+) PVID_(SIZED|REFINED)\((pvid_\w+)\)$", all_text, re.MULTILINE)
+    assert all(one == other and ("_refine_" in one) == (how == "REFINED") for one, how, other in listed)
+    assert given and given | {"pvid_estimator_defaults_f32", "pvid_refine_stage_f32"} == {one for one, _, _ in listed}
 
 
 def test_a_size_costs_nothing_on_a_board(tmp_path: Path) -> None:

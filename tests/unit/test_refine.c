@@ -345,7 +345,7 @@ static void test_it_waits_for_the_weak_form(void **state)
 
 /* ---- blocks, of samples at 1 kHz whose input is measured ---- */
 
-#define TICKS 9000u
+#define TICKS 16000u
 #define END 4u /* phase of refine_f32.c: a block's passes are done */
 #define FIRST_WEAK 1000u
 
@@ -518,6 +518,109 @@ static void test_a_search_behind_a_lost_track_remembers_the_refusals(void **stat
     assert_true(!(refinement.clash < remembered));
 }
 
+/* ---- what is published ---- */
+
+/* Steps until a block ends, with an estimate of the weak form at the first tick; *tick: the first one, then the one
+ * behind. Returns what the block told. */
+static pvid_reason next_block(const pvid_estimate_f32 *weak, uint32_t *tick)
+{
+    pvid_reason reason = pvid_refine_step_f32(&refinement, samples[*tick], weak);
+    while ((reason == PVID_ACCUMULATED) && ((*tick + 1u) < TICKS)) {
+        (*tick)++;
+        reason = pvid_refine_step_f32(&refinement, samples[*tick], NULL);
+    }
+    (*tick)++;
+    return reason;
+}
+
+/* The number of estimates that another context reads; 0: none stands. */
+static uint32_t number_read(void)
+{
+    pvid_refine_estimate_f32 copy;
+    uint32_t number = 77;
+    assert_true(pvid_refine_read_f32(&refinement, &copy, &number));
+    assert_memory_equal(&copy, &refinement.estimate, sizeof copy);
+    return number;
+}
+
+static void test_an_estimate_that_disagrees_is_held_and_the_published_one_withdrawn(void **state)
+{
+    (void)state;
+    begin_run();
+    uint32_t tick = run_until(is_published, 0);
+    const uint32_t number = number_read();
+    assert_true(number > 0u);
+    pvid_estimate_f32 weak = weak_estimate();
+    weak.p[2] *= 1.1f;
+    weak.se[2] = 0.01f;
+    assert_int_equal(next_block(NULL, &tick), PVID_UPDATED); /* of the block before */
+    assert_int_equal(next_block(&weak, &tick), PVID_HELD_DISAGREES);
+    assert_int_equal(pvid_refine_reason_f32(&refinement), PVID_HELD_DISAGREES);
+    assert_true(refinement.taken > 0u); /* it is in the track all the same */
+    assert_null(pvid_refine_latest_f32(&refinement));
+    assert_int_equal(number_read(), 0);
+    weak = weak_estimate();
+    assert_int_equal(next_block(&weak, &tick), PVID_UPDATED);
+    assert_int_equal(number_read(), number + 1u);
+    is_near_the_truth();
+}
+
+static void test_the_published_estimate_outlives_one_refused_block_and_not_the_loss_of_the_track(void **state)
+{
+    (void)state;
+    begin_run();
+    uint32_t tick = run_until(is_published, 0);
+    assert_int_equal(next_block(NULL, &tick), PVID_UPDATED);
+    for (uint32_t refused = 1; refused <= 2u; refused++) {
+        tick = run_until(is_at_its_end, tick);
+        refinement.solve.residual = 1.0f;
+        assert_int_equal(next_block(NULL, &tick), PVID_HELD_BLOCK);
+        assert_int_equal(number_read(), (refused == 1u) ? 1u : 0u);
+        assert_true((pvid_refine_latest_f32(&refinement) == NULL) == (refused == 2u));
+    }
+    (void)run_until(is_published, tick);
+    assert_int_equal(number_read(), 2);
+    is_near_the_truth();
+}
+
+static void test_the_best_estimate_is_the_refined_one_while_it_stands(void **state)
+{
+    (void)state;
+    pvid_estimate_f32 best;
+    pvid_estimate_f32 weak = weak_estimate();
+    for (size_t i = 0; i < PVID_MAX_P; i++) {
+        for (size_t j = 0; j < PVID_MAX_P; j++) {
+            weak.covariance[i][j] = 0.25f;
+        }
+    }
+    weak.kappa = 0.125f;
+    begin_run();
+    assert_int_equal(pvid_refine_best_f32(&refinement, &weak, &best), PVID_STAGE_WEAK);
+    assert_memory_equal(&best, &weak, sizeof best);
+    (void)run_until(is_published, 0);
+    assert_int_equal(pvid_refine_best_f32(&refinement, &weak, &best), PVID_STAGE_REFINED);
+    static const size_t places[PVID_REFINE_P] = {0, 1, 2, 6}; /* w, d1, d2, c */
+    for (size_t i = 0; i < PVID_REFINE_P; i++) {
+        assert_memory_equal(&best.p[i], &refinement.estimate.r[places[i]], sizeof best.p[i]);
+        assert_memory_equal(&best.se[i], &refinement.estimate.se[places[i]], sizeof best.se[i]);
+        assert_true(fabsf((sqrtf(best.covariance[i][i]) / best.se[i]) - 1.0f) <
+                    1.0e-6f); /* of p, not of its logarithm */
+        for (size_t j = 0; j < PVID_MAX_P; j++) {
+            assert_memory_equal(&best.covariance[i][j], &best.covariance[j][i], sizeof best.p[i]);
+            assert_true((j < PVID_REFINE_P) || ((best.covariance[i][j] >= 0.0f) && (best.covariance[i][j] <= 0.0f)));
+        }
+    }
+    const float expected = refinement.estimate.covariance[0][6] * refinement.estimate.r[0]; /* c has no logarithm */
+    assert_true(fabsf((best.covariance[0][3] / expected) - 1.0f) < 1.0e-6f);
+    assert_true((best.kappa >= 0.125f) && (best.kappa <= 0.125f));
+    best.kappa = 7.0f;
+    assert_int_equal(pvid_refine_best_f32(&refinement, NULL, &best), PVID_STAGE_WEAK);
+    assert_true((best.kappa >= 7.0f) && (best.kappa <= 7.0f));
+    assert_int_equal(pvid_refine_best_f32(&refinement, &weak, NULL), PVID_STAGE_WEAK);
+    assert_int_equal(pvid_refine_best_f32(NULL, &weak, &best), PVID_STAGE_WEAK);
+    assert_memory_equal(&best, &weak, sizeof best);
+}
+
 static void test_a_gap_ends_a_longer_block_of_used_samples(void **state)
 {
     (void)state;
@@ -631,6 +734,9 @@ int main(void)
         cmocka_unit_test(test_a_search_grows_in_its_first_samples),
         cmocka_unit_test(test_a_longer_block_of_used_samples_is_judged_by_its_own_level),
         cmocka_unit_test(test_a_search_behind_a_lost_track_remembers_the_refusals),
+        cmocka_unit_test(test_an_estimate_that_disagrees_is_held_and_the_published_one_withdrawn),
+        cmocka_unit_test(test_the_published_estimate_outlives_one_refused_block_and_not_the_loss_of_the_track),
+        cmocka_unit_test(test_the_best_estimate_is_the_refined_one_while_it_stands),
         cmocka_unit_test(test_a_gap_ends_a_longer_block_of_used_samples),
         cmocka_unit_test(test_rounding_to_counts_leaves_no_bias),
         cmocka_unit_test(test_new_estimates_at_every_tick_do_not_starve_it),

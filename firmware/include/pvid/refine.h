@@ -15,8 +15,9 @@
  *   config.refine = &second;
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick:     reason = pvid_weak_step_f32(&identifier, sample);          both stages
- *   same context:  estimate = pvid_refine_latest_f32(&refinement);               NULL: the weak form's stands
- *   other context: if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
+ *   same context:  stage = pvid_refine_best_f32(&refinement, pvid_weak_estimate_f32(&identifier), &estimate);
+ *   other context: pvid_publication_put_f32 of that estimate (publication.h), or
+ *                  if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
  * The model: refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is spread over the ticks,
  * one job each; that of a tick is bounded (with the weak form 1 500 instructions on a Cortex-M4F for the pendulum). A
@@ -95,11 +96,14 @@ typedef struct {
                     block that is refused in the track counts with clash_max times the level */
 } pvid_refine_estimate_f32;
 
+/* Whose estimate is published. */
+typedef enum { PVID_STAGE_WEAK, PVID_STAGE_REFINED } pvid_stage;
+
 /* State: detail/refine_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_refine_f32 pvid_refine_f32;
 
-/* The functions below, for the configuration of the weak form, which then calls them: only latest, read and
- * reason are left to the application. */
+/* The functions below, for the configuration of the weak form, which then calls them: only best, latest, read
+ * and reason are left to the application. */
 extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
 
 /* Initialises `self`. Fails iff
@@ -119,15 +123,25 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
  *   - PVID_ACCUMULATED at all other ticks. */
 pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak);
 
-/* The published estimate, for the context that calls step; NULL before the first one. */
+/* The published estimate, for the context that calls step; NULL: there is none. It stands until the next one, but is
+ * withdrawn when the track is lost (two blocks in a row that do not fit to their past), or when a block's estimate is
+ * too uncertain or disagrees with the weak form's. The next one may be published many blocks later. */
 const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self);
 
 /* What the last block told: as step, at the end of a block. PVID_WARMING_UP before the first one, PVID_NOT_READY
  * without init. */
 pvid_reason pvid_refine_reason_f32(const pvid_refine_f32 *self);
 
-/* Copies the published estimate from any context (publication.h). *number: estimates published so far, 0: none; may be
- * NULL. Fails iff
+/* The estimate that both stages publish, for the context that calls step: p, standard errors and covariance of the
+ * refinement while its estimate stands (see latest), else those of the weak form's published one, `weak`, which the
+ * rest of *estimate always has. Returns whose it is; pvid_refine_reason_f32 is the reason: PVID_UPDATED, or why the
+ * last block gave no new estimate. The weak form's without init. Nothing is copied iff `weak` or `estimate` is NULL.
+ * Cost on a Cortex-M4F: 500 instructions. */
+pvid_stage pvid_refine_best_f32(const pvid_refine_f32 *self, const pvid_estimate_f32 *weak,
+                                pvid_estimate_f32 *estimate);
+
+/* Copies the published estimate from any context (publication.h). *number: estimates published so far, 0: there is
+ * none, or it was withdrawn; may be NULL. Fails iff
  *   - an estimate was published during each of PVID_READ_ATTEMPTS attempts, or
  *   - `self` is not initialised. */
 bool pvid_refine_read_f32(const pvid_refine_f32 *self, pvid_refine_estimate_f32 *estimate, uint32_t *number);

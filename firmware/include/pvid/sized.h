@@ -39,6 +39,11 @@
                   PVID_MAX_HARMONICS, PVID_MAX_KINDS, PVID_MAX_COLUMNS, PVID_MAX_POWER, PVID_MAX_BLOCKS,               \
                   PVID_MAX_WINDOWS, PVID_ENUM_SIZE)
 
+/* Symbols of the refinement contain its mechanism too (refine_shape.h): with another one it is a link error. */
+#define PVID_REFINED_AS(name, id) name##_model##id
+#define PVID_REFINED_OF(name, id) PVID_REFINED_AS(name, id)
+#define PVID_REFINED(name) PVID_SIZED(PVID_REFINED_OF(name, PVID_REFINE_MODEL_ID))
+
 /* differentiator.h */
 #define pvid_differentiator_init_f32 PVID_SIZED(pvid_differentiator_init_f32)
 #define pvid_differentiator_reset_f32 PVID_SIZED(pvid_differentiator_reset_f32)
@@ -139,25 +144,26 @@
 #define pvid_snapshot_restore_strong_q31 PVID_SIZED(pvid_snapshot_restore_strong_q31)
 
 /* refine.h */
-#define pvid_refine_init_f32 PVID_SIZED(pvid_refine_init_f32)
-#define pvid_refine_step_f32 PVID_SIZED(pvid_refine_step_f32)
-#define pvid_refine_latest_f32 PVID_SIZED(pvid_refine_latest_f32)
-#define pvid_refine_read_f32 PVID_SIZED(pvid_refine_read_f32)
-#define pvid_refine_gap_f32 PVID_SIZED(pvid_refine_gap_f32)
-#define pvid_refine_freeze_f32 PVID_SIZED(pvid_refine_freeze_f32)
-#define pvid_refine_reason_f32 PVID_SIZED(pvid_refine_reason_f32)
-#define pvid_refine_stage_f32 PVID_SIZED(pvid_refine_stage_f32)
+#define pvid_refine_init_f32 PVID_REFINED(pvid_refine_init_f32)
+#define pvid_refine_step_f32 PVID_REFINED(pvid_refine_step_f32)
+#define pvid_refine_best_f32 PVID_REFINED(pvid_refine_best_f32)
+#define pvid_refine_latest_f32 PVID_REFINED(pvid_refine_latest_f32)
+#define pvid_refine_read_f32 PVID_REFINED(pvid_refine_read_f32)
+#define pvid_refine_gap_f32 PVID_REFINED(pvid_refine_gap_f32)
+#define pvid_refine_freeze_f32 PVID_REFINED(pvid_refine_freeze_f32)
+#define pvid_refine_reason_f32 PVID_REFINED(pvid_refine_reason_f32)
+#define pvid_refine_stage_f32 PVID_REFINED(pvid_refine_stage_f32)
 
 /* fnv_refine.h */
-#define pvid_fnv_refine_f32 PVID_SIZED(pvid_fnv_refine_f32)
+#define pvid_fnv_refine_f32 PVID_REFINED(pvid_fnv_refine_f32)
 
 /* snapshot_weak.h */
 #define pvid_snapshot_save_weak_f32 PVID_SIZED(pvid_snapshot_save_weak_f32)
 #define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
 
 /* snapshot_refine.h */
-#define pvid_snapshot_save_refine_f32 PVID_SIZED(pvid_snapshot_save_refine_f32)
-#define pvid_snapshot_restore_refine_f32 PVID_SIZED(pvid_snapshot_restore_refine_f32)
+#define pvid_snapshot_save_refine_f32 PVID_REFINED(pvid_snapshot_save_refine_f32)
+#define pvid_snapshot_restore_refine_f32 PVID_REFINED(pvid_snapshot_restore_refine_f32)
 
 /* snapshot_weak_q31.h */
 #define pvid_snapshot_save_weak_q31 PVID_SIZED(pvid_snapshot_save_weak_q31)

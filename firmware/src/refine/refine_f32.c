@@ -403,10 +403,18 @@ static void assess(pvid_refine_f32 *self)
 static void publish(pvid_refine_f32 *self)
 {
     if (self->verdict == PVID_UPDATED) {
-        uint32_t number = self->mark.number[0];
-        pvid_count_up(&number);
+        pvid_count_up(&self->published);
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->candidate, sizeof self->candidate,
-                               number);
+                               self->published);
+    }
+}
+
+/* Withdraws the published estimate if the last block refutes it: one that was not taken in the track does not yet. */
+static void withdraw(pvid_refine_f32 *self)
+{
+    const bool stands = (self->verdict == PVID_UPDATED) || ((self->verdict == PVID_HELD_BLOCK) && (self->taken > 0u));
+    if (!stands && (self->mark.number[0] > 0u)) {
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->estimate, 0, 0);
     }
 }
 
@@ -470,6 +478,7 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
     case NEXT:
         reason = self->verdict;
         self->told = reason;
+        withdraw(self);
         next_block(self);
         break;
     default:

@@ -127,7 +127,8 @@ struct pvid_refine_f32 {
     pvid_refine_front_f32 front;
     pvid_refine_pass_f32 work;
     pvid_refine_solve_f32 solve;
-    pvid_publication_mark mark;
+    uint32_t published;         /* estimates so far */
+    pvid_publication_mark mark; /* with 0 while there is none */
     pvid_refine_estimate_f32 candidate;
     pvid_refine_estimate_f32 estimate;
     pvid_refine_estimate_f32 copy;

@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.models.simulated_rig import SimulatedRig
     from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
+    from pvid.settings.refine import RefineConfig
     from pvid.settings.weak import WeakConfig
 
 _MODEL = click.argument("model", metavar="MODEL")
@@ -161,7 +162,8 @@ def build(
     In the CMakeLists.txt of your firmware: add_subdirectory(OUT) and target_link_libraries(my_firmware PRIVATE NAME).
 
     NAME_design_f32.h has the tables and settings of the weak form for the rig of --run, or for the shipped rig of a
-    shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point. With --strong,
+    shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point. NAME_refine_design_f32.h has the
+    settings of the second stage, which fits the full equations (host/docs/firmware.md). With --strong,
     NAME_strong_design_f32.h has the differentiators and settings of the strong form.
     """
     from pvid.codegen import build as generated
@@ -185,7 +187,10 @@ def build(
     if design is not None:
         fixed_weak, no_fixed_weak = _fixed_weak(compiled, rig, run_path, columns, functions, soft, title)
     strong_design = _strong_design_of(compiled, rig, model, run_path, columns) if strong else None
-    options = generated.Options(limits, soft, strong, design, fixed_weak, strong_design)
+    refine_design, no_refinement = None, generated.refine_refusal(compiled)
+    if design is not None and no_refinement is None:
+        refine_design, no_refinement = _refine_design_of(compiled, rig, run_path, columns, design, soft)
+    options = generated.Options(limits, soft, strong, design, fixed_weak, strong_design, refine_design)
     if not only_check:
         for path in generated.build(compiled, out, title, options):
             click.echo(path)
@@ -197,6 +202,8 @@ def build(
             write_stderr(f"pvid: no weak form in C: {reason}")
         if no_fixed_weak is not None:
             write_stderr(f"pvid: no weak form in fixed point: {no_fixed_weak}")
+        if no_refinement is not None:
+            write_stderr(f"pvid: no refinement in C: {no_refinement}")
         if reason is None and design is None:
             write_stderr("pvid: no design of a rig: give a recording of it with --run")
         return DONE
@@ -309,6 +316,28 @@ def _strong_design_of(
     run = simulation.run()
     signals = {one.name: run[one.name] for one in compiled.signals}
     return strong_design(compiled, Recording(run["t"], signals, simulation.rig.sample_rate)).config
+
+
+def _refine_design_of(
+    compiled: CompiledModel,
+    rig: MechanismRig | RigFile | None,
+    run_path: Path | None,
+    columns: str | None,
+    design: WeakConfig,
+    soft_signs: dict[str, float],
+) -> tuple[RefineConfig | None, str | None]:
+    """Of the refinement behind the weak form, or why there is none."""
+    from pvid.run.engine_design import simulated_run_of
+    from pvid.run.refine_design import refine_design
+
+    try:
+        if run_path is not None:
+            recording = recorded(compiled, rig, run_path, columns)
+            return refine_design(compiled, design, recording.signals, soft_signs=soft_signs), None
+        run, _, p = simulated_run_of(compiled)
+        return refine_design(compiled, design, run, p, soft_signs), None
+    except PvidError as error:
+        return None, str(error)
 
 
 def _design_of(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.core.native import Native, Publisher
+from pvid.settings.enums import Stage
 from pvid.settings.record import Record
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig
@@ -91,7 +92,7 @@ class RefinedRecord:
     ----------
     told : reason of the refinement's last block, uint8 [ticks]
     weak_p, weak_se : estimates of the weak form, trusted or not, where they are new [ticks, p]; NaN at all others
-    r, se : published parameters and standard errors of the refinement [ticks, parameters]; 0 before the first one
+    r, se : published parameters and standard errors of the refinement [ticks, parameters]; 0 where there is none
     hash : running hash of both stages, uint32 [ticks]
     """
 
@@ -116,9 +117,16 @@ class RefinedIdentifier(WeakIdentifier):
 
     @property
     def refined(self) -> npt.NDArray[np.void] | None:
-        """The published estimate of the refinement; None before the first one."""
+        """The published estimate of the refinement; None: there is none."""
         number = int(self.refinement.mark.number[0])
         return self.native.headers.viewed(self.refinement.estimate) if number else None
+
+    @property
+    def best(self) -> tuple[Stage, npt.NDArray[np.void]]:
+        """Whose estimate is published, and the estimate."""
+        library, estimate = self.native.library, self.native.headers.ffi.new("pvid_estimate_f32 *")
+        stage = library.pvid_refine_best_f32(self.refinement, library.pvid_weak_estimate_f32(self.state), estimate)
+        return Stage(stage), self.native.headers.viewed(estimate[0]).copy()
 
     def run_both(self, samples: npt.ArrayLike) -> RefinedRecord:
         """Steps through samples [ticks, samples]."""

@@ -31,8 +31,8 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0) -> RefineConfig:
     ratio = math.floor(rig.sample_rate / (_STEPS_OF_FAST * rig.fast_hz))
     if ratio < 1:
         raise PvidError(
-            f"the refinement needs {_STEPS_OF_FAST:g} samples of the fastest period: a sample rate of "
-            f"{_STEPS_OF_FAST * rig.fast_hz:.4g} Hz, not {rig.sample_rate:g}"
+            f"the refinement needs {_STEPS_OF_FAST:g} samples of the fastest motion's period, {1 / rig.fast_hz:.3g} s: "
+            f"a sample rate of {_STEPS_OF_FAST * rig.fast_hz:.4g} Hz, not {rig.sample_rate:g}"
         )
     ratio = min(ratio, 255)
     h = ratio / rig.sample_rate

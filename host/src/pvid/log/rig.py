@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -83,6 +84,23 @@ def rig_in(text: str) -> RigFile | None:
     engine = document.pop("engine", None)
     rig = rig_of_document(document) if isinstance(engine, dict) else RigFile.of_document(document)
     return rig if isinstance(rig, RigFile) else None
+
+
+def described_document_of_log(path: Path) -> dict[str, Any] | None:
+    """The tables of the rig in a log of a described mechanism, without the engine's; None: the log has another rig, or
+    none.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, or the rig file in it is none.
+    """
+    text = _text_of_log(path)
+    if text is None or rig_in(text) is not None:
+        return None
+    document = toml_document(text)
+    del document["engine"]
+    return document
 
 
 def mechanism_of_log(path: Path) -> Mechanism:

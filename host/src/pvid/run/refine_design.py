@@ -10,13 +10,16 @@ import numpy.typing as npt
 import sympy as sp
 
 from pvid.base.errors import PvidError
-from pvid.codegen.refine import RefineFunctions
+from pvid.codegen import files_refine
+from pvid.codegen.build import Options, refine_functions
+from pvid.codegen.refine import RefineFunctions, signs_of
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
+from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Jet
 from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
-from pvid.settings.weak import Source
+from pvid.settings.weak import Source, WeakConfig
 
 Float = npt.NDArray[np.float64]
 
@@ -25,6 +28,42 @@ _LEAST = 4.0  # periods of the fastest motion in a block
 _STATES = 40  # of the run that are looked at
 _A_PERIOD = 48.0  # steps in a period
 _MARGIN = 1.5  # ranges over what the run has of them
+
+
+def refine_design(
+    compiled: CompiledModel,
+    config: WeakConfig,
+    run: Mapping[str, npt.ArrayLike],
+    p: npt.ArrayLike | None = None,
+    soft_signs: Mapping[str, float] | None = None,
+) -> RefineConfig:
+    """Settings of the refinement for a rig, behind its weak form.
+
+    Parameters
+    ----------
+    config : of the weak form
+    run : of the rig: name of each signal -> samples
+    p : parameters near those of the rig; None: those that the weak form starts at
+    soft_signs : argument of a sign -> width of the soft sign in its place
+
+    Raises
+    ------
+    PvidError
+        Where the refinement in C does not have what the model needs: the reason in a sentence.
+    """
+    widths = dict(soft_signs or {})
+    made = refine_functions(compiled, Options(soft_signs=widths))
+    files_refine.check_outputs(made)
+    sharp = [str(one) for one in signs_of(made.model) if str(one) not in widths]
+    if sharp:
+        raise PvidError(
+            f"{compiled.name} has a sharp friction, sgn({sharp[0]}), within whose reversal the refinement in C makes "
+            f"too few steps: --soft-sign {sharp[0]}=WIDTH makes it a soft one"
+        )
+    near = config.estimator.start if p is None else p
+    settings = refine_settings(made, run, config.sample_rate, near, 4 * config.hop_s)
+    own = made.model.refinement.equations
+    return settings if own else replace(settings, se_max=config.trust.se_max)
 
 
 def refine_settings(
@@ -52,7 +91,7 @@ def refine_settings(
     signal = []
     for name, order, scale in samples:
         if name not in names:
-            raise PvidError(f"{model.name}: the refinement in C has no input {name}, which is no sample")
+            raise PvidError(f"{model.name}: its input {name} is no sample")
         x = np.asarray(run[name], float)
         largest = np.nanmax(np.abs(x)) if order == 0 else np.nanmax(np.abs(_curvature(x, rate, block_s)))
         place = names.index(name)
@@ -79,7 +118,9 @@ def _input(made: RefineFunctions, jet: Jet) -> tuple[str, int, float]:
     found = [one for one in value.atoms(Jet) if one.order in (0, 2)]
     scale = sp.simplify(value / found[0]) if len(found) == 1 else None
     if scale is None or not scale.is_number:
-        raise PvidError(f"{model.name}: the refinement in C has no input {value}: only samples and their second rates")
+        raise PvidError(
+            f"{model.name} has the input {value}; those of the refinement in C are samples and their second rates"
+        )
     return found[0].of, found[0].order, float(scale)
 
 

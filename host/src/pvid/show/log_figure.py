@@ -45,12 +45,12 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
     if not len(t):
         raise PvidError(f"{log} holds no estimate: there is nothing to plot")
     model = history.model
-    panels = len(model.parameters) + 2 + len(model.channels)
+    panels = len(model.published) + 2 + len(model.channels)
     rows = -(-panels // _COLUMNS)
     figure, grid = plt.subplots(rows, _COLUMNS, squeeze=False, figsize=(13, 1.5 + 1.9 * rows), layout="constrained")
     try:
         axes = list(grid.T.flat)
-        for one, axis in zip(model.parameters, axes, strict=False):
+        for one, axis in zip(model.published, axes, strict=False):
             value, band = history.estimates(one.name), 2 * history.estimates(f"{one.name}_se")
             axis.fill_between(t, value - band, value + band, color="C0", alpha=0.25, label="±2 standard errors")
             axis.plot(t, value, color="C0", linewidth=1.2, label="estimate")
@@ -58,7 +58,7 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
             if math.isfinite(low) and low < high:
                 axis.set_ylim(low, high)
             axis.set_ylabel(one.name_and_unit)
-        rest = axes[len(model.parameters) :]
+        rest = axes[len(model.published) :]
         _quality(history, rest[0], rest[1])
         seconds, *signals = history.samples()
         for channel, x, axis in zip(model.channels, signals, rest[2:], strict=False):
@@ -93,7 +93,7 @@ def _last(history: History) -> str:
     """The last estimate in words."""
     newest = history.newest
     parts = []
-    for one in history.model.parameters:
+    for one in history.model.published:
         if math.isfinite(newest.get(one.name, math.nan)):
             value, error = with_error(newest[one.name], newest[f"{one.name}_se"])
             parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())

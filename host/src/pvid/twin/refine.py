@@ -108,7 +108,9 @@ class RefineTwin:
         self.start, self.expected = np.zeros(shape.states, _F), np.zeros(shape.states, _F)
         self.covariance = np.zeros((n, n), _F)
         self.verdict = Reason.UPDATED
-        self.estimate: RefineEstimate | None = None
+        self.told = Reason.WARMING_UP  # of the last block
+        self.estimate: RefineEstimate | None = None  # published, not withdrawn
+        self.published = 0  # estimates so far
         self.hash = START
 
     # ---- blocks ----
@@ -358,6 +360,11 @@ class RefineTwin:
             self._begin_anew()
             self._begin_block()
 
+    def _withdraw(self) -> None:
+        """The published estimate, if the last block refutes it."""
+        if self.verdict != Reason.UPDATED and not (self.verdict == Reason.HELD_BLOCK and self.taken > 0):
+            self.estimate = None
+
     def _do(self) -> Reason:
         match self.phase:
             case Phase.WAIT:
@@ -384,9 +391,11 @@ class RefineTwin:
             case Phase.PUBLISH:
                 if self.verdict == Reason.UPDATED:
                     self.estimate = self.candidate
+                    self.published += 1
                 self.phase = Phase.NEXT
             case Phase.NEXT:
-                reason = self.verdict
+                reason = self.told = self.verdict
+                self._withdraw()
                 self._next_block()
                 return reason
         return Reason.ACCUMULATED
@@ -426,10 +435,16 @@ class RefineTwin:
             return self._do()
         return Reason.WARMING_UP if self.phase is Phase.WAIT else Reason.ACCUMULATED
 
-    def _fold(self, reason: Reason) -> None:
+    def _state(self, reason: Reason) -> bytes:
+        """The bytes that a hash covers, as in fnv_refine.h."""
         values = np.concatenate([self.linear, self.work.state, [self.level]]).astype(_F)
         words = np.where(np.isfinite(values), values.view(np.uint32), np.uint32(0x7FC00000))
-        self.hash = fold_bytes(self.hash, words.astype("<u4").tobytes() + int(reason).to_bytes(4, "little"))
+        return words.astype("<u4").tobytes() + int(reason).to_bytes(4, "little")
+
+    @property
+    def hashed(self) -> bytes:
+        """What the running hash of both stages covers of the refinement after a tick."""
+        return self._state(self.told)
 
     def run(self, samples: npt.ArrayLike, weak_p: npt.ArrayLike, weak_se: npt.ArrayLike) -> TwinRefineRecord:
         """Steps through samples [ticks, samples] with the weak form's new estimates, else NaN [ticks, p]."""
@@ -444,7 +459,7 @@ class RefineTwin:
         with np.errstate(all="ignore"):
             for tick in range(ticks):
                 reason = self.step(given[tick], p[tick], se[tick])
-                self._fold(reason)
+                self.hash = fold_bytes(self.hash, self._state(reason))
                 record.reason[tick], record.hash[tick] = reason, self.hash
                 if self.estimate is not None:
                     record.r[tick], record.se[tick] = self.estimate.r, self.estimate.se

@@ -39,6 +39,7 @@ class Finish:
     Attributes
     ----------
     alone : the next window has no neighbour before it
+    candidate : the estimate of the last window [lanes], published or not
     """
 
     def __init__(self, config: WeakConfig, dt: np.float32, estimator: RelativeEstimator, trust: Trust) -> None:
@@ -55,6 +56,7 @@ class Finish:
         ]
         self.scores = Scores(len(estimator.p), estimator.forgetting_s * windows_hz)
         self.alone = False
+        self.candidate: Candidate = np.zeros_like(trust.estimate)
 
     # ---- number of stages
 
@@ -276,7 +278,9 @@ class Finish:
         """The verdict; a tick later the publication."""
         verdict = self.trust.decide(reason, size, above_noise, variance_ratio, candidate)
         yield None
-        yield self.trust.publish(verdict, reason, candidate)
+        reported = self.trust.publish(verdict, reason, candidate)
+        self.candidate = np.where(verdict == Reason.UPDATED, self.trust.estimate, candidate)  # with what it neglects
+        yield reported
 
     def _cluster(self, candidate: Candidate) -> None:
         """The larger of the two standard errors of each parameter; the covariance grows with it."""
