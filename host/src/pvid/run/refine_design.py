@@ -61,7 +61,7 @@ def refine_design(
     if sharp:
         raise PvidError(
             f"{compiled.name} has a sharp friction, sgn({sharp[0]}), within whose reversal the refinement in C makes "
-            f"too few steps: --soft-sign {sharp[0]}=WIDTH makes it a soft one"
+            f"too few steps: `model build --soft-sign {sharp[0]}=WIDTH` makes it a soft one"
         )
     near = config.estimator.start if p is None else p
     settings = refine_settings(made, run, config.sample_rate, near, 4 * config.hop_s)
