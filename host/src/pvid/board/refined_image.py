@@ -18,10 +18,9 @@ from pvid.codegen.weak_library import weak_native
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
-from pvid.run.refine_design import refine_settings
+from pvid.run.refine_design import full_pendulum, refine_settings
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
-from pvid.sim.pendulum import simulate, standard_sensors
 
 _START = "#define REPLAY_INIT pvid_weak_init_f32"
 _HASH = "#define REPLAY_HASH pvid_fnv_estimator_f32"
@@ -63,8 +62,7 @@ def refined_pendulum(ticks: int) -> RefinedRun:
         Where it is not published within `ticks`.
     """
     run = refined_run(DEFAULT, ticks)
-    found = simulate(sensors=standard_sensors(14), truth="full", duration=(ticks + 1) / 1000.0, seed=1).run
-    measured = {"phi": found.phi, "y": found.y}
+    measured = full_pendulum((ticks + 1) / 1000.0)
     samples = np.stack([measured[one] for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
     run = replace(run, weak=replace(run.weak, counts=np.rint(samples / run.weak.lsb).astype(np.int32)))
     published = np.flatnonzero(run.native().run_both(run.weak.samples).told == Reason.UPDATED)

@@ -327,15 +327,13 @@ def _refine_design_of(
     soft_signs: dict[str, float],
 ) -> tuple[RefineConfig | None, str | None]:
     """Of the refinement behind the weak form, or why there is none."""
-    from pvid.run.engine_design import simulated_run_of
-    from pvid.run.refine_design import refine_design
+    from pvid.run.refine_design import refine_design, refine_for_simulated_rig
 
     try:
         if run_path is not None:
             recording = recorded(compiled, rig, run_path, columns)
             return refine_design(compiled, design, recording.signals, soft_signs=soft_signs), None
-        run, _, p = simulated_run_of(compiled)
-        return refine_design(compiled, design, run, p, soft_signs), None
+        return refine_for_simulated_rig(compiled, design, soft_signs), None
     except PvidError as error:
         return None, str(error)
 

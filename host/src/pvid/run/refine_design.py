@@ -18,8 +18,11 @@ from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Jet
+from pvid.models.registry import DEFAULT
+from pvid.run.engine_design import Run, simulated_run_of
 from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
 from pvid.settings.weak import Source, WeakConfig
+from pvid.sim.pendulum import simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
 
@@ -58,12 +61,32 @@ def refine_design(
     if sharp:
         raise PvidError(
             f"{compiled.name} has a sharp friction, sgn({sharp[0]}), within whose reversal the refinement in C makes "
-            f"too few steps: --soft-sign {sharp[0]}=WIDTH makes it a soft one"
+            f"too few steps: `model build --soft-sign {sharp[0]}=WIDTH` makes it a soft one"
         )
     near = config.estimator.start if p is None else p
     settings = refine_settings(made, run, config.sample_rate, near, 4 * config.hop_s)
     own = made.model.refinement.equations
     return settings if own else replace(settings, se_max=config.trust.se_max)
+
+
+def refine_for_simulated_rig(
+    compiled: CompiledModel, config: WeakConfig, soft_signs: Mapping[str, float] | None = None
+) -> RefineConfig:
+    """The same for the shipped rig of a mechanism."""
+    run, _, p = simulated_run_of(compiled)
+    return refine_design(compiled, config, run, p, soft_signs)
+
+
+def full_motion_of(compiled: CompiledModel) -> Run:
+    """A run of the shipped rig of a mechanism with the equations of its refinement: of the pendulum the full ones, the
+    other mechanisms have no others."""
+    return full_pendulum() if compiled.name == DEFAULT else simulated_run_of(compiled)[0]
+
+
+def full_pendulum(duration: float = 40.0) -> dict[str, Float]:
+    """The standard rig with its full equations and an encoder of 14 bits: name of each signal -> samples."""
+    found = simulate(sensors=standard_sensors(14), truth="full", duration=duration, seed=1).run
+    return {"phi": found.phi, "y": found.y}
 
 
 def refine_settings(
