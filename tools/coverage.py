@@ -42,12 +42,11 @@ WANTED = 95.0
 PLAY = "import playback; from pvid.core.native import Native; list(playback.digests(Native()))"
 # The weak engine in both arithmetics and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
-    "tests/twin/test_weak_f32.py",
-    "tests/twin/test_weak_bits_q31.py",
-    "tests/twin/test_weak_snapshot_q31.py",
-    "tests/twin/test_second_stage.py",
-    "tests/twin/test_refinement.py",
-    "tests/core/test_snapshot_weak.py",
+    *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_bits_q31", "weak_snapshot_q31", "weak_rows_q31")),
+    *(f"tests/twin/test_{name}.py" for name in ("second_stage", "refinement", "trust_q31", "kinds", "kinds_q31")),
+    *(f"tests/twin/test_{name}.py" for name in ("estimator_q31", "gate", "misfit")),
+    *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
+    "tests/core/test_weak_valid_q31.py",
 )
 # A compiler that counts branches; each call has a folder of its own, since objects of several builds have one name.
 COUNTING = """#!/bin/sh
