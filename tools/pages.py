@@ -49,11 +49,11 @@ SHORT = (
     (r"\b(mps2-an386|microbit)\b", "stream-host", "tests/board has the emulators; they compute the same bits"),
     (r"--on all\b", "--on stream-host", "the same"),
     (r"/dev/ttyACM0 run", "stream-host board", "a board behind a pseudo-terminal of this machine; run.pvlog exists"),
-    (r"(model predict \S+)", r"\1 --drive steps --duration 4", "one drive is enough"),
+    (r"(model predict \S+)(?: --duration \d+)?", r"\1 --drive steps --duration 4", "one short drive is enough"),
     (r"(pvid simulate \S+)", r"\1 --duration 8", "a shorter run"),
     (r"(model simulate \S+ \S+)", r"\1 --duration 5", "a shorter run"),
     (r"(pvid log .*)", r"\1 --paced --samples 3000 --quiet", "a shorter log"),
-    (r"(pvid batch .* -o \S+)(?: --workers 4)?", r"\1 --workers 1", "one process more is enough"),
+    (r"(pvid batch .* -o \S+)(?: --workers 4)?", r"\1 --workers 1", "tests/fleet has a batch by two processes"),
     (r"MODEL --for \S+ --run RUN.csv -o DIR", "dc_motor --for arduino --run motor.csv -o made", "a form, filled in"),
 )
 # ---- blocks that are neither commands nor programs: page, pattern of the first line, what they are and their test
