@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 from collections.abc import Iterator
@@ -46,6 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    gc.set_threshold(50_000, 20, 100)  # modules and SymPy's expressions live to the end: 5 % of the time found nothing
     config.addinivalue_line("markers", "ticks(short, long): the length of a run, here and in `pvid bench long`")
     config.addinivalue_line("markers", "long: in `pvid bench long` alone")
     config.addinivalue_line("markers", "slow: left out of `./tools/test quick`")
