@@ -9,6 +9,9 @@ A deviation names a tool, a rule, a reason, and what it covers: files and a regu
 finding has to match. One that covers nothing any more is an error. So is one of a required rule with more findings than
 its `most`, until a person has looked and run --update. build/analysis/deviations.md is the list with all counts.
 
+A source is not read again while nothing that a tool reads has changed: cppcheck keeps its findings itself, those of the
+others tools/kept.py keeps.
+
 Ports are read as their processor's compilers read them, the applications as for this machine; Debian's avr-gcc is too
 old to have -fanalyzer.
 """

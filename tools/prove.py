@@ -11,6 +11,8 @@ out of bounds, no division by zero, no bad shift, no uninitialised read, and the
 of `taken` are replaced by their contracts in tests/proofs/contracts.h, and their conditions are shown to be met; the
 proof of their own module shows that they keep the contract.
 
+A proof is not done again while nothing that it reads has changed (tools/kept.py).
+
 Where the bound is a relation between several numbers, which intervals do not see, the functions of `deduced` carry
 contracts and loop invariants in their source, and Frama-C's WP proves these, the same absence of faults and that every
 loop ends, goal by goal, with z3.
