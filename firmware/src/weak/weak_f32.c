@@ -276,6 +276,7 @@ PVID_SELDOM static pvid_reason end_half(pvid_weak_f32 *self)
 /* The channels of a step to the present block. */
 PVID_SELDOM static pvid_reason form(pvid_weak_f32 *self)
 {
+    self->busy = true;
     const pvid_weak_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
     pvid_reason dropped = PVID_ACCUMULATED;
@@ -299,6 +300,7 @@ PVID_SELDOM static pvid_reason reject(pvid_weak_f32 *self)
 /* Some harmonics of the last block are added, or of the last window joined. */
 static pvid_reason add(pvid_weak_f32 *self)
 {
+    self->busy = true;
     pvid_weak_sums_f32 *sums = &self->sums;
     for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
         if (pvid_weak_sums_joins_f32(sums)) {
@@ -320,6 +322,7 @@ static pvid_reason add(pvid_weak_f32 *self)
 /* Some stages of the last whole window. */
 static pvid_reason process(pvid_weak_f32 *self)
 {
+    self->busy = true;
     pvid_reason reason = idle(self);
     uint32_t left = self->stages_per_tick;
     do {
@@ -431,13 +434,14 @@ static inline pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
     return follow(self, sample);
 }
 
-/* A tick of both stages. */
+/* A tick of both stages: the second one knows at which the first one has more to do than to take a sample. */
 PVID_SELDOM static pvid_reason both_ticks(pvid_weak_f32 *self, const float sample[])
 {
+    self->busy = false;
     const pvid_reason reason = weak_tick(self, sample);
     const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
     if (sample != NULL) {
-        self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL);
+        (void)self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL, self->busy);
     }
     return reason;
 }

@@ -198,6 +198,7 @@ struct pvid_weak_f32 {
     uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: weak_f32.c */
     bool warm;         /* a window has been complete since the restart */
     bool frozen;       /* complete windows are dropped */
+    bool busy;         /* the last tick did more than to take its samples; with a second stage alone */
     bool watches;      /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
