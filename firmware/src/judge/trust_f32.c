@@ -51,7 +51,7 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
 /* Largest variance with neglected terms: a covariance of two such is finite. */
 #define VARIANCE_MAX 1.0e36f
 
-static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
+PVID_COLD static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
 {
     if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
         return PVID_BAD_PUBLISH_KAPPA;
@@ -87,8 +87,8 @@ void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
 }
 
-pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
-                                const pvid_estimator_f32 *estimator)
+PVID_COLD pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
+                                          const pvid_estimator_f32 *estimator)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
     if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
@@ -293,9 +293,9 @@ PVID_COLD static void add_neglected(const pvid_trust_f32 *self, const pvid_estim
     }
 }
 
-pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
-                                  float size, bool above_noise, float variance_ratio,
-                                  const pvid_estimate_f32 *candidate)
+PVID_COLD pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
+                                            pvid_reason reason, float size, bool above_noise, float variance_ratio,
+                                            const pvid_estimate_f32 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
@@ -308,8 +308,8 @@ pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32
     return verdict_on(self, reason, size, above_noise, error, candidate);
 }
 
-pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
-                                   pvid_reason reason, pvid_estimate_f32 *candidate)
+PVID_COLD pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
+                                             pvid_reason reason, pvid_estimate_f32 *candidate)
 {
     if (verdict == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];

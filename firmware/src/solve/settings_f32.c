@@ -45,11 +45,16 @@ PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f3
     }
     /* in the order of `values` */
     static const range ranges[] = {
-        {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD},  {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE},
-        {0.0f, 1.0e12f, PVID_BAD_FORGETTING},  {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING},
-        {0.0f, 1.0e12f, PVID_BAD_FEEDBACK},    {1.0f, 1.0e6f, PVID_BAD_CORRELATION},
-        {1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT},  {0.0f, 0.999f, PVID_BAD_KAPPA_MIN},
-        {0.0f, 1.0e6f, PVID_BAD_NOISE_MARGIN}, {0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f, PVID_BAD_DEAD_ZONE},
+        {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD},
+        {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE},
+        {0.0f, 1.0e12f, PVID_BAD_FORGETTING},
+        {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING},
+        {0.0f, (PVID_FEEDBACK != 0) ? 1.0e12f : 0.0f, PVID_BAD_FEEDBACK},
+        {1.0f, 1.0e6f, PVID_BAD_CORRELATION},
+        {1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT},
+        {0.0f, 0.999f, PVID_BAD_KAPPA_MIN},
+        {0.0f, 1.0e6f, PVID_BAD_NOISE_MARGIN},
+        {0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f, PVID_BAD_DEAD_ZONE},
     };
     /* fewer than four groups in the time constant of forgetting are none */
     const float groups = (config->forgetting_s > 0.0f) ? (config->forgetting_s * update_rate_hz) : GROUPS_MIN;
@@ -61,7 +66,7 @@ PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f3
             return ranges[i].status;
         }
     }
-    if ((config->law != PVID_LAW_STATIONARY) && (config->law != PVID_LAW_PSEUDOVELOCITY)) {
+    if ((config->law != PVID_LAW_STATIONARY) && ((PVID_FEEDBACK == 0) || (config->law != PVID_LAW_PSEUDOVELOCITY))) {
         return PVID_BAD_LAW;
     }
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
@@ -69,6 +74,9 @@ PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f3
 
 PVID_COLD float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float update_rate_hz, float interval)
 {
+    if (PVID_FEEDBACK == 0) {
+        return 1.0f;
+    }
     if (config->law == PVID_LAW_PSEUDOVELOCITY) {
         return 0.0f;
     }

@@ -15,7 +15,9 @@
 #include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
+#include "solve/state_f32.h"
 #include "solve/step_f32.h"
+#include "number/unroll.h"
 
 enum {
     STAGE_READ,        /* the sums and C */
@@ -48,7 +50,7 @@ static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *b
                              float gradient[])
 {
     const pvid_model_f32 *model = self->model;
-    if (self->settings.gain < 1.0f) {
+    if (pvid_feeds_back_f32(self)) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         model->jacobian(self->p, c);
         pvid_pattern_transpose_times_f32(model, c, block, n, gradient);
@@ -76,7 +78,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const fl
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
-    if (self->settings.gain < 1.0f) {
+    if (pvid_feeds_back_f32(self)) {
         pvid_row_accumulate_innovation_f32(self, model->n_p, gradient, e);
     }
     self->group_rss += e * e;
@@ -86,7 +88,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const fl
     return PVID_ACCUMULATED;
 }
 
-void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance)
+PVID_COLD void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance)
 {
     float tail[2];
     pvid_information_tail_f32(&self->information, tail);
@@ -194,15 +196,16 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
 
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    const pvid_model_f32 *model = self->model;
-    float rhs[PVID_MAX_P];
-    for (size_t a = 0; a < model->n_p; a++) {
-        rhs[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
+    const float *rhs = solve->system.force;
+#if PVID_FEEDBACK
+    float damped[PVID_MAX_P];
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        damped[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
         self->innovation[a] = 0.0f;
     }
-    for (size_t a = 0; a < model->n_p; a++) {
-        solve->p[a] = self->p[a];
-    }
+    rhs = damped;
+#endif
+    memcpy(solve->p, self->p, sizeof solve->p);
     if (solve->reason == PVID_UPDATED) {
         take_step(self, solve, rhs);
     }
@@ -307,7 +310,7 @@ static void reset_solve(const pvid_estimator_f32 *self, pvid_estimator_solve_f32
     solve->estimate = NULL;
 }
 
-void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
+PVID_COLD void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
 {
     reset_solve(self, solve);
     solve->ends_group = ends_group;
@@ -317,7 +320,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
         self->group_weight = 0.0f;
         solve->gain = self->settings.gain;
         solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_READ : STAGE_FOLD);
-    } else if (self->settings.gain < 1.0f) {
+    } else if (pvid_feeds_back_f32(self)) {
         solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
     }
 }
@@ -422,7 +425,7 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
     return finish_stage(solve, repeat);
 }
 
-bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+PVID_COLD bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const float wide = solve->variance * self->settings.correlation;
     bool repeat = false;

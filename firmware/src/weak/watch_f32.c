@@ -51,7 +51,7 @@ bool pvid_weak_watch_beyond_f32(const pvid_weak_watch_f32 *self)
     return self->out[0] || self->out[1];
 }
 
-void pvid_weak_watch_half_f32(pvid_weak_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
+PVID_COLD void pvid_weak_watch_half_f32(pvid_weak_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
 {
     bool still = false;
     const float n = (float)hop;

@@ -29,13 +29,14 @@ uint16_t pvid_weak_front_half_f32(const pvid_weak_design_f32 *design)
     return half;
 }
 
-uint32_t pvid_weak_front_length_f32(const pvid_weak_design_f32 *design)
+PVID_COLD uint32_t pvid_weak_front_length_f32(const pvid_weak_design_f32 *design)
 {
     const uint32_t steps = (2u * (uint32_t)pvid_weak_front_half_f32(design)) + 1u;
     return (uint32_t)design->model->signals * (3u + (2u * steps));
 }
 
-void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design, float sample_rate_hz)
+PVID_COLD void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design,
+                                        float sample_rate_hz)
 {
     const pvid_weak_model_f32 *model = design->model;
     const float ticks = (float)design->decimation;
@@ -54,7 +55,7 @@ void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_
  * from the second tick on. */
 static uint16_t lost(const pvid_weak_front_f32 *self)
 {
-    if (self->decimation > 1u) {
+    if (pvid_weak_decimation(self->decimation) > 1u) {
         return 1;
     }
     return (uint16_t)(((self->needs != PVID_WEAK_NEEDS_NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
@@ -73,6 +74,8 @@ void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self)
     self->wait = self->decimation;
     memset(self->line, 0, 3u * (size_t)self->signals * sizeof self->line[0]);
 }
+
+#if !PVID_EXACT_PLAIN
 
 /* The samples before: all equal to the first one since a restart. */
 static void begin(pvid_weak_front_f32 *self, size_t samples, const float sample[])
@@ -138,6 +141,8 @@ PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvi
         remember(self, model->samples, sample);
     }
 }
+
+#endif
 
 /* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
 static inline float jet_of(const pvid_weak_filter_f32 *filter, uint8_t order, const float *x, size_t stride)
