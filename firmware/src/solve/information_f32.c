@@ -33,16 +33,6 @@ PVID_COLD void pvid_information_init_f32(pvid_information_f32 *self, const pvid_
     }
 }
 
-void pvid_information_block_f32(const pvid_model_f32 *model, size_t i, pvid_block *block)
-{
-    block->first = 0;
-    block->n = model->n_theta;
-    block->moment = 0;
-    if (model->n_kinds > 1u) {
-        pvid_block_among_kinds(model->n_kinds, model->kind_end, i, block);
-    }
-}
-
 static size_t number_of_sums(const pvid_information_f32 *self)
 {
     return (size_t)self->n_moments + self->n_theta + 2u;

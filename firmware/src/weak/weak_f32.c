@@ -110,10 +110,16 @@ static inline pvid_reason idle(const pvid_weak_f32 *self)
     return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
 }
 
-/* What a tick without a step does from now on. */
-static void rest(pvid_weak_f32 *self)
+/* H + 1. */
+static inline uint8_t harmonics_of(const pvid_weak_f32 *self)
 {
-    if (pvid_weak_sums_is_busy_f32(&self->sums, self->harmonics)) {
+    return (PVID_EXACT != 0) ? (uint8_t)PVID_MAX_HARMONICS : self->harmonics;
+}
+
+/* What a tick without a step does from now on. */
+PVID_SELDOM static void rest(pvid_weak_f32 *self)
+{
+    if (pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self))) {
         self->rest = ADD;
     } else {
         self->rest = pvid_weak_finish_is_busy_f32(&self->finish) ? PROCESS : (uint8_t)idle(self);
@@ -303,23 +309,30 @@ PVID_COLD static pvid_reason reject(pvid_weak_f32 *self)
     return PVID_REJECTED_NOT_FINITE;
 }
 
+/* Harmonics that a tick adds or joins. */
+static inline uint32_t items_of(const pvid_weak_f32 *self)
+{
+    return (PVID_EXACT != 0)
+               ? pvid_weak_items_f32(pvid_weak_free_ticks_f32(PVID_MAX_DECIMATION), (uint32_t)PVID_MAX_HARMONICS)
+               : self->items_per_tick;
+}
+
 /* Some harmonics of the last block are added, or of the last window joined. */
 static pvid_reason add(pvid_weak_f32 *self)
 {
     pvid_weak_sums_f32 *sums = &self->sums;
-    for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
-        if (pvid_weak_sums_joins_f32(sums)) {
-            pvid_weak_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_weak_window_f32(self));
-            if (sums->joined == self->harmonics) {
-                pvid_weak_finish_begin_f32(&self->finish);
-                rest(self);
-            }
-        } else {
+    for (uint32_t left = items_of(self); (left > 0u) && pvid_weak_sums_is_busy_f32(sums, harmonics_of(self)); left--) {
+        if (!pvid_weak_sums_joins_f32(sums)) {
             pvid_weak_sums_add_f32(sums, self->design, self->channels);
-            if (!pvid_weak_sums_is_busy_f32(sums, self->harmonics)) {
-                rest(self);
-            }
+            continue;
         }
+        pvid_weak_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_weak_window_f32(self));
+        if (sums->joined == harmonics_of(self)) {
+            pvid_weak_finish_begin_f32(&self->finish);
+        }
+    }
+    if (!pvid_weak_sums_is_busy_f32(sums, harmonics_of(self))) {
+        rest(self);
     }
     return idle(self);
 }

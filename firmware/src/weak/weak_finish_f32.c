@@ -52,7 +52,7 @@ enum {
 };
 
 /* Entries of the noise table, and products of the residuals and of columns, in a stage. */
-#define ENTRIES_PER_STAGE 8u
+#define ENTRIES_PER_STAGE 7u
 #define PRODUCTS_PER_STAGE 30u
 
 /* Most functions with which a stage reflects the real and the imaginary parts of a column. */
@@ -175,9 +175,9 @@ PVID_SELDOM static bool scale_stage(pvid_weak_f32 *self)
 {
     pvid_weak_rows_f32 *rows = &self->finish.work.rows;
     pvid_weak_white_scale_f32(&self->finish.white, self->design);
-    memset(rows->part, 0, sizeof rows->part);
     if (self->finish.kind == 0u) {
         memset(rows->score, 0, sizeof rows->score);
+        memset(self->finish.candidate.covariance, 0, sizeof self->finish.candidate.covariance);
     }
     return false;
 }
@@ -212,63 +212,72 @@ static float weight_of(const pvid_weak_f32 *self)
            self->estimator.information.row_weight;
 }
 
-/* Column `index` of C, the rows of the kind. */
-static void begin_column(pvid_weak_f32 *self, pvid_weak_slopes_f32 *slopes)
+/* The column of C whose non-zeros begin at `other`; of Y, behind the kind's entries, there is none. */
+static void begin_column(const pvid_weak_f32 *self, pvid_weak_slopes_f32 *slopes)
 {
     const pvid_model_f32 *model = self->estimator.model;
-    pvid_weak_finish_f32 *finish = &self->finish;
-    const size_t thetas = kind_of(self)->thetas;
-    if (finish->index == 0u) {
-        model->jacobian(self->estimator.p, slopes->c);
-        if (finish->kind == 0u) {
-            memset(finish->candidate.covariance, 0, sizeof finish->candidate.covariance);
-        }
-    }
-    for (size_t i = 0; i <= thetas; i++) {
+    const size_t end = pvid_pattern_end_f32(model, self->finish.other);
+    for (size_t i = 0; i <= model->n_theta; i++) {
         slopes->column[i] = 0.0f;
         slopes->product[i] = 0.0f;
     }
-    for (size_t k = 0; k < model->n_c; k++) {
-        const size_t row =
-            (size_t)model->c_row[k] - finish->theta; /* beyond `thetas` also for a row before the kind's */
-        if ((model->c_column[k] == finish->index) && (row < thetas)) {
-            slopes->column[row] = slopes->c[k];
-        }
+    for (size_t k = self->finish.other; k < end; k++) {
+        slopes->column[model->c_row[k]] = slopes->c[k];
+    }
+    slopes->column[(size_t)self->finish.theta + kind_of(self)->thetas] = 0.0f;
+}
+
+/* Adds row `index` of C^T V C over the weight of the rows. */
+static void add_noise(pvid_weak_f32 *self, const pvid_weak_slopes_f32 *slopes)
+{
+    pvid_weak_finish_f32 *finish = &self->finish;
+    const pvid_model_f32 *model = self->estimator.model;
+    const float weight = weight_of(self);
+    float *s = finish->candidate.covariance[finish->index];
+    float row[PVID_MAX_P];
+    pvid_pattern_project_row_f32(model, slopes->c, finish->other, slopes->product, row);
+    for (size_t b = finish->index; b < model->n_p; b++) {
+        s[b] += row[b] / weight;
     }
 }
 
-/* C^T V C over the weight of the rows, V as in white_f32.h, by a few entries of the noise table for each column of C.
- * It is in the place of the covariance of the assessment, which comes later. */
+/* C at p; then for each column of it, whose non-zeros begin at `other`, V times it by a few entries of the noise table,
+ * V as in white_f32.h. The sum is in the place of the covariance of the assessment, which comes later. */
 PVID_SELDOM static bool noise_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const pvid_model_f32 *model = self->estimator.model;
     pvid_weak_slopes_f32 *slopes = &finish->work.rows.of_kind.slopes;
-    const size_t all = self->design->n_noise;
-    const size_t end = (size_t)finish->phase * ENTRIES_PER_STAGE;
     if (!checks_noise(self)) {
         return false;
     }
+    const size_t phase = finish->phase;
     finish->phase++;
-    if (end == 0u) {
+    if (phase == 0u) {
+        model->jacobian(self->estimator.p, slopes->c);
+        return true;
+    }
+    const size_t all = self->design->n_noise;
+    const size_t end = phase * ENTRIES_PER_STAGE;
+    const size_t first = end - ENTRIES_PER_STAGE;
+    if (phase == 1u) {
         begin_column(self, slopes);
+    }
+    if (first < all) {
+        pvid_weak_white_pull_f32(&finish->white, self->design, finish->kind, &slopes->column[finish->theta], first,
+                                 (end < all) ? end : all, &slopes->product[finish->theta]);
         return true;
     }
-    pvid_weak_white_pull_f32(&finish->white, self->design, finish->kind, slopes->column, end - ENTRIES_PER_STAGE,
-                             (end < all) ? end : all, slopes->product);
-    if (end < all) {
-        return true;
+    slopes->product[(size_t)finish->theta + kind_of(self)->thetas] = 0.0f; /* of Y */
+    add_noise(self, slopes);
+    finish->phase = 1;
+    finish->other = (uint8_t)pvid_pattern_end_f32(model, finish->other);
+    if (finish->other == model->n_c) {
+        finish->other = 0;
+        return false;
     }
-    const size_t a = finish->index;
-    const pvid_block block = {finish->theta, kind_of(self)->thetas, 0};
-    const float weight = weight_of(self);
-    float row[PVID_MAX_P];
-    pvid_pattern_transpose_times_f32(model, slopes->c, &block, slopes->product, row);
-    for (size_t b = a; b < model->n_p; b++) {
-        finish->candidate.covariance[a][b] += row[b] / weight;
-    }
-    finish->phase = 0;
-    return goes_on(finish, a + 1u, model->n_p);
+    finish->index++;
+    return true;
 }
 
 /* Adds a term of the present column, if it has one. Returns whether another one follows. */
@@ -286,7 +295,7 @@ static bool gather_term(pvid_weak_f32 *self)
     return (finish->term < end) && (term[finish->term].column == finish->index);
 }
 
-/* Rows of a family of the present column from its parts, which are cleared. */
+/* Rows of a family of the present column from its parts. */
 static void reflect_parts(pvid_weak_f32 *self, size_t family)
 {
     pvid_weak_rows_f32 *rows = &self->finish.work.rows;
@@ -300,23 +309,36 @@ static void reflect_parts(pvid_weak_f32 *self, size_t family)
     for (size_t i = 0; i < count; i++) {
         row[i] = part[family + vectors + i];
     }
-    memset(part, 0, sizeof rows->part[0]);
 }
 
-/* The present column: its parts, then the rows of one family after the other. */
+/* No terms yet. */
+static void clear_parts(pvid_weak_f32 *self)
+{
+    float (*part)[PVID_MAX_HARMONICS] = self->finish.work.rows.part;
+    PVID_UNROLL_EXACT
+    for (size_t h = 0; h < pvid_weak_harmonics(self->design); h++) {
+        part[0][h] = 0.0f;
+        part[1][h] = 0.0f;
+    }
+}
+
+/* The present column: its terms, the first of them in phase 0, then the rows of one family after the other. */
 PVID_SELDOM static bool column_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
+    const bool both = self->design->functions <= BOTH_FAMILIES;
     if (finish->phase == 0u) {
-        finish->phase = (uint16_t)(gather_term(self) ? 0u : 1u);
+        clear_parts(self);
+    }
+    if (finish->phase < 2u) {
+        finish->phase = (uint16_t)(gather_term(self) ? 1u : 2u);
         return true;
     }
-    const bool both = self->design->functions <= BOTH_FAMILIES;
-    if (finish->phase == 1u) {
+    if (finish->phase == 2u) {
         reflect_parts(self, 0);
     }
-    if ((finish->phase == 1u) && !both) {
-        finish->phase = 2;
+    if ((finish->phase == 2u) && !both) {
+        finish->phase = 3;
         return true;
     }
     reflect_parts(self, 1);
@@ -745,7 +767,7 @@ PVID_COLD static uint32_t stages_of_columns(const pvid_weak_f32 *self, const pvi
     const uint32_t columns = (uint32_t)columns_of(kind);
     const uint32_t terms = (uint32_t)kind->end - kind->first;
     const uint32_t entries = parts_of(design->n_noise, ENTRIES_PER_STAGE);
-    const uint32_t noise = checks_noise(self) ? ((1u + entries) * design->model->model->n_p) : 1u;
+    const uint32_t noise = checks_noise(self) ? (1u + ((entries + 1u) * design->model->model->n_p)) : 1u;
     const uint32_t reflected = columns * ((design->functions <= BOTH_FAMILIES) ? 1u : 2u);
     const uint32_t shares = parts_of((uint32_t)pvid_weak_harmonics(design), SHARES_PER_STAGE);
     return entries + 2u + (uint32_t)pvid_weak_basis_stages(design) + shares + noise + columns + terms +

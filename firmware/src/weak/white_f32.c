@@ -51,6 +51,11 @@ PVID_COLD void pvid_weak_white_init_f32(pvid_weak_white_f32 *self, const pvid_we
     self->powers = (uint8_t)(highest + 1u);
 }
 
+static inline bool is_of_kind(const pvid_weak_noise_f32 *one, uint8_t kind)
+{
+    return (PVID_MAX_KINDS == 1) || (one->kind == kind);
+}
+
 void pvid_weak_white_weigh_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
                                const float theta[], size_t first, size_t last)
 {
@@ -59,7 +64,7 @@ void pvid_weak_white_weigh_f32(pvid_weak_white_f32 *self, const pvid_weak_design
     }
     for (size_t i = first; i < last; i++) {
         const pvid_weak_noise_f32 *one = &design->noise[i];
-        if (one->kind == kind) {
+        if (is_of_kind(one, kind)) {
             self->weight[one->power] += one->factor * (theta[one->a] * theta[one->b]);
         }
     }
@@ -249,7 +254,7 @@ void pvid_weak_white_pull_f32(const pvid_weak_white_f32 *self, const pvid_weak_d
 {
     for (size_t i = first; i < last; i++) {
         const pvid_weak_noise_f32 *one = &design->noise[i];
-        if (one->kind == kind) {
+        if (is_of_kind(one, kind)) {
             const float half = (0.5f * one->factor) * self->share[one->power];
             out[one->a] += half * x[one->b];
             out[one->b] += half * x[one->a];

@@ -23,7 +23,7 @@ Float32 = npt.NDArray[np.float32]
 Stages = Iterator[Reasons | None]
 
 _F = np.float32
-_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 30, 4
+_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 7, 30, 4
 _BOTH_FAMILIES = 16
 _GATE_MEMORY = _F(4)
 _VARIANCE_MAX = _F(1e36)
@@ -65,7 +65,7 @@ class Finish:
     def _before_columns(self) -> int:
         """Stages of a kind before its columns."""
         basis = 2 * self.design.power + _parts(self.rows.harmonics, _SHARES_PER_STAGE)
-        noise = (1 + self._entries()) * len(self.estimator.p) if self._checks_noise else 1
+        noise = 1 + (self._entries() + 1) * len(self.estimator.p) if self._checks_noise else 1
         return self._entries() + 2 + basis + noise
 
     def _reflections(self, kind: int) -> int:

@@ -1,4 +1,4 @@
-"""Twin of the stages of weak/weak_finish_f32.c that find what the noise of the sensors alone adds to the information."""
+"""Twin of the noise stages of weak/weak_finish_f32.c: what the sensors' noise alone adds to the information."""
 
 from __future__ import annotations
 
@@ -33,17 +33,18 @@ class Noise:
         """Adds C^T V C of a kind with theta from `first` on, V as in `White.pull`."""
         model = self._model
         pattern = list(zip(model.c_row, model.c_column, self._c, strict=True))
-        own = range(first, first + len(white.full) - 1)
+        thetas = len(white.full) - 1
+        own = slice(first, first + thetas)
         with np.errstate(all="ignore"):
             for a in range(model.n_p):
-                column = np.zeros_like(white.full)
+                column, product = (np.zeros((model.n_theta, white.full.shape[1]), np.float32) for _ in range(2))
                 for row, of, c in pattern:
-                    if of == a and row in own:
-                        column[row - first] = c
-                product = white.pull(column)
-                sums = np.zeros((model.n_p, column.shape[1]), np.float32)
-                for row, of, c in pattern:
-                    if row in own:
-                        sums[of] = sums[of] + c * product[row - first]
+                    if of == a:
+                        column[row] = c
+                product[own] = white.pull(np.concatenate([column[own], np.zeros((1, column.shape[1]), np.float32)]))
                 for b in range(a, model.n_p):
-                    self.s[a, b] = self.s[a, b] + sums[b] / self._rows
+                    entry = np.zeros(column.shape[1], np.float32)
+                    for row, of, c in pattern:
+                        if of == b:
+                            entry = entry + c * product[row]
+                    self.s[a, b] = self.s[a, b] + entry / self._rows

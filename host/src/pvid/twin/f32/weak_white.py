@@ -1,7 +1,7 @@
 """Twin of weak/white_f32.c: noise of a kind's rows at p, and the directions that the test functions leave out.
 
-Rows are made of parts of the sums S_h, in two families: real parts of the harmonics 0.., imaginary parts of the harmonics
-1...; both are arrays over all harmonics, with zeros where there is no part.
+Rows are made of parts of the sums S_h, in two families: real parts of the harmonics 0.., imaginary parts of the
+harmonics 1...; both are arrays over all harmonics, with zeros where there is no part.
 """
 
 from __future__ import annotations
