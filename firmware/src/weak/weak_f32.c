@@ -92,10 +92,10 @@ static inline bool is_ready(const pvid_weak_f32 *self)
     return ready;
 }
 
-/* Returns whether a tick only adds its samples; not so before init. */
+/* Returns whether a tick only adds its samples. */
 static inline bool is_plain(const pvid_weak_f32 *self)
 {
-    return (PVID_EXACT != 0) ? (PVID_EXACT_PLAIN != 0) : (self->plain > 0u);
+    return (PVID_EXACT != 0) ? (PVID_EXACT_PLAIN != 0) : self->plain;
 }
 
 /* Returns whether there is a second stage. */
@@ -201,7 +201,8 @@ PVID_COLD static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config
     pvid_weak_step_init_f32(&self->history, (float)pvid_weak_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_weak_watch_init_f32(&self->watch, config, delay_of(design));
     self->watches = (config->range != NULL) || (config->drive_min != NULL);
-    self->plain = self->front.plain ? design->model->samples : 0u;
+    self->samples = design->model->samples;
+    self->plain = self->front.plain;
     if ((PVID_EXACT != 0) &&
         ((self->channels != PVID_EXACT_CHANNELS) || (self->front.plain != (PVID_EXACT_PLAIN != 0)))) {
         return PVID_BAD_DESIGN;
@@ -414,23 +415,28 @@ static bool are_finite(pvid_weak_f32 *self, const float sample[])
     return finite;
 }
 
-/* Every tick whose samples are not the signals, or with one that is not finite or beyond its range. */
-PVID_COLD static pvid_reason other_tick(pvid_weak_f32 *self, const float sample[])
+/* Adds finite samples to the block. */
+static inline void take(pvid_weak_f32 *self, const float sample[])
+{
+#if !PVID_EXACT_PLAIN
+    if (!is_plain(self)) {
+        pvid_weak_front_derive_f32(&self->front, self->design->model, sample);
+        return;
+    }
+#endif
+    pvid_weak_front_add_f32(&self->front, self->samples, sample);
+}
+
+/* A tick with a sample that is not finite or beyond its range. */
+PVID_COLD static pvid_reason odd_tick(pvid_weak_f32 *self, const float sample[])
 {
     if (!is_ready(self)) {
         return PVID_NOT_READY;
     }
-    const pvid_weak_model_f32 *model = self->design->model;
-    if (!pvid_weak_front_fits_f32(&self->front, model->samples, sample) && !are_finite(self, sample)) {
+    if (!are_finite(self, sample)) {
         return reject(self);
     }
-#if !PVID_EXACT_PLAIN
-    if (!is_plain(self)) {
-        pvid_weak_front_derive_f32(&self->front, model, sample);
-        return follow(self, sample);
-    }
-#endif
-    pvid_weak_front_add_f32(&self->front, model->samples, sample);
+    take(self, sample);
     return follow(self, sample);
 }
 
@@ -441,10 +447,10 @@ static inline pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
         PVID_ASSERT(false);
         return PVID_NOT_READY;
     }
-    if (!is_plain(self) || !pvid_weak_front_fits_f32(&self->front, self->plain, sample)) {
-        return other_tick(self, sample);
+    if (!pvid_weak_front_fits_f32(&self->front, self->samples, sample)) {
+        return odd_tick(self, sample);
     }
-    pvid_weak_front_add_f32(&self->front, self->plain, sample);
+    take(self, sample);
     return follow(self, sample);
 }
 

@@ -99,29 +99,17 @@ static void remember(pvid_weak_front_f32 *self, size_t count, const float sample
     }
 }
 
-/* A signal of the tick before, whose sample is x, from the next sample and the two before it. */
-static inline float held_signal(const pvid_weak_front_f32 *self, const pvid_weak_signal *signal, float next)
+/* A held signal of the tick `now`, between the samples `next` and `last` with one more before it. */
+static inline float held_signal(float before, float last, float now, float next)
 {
-    const size_t i = signal->sample;
-    const float x = self->before[0][i];
-    if (signal->source == (uint8_t)PVID_SIGNAL_HELD) {
-        return (((-self->before[2][i] + (13.0f * self->before[1][i])) + (13.0f * x)) - next) * HELD_SCALE;
-    }
-    return (signal->source == (uint8_t)PVID_SIGNAL_JUMP) ? (self->jump_scale * (x - self->before[1][i])) : x;
-}
-
-/* A signal of this tick. */
-static inline float plain_signal(const pvid_weak_front_f32 *self, const pvid_weak_signal *signal, float x)
-{
-    return (signal->source == (uint8_t)PVID_SIGNAL_JUMP) ? (self->jump_scale * (x - self->before[0][signal->sample]))
-                                                         : x;
+    return (((-before + (13.0f * last)) + (13.0f * now)) - next) * HELD_SCALE;
 }
 
 PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvid_weak_model_f32 *model,
                                             const float sample[])
 {
     const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, model->signals);
-    const bool next = self->needs == PVID_WEAK_NEEDS_NEXT;
+    const bool next = self->needs == PVID_WEAK_NEEDS_NEXT; /* then the signals are those of the tick before */
     if (!self->seen) {
         begin(self, model->samples, sample);
         if (next) {
@@ -129,13 +117,22 @@ PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvi
             return;
         }
     }
-    for (size_t i = 0; i < signals; i++) {
-        const pvid_weak_signal *signal = &model->signal[i];
-        const float x = sample[signal->sample];
-        float *sums = &self->line[2u * i];
-        const float once = sums[0] + (next ? held_signal(self, signal, x) : plain_signal(self, signal, x));
+    const float *now = next ? self->before[0] : sample;
+    const float *last = next ? self->before[1] : self->before[0];
+    const pvid_weak_signal *signal = model->signal;
+    float *sums = self->line;
+    for (size_t left = signals; left > 0u; left--) {
+        const size_t i = signal->sample;
+        float x = now[i];
+        if (signal->source != (uint8_t)PVID_SIGNAL_SAMPLED) {
+            x = (signal->source == (uint8_t)PVID_SIGNAL_HELD) ? held_signal(self->before[2][i], last[i], x, sample[i])
+                                                              : (self->jump_scale * (x - last[i]));
+        }
+        const float once = sums[0] + x;
         sums[0] = once;
         sums[1] += once;
+        sums = &sums[2];
+        signal++;
     }
     if (self->needs != PVID_WEAK_NEEDS_NOTHING) {
         remember(self, model->samples, sample);

@@ -44,7 +44,7 @@ static inline uint32_t pvid_weak_front_limit_f32(float largest)
     return (pvid_bits_f32(largest) << 1u) + 1u;
 }
 
-/* Returns whether none of this number of samples is beyond its limit: never before init has set the limits. */
+/* Returns whether none of this number of samples is beyond its limit: never before init, with no samples or limits. */
 static inline bool pvid_weak_front_fits_f32(const pvid_weak_front_f32 *self, uint32_t number, const float sample[])
 {
     const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
@@ -54,7 +54,7 @@ static inline bool pvid_weak_front_fits_f32(const pvid_weak_front_f32 *self, uin
             return false;
         }
     }
-    return true;
+    return count > 0u;
 }
 
 /* Adds this number of finite samples of a tick to the block. */
