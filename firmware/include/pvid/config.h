@@ -221,6 +221,7 @@
 #define PVID_EXACT_JETS 0
 #define PVID_EXACT_RUNS 0
 #define PVID_EXACT_SIGNS 0
+#define PVID_EXACT_GAINS 0
 #define PVID_EXACT_INTEGRANDS 0
 #define PVID_EXACT_CHANNELS 0 /* that are summed */
 #define PVID_EXACT_PLAIN 0    /* 1: the signals are the samples */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "number/count.h"
+#include "solve/settings_f32.h"
 #include "solve/staged_f32.h"
 #include "solve/state_f32.h"
 #include "number/finite_f32.h"
@@ -53,22 +54,14 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
 
 PVID_COLD static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
 {
-    if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
-        return PVID_BAD_PUBLISH_KAPPA;
-    }
-    if (!pvid_within_f32(config->se_max, 1.0e-9f, 1.0e9f)) {
-        return PVID_BAD_SE_MAX;
-    }
-    if (!pvid_within_f32(config->misfit_max, 1.0f, 1.0e6f) && !pvid_within_f32(config->misfit_max, 0.0f, 0.0f)) {
-        return PVID_BAD_MISFIT_MAX;
-    }
-    if (!pvid_within_f32(config->renewal, 0.01f, 1.0e3f) && !pvid_within_f32(config->renewal, 0.0f, 0.0f)) {
-        return PVID_BAD_RENEWAL;
-    }
-    if (!pvid_within_f32(config->neglected, 0.0f, 1.0f)) {
-        return PVID_BAD_NEGLECTED;
-    }
-    return PVID_OK;
+    /* in the order of `values` */
+    static const pvid_range_f32 ranges[] = {
+        {0.0f, 0.999f, PVID_BAD_PUBLISH_KAPPA, false}, {1.0e-9f, 1.0e9f, PVID_BAD_SE_MAX, false},
+        {1.0f, 1.0e6f, PVID_BAD_MISFIT_MAX, true},     {0.01f, 1.0e3f, PVID_BAD_RENEWAL, true},
+        {0.0f, 1.0f, PVID_BAD_NEGLECTED, false},
+    };
+    const float values[] = {config->kappa_min, config->se_max, config->misfit_max, config->renewal, config->neglected};
+    return pvid_settings_within_f32(values, ranges, sizeof values / sizeof values[0]);
 }
 
 static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 *estimator)

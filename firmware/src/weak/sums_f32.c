@@ -99,6 +99,24 @@ static void add_plain(size_t channels, const float x[], const float last[][2], f
     }
 }
 
+/* The block's sum of another harmonic, of a channel. */
+static inline void add_channel(const float x[], const float cosine[], const float sine[], const float last[2],
+                               float sum[2])
+{
+    float even = x[CENTRE * PVID_MAX_CHANNELS];
+    float odd = 0.0f;
+    PVID_UNROLL
+    for (size_t j = 1; j < CENTRE; j++) {
+        const float part = sine[j] * x[(CENTRE - j) * PVID_MAX_CHANNELS];
+        even += cosine[j] * x[(CENTRE + j) * PVID_MAX_CHANNELS];
+        odd = (j == 1u) ? part : (odd + part);
+    }
+    even += cosine[CENTRE] * x[0];
+    odd -= sine[CENTRE] * x[0];
+    sum[0] = (last[0] + (cosine[0] * even)) - (sine[0] * odd);
+    sum[1] = (last[1] + (sine[0] * even)) + (cosine[0] * odd);
+}
+
 void pvid_weak_sums_add_f32(pvid_weak_sums_f32 *self, const pvid_weak_design_f32 *design, size_t number)
 {
     const size_t channels = PVID_COUNT(PVID_EXACT_CHANNELS, number);
@@ -126,21 +144,11 @@ void pvid_weak_sums_add_f32(pvid_weak_sums_f32 *self, const pvid_weak_design_f32
         cosine[j] = of_cosine[at];
         sine[j] = of_sine[at];
     }
-    PVID_UNROLL_BY_TWO
-    for (size_t c = 0; c < channels; c++) {
-        float even = x[CENTRE * PVID_MAX_CHANNELS];
-        float odd = 0.0f;
-        PVID_UNROLL
-        for (size_t j = 1; j < CENTRE; j++) {
-            const float part = sine[j] * x[(CENTRE - j) * PVID_MAX_CHANNELS];
-            even += cosine[j] * x[(CENTRE + j) * PVID_MAX_CHANNELS];
-            odd = (j == 1u) ? part : (odd + part);
+    for (size_t c = 0; c < channels; c += 2u) { /* two of them: gcc does not unroll a loop of constant length in part */
+        add_channel(&x[c], cosine, sine, last[c], sum[c]);
+        if ((c + 1u) < channels) {
+            add_channel(&x[c + 1u], cosine, sine, last[c + 1u], sum[c + 1u]);
         }
-        even += cosine[CENTRE] * x[0];
-        odd -= sine[CENTRE] * x[0];
-        sum[c][0] = (last[c][0] + (cosine[0] * even)) - (sine[0] * odd);
-        sum[c][1] = (last[c][1] + (sine[0] * even)) + (cosine[0] * odd);
-        x = &x[1];
     }
 }
 

@@ -164,7 +164,8 @@ static bool is_exact(const pvid_weak_design_f32 *design)
            (pvid_weak_front_length_f32(design) <= PVID_MAX_RING) && (model->samples == PVID_MAX_SAMPLES) &&
            (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
            (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
-           (model->integrands == PVID_EXACT_INTEGRANDS) && (model->model->n_p == PVID_MAX_P);
+           (model->gains == PVID_EXACT_GAINS) && (model->integrands == PVID_EXACT_INTEGRANDS) &&
+           (model->model->n_p == PVID_MAX_P);
 }
 
 static pvid_status sizes_are_valid(const pvid_weak_design_f32 *design)

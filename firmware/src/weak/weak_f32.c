@@ -200,7 +200,7 @@ PVID_COLD static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config
     pvid_weak_front_init_f32(&self->front, design, config->sample_rate_hz);
     pvid_weak_step_init_f32(&self->history, (float)pvid_weak_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_weak_watch_init_f32(&self->watch, config, delay_of(design));
-    self->watches = (config->range != NULL) || (config->drive_min != NULL);
+    self->watches = (config->range != NULL) || (self->watch.moves != 0u);
     self->samples = design->model->samples;
     self->plain = self->front.plain;
     if ((PVID_EXACT != 0) &&
@@ -298,7 +298,7 @@ PVID_SELDOM static pvid_reason form(pvid_weak_f32 *self)
             dropped = end_half(self);
         }
     }
-    rest(self);
+    self->rest = pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self)) ? (uint8_t)ADD : self->resume;
     return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
 }
 
@@ -370,6 +370,7 @@ PVID_SELDOM static pvid_reason end_block(pvid_weak_f32 *self, const float sample
 {
     const uint8_t decimation = pvid_weak_decimation(self->front.decimation);
     const bool steps = pvid_weak_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
+    self->resume = self->rest;
     if (steps && self->watches && (self->history.known > 1u)) {
         watch(self, sample);
     }

@@ -31,6 +31,17 @@ typedef struct {
                                   twice */
 } pvid_weak_front_f32;
 
+/* Sizes of the next struct's arrays: those of a build for one model, or enough for any. */
+#if PVID_EXACT
+#define PVID_WEAK_RUNS ((PVID_EXACT_RUNS > 0) ? PVID_EXACT_RUNS : 1)
+#define PVID_WEAK_SIGNS ((PVID_EXACT_SIGNS > 0) ? PVID_EXACT_SIGNS : 1)
+#define PVID_WEAK_VALUES (PVID_EXACT_GAINS + PVID_EXACT_INTEGRANDS)
+#else
+#define PVID_WEAK_RUNS PVID_MAX_INTEGRANDS
+#define PVID_WEAK_SIGNS PVID_MAX_INTEGRANDS
+#define PVID_WEAK_VALUES (PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS)
+#endif
+
 /* From the jets of a step to the values of its channels, two steps later. */
 typedef struct {
     uint8_t known;  /* steps since the restart, 0..4 */
@@ -39,12 +50,12 @@ typedef struct {
     float lead;     /* from a run's first sample to its first step [s] */
     uint8_t newest; /* place in `inputs` of the newest step; the other is of the last step before it */
     float inputs[2][PVID_MAX_INPUTS]; /* of `values` */
-    float rate[PVID_MAX_INTEGRANDS];  /* derivatives of the runs there */
-    float v[2][PVID_MAX_INTEGRANDS];  /* arguments of sgn at that step and the one before it */
-    float run[PVID_MAX_INTEGRANDS];   /* integrals since the start of the run, and what rounding took off */
-    float run_low[PVID_MAX_INTEGRANDS];
-    float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
-                                                              the next ones */
+    float rate[PVID_WEAK_RUNS];       /* derivatives of the runs there */
+    float v[2][PVID_WEAK_SIGNS];      /* arguments of sgn at that step and the one before it */
+    float run[PVID_WEAK_RUNS];        /* integrals since the start of the run, and what rounding took off */
+    float run_low[PVID_WEAK_RUNS];
+    float out[2][PVID_WEAK_VALUES];          /* results of `values` at the step before that, and place for
+                                                                       the next ones */
     float f[2][PVID_MAX_INTEGRANDS];         /* integrands at the two steps before that one, latest first */
     float integral[2 * PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of each since the start of the half */
     float edge[2][PVID_MAX_INTEGRANDS];      /* I^1 and I^2 of the half before, at its end */
@@ -61,6 +72,7 @@ typedef struct {
 typedef struct {
     const float *range; /* of the configuration; NULL: no check */
     const float *drive_min;
+    uint32_t moves;                                   /* bit i set: sample i has a least deviation */
     uint16_t delay;                                   /* steps from a sample to the last step that it is part of */
     uint16_t beyond;                                  /* steps that may yet contain a sample beyond its range */
     bool out[2];                                      /* of each half: contains such a step */
@@ -192,6 +204,7 @@ struct pvid_weak_f32 {
     const pvid_weak_refine_f32 *refine; /* second stage; NULL: none */
     uint8_t samples;                    /* of a tick; 0: `self` is not initialised */
     bool plain;                         /* a tick only adds its samples */
+    uint8_t resume;                     /* `rest` behind the channels of a step */
     uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: weak_f32.c */
     bool warm;         /* a window has been complete since the restart */
     bool frozen;       /* complete windows are dropped */

@@ -32,7 +32,7 @@ def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]
     }
     if found != needed:
         return fitted
-    counts = ("signals", "jets", "runs", "signs", "integrands")
+    counts = ("signals", "jets", "runs", "signs", "gains", "integrands")
     exact = {f"PVID_EXACT_{one.upper()}": int(getattr(model, one)) for one in counts}
     summed = max(k + 1 for k, one in enumerate(model.channel) if one.gain != NONE)
     exact |= {"PVID_EXACT_CHANNELS": summed, "PVID_EXACT_PLAIN": int(model.plain)}
