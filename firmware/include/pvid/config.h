@@ -228,7 +228,8 @@
 #endif
 
 /* Parts that a design or its settings may do without, for less flash; `pvid model build` tells. init refuses settings
- * that need a part which is left out: a dead zone with PVID_BAD_DEAD_ZONE, g < 1 with PVID_BAD_FEEDBACK, a second stage
+ * that need a part which is left out: a dead zone with PVID_BAD_DEAD_ZONE, g < 1 with PVID_BAD_FEEDBACK, neglected
+ * terms with PVID_BAD_NEGLECTED, a second stage
  * with PVID_BAD_POINTER. */
 #ifndef PVID_DEAD_ZONE /* dead zone of estimator.h */
 #define PVID_DEAD_ZONE 1
@@ -241,6 +242,12 @@
 #endif
 #if PVID_FEEDBACK != 0 && PVID_FEEDBACK != 1
 #error "PVID_FEEDBACK must be 0 or 1"
+#endif
+#ifndef PVID_NEGLECTED /* errors from neglected terms (trust.h) */
+#define PVID_NEGLECTED 1
+#endif
+#if PVID_NEGLECTED != 0 && PVID_NEGLECTED != 1
+#error "PVID_NEGLECTED must be 0 or 1"
 #endif
 #ifndef PVID_REFINEMENT /* second stage of weak.h */
 #define PVID_REFINEMENT 1

@@ -171,7 +171,7 @@ PVID_SELDOM static bool spectrum_stage(pvid_weak_f32 *self)
     return false;
 }
 
-PVID_SELDOM static bool scale_stage(pvid_weak_f32 *self)
+PVID_COLD static bool scale_stage(pvid_weak_f32 *self)
 {
     pvid_weak_rows_f32 *rows = &self->finish.work.rows;
     pvid_weak_white_scale_f32(&self->finish.white, self->design);
@@ -422,7 +422,7 @@ PVID_SELDOM static bool residual_stage(pvid_weak_f32 *self)
     return goes_on(finish, last, rows_of(self));
 }
 
-PVID_SELDOM static bool squares_stage(pvid_weak_f32 *self)
+PVID_COLD static bool squares_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const size_t thetas = kind_of(self)->thetas;
@@ -435,7 +435,7 @@ PVID_SELDOM static bool squares_stage(pvid_weak_f32 *self)
 }
 
 /* Behind a kind: the next kind, or the solves; nothing if no kind has been added. */
-static void end_kind(pvid_weak_f32 *self)
+PVID_COLD static void end_kind(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const pvid_weak_kind *kind = kind_of(self);
@@ -453,7 +453,7 @@ static void end_kind(pvid_weak_f32 *self)
 }
 
 /* The estimator and the gate accept the kind, or the reason why not. */
-static pvid_reason accept_kind(pvid_weak_f32 *self, float freedom)
+PVID_COLD static pvid_reason accept_kind(pvid_weak_f32 *self, float freedom)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const pvid_reason accepted =
@@ -473,7 +473,7 @@ static pvid_reason accept_kind(pvid_weak_f32 *self, float freedom)
     return PVID_ACCUMULATED;
 }
 
-PVID_SELDOM static bool gate_stage(pvid_weak_f32 *self)
+PVID_COLD static bool gate_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     /* test functions less nuisances: the dimensions that the rows of the kind span */
@@ -497,7 +497,7 @@ PVID_SELDOM static bool gate_stage(pvid_weak_f32 *self)
     return false;
 }
 
-PVID_SELDOM static bool pull_stage(pvid_weak_f32 *self)
+PVID_COLD static bool pull_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const size_t all = finish->compensation ? self->design->n_noise : 0u;
@@ -507,7 +507,7 @@ PVID_SELDOM static bool pull_stage(pvid_weak_f32 *self)
     return goes_on(finish, last, all);
 }
 
-PVID_SELDOM static bool correct_stage(pvid_weak_f32 *self)
+PVID_COLD static bool correct_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const size_t thetas = kind_of(self)->thetas;
@@ -564,13 +564,13 @@ PVID_SELDOM static bool add_stage(pvid_weak_f32 *self)
 
 /* ---- steps of p and verdict ---- */
 
-PVID_SELDOM static bool score_stage(pvid_weak_f32 *self)
+PVID_COLD static bool score_stage(pvid_weak_f32 *self)
 {
     pvid_weak_scores_take_f32(&self->finish.scores, &self->estimator, self->finish.work.rows.score);
     return false;
 }
 
-PVID_SELDOM static bool begin_stage(pvid_weak_f32 *self)
+PVID_COLD static bool begin_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const bool first = finish->iteration == 0u;
@@ -603,7 +603,7 @@ PVID_SELDOM static bool solve_stage(pvid_weak_f32 *self)
 }
 
 /* No assessment if no solve was due. */
-PVID_SELDOM static bool mean_stage(pvid_weak_f32 *self)
+PVID_COLD static bool mean_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     pvid_weak_scores_add_f32(&finish->scores, self->estimator.model->n_p, finish->square / finish->free);
@@ -613,19 +613,19 @@ PVID_SELDOM static bool mean_stage(pvid_weak_f32 *self)
     return false;
 }
 
-PVID_SELDOM static bool prepare_stage(pvid_weak_f32 *self)
+PVID_COLD static bool prepare_stage(pvid_weak_f32 *self)
 {
     pvid_estimator_assess_solved_f32(&self->estimator, &self->finish.work.solve, &self->finish.candidate);
     return false;
 }
 
-PVID_SELDOM static bool assess_stage(pvid_weak_f32 *self)
+PVID_COLD static bool assess_stage(pvid_weak_f32 *self)
 {
     return !pvid_estimator_assess_advance_f32(&self->estimator, &self->finish.work.solve);
 }
 
 /* The larger of the two standard errors of a parameter; the covariance grows with it. */
-PVID_SELDOM static bool cluster_stage(pvid_weak_f32 *self)
+PVID_COLD static bool cluster_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     pvid_estimate_f32 *estimate = &finish->candidate;
@@ -642,7 +642,7 @@ PVID_SELDOM static bool cluster_stage(pvid_weak_f32 *self)
     return goes_on(finish, a + 1u, n_p);
 }
 
-PVID_SELDOM static bool grow_stage(pvid_weak_f32 *self)
+PVID_COLD static bool grow_stage(pvid_weak_f32 *self)
 {
     pvid_estimate_f32 *estimate = &self->finish.candidate;
     const size_t n_p = self->estimator.model->n_p;
@@ -659,7 +659,7 @@ PVID_SELDOM static bool grow_stage(pvid_weak_f32 *self)
     return false;
 }
 
-PVID_SELDOM static bool judge_stage(pvid_weak_f32 *self)
+PVID_COLD static bool judge_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const float expected = finish->expected / (float)finish->used;
@@ -670,7 +670,7 @@ PVID_SELDOM static bool judge_stage(pvid_weak_f32 *self)
     return false;
 }
 
-PVID_SELDOM static bool publish_stage(pvid_weak_f32 *self)
+PVID_COLD static bool publish_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     finish->report = (uint8_t)pvid_trust_publish_f32(&self->trust, &self->estimator, (pvid_reason)finish->verdict,

@@ -102,7 +102,7 @@ void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_des
     self->floor = (part > SPECTRUM_MIN) ? part : SPECTRUM_MIN;
 }
 
-void pvid_weak_white_scale_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design)
+PVID_COLD void pvid_weak_white_scale_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design)
 {
     const size_t harmonics = pvid_weak_harmonics(design);
     for (size_t h = 0; h < harmonics; h++) {
@@ -262,7 +262,7 @@ void pvid_weak_white_pull_f32(const pvid_weak_white_f32 *self, const pvid_weak_d
     }
 }
 
-float pvid_weak_white_sensors_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design)
+PVID_COLD float pvid_weak_white_sensors_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design)
 {
     float sum = 0.0f;
     for (size_t j = 0; j < self->powers; j++) {
