@@ -37,7 +37,11 @@ OTHER = {
     "PVID_MAX_POWER": 6,
     "PVID_MAX_BLOCKS": 1,
     "PVID_MAX_WINDOWS": 0,
+    "PVID_FEEDBACK": 0,
 }
+
+# Of a build for one design, whose structs have no more than it needs.
+EXACT = ("", *(f"_{one}" for one in "SIGNALS JETS RUNS SIGNS GAINS INTEGRANDS CHANNELS PLAIN".split()))
 
 LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
 
@@ -105,7 +109,7 @@ def link(folder: Path, language: str, compiled: Path, library: Path) -> subproce
 
 def test_every_size_of_the_headers_is_tried() -> None:
     text = "".join(path.read_text(encoding="utf-8") for path in public_headers())
-    assert set(re.findall(r"#ifndef (PVID_MAX_\w+)", text)) == set(OTHER)
+    assert set(re.findall(r"#ifndef (PVID_MAX_\w+|PVID_FEEDBACK)", text)) == set(OTHER)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -128,6 +132,16 @@ def test_another_size_is_refused(language: str, name: str, libraries: dict[str, 
             re.findall(rf"undefined reference to `(pvid_\w+[fq]3[12])_window(?:\w*[a-z])?{OTHER[name]}_", done.stderr)
         )
         assert refused == set(FUNCTIONS), done.stderr
+
+
+def test_a_build_for_one_design_is_refused(libraries: dict[str, Path], tmp_path: Path) -> None:
+    """Its counts of the model have places of their own in the names."""
+    compiled = user(tmp_path, "c", *(f"-DPVID_EXACT{name}={place}" for place, name in enumerate(EXACT, 1)))
+    done = link(tmp_path, "c", compiled, libraries["static"])
+    names = re.findall(
+        r"`(pvid_\w+[fq]3[12])_window\w+_exact1_plain9_runs4_signs5_gains6_integrals7_enum\d", done.stderr
+    )
+    assert set(names) == set(FUNCTIONS), done.stderr
 
 
 def test_every_function_that_takes_a_struct_has_its_sizes_in_its_name() -> None:

@@ -68,7 +68,7 @@ def test_the_twin_has_the_bits_of_a_first_order_model() -> None:
     settings = replace(given.settings, distance=0.1)
     core, twin = given.identifier(distance=0.1), RefineTwin(given.model, settings)
     record = core.run_both(given.rig.samples[:6000])
-    expected = twin.run(given.rig.samples[:6000], record.weak_p, record.weak_se)
+    expected = twin.run(given.rig.samples[:6000], record.weak_p, record.weak_se, record.busy)
     np.testing.assert_array_equal(record.r, expected.r)
     np.testing.assert_array_equal(record.se, expected.se)
     np.testing.assert_array_equal(np.array(list(core.refinement.work.state), np.float32), twin.work.state)

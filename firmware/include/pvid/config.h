@@ -221,17 +221,33 @@
 #define PVID_EXACT_JETS 0
 #define PVID_EXACT_RUNS 0
 #define PVID_EXACT_SIGNS 0
+#define PVID_EXACT_GAINS 0
 #define PVID_EXACT_INTEGRANDS 0
 #define PVID_EXACT_CHANNELS 0 /* that are summed */
+#define PVID_EXACT_PLAIN 0    /* 1: the signals are the samples */
 #endif
 
 /* Parts that a design or its settings may do without, for less flash; `pvid model build` tells. init refuses settings
- * that need a part which is left out: a dead zone with PVID_BAD_DEAD_ZONE, a second stage with PVID_BAD_POINTER. */
+ * that need a part which is left out: a dead zone with PVID_BAD_DEAD_ZONE, g < 1 with PVID_BAD_FEEDBACK, neglected
+ * terms with PVID_BAD_NEGLECTED, a second stage
+ * with PVID_BAD_POINTER. */
 #ifndef PVID_DEAD_ZONE /* dead zone of estimator.h */
 #define PVID_DEAD_ZONE 1
 #endif
 #if PVID_DEAD_ZONE != 0 && PVID_DEAD_ZONE != 1
 #error "PVID_DEAD_ZONE must be 0 or 1"
+#endif
+#ifndef PVID_FEEDBACK /* laws of the weak form with g < 1 (estimator.h) */
+#define PVID_FEEDBACK 1
+#endif
+#if PVID_FEEDBACK != 0 && PVID_FEEDBACK != 1
+#error "PVID_FEEDBACK must be 0 or 1"
+#endif
+#ifndef PVID_NEGLECTED /* errors from neglected terms (trust.h) */
+#define PVID_NEGLECTED 1
+#endif
+#if PVID_NEGLECTED != 0 && PVID_NEGLECTED != 1
+#error "PVID_NEGLECTED must be 0 or 1"
 #endif
 #ifndef PVID_REFINEMENT /* second stage of weak.h */
 #define PVID_REFINEMENT 1

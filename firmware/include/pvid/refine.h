@@ -20,8 +20,8 @@
  *                  if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
  * The model: refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is spread over the ticks,
- * one job each; that of a tick is bounded (with the weak form 1 500 instructions on a Cortex-M4F for the pendulum). A
- * tick with a new estimate of the weak form has none, unless the tick before had such an estimate too.
+ * some jobs each; that of a tick is bounded. Ticks at which the weak form has work of its own have none, up to
+ * `rests` in a row.
  */
 #ifndef PVID_REFINE_H
 #define PVID_REFINE_H
@@ -66,9 +66,13 @@ typedef struct pvid_refine_config_f32 {
     const pvid_refine_signal_f32 *signal; /* [inputs + outputs]; must outlive the object */
     uint16_t block;                       /* big steps (4 steps) of a full block, about two slow periods, 8..ring / 6 */
     uint16_t first_block;                 /* of the first block of a search, 8..block; recommended: block / 4 */
-    uint8_t passes;                       /* of a block, at least, 1..most_passes; recommended: 2 */
-    uint8_t most_passes;                  /* of a block whose steps do not become small, 1..16; recommended: 8 */
-    float sd[PVID_REFINE_OUTPUTS];        /* of the noise of a row, at low frequencies [unit of the output], > 0 */
+    uint8_t passes;      /* of a block, at least, 1..most_passes; in the track one does whose step is below a quarter of
+                            step_max; recommended: 2 */
+    uint8_t most_passes; /* of a block whose steps do not become small, 1..16; recommended: 8 */
+    uint8_t jobs;        /* of a pass in one tick, 1..16; recommended: 3 with a floating point unit, 1 without */
+    uint8_t rests;       /* ticks in a row, at most, that have no jobs because the weak form is busy, 0..255: 255 makes
+                            the longest tick short where it is seldom busy, as the pendulum's is; 1 otherwise */
+    float sd[PVID_REFINE_OUTPUTS];          /* of the noise of a row, at low frequencies [unit of the output], > 0 */
     float prior_sd[PVID_REFINE_PARAMETERS]; /* of the weak form's estimate, in the search; relative if logarithmic */
     float gain_sd[PVID_REFINE_PARAMETERS];  /* errors of the steps by one error of a sensor's gain, with their signs */
     float state_limit[PVID_REFINE_ORDER *
@@ -111,8 +115,9 @@ extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
  *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config);
 
-/* One tick: the samples of signal[].sample, taken at the same time, and an estimate of the weak form that is new at
- * this tick, with its standard errors, whether the weak form trusts it already or not (NULL: none). Returns
+/* One tick: the samples of signal[].sample, taken at the same time, an estimate of the weak form that is new at this
+ * tick, with its standard errors, whether the weak form trusts it already or not (NULL: none), and whether the weak
+ * form's tick was long. Returns
  *   - PVID_WARMING_UP until there is an estimate of the weak form,
  *   - PVID_REJECTED_NOT_FINITE if a sample of an input is not finite, at the end of its step: the block restarts.
  *     (An output that is not finite is a missing row.)
@@ -121,7 +126,7 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
  *     PVID_HELD_BLOCK (the block does not fit to its past), PVID_HELD_UNCERTAIN (standard errors, or one block alone)
  * or PVID_HELD_DISAGREES (the estimate differs from the weak form's beyond the errors of both),
  *   - PVID_ACCUMULATED at all other ticks. */
-pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak);
+pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy);
 
 /* The published estimate, for the context that calls step; NULL: there is none. It stands until the next one, but is
  * withdrawn when the track is lost (two blocks in a row that do not fit to their past), or when a block's estimate is
@@ -136,7 +141,7 @@ pvid_reason pvid_refine_reason_f32(const pvid_refine_f32 *self);
  * refinement while its estimate stands (see latest), else those of the weak form's published one, `weak`, which the
  * rest of *estimate always has. Returns whose it is; pvid_refine_reason_f32 is the reason: PVID_UPDATED, or why the
  * last block gave no new estimate. The weak form's without init. Nothing is copied iff `weak` or `estimate` is NULL.
- * Cost on a Cortex-M4F: 500 instructions. */
+ * Cost: a copy of *weak and O(p^2). */
 pvid_stage pvid_refine_best_f32(const pvid_refine_f32 *self, const pvid_estimate_f32 *weak,
                                 pvid_estimate_f32 *estimate);
 

@@ -24,20 +24,21 @@
 
 #define PVID_SIZED_AS(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31,       \
                       c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks,    \
-                      windows, enums)                                                                                  \
-    name##_window##window##_theta##theta##_p##p##_moments##moments##_decimation##decimation##_functions##functions##_iterations##iterations##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_blocks##blocks##_windows##windows##_enum##enums
+                      windows, feedback, exact, plain, runs, signs, gains, exact_integrands, enums)                    \
+    name##_window##window##_theta##theta##_p##p##_moments##moments##_decimation##decimation##_functions##functions##_iterations##iterations##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_blocks##blocks##_windows##windows##_feedback##feedback##_exact##exact##_plain##plain##_runs##runs##_signs##signs##_gains##gains##_integrals##exact_integrands##_enum##enums
 #define PVID_SIZED_OF(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31,       \
                       c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks,    \
-                      windows, enums)                                                                                  \
+                      windows, feedback, exact, plain, runs, signs, gains, exact_integrands, enums)                    \
     PVID_SIZED_AS(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31, c_q31,    \
                   samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks, windows,      \
-                  enums)
+                  feedback, exact, plain, runs, signs, gains, exact_integrands, enums)
 #define PVID_SIZED(name)                                                                                               \
     PVID_SIZED_OF(name, PVID_MAX_WINDOW, PVID_MAX_THETA, PVID_MAX_P, PVID_MAX_MOMENTS, PVID_MAX_DECIMATION,            \
                   PVID_MAX_FUNCTIONS, PVID_MAX_ITERATIONS, PVID_MAX_THETA_Q31, PVID_MAX_MOMENTS_Q31, PVID_MAX_C_Q31,   \
                   PVID_MAX_SAMPLES, PVID_MAX_RING, PVID_MAX_INPUTS, PVID_MAX_CHANNELS, PVID_MAX_INTEGRANDS,            \
                   PVID_MAX_HARMONICS, PVID_MAX_KINDS, PVID_MAX_COLUMNS, PVID_MAX_POWER, PVID_MAX_BLOCKS,               \
-                  PVID_MAX_WINDOWS, PVID_ENUM_SIZE)
+                  PVID_MAX_WINDOWS, PVID_FEEDBACK, PVID_EXACT, PVID_EXACT_PLAIN, PVID_EXACT_RUNS, PVID_EXACT_SIGNS,    \
+                  PVID_EXACT_GAINS, PVID_EXACT_INTEGRANDS, PVID_ENUM_SIZE)
 
 /* Symbols of the refinement contain its mechanism too (refine_shape.h): with another one it is a link error. */
 #define PVID_REFINED_AS(name, id) name##_model##id

@@ -120,7 +120,7 @@ struct pvid_refine_config_f32;
  * stage none of it is linked. */
 typedef struct {
     pvid_status (*init)(struct pvid_refine_f32 *self, const struct pvid_refine_config_f32 *config);
-    void (*step)(struct pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak);
+    pvid_reason (*step)(struct pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy);
     void (*gap)(struct pvid_refine_f32 *self);
     void (*freeze)(struct pvid_refine_f32 *self, bool frozen);
 } pvid_weak_stage_f32;

@@ -56,9 +56,14 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
  * to no weight then, but still shows the clash. */
 #define KEPT (1.0f / 16.0f)
 
-/* Jobs of a pass for each of its big steps, at most, and beside them; entries that such a block keeps free. */
-#define JOBS 6u
-#define OTHER_JOBS 40u
+/* In the track a first pass whose step of the logarithms is this much below the limit is the block's last. */
+#define SHORT 0.25f
+
+/* Jobs of a pass for each of its big steps, at most, and for its beginning; ticks of a solution; entries that such a
+ * block keeps free. */
+#define JOBS 9u
+#define FIRST_JOBS 16u
+#define SOLVE_TICKS 45u
 #define SPARE 16u
 
 static inline bool is_ready(const pvid_refine_f32 *self)
@@ -145,8 +150,9 @@ static void begin_anew(pvid_refine_f32 *self)
 static uint32_t oldest(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    const uint32_t jobs = config->passes * ((JOBS * (uint32_t)self->length) + OTHER_JOBS);
-    const uint32_t taken = (jobs / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + SPARE; /* in the meantime */
+    const uint32_t jobs = (JOBS * (uint32_t)self->length) + FIRST_JOBS;
+    const uint32_t ticks = config->passes * ((jobs / config->jobs) + SOLVE_TICKS);
+    const uint32_t taken = (ticks / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + SPARE; /* in the meantime */
     const uint32_t room = pvid_refine_front_room_f32(&self->front);
     const uint32_t end = pvid_refine_front_end_f32(&self->front);
     const uint32_t back = (room > taken) ? (room - taken) : 0u;
@@ -306,32 +312,28 @@ static void end_block(pvid_refine_f32 *self)
 
 /* ---- jobs ---- */
 
-static void pass_job(pvid_refine_f32 *self)
+/* Some jobs of a pass, as far as their signals are there. */
+static inline void pass_jobs(pvid_refine_f32 *self)
 {
-    pvid_refine_signals_f32 signals;
-    uint32_t first = 0;
-    const uint32_t steps = pvid_refine_pass_needs_f32(&self->work, &first);
-    if (steps > 0u) {
-        const uint32_t entry = self->begin + first;
-        const uint32_t behind = entry + (steps + PVID_REFINE_REACH);
-        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - behind) < 0) {
-            self->waiting = true;
-            self->due = behind;
-            return;
-        }
-        pvid_refine_front_read_f32(&self->front, entry, steps, &signals);
-    }
-    pvid_refine_pass_job_f32(&self->work, self->linear, self->weight, &signals);
-    if (pvid_refine_pass_ends_f32(&self->work, self->length)) {
+    const pvid_refine_block_f32 block = {self->linear, self->weight, self->begin, self->length};
+    const pvid_refine_progress progress =
+        pvid_refine_pass_run_f32(&self->work, &self->front, &block, self->config.jobs);
+    if (progress == PVID_REFINE_PASS_WAITS) {
+        uint32_t step = 0;
+        self->waiting = pvid_refine_pass_needs_f32(&self->work, &step);
+        self->due = self->begin + step + 1u;
+    } else if (progress == PVID_REFINE_PASS_DONE) {
         pvid_refine_solve_begin_f32(&self->solve);
         self->phase = SOLVE;
+    } else {
+        /* at the next tick */
     }
 }
 
 static void solve_job(pvid_refine_f32 *self)
 {
     const pvid_refine_solution solution =
-        pvid_refine_solve_job_f32(&self->solve, &self->work, self->triangle, self->r, self->linear,
+        pvid_refine_solve_job_f32(&self->solve, self->work.sums.sum, self->triangle, self->r, self->linear,
                                   self->config.prior_sd, self->config.step_limit);
     if (solution != PVID_REFINE_SOLVING) {
         self->solved = solution == PVID_REFINE_SOLVED;
@@ -339,13 +341,14 @@ static void solve_job(pvid_refine_f32 *self)
     }
 }
 
-/* Whether the block has had enough passes: until the steps are small, in the track `passes` of them usually do; or the
- * ring has lost it. */
+/* Whether the block has had enough passes: until the steps are small, in the track mostly one pass; or the ring has
+ * lost it. */
 static bool is_enough(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    const bool small = self->solve.size < config->step_max;
-    return (self->pass >= config->most_passes) || (small && (self->pass >= config->passes)) || !is_there(self);
+    const bool tracks = (self->taken > 0u) && (self->solve.bend < (SHORT * config->step_max));
+    const bool small = (tracks || (self->pass >= config->passes)) && (self->solve.size < config->step_max);
+    return small || (self->pass >= config->most_passes) || !is_there(self);
 }
 
 /* Whether a block of a search goes on twice as long. */
@@ -373,8 +376,10 @@ static void move(pvid_refine_f32 *self)
     } else if (is_enough(self)) {
         self->phase = END;
     } else if ((self->taken == 0u) && self->renewed && !(self->solve.size < ASTRAY)) {
-        begin_anew_in_the_past(self);
-        begin_block(self);
+        self->lost = 1;
+        self->length = self->config.first_block;
+        self->verdict = PVID_HELD_SEARCHING;
+        self->phase = NEXT;
     } else {
         begin_pass(self);
     }
@@ -393,9 +398,9 @@ static float variance_of_row(const pvid_refine_f32 *self)
 static void assess(pvid_refine_f32 *self)
 {
     if (self->pass == 0u) {
-        pvid_refine_assess_begin_f32(&self->candidate, &self->config);
+        pvid_refine_assess_begin_f32(&self->work.sums.candidate, &self->config);
     }
-    pvid_refine_assess_column_f32(&self->candidate, self->solve.triangle, self->pass, variance_of_row(self));
+    pvid_refine_assess_column_f32(&self->work.sums.candidate, self->solve.triangle, self->pass, variance_of_row(self));
     self->pass++;
     self->phase = (self->pass < N) ? ASSESS : JUDGE;
 }
@@ -404,8 +409,8 @@ static void publish(pvid_refine_f32 *self)
 {
     if (self->verdict == PVID_UPDATED) {
         pvid_count_up(&self->published);
-        pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->candidate, sizeof self->candidate,
-                               self->published);
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->work.sums.candidate,
+                               sizeof self->work.sums.candidate, self->published);
     }
 }
 
@@ -441,13 +446,11 @@ static void next_block(pvid_refine_f32 *self)
     begin_block(self);
 }
 
-PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
+/* The jobs that are not a pass's. */
+PVID_SELDOM static pvid_reason seldom(pvid_refine_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
     switch (self->phase) {
-    case PASS:
-        pass_job(self);
-        break;
     case SOLVE:
         solve_job(self);
         break;
@@ -467,8 +470,8 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
         assess(self);
         break;
     case JUDGE:
-        pvid_refine_assess_end_f32(&self->candidate, self->r, self->level, self->clash);
-        self->verdict = pvid_refine_verdict_f32(&self->candidate, &self->config, self->weak, self->weak_se);
+        pvid_refine_assess_end_f32(&self->work.sums.candidate, self->r, self->level, self->clash);
+        self->verdict = pvid_refine_verdict_f32(&self->work.sums.candidate, &self->config, self->weak, self->weak_se);
         self->phase = PUBLISH;
         break;
     case PUBLISH:
@@ -493,6 +496,15 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
         break;
     }
     return reason;
+}
+
+PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
+{
+    if (self->phase != (uint8_t)PASS) {
+        return seldom(self);
+    }
+    pass_jobs(self);
+    return PVID_ACCUMULATED;
 }
 
 /* ---- API ---- */
@@ -524,6 +536,7 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
 static void restart(pvid_refine_f32 *self)
 {
     pvid_refine_front_reset_f32(&self->front, &self->config);
+    self->plain = false;
     self->begin = pvid_refine_front_first_f32(&self->front);
     self->origin = self->begin;
     self->again = false;
@@ -544,20 +557,34 @@ void pvid_refine_freeze_f32(pvid_refine_f32 *self, bool frozen)
 {
     if (is_ready(self)) {
         self->frozen = frozen;
+        self->plain = false;
     }
 }
 
-pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak)
+static pvid_reason idle(const pvid_refine_f32 *self)
 {
-    if (!is_ready(self) || (sample == NULL)) {
-        return PVID_NOT_READY;
+    return (self->phase == (uint8_t)WAIT) ? PVID_WARMING_UP : PVID_ACCUMULATED;
+}
+
+/* The jobs of a tick: not while the weak form is busy, but not too often. */
+static inline pvid_reason work_unless(pvid_refine_f32 *self, bool busy)
+{
+    if (self->waiting) {
+        return PVID_ACCUMULATED;
     }
-    const bool rests = (weak != NULL) && !self->beside; /* the weak form's tick is long */
-    self->beside = weak != NULL;
-    if (self->beside) {
-        take_weak(self, weak);
+    self->busy = busy;
+    if (busy && (self->rested < self->config.rests)) {
+        self->rested++;
+        return idle(self);
     }
-    const pvid_refine_entry entry = pvid_refine_front_step_f32(&self->front, &self->config, sample);
+    self->rested = 0;
+    return work(self);
+}
+
+/* The last tick of a step: of its own it has no jobs. */
+PVID_SELDOM static pvid_reason end_step(pvid_refine_f32 *self, const float sample[], bool busy)
+{
+    const pvid_refine_entry entry = pvid_refine_front_end_block_f32(&self->front, &self->config, sample);
     if (entry == PVID_REFINE_BROKEN) {
         restart(self);
         return PVID_REJECTED_NOT_FINITE;
@@ -565,15 +592,50 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
     if (self->frozen) {
         return PVID_HELD_FROZEN;
     }
-    if (entry == PVID_REFINE_ENTERED) {
-        self->waiting = self->waiting && (pvid_refine_front_end_f32(&self->front) < self->due);
-    }
-    const bool works = (entry == PVID_REFINE_NOTHING) || (self->config.ratio == 1u);
-    if (works && !rests && !self->waiting) {
-        return work(self);
-    }
-    return (self->phase == (uint8_t)WAIT) ? PVID_WARMING_UP : PVID_ACCUMULATED;
+    self->waiting = self->waiting && (pvid_refine_front_end_f32(&self->front) < self->due);
+    return (self->config.ratio == 1u) ? work_unless(self, busy) : idle(self);
 }
+
+/* A tick with a new estimate of the weak form, the first one, one while it is frozen. */
+PVID_SELDOM static pvid_reason odd_step(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak,
+                                        bool busy)
+{
+    if (weak != NULL) {
+        take_weak(self, weak);
+    }
+    if (!self->front.referred) {
+        pvid_refine_front_refer_f32(&self->front, &self->config, sample);
+    }
+    self->plain = !self->frozen;
+    if (pvid_refine_front_add_f32(&self->front, sample)) {
+        return end_step(self, sample, busy);
+    }
+    return self->frozen ? PVID_HELD_FROZEN : work_unless(self, busy);
+}
+
+/* A tick of the weak form's second stage, whose pointers are given. */
+static pvid_reason step(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy)
+{
+    if ((weak != NULL) || !self->plain) {
+        return odd_step(self, sample, weak, busy);
+    }
+    if (pvid_refine_front_add_f32(&self->front, sample)) {
+        return end_step(self, sample, busy);
+    }
+    return work_unless(self, busy);
+}
+
+pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy)
+{
+    return (is_ready(self) && (sample != NULL)) ? step(self, sample, weak, busy) : PVID_NOT_READY;
+}
+
+const pvid_weak_stage_f32 pvid_refine_stage_f32 = {
+    .init = pvid_refine_init_f32,
+    .step = step,
+    .gap = pvid_refine_gap_f32,
+    .freeze = pvid_refine_freeze_f32,
+};
 
 const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self)
 {

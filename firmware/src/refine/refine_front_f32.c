@@ -46,12 +46,7 @@ void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_
 
 uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self)
 {
-    return (uint32_t)self->behind + PVID_REFINE_REACH;
-}
-
-uint32_t pvid_refine_front_end_f32(const pvid_refine_front_f32 *self)
-{
-    return (self->next > self->behind) ? (self->next - self->behind) : 0u;
+    return self->behind;
 }
 
 uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)

@@ -44,8 +44,8 @@ static pvid_status blocks_are_valid(const pvid_refine_config_f32 *config)
         (((uint32_t)config->block * 6u) > PVID_REFINE_RING)) {
         return PVID_BAD_WINDOW;
     }
-    const bool passes =
-        (config->passes >= 1u) && (config->passes <= config->most_passes) && (config->most_passes <= 16u);
+    const bool passes = (config->passes >= 1u) && (config->passes <= config->most_passes) &&
+                        (config->most_passes <= 16u) && (config->jobs >= 1u) && (config->jobs <= 16u);
     return passes ? PVID_OK : PVID_BAD_ITERATIONS;
 }
 

@@ -81,22 +81,26 @@ static void integrate(pvid_weak_history_f32 *self, size_t integrands, float dt, 
     const float part = dt / 24.0f;
     const float half = 0.5f * dt;
     const float bend = (dt * dt) / 60.0f;
-    const bool starts = self->known <= 2u;
-    const bool second = self->known == 3u;
+    for (size_t i = 0; (self->known == 3u) && (i < integrands); i++) { /* a line before the second step */
+        self->f[1][i] = (2.0f * self->f[0][i]) - now[i];
+    }
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < integrands; i++) {
         const float last = self->f[0][i];
         const float f = now[i];
-        const float before = second ? ((2.0f * last) - f) : self->f[1][i];
+        const float before = self->f[1][i];
         const float rise = part * (((-before + (13.0f * last)) + (13.0f * f)) - next[i]);
         const float from = self->integral[2u * i];
         const float once = from + rise;
         const float outside = (next[i] - before) - (8.0f * (f - last));
         const float twice = self->integral[(2u * i) + 1u] + ((half * (from + once)) + (bend * outside));
-        self->integral[2u * i] = starts ? 0.0f : once;
-        self->integral[(2u * i) + 1u] = starts ? 0.0f : twice;
+        self->integral[2u * i] = once;
+        self->integral[(2u * i) + 1u] = twice;
         self->f[1][i] = last;
         self->f[0][i] = f;
+    }
+    for (size_t i = 0; (self->known <= 2u) && (i < (2u * integrands)); i++) { /* at the first step */
+        self->integral[i] = 0.0f;
     }
 }
 
@@ -115,7 +119,7 @@ bool pvid_weak_step_take_f32(pvid_weak_history_f32 *self, const pvid_weak_design
                              float channel[])
 {
     const pvid_weak_model_f32 *model = design->model;
-    float arguments[PVID_MAX_INPUTS] = {0.0f}; /* of the newest step: derivatives of the runs, then arguments of sgn */
+    float arguments[PVID_MAX_INPUTS]; /* of the newest step: derivatives of the runs, then arguments of sgn */
     const size_t runs = PVID_COUNT(PVID_EXACT_RUNS, model->runs);
     const size_t signs = PVID_COUNT(PVID_EXACT_SIGNS, model->signs);
     const size_t jets = PVID_COUNT(PVID_EXACT_JETS, model->jets);
@@ -125,7 +129,7 @@ bool pvid_weak_step_take_f32(pvid_weak_history_f32 *self, const pvid_weak_design
     float *newest = self->inputs[self->newest];
     self->newest ^= 1u;
     float *before = self->inputs[self->newest];
-    if (model->prepare != NULL) {
+    if (((runs + signs) > 0u) && (model->prepare != NULL)) {
         model->prepare(newest, arguments);
     }
     if (self->known > 0u) {

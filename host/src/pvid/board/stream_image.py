@@ -179,8 +179,8 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
     """With the options of the core (firmware/cmake/PvidCompile.cmake); without what it does not link."""
     application = FIRMWARE / "apps" / "stream"
     needless = re.compile(made.left_out)
+    core = [path for path in core_sources() if not needless.search(path.as_posix())]
     sources = [
-        *(path for path in core_sources() if not needless.search(path.as_posix())),
         FIRMWARE / "link" / "link.c",
         FIRMWARE / "ports" / "host" / "port.c",
         FIRMWARE / "ports" / "host" / "receiver.c",
@@ -188,14 +188,17 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
         *(folder / name for name in sorted(made.files) if name.endswith(".c")),
     ]
     image = tree / "stream"
-    inputs = [*sources, *folder.glob("**/*.h"), *FIRMWARE.glob("**/*.h")]
+    inputs = [*core, *sources, *folder.glob("**/*.h"), *FIRMWARE.glob("**/*.h")]
     if image.exists() and image.stat().st_mtime > max(one.stat().st_mtime for one in inputs):
         return image
-    includes = [folder, *FOLDERS, FIRMWARE / "link", FIRMWARE / "ports"]
+    includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports"]
     options = ["-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
     options += [f"-D{name}={value}" for name, value in made.sizes.items()] + [f"-I{one}" for one in includes]
     tree.mkdir(parents=True, exist_ok=True)
-    objects = objects_of("gcc", options, sources, tree)
+    own = [f"-I{folder}", *options]
+    # The same of every rig with these sizes, but for the second stage, whose shape stands before the core's header.
+    objects = objects_of("gcc", own if made.refined else options, core, tree)
+    objects += objects_of("gcc", own, sources, tree)
     fresh = tree / "stream.new"
     run_compiler(["gcc", *objects, "-lm", "-o", str(fresh)])
     fresh.replace(image)

@@ -22,7 +22,7 @@ from pvid.codegen.statements import Language, call_of, statements
 WRITTEN = {  # by the core's functions, whatever the model has of it
     "constants": ("m",),
     "motion": ("a",),
-    "jacobian": ("a", "K", "D", "U", "B"),
+    "jacobian": ("a", "K", "D", "B"),
     "output": ("z",),
     "output_jacobian": ("Zq", "Zv", "Zr"),
     "chart": ("row",),
@@ -34,7 +34,7 @@ _DEFINED = re.compile(r"^(?:const )?(?:float|double) (\w+)")
 _MEANING = {
     "constants": "Once a pass: m from r.",
     "motion": "a: q'' of order 2, q' of order 1.",
-    "jacobian": "a, da/dq, da/dv, da/du by rows; B[parameter][row] = da/d(steps of the motion's parameters).",
+    "jacobian": "a, da/dq, da/dv by rows; B[parameter][row] = da/d(steps of the motion's parameters).",
     "output": "z: what the sensors measure.",
     "output_jacobian": "dz/dq, dz/dv (only with PVID_REFINE_OUTPUT_RATES), dz/d(steps of r behind the moving ones).",
     "region": "Whether a mechanism with these parameters is possible.",
@@ -109,10 +109,10 @@ def shape(made: RefineFunctions, command: str) -> str:
         ("OUTPUTS", len(made.outputs), "entries of z, which are measured"),
         ("OUTPUT_RATES", int(rates), "1: an output depends on v"),
         ("OUTPUT_LINEAR", int(_is_linear(made)), "1: the derivatives of the outputs are constants"),
-        ("MOVING", made.moving, "first entries of r: they change the motion"),
+        ("MOVING", made.moving - made.skew, "first entries of r: they change the motion"),
+        ("SKEW", int(made.skew), "1: the entry behind them is the skew of the sensors"),
         ("PARAMETERS", len(made.parameters), "entries of r"),
         ("CONSTANTS", len(made.constants), "that the equations need of r"),
-        ("SKEW", int(made.skew), "1: the last moving entry is the skew of the sensors"),
         ("P", sum(one.place >= 0 for one in made.parameters), "entries of the weak form's p that r needs"),
         ("MODEL_ID", refine_id(made), "changes with everything that the generated functions are made from"),
     ]
@@ -242,6 +242,8 @@ def function(one: RefineFunction, real: Real, made: RefineFunctions | None = Non
     arguments += [f"{real.name} {key}[]" for key in written]
     places = [f"{key}[{k}]" for key, n in one.written for k in range(n)]
     stored = [f"{place} = {text};" for place, text in zip(places, results, strict=True) if place != text]
+    if made is not None:
+        stored = [one for one in stored if one.partition("[")[0] in written]
     if made is not None and one.name == "output_jacobian":
         stored = _tail(made, stored)
     kept = _needed(lines, stored)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from pvid.codegen.files_f32 import guarded
 from pvid.core.sizes import smallest
+from pvid.settings.enums import Law
 from pvid.settings.weak import NONE, WeakConfig
 from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
@@ -26,14 +27,17 @@ def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]
     fitted = found | {
         "PVID_MAX_WINDOWS": 0 if _shares_place(config) else 1,
         "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
+        "PVID_FEEDBACK": int(config.estimator.law is not Law.STATIONARY or config.estimator.feedback_hz > 0),
+        "PVID_NEGLECTED": int(config.trust.neglected > 0),
         "PVID_REFINEMENT": int(refined),
     }
     if found != needed:
         return fitted
-    counts = ("signals", "jets", "runs", "signs", "integrands")
+    counts = ("signals", "jets", "runs", "signs", "gains", "integrands")
     exact = {f"PVID_EXACT_{one.upper()}": int(getattr(model, one)) for one in counts}
     summed = max(k + 1 for k, one in enumerate(model.channel) if one.gain != NONE)
-    return fitted | {"PVID_CHECK_TABLES": 0, "PVID_EXACT": 1, "PVID_EXACT_CHANNELS": summed} | exact
+    exact |= {"PVID_EXACT_CHANNELS": summed, "PVID_EXACT_PLAIN": int(model.plain)}
+    return fitted | {"PVID_CHECK_TABLES": 0, "PVID_EXACT": 1} | exact
 
 
 def fitted_sizes_q31(config: WeakConfigQ31, n_p: int, n_c: int) -> dict[str, int]:

@@ -53,6 +53,7 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0) -> RefineConfig:
         gain_sd=_as_float32(rig.gain_sd),
         state_limit=_as_float32(rig.state_limit),
         forgetting_s=forgetting_s,
+        rests=rig.rests,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
 from pvid.link.frames import Hello, Names
+from pvid.link.names import BoardNames
 from pvid.log.board_model import mechanism_of
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.values import UNKNOWN_RIG, Values, is_rate
@@ -115,11 +116,22 @@ def mechanism_of_log(path: Path) -> Mechanism:
     rig = None if text is None else rig_in(text)
     if rig is not None:
         return rig.mechanism
-    for record in LogReader(path):
-        if isinstance(record.item, Names):
-            with suppress(PvidError):
-                return mechanism_of(record.item.text)
+    for names in _names_of_log(path):
+        with suppress(PvidError):
+            return mechanism_of(names.text)
     return UNKNOWN_RIG
+
+
+def _names_of_log(path: Path) -> Iterator[Names]:
+    return (record.item for record in LogReader(path) if isinstance(record.item, Names))
+
+
+def names_of_log(path: Path) -> BoardNames | None:
+    """What the first board named that named what there can be; None when none did."""
+    for names in _names_of_log(path):
+        with suppress(PvidError):
+            return BoardNames.parse(names.text)
+    return None
 
 
 def refuse_to_append(path: Path, rig: RigFile | str | None) -> None:

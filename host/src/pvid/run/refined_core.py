@@ -206,7 +206,7 @@ def compare_refined(stages: BothStages, progress: Callable[[int], None] | None =
     pieces = []
     for first in range(0, ticks, _PIECE):
         part = slice(first, first + _PIECE)
-        pieces.append(twin.run(stages.samples[part], core.weak_p[part], core.weak_se[part]))
+        pieces.append(twin.run(stages.samples[part], core.weak_p[part], core.weak_se[part], core.busy[part]))
         if progress is not None:
             progress(min(first + _PIECE, ticks))
     reason = np.concatenate([one.reason for one in pieces])

@@ -37,7 +37,7 @@ class BothStagesTwin:
                 candidate = self.weak.finish.candidate[0]
                 p, se = (candidate[name][: len(none)] for name in ("p", "se"))
             with np.errstate(all="ignore"):
-                self.refine.step(given[tick], p, se)
+                self.refine.step(given[tick], p, se, self.weak.busy)
             after(tick, reasons)
 
         return self.weak.follow(given, both)

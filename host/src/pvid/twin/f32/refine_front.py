@@ -29,7 +29,7 @@ class Front:
     """pvid_refine_front_f32."""
 
     def __init__(self, config: RefineConfig, shape: RefineShape) -> None:
-        self.config, self.inputs, self.reach = config, shape.inputs, shape.reach
+        self.config, self.inputs = config, shape.inputs
         signals = config.signal
         ratio = _F(config.ratio)
         self.share = _F(1) / ratio
@@ -62,7 +62,7 @@ class Front:
     @property
     def first(self) -> int:
         """First entry that a block may begin at."""
-        return self.behind + self.reach
+        return self.behind
 
     @property
     def room(self) -> int:
@@ -130,10 +130,9 @@ class Front:
         self.wait -= 1
         return Entry.NOTHING if self.wait > 0 else self._end_block(given - self.reference)
 
-    def read(self, entry: int, steps: int) -> Signals:
-        """Signals of so many entries; of inputs those of the reach as well."""
-        value = self.ring[(entry - self.reach + np.arange(steps + 2 * self.reach)) % RING]
+    def read(self, entry: int) -> Signals:
+        """Signals of an entry."""
+        value = self.ring[entry % RING]
         found = value.astype(_F) * self.from_counts
-        outputs = found[self.reach : self.reach + steps, self.inputs :]
-        outputs[value[self.reach : self.reach + steps, self.inputs :] == _MISSING] = np.nan
-        return found[:, : self.inputs], outputs
+        outputs = np.where(value[self.inputs :] == _MISSING, _F(np.nan), found[self.inputs :])
+        return found[: self.inputs], outputs
