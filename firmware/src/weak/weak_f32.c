@@ -441,7 +441,8 @@ PVID_SELDOM static pvid_reason both_ticks(pvid_weak_f32 *self, const float sampl
     const pvid_reason reason = weak_tick(self, sample);
     const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
     if (sample != NULL) {
-        (void)self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL, self->busy);
+        (void)self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL,
+                                        self->busy);
     }
     return reason;
 }
