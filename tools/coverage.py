@@ -40,7 +40,7 @@ FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(c
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
 PLAY = "import playback; from pvid.core.native import Native; list(playback.digests(Native()))"
-# The weak engine in both arithmetic and the refinement: every shipped mechanism, hostile samples, snapshots.
+# The weak engine in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
     *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_bits_q31", "weak_snapshot_q31", "weak_rows_q31")),
     *(f"tests/twin/test_{name}.py" for name in ("second_stage", "refinement", "trust_q31", "kinds", "kinds_q31")),
