@@ -68,7 +68,7 @@ def _pushed(mnemonic: str, operands: str) -> int:
     if down := re.search(r", \[sp, #-(\d+)\]!", operands):
         return int(down.group(1))
     if down := re.match(r"^sp,sp,-(\d+)$", operands):
-        return int(down.group(1)) if mnemonic == "addi" else 0
+        return int(down.group(1)) if mnemonic in ("addi", "add") else 0  # an alias of some versions of objdump
     return 0
 
 
