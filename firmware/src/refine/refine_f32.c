@@ -614,7 +614,7 @@ PVID_SELDOM static pvid_reason odd_step(pvid_refine_f32 *self, const float sampl
 }
 
 /* A tick of the weak form's second stage, whose pointers are given. */
-static pvid_reason step(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy)
+static pvid_reason step_of_stage(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy)
 {
     if ((weak != NULL) || !self->plain) {
         return odd_step(self, sample, weak, busy);
@@ -627,12 +627,12 @@ static pvid_reason step(pvid_refine_f32 *self, const float sample[], const pvid_
 
 pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy)
 {
-    return (is_ready(self) && (sample != NULL)) ? step(self, sample, weak, busy) : PVID_NOT_READY;
+    return (is_ready(self) && (sample != NULL)) ? step_of_stage(self, sample, weak, busy) : PVID_NOT_READY;
 }
 
 const pvid_weak_stage_f32 pvid_refine_stage_f32 = {
     .init = pvid_refine_init_f32,
-    .step = step,
+    .step = step_of_stage,
     .gap = pvid_refine_gap_f32,
     .freeze = pvid_refine_freeze_f32,
 };
