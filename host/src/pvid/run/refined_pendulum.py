@@ -40,6 +40,7 @@ _EXTRAS = ("slant", "f1", "f2", PLAY)  # in the order of r
 _DRY = ("f1", "f2")
 _FRICTIONS = ("k1", "k2", *_DRY)
 _DRY_STARTS = 4  # of a search with them
+_NEAREST = 2  # of them from the shortest blocks
 _OPTION_PASSES = 10
 _SHORTER = (0.5, 0.25)  # of a block: tried where the residuals are larger than the sensors' noise
 _LONGER = 3  # times a block: tried where they are not
@@ -120,6 +121,7 @@ class _Search:
         middle = self.first + (self.mean - 1) / 2  # of the first average
         self._track = times - middle / rate, acceleration / rig.l1
         self._problems: dict[tuple[str, ...], Problem] = {}
+        self.short: list[tuple[float, dict[str, float]]] = []  # chi^2 and values of the shortest blocks, of each start
 
     def problem(self, optional: tuple[str, ...] = ()) -> Problem:
         """With these extras."""
@@ -158,6 +160,10 @@ class _Search:
         sd = np.array([3 * LOG_SD if one.log else _SD[one.name] for one in made.parameters])
         searched = np.array([free is None or one.name in free for one in made.parameters])
         return Prior(r, sd, searched)
+
+    def nearest(self) -> list[dict[str, float]]:
+        """Where the shortest blocks fit best: what no equation has moves their parameters least."""
+        return [values for _, values in sorted(self.short, key=lambda one: one[0])[:_NEAREST]]
 
     def lengths(self, slow_hz: float, shares: Sequence[float]) -> list[int]:
         """Of blocks [samples]."""
@@ -207,8 +213,9 @@ def refine_pendulum(
     unsure = found.slow_chi2 > _ASKED and _largest_error(found) > _UNSURE
     if found.slow_chi2 > GOOD or not found.converged or unsure:
         outcomes.sort(key=lambda one: one.chi2)
-        about = [*map(_values_of(search.problem()), outcomes[:2]), *starts]
-        problem, found = _with_friction(search, (problem, found), about[: 1 if sure else _DRY_STARTS])
+        reached = [_values_of(search.problem())(one) for one in outcomes[:2]]
+        about = reached[:1] if sure else [*search.nearest(), *reached, *starts][:_DRY_STARTS]
+        problem, found = _with_friction(search, (problem, found), about)
         slow = model.modes_hz(found.r[:3])[0]
     if found.slow_chi2 > _ASKED:
         found = _shorter(problem, search.prior(problem, found.r), found, search.lengths(slow, _SHORTER))
@@ -370,8 +377,11 @@ def _searched(
     prior = search.prior(problem, r, (*_FIRST, *more))
     wide = Prior(r, np.maximum(prior.sd, 1.0), prior.free)
     total = len(problem.measured.z)
+    short, full = search.lengths(model.modes_hz(p)[0], _SEARCH)
     try:
-        found = refined(problem, wide, search.lengths(model.modes_hz(p)[0], _SEARCH), most=_SEARCH_PASSES)
+        found = refined(problem, wide, [short], most=_SEARCH_PASSES)
+        search.short.append((found.chi2, _values_of(problem)(found)))
+        found = refined(problem, wide, [full], before=found, most=_SEARCH_PASSES)
         while _is_vague(found) and len(found.cut.first) > 1:
             samples = min(_LONGER * found.cut.samples, total)
             found = refined(problem, wide, [samples], before=found, most=_SEARCH_PASSES)
