@@ -79,7 +79,7 @@ static void prepare_variants(const pvid_strong_config_f32 *config)
     start(&exact, &exactly);
     in_stages.estimator.divider = 8;
     start(&staged, &in_stages);
-    smoothly.bank = (pvid_fir_bank_f32){.half = POINTS, .stride = BLOCK, .block = BLOCK, .weights = long_bank};
+    smoothly.bank = (pvid_fir_bank_f32){.half = POINTS, .stride = 1, .block = BLOCK, .weights = long_bank};
     start(&smoothing, &smoothly);
 }
 

@@ -55,10 +55,10 @@ static uint8_t exact_every_of(const pvid_strong_config_f32 *config)
 }
 
 PVID_COLD pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self,
-                                                      const pvid_strong_config_f32 *config)
+                                                      const pvid_strong_config_f32 *config, float rate_hz)
 {
     const pvid_estimator_config_f32 *estimator = &config->estimator;
-    const pvid_status status = pvid_settings_are_valid_f32(estimator, PVID_KAPITZA_P, 7u, config->sample_rate_hz);
+    const pvid_status status = pvid_settings_are_valid_f32(estimator, PVID_KAPITZA_P, 7u, rate_hz);
     if (status != PVID_OK) {
         return status;
     }
@@ -75,12 +75,12 @@ PVID_COLD pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 
         /* not 0: row_variance over it is the square of a start_sd */
         self->prior[a] = (square > PVID_LEAST_NORMAL_F32) ? square : PVID_LEAST_NORMAL_F32;
     }
-    const float forgetting_rows = estimator->forgetting_s * config->sample_rate_hz;
+    const float forgetting_rows = estimator->forgetting_s * rate_hz;
     const uint32_t divider = estimator->divider;
     self->config = config;
     self->exact_every = exact_every_of(config);
     const float interval = (float)((divider > 1u) ? divider : self->exact_every);
-    self->gain = pvid_settings_gain_f32(estimator, config->sample_rate_hz, interval);
+    self->gain = pvid_settings_gain_f32(estimator, rate_hz, interval);
     const bool long_enough = (forgetting_rows <= 0.0f) || (forgetting_rows >= (float)divider);
     self->staged = ((divider % PVID_STRONG_ROWS) == 0u) && (divider >= (2u * PVID_STRONG_ROWS)) &&
                    (divider <= FOLD_MAX) && !(estimator->dead_zone > 0.0f) && long_enough;

@@ -7,8 +7,9 @@
 
 #include "pvid/strong.h"
 
-/* Initialises `self`, which is all zeros. Fails as pvid_strong_init_f32. */
-pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self, const pvid_strong_config_f32 *config);
+/* Initialises `self`, which is all zeros, for rows at rate_hz. Fails as pvid_strong_init_f32. */
+pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self, const pvid_strong_config_f32 *config,
+                                            float rate_hz);
 
 /* Residuals at p. */
 typedef struct {

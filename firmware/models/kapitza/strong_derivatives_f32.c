@@ -23,51 +23,49 @@ PVID_COLD pvid_status pvid_strong_window_init_f32(pvid_strong_window_f32 *self, 
     }
     const pvid_fir_bank_f32 *bank = &config->bank;
     self->stride = bank->stride;
-    self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);
+    self->length = pvid_fir_length_f32(bank);
     self->five_points = is_five_points(bank) ? 1u : 0u;
-    const float rate = config->sample_rate_hz / (float)bank->stride;
+    const uint32_t block = pvid_fir_block_f32(bank);
+    const float rate = config->sample_rate_hz / (float)(block * bank->stride);
     const float inverse_l1 = 1.0f / config->l1;
     const float rate2 = rate * rate;
-    self->phi_scale[0] = 1.0f / (float)((bank->block > 1u) ? bank->block : 1u);
+    self->phi_scale[0] = 1.0f / (float)block;
     self->phi_scale[1] = (self->five_points != 0u) ? (rate2 / 12.0f) : (rate2 * self->phi_scale[0]);
     self->phi_scale[2] = (rate2 * rate) * ((self->five_points != 0u) ? 0.5f : self->phi_scale[0]);
     self->phi_scale[3] = (rate2 * rate2) * self->phi_scale[0];
     for (size_t i = 0; i < 3u; i++) {
         self->u_scale[i] = self->phi_scale[i + 1u] * inverse_l1;
     }
-    pvid_strong_window_reset_f32(self, bank);
+    pvid_strong_window_reset_f32(self);
     return PVID_OK;
 }
 
-PVID_COLD void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank)
+PVID_COLD void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self)
 {
-    const size_t places = (size_t)pvid_fir_places_f32(bank);
     self->head = 0;
     self->at = 0;
-    self->missing = (uint16_t)(self->length + ((bank->block > 1u) ? (bank->block - 1u) : 0u));
+    self->missing = self->length;
     self->five_points = (self->five_points != 0u) ? 1u : 0u;
-    for (size_t i = 0; i < places; i++) {
+    for (size_t i = 0; i < self->length; i++) {
         self->samples[i][0] = 0.0f;
         self->samples[i][1] = 0.0f;
     }
 }
 
-/* Takes a sample of each channel into the sums of their blocks, whose values become the points at `head`. */
-static void sum_blocks(pvid_strong_window_f32 *self, size_t block, size_t head)
+PVID_SELDOM bool pvid_strong_window_takes_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, float phi,
+                                              float y)
 {
-    float *tail = self->samples[self->length];
-    PVID_ROLLED
-    for (size_t i = 0; i < 2u; i++) {
-        self->samples[head][i] = pvid_block_sum_f32(&tail[i], 2, block, self->at, self->samples[head][i]);
+    const size_t head = self->head;
+    const uint32_t samples = (uint32_t)self->at + 1u;
+    float *point = self->samples[head];
+    point[0] = (samples == 1u) ? phi : (point[0] + phi);
+    point[1] = (samples == 1u) ? y : (point[1] + y);
+    if (samples < bank->block) {
+        self->at = (uint16_t)samples;
+        return false;
     }
-    self->at = pvid_block_next_f32(block, self->at);
-}
-
-PVID_SELDOM bool pvid_strong_window_fills_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, size_t head)
-{
-    if (bank->block > 1u) {
-        sum_blocks(self, bank->block, head);
-    }
+    self->at = 0;
+    self->head = (uint16_t)pvid_strong_after_f32(self, head, 1);
     if (self->missing > 0u) {
         self->missing--;
     }

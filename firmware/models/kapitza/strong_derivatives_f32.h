@@ -13,8 +13,8 @@
 /* Takes the bank, the sample rate and l1. Fails as pvid_differentiator_init_f32. */
 pvid_status pvid_strong_window_init_f32(pvid_strong_window_f32 *self, const pvid_strong_config_f32 *config);
 
-/* Empties the window of a bank. */
-void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank);
+/* Empties the window. */
+void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self);
 
 /* The sums of the filters of orders 0, 2, 3, 4. */
 typedef struct {
@@ -70,22 +70,26 @@ static inline void pvid_strong_five_points_f32(const pvid_strong_window_f32 *sel
 /* pvid_strong_window_f32.five_points of a full window. */
 #define PVID_FIVE_POINTS_READY 2u
 
-/* Takes the sample at `head` into a window of another bank, or one that is not full yet. Returns whether it is full. */
-bool pvid_strong_window_fills_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, size_t head);
+/* Takes a sample of each channel into a window of another bank, or one that is not full yet. Returns whether it
+ * completes a block, and the window is full. */
+bool pvid_strong_window_takes_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, float phi, float y);
 
-/* Stores a sample of each channel. When the window is full, writes phi, phi'', phi''', phi'''' (its order 1 is not set)
- * and u, u', u'', and returns true. */
+/* Takes a sample of each channel. When it completes a block and the window is full, writes phi, phi'', phi''', phi''''
+ * (its order 1 is not set) and u, u', u'', and returns true. */
 static inline bool pvid_strong_window_step_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, float phi,
                                                float y, float d_phi[PVID_ORDERS], float u[3])
 {
     const size_t head = self->head;
-    self->samples[head][0] = phi;
-    self->samples[head][1] = y;
     const size_t oldest = pvid_strong_after_f32(self, head, 1);
-    self->head = (uint16_t)oldest;
     const uint32_t five_points = self->five_points;
-    if ((five_points != PVID_FIVE_POINTS_READY) && !pvid_strong_window_fills_f32(self, bank, head)) {
+    if (five_points == PVID_FIVE_POINTS_READY) {
+        self->samples[head][0] = phi;
+        self->samples[head][1] = y;
+        self->head = (uint16_t)oldest;
+    } else if (!pvid_strong_window_takes_f32(self, bank, phi, y)) {
         return false;
+    } else {
+        /* the window is full */
     }
     pvid_strong_filters_f32 of_phi;
     pvid_strong_filters_f32 of_y;

@@ -42,16 +42,16 @@ static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *
     if (status != PVID_OK) {
         return status;
     }
-    self->drive_forgetting = (config->sample_rate_hz > 1.0f) ? (1.0f / config->sample_rate_hz) : 1.0f;
+    const float rate = config->sample_rate_hz / (float)pvid_fir_block_f32(&config->bank); /* of rows */
+    self->drive_forgetting = (rate > 1.0f) ? (1.0f / rate) : 1.0f;
     self->drive_min = config->drive_min * config->drive_min;
-    status = pvid_kapitza_estimator_init_f32(&self->estimator, config);
+    status = pvid_kapitza_estimator_init_f32(&self->estimator, config, rate);
     if (status != PVID_OK) {
         return status;
     }
-    pvid_misfit_init_f32(&self->misfit, config->sample_rate_hz, config->estimator.forgetting_s);
+    pvid_misfit_init_f32(&self->misfit, rate, config->estimator.forgetting_s);
     const float row_variance = config->estimator.row_sd * config->estimator.row_sd;
-    return pvid_gate_init_f32(&self->gate, &config->gate, config->sample_rate_hz,
-                              GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * row_variance);
+    return pvid_gate_init_f32(&self->gate, &config->gate, rate, GATE_MEMORY_S * rate, GATE_FLOOR * row_variance);
 }
 
 PVID_COLD pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
@@ -70,7 +70,7 @@ void pvid_strong_freeze_f32(pvid_strong_f32 *self, bool frozen)
 void pvid_strong_gap_f32(pvid_strong_f32 *self)
 {
     if (is_ready(self)) {
-        pvid_strong_window_reset_f32(&self->window, &self->estimator.config->bank);
+        pvid_strong_window_reset_f32(&self->window);
     }
 }
 
@@ -356,14 +356,14 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
         return PVID_NOT_READY;
     }
     if (!pvid_finite_f32(phi) || !pvid_finite_f32(y)) {
-        pvid_strong_window_reset_f32(&self->window, &self->estimator.config->bank);
+        pvid_strong_window_reset_f32(&self->window);
         pvid_count_up(&self->estimator.counters.rejected_not_finite);
         return PVID_REJECTED_NOT_FINITE;
     }
     float d_phi[PVID_ORDERS];
     float u[3];
     if (!pvid_strong_window_step_f32(&self->window, &self->estimator.config->bank, phi, y, d_phi, u)) {
-        return PVID_WARMING_UP;
+        return (self->window.missing > 0u) ? PVID_WARMING_UP : PVID_ACCUMULATED; /* or in a block */
     }
     const float drive = self->drive + (self->drive_forgetting * ((u[0] * u[0]) - self->drive));
     self->drive = pvid_finite_f32(drive) ? drive : self->drive;

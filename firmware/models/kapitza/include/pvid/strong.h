@@ -60,7 +60,7 @@ typedef struct pvid_strong_estimator_f32 pvid_strong_estimator_f32;
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m], sampled at the same time. Returns
- *   - PVID_WARMING_UP until the windows are full,
+ *   - PVID_WARMING_UP until the windows are full, PVID_ACCUMULATED within a block of samples,
  *   - PVID_REJECTED_NOT_FINITE for a sample that is not finite: it restarts the windows, the sums are kept,
  *   - PVID_HELD_NOT_EXCITED without drive: the noise of a resting sensor, differentiated four times, would look
  *     like motion,

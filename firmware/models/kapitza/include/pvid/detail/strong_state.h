@@ -51,14 +51,13 @@ typedef struct {
     float phi_scale[4];                /* factors of the filters' sums for orders 0, 2, 3, 4 of phi [1/s^k] */
     float u_scale[3];                  /* the same for u, u', u'', over l1 */
     uint16_t length;                   /* places of the ring */
-    uint16_t stride;                   /* places from one point of a filter to the next */
-    uint16_t head;                     /* place of the oldest point */
-    uint16_t at;                       /* place of the oldest sample of a block */
-    uint16_t missing;                  /* samples until the window is full */
+    uint16_t stride;                   /* places from tap to tap */
+    uint16_t head;                     /* place of the oldest point, and of the sums of a block until they replace it */
+    uint16_t at;                       /* samples in these sums */
+    uint16_t missing;                  /* points until the window is full */
     uint8_t five_points;               /* 1: the bank is pvid_five_points_f32, whose sums are written out; 2: and the
                                           window is full */
-    float samples[PVID_MAX_WINDOW][2]; /* the ring of points, phi and y; behind it the sums of blocks
-                                          (differentiator_f32.h) */
+    float samples[PVID_MAX_WINDOW][2]; /* the ring of points, phi and y */
 } pvid_strong_window_f32;
 
 struct pvid_strong_f32 {
