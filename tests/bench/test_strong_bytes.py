@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from bench.strong_bytes import BOARD, TEXT_HEADER, measured, state_rows, text_rows
 from bench.tick_methods import VARIANTS, smoothed_run
 from pvid.board.boards import BOARDS
@@ -49,3 +51,14 @@ def test_a_savitzky_golay_bank_of_315_samples_takes_few_instructions_and_bytes()
     of_float, of_integers = [play(BOARDS[BOARD], build_image(BOARDS[BOARD], run)[0], TIMEOUT_S) for run in runs]
     assert of_float.instructions_mean <= 250 and of_float.state_bytes <= 1100
     assert of_integers.instructions_mean <= 900 and of_integers.state_bytes <= 1200
+
+
+@pytest.mark.parametrize(
+    ("target", "divider", "most"),
+    [("mps2-an386", 1, 4500), ("mps2-an385", 1, 4500), ("microbit", 1, 16_500), ("microbit", 8, 8000)],
+)
+def test_fixed_point_keeps_its_limits_without_a_floating_point_unit(target: str, divider: int, most: int) -> None:
+    """Instructions a tick in the mean, a solve at every row or every eighth, and 1.2 kB of state."""
+    report = play(BOARDS[target], build_image(BOARDS[target], standard_run(TICKS, "q31", divider))[0], TIMEOUT_S)
+    assert report.instructions_mean <= most
+    assert report.state_bytes <= 1200

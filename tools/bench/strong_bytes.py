@@ -1,4 +1,4 @@
-"""Where the bytes of the strong form go: code by part in each build, state by member, on a Cortex-M4F."""
+"""Where the bytes of the strong form go: code by part, state by member, on a Cortex-M4F; its cost in fixed point."""
 
 from __future__ import annotations
 
@@ -90,6 +90,20 @@ def text_rows() -> list[tuple[str, ...]]:
         ("instructions a tick, mean", *(f"{build.report.instructions_mean:.0f}" for build in builds)),
         ("instructions, longest tick", *(f"{build.report.instructions_longest:.0f}" for build in builds)),
     ]
+
+
+SOFT = ("mps2-an386", "mps2-an385", "microbit", "virt-rv32imac")
+FIXED_HEADER = ("instructions per tick", "q31", "q31, a solve at every eighth row", "float32", "ratio")
+
+
+def fixed_rows() -> list[tuple[str, ...]]:
+    """A tick in fixed point beside float32, by a floating-point unit (Cortex-M4F) or soft float, as in FIXED_HEADER."""
+    rows = []
+    for name in SOFT:
+        runs = (standard_run(TICKS, "q31"), standard_run(TICKS, "q31", 8), standard_run(TICKS))
+        means = [play(BOARDS[name], build_image(BOARDS[name], run)[0], TIMEOUT_S).instructions_mean for run in runs]
+        rows.append((BOARDS[name].core, *(f"{one:.0f}" for one in means), f"{means[2] / means[0]:.1f}"))
+    return rows
 
 
 def _part_of(section: str, file: str) -> str:

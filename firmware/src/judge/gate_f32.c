@@ -58,7 +58,7 @@ PVID_COLD bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square)
 PVID_COLD pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square)
 {
     const bool widened = self->scale > self->usual;
-    if (!pvid_gate_judges_f32(self, square)) {
+    if (!pvid_gate_passes_f32(self, square)) {
         return PVID_GATE_REJECTS;
     }
     if (!pvid_finite_f32(square)) {

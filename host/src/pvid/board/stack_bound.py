@@ -67,8 +67,8 @@ def _pushed(mnemonic: str, operands: str) -> int:
         return int(down.group(1)) if mnemonic in ("sub", "sub.w", "subw") else 0
     if down := re.search(r", \[sp, #-(\d+)\]!", operands):
         return int(down.group(1))
-    if down := re.match(r"^sp,sp,-(\d+)$", operands):
-        return int(down.group(1)) if mnemonic == "addi" else 0
+    if down := re.match(r"^sp,sp,-(\d+)\b", operands):  # an alias of addi for some binutils; a comment may follow
+        return int(down.group(1)) if mnemonic in ("add", "addi") else 0
     return 0
 
 
