@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
+from pvid.board.target import HOST_TARGET
 from pvid.cli.main import commands
 from pvid.cli.mechanism import recording_of
 from pvid.models.simulated_rig import simulated_rig
@@ -153,6 +154,10 @@ def test_both_stages_in_c_refine_a_pendulum_of_its_own_rig_file(tmp_path: Path) 
         one = shown["parameters"][name]
         assert abs(one["value"] - truth) < 3.5 * one["se_noise"], name
     assert shown["w"]["se"] < 1e-3 * shown["w"]["value"]
+    streamed = pvid("identify", run, "--core", "f32", "--refine", "--on", HOST_TARGET, "--json")
+    on_board = json.loads(streamed.stdout)
+    assert on_board["on"] == HOST_TARGET and on_board["hash"] == shown["hash"]  # of both stages, at every report
+    assert on_board["parameters"] == shown["parameters"]
     answer = pvid("compare", run, "--core", "f32")
     assert answer.return_value == DONE and "refined" in answer.stdout and answer.stdout.count("equal") == 2
     rig = tmp_path / "described.toml"

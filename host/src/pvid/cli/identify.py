@@ -75,10 +75,11 @@ def command(
     signals against the simulated.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
-    reported tick and at the end. It is then the answer of the target's form, without the refinement.
+    reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both
+    stages.
     """
-    if refine and target is not None:
-        raise PvidError("--refine is computed on this computer alone: omit --on")
+    if refine and target is not None and core != FLOAT.name:
+        raise PvidError(f"the refinement on a target is in float32: --on {target} --refine --core {FLOAT.name}")
     described: MechanismRig | RigFile | None = mechanism_rig(run_path, rig_path, settings, model)
     if described is None and refine and core == FLOAT.name:
         own = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)

@@ -114,11 +114,11 @@ def identify_run(
     if refine and in_c and in_c is not FLOAT:
         raise PvidError(f"--refine is in float32 and float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
-    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
+    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     answer = identify_mechanism(recording, model, weights)
     if refine and in_c:
-        return _refined_in_c(answer, as_json=as_json, figure=figure)
+        return _refined_in_c(answer, as_json=as_json, figure=figure, on=on)
     if refine:
         return _refined(answer, as_json=as_json, figure=figure)
     core: CoreAnswer | None = None
@@ -188,13 +188,13 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
     return core
 
 
-def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core) -> bool:
+def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core, refined: bool) -> bool:
     """Streams a recording to a target and prints the account; whether every hash is that of this machine."""
     from pvid.board.engine_board import verify_recording
 
     own = described(rig) if isinstance(rig, RigFile) else rig
     with progress_bar(f"streaming to {target}", len(recording)) as advance:
-        verdict = verify_recording(target, own, recording, core, advance)
+        verdict = verify_recording(target, own, recording, core, advance, refined=refined)
     write_stderr(f"{target}: {verdict.playback.account}")
     if not verdict.equal:
         write_stderr(f"pvid: {target}: {verdict.text}")
@@ -223,7 +223,7 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
     return DONE
 
 
-def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> int:
+def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None, on: str | None) -> int:
     """Identifies by both stages in C and prints the refined estimate, or that of the first stage."""
     from pvid.run.refined_core import refined_in_c
 
@@ -231,7 +231,7 @@ def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None
         raise PvidError("--figure is of a refinement in float64; omit --core f32")
     found = refined_in_c(answer)
     if as_json:
-        click.echo(json.dumps(found.as_json()))
+        click.echo(json.dumps(found.as_json() | ({} if on is None else {"on": on})))
     else:
         if found.identified:
             stage = "refined" if found.adopted else "weak form"

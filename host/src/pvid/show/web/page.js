@@ -169,7 +169,7 @@ function drawPlots({ estimates, motion, marks: newest }) {
       id: `parameter${i}`, section: "parameters", label: one.label, data: [t, one.value, one.low, one.high, ...refined], limits: one.limits, marked: true,
       series: [
         { label: refined.length ? "weak form" : "estimate", colour: "blue", width: 2, paths: held }, ...edges,
-        ...(refined.length ? [{ label: "refined, published", colour: "orange", width: 2, paths: held }, ...edges] : []),
+        ...(refined.length ? [{ label: "refined", colour: "orange", width: 2, paths: held }, ...edges] : []),
       ],
       bands: refined.length ? [[3, 2], [6, 5]] : [[3, 2]],
     });
