@@ -16,7 +16,7 @@ from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_weak
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.sources import INCLUDES, sources_of
-from pvid.design.weak_q31 import CIRCLE, DOWN, Sensing, fixed_design
+from pvid.design.weak_q31 import DOWN, Sensing, fixed_design
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.design import WeakDesign
@@ -68,13 +68,7 @@ class Rig:
             [np.rint(self.run[one] / lsb) for one, lsb in zip(self.made.samples, self.lsb, strict=True)]
         ).astype(np.int64)
         # what the integers are made of, for float64
-        self.exact = dict(
-            zip(
-                self.made.samples,
-                self.counts * np.array(self.lsb)[:, np.newaxis],
-                strict=True,
-            )
-        )
+        self.exact = dict(zip(self.made.samples, self.counts * np.array(self.lsb)[:, np.newaxis], strict=True))
         self.record = record_of(self.compiled, self.exact, self.oracle_design)
         of_jets = {str(one): x for one, x in self.record.grid.jets.items()}
         reaches = {one: _HIGHEST * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in self.made.jet_names}
@@ -119,10 +113,7 @@ class Rig:
             for mine, theirs in zip(self.made.term[first:], ordered, strict=False):
                 whole = np.zeros((sums.shape[1], functions.highest + 1, 2))
                 whole[:, 0, 0] = sums[theirs.channel, :, 0]
-                whole[:, 1:, 0], whole[:, 1:, 1] = (
-                    sums[theirs.channel, :, 1::2],
-                    sums[theirs.channel, :, 2::2],
-                )
+                whole[:, 1:, 0], whole[:, 1:, 1] = (sums[theirs.channel, :, 1::2], sums[theirs.channel, :, 2::2])
                 out[mine.channel] = whole
             first += len(row.terms)
         return out
@@ -138,8 +129,9 @@ class Rig:
                 continue
             whole = np.abs(made.channels[place]).astype(np.float64)
             window = np.convolve(whole, np.ones(2 * design.hop), "valid").max()
+            # a sum of the channel at h = 0, where the cosine is 1
             down = 2.0 ** (DOWN + design.sum_shift + design.format[place].own)
-            out[place] = 4.0**one.fold * window * CIRCLE / down * design.units[place]
+            out[place] = 4.0**one.fold * window * float(design.circle[0]) / down * design.units[place]
         return out
 
 
@@ -290,14 +282,7 @@ SIZES = (
 )
 # Not -O1: with -fsanitize=undefined the compiler of Debian 12 (gcc 12.2) then takes the sign off a negative sine.
 _OPTIONS = (
-    *(
-        "-std=c99",
-        "-O2",
-        "-fPIC",
-        "-DPVID_PLAIN_NAMES",
-        "-fsanitize=undefined",
-        "-fsanitize-undefined-trap-on-error",
-    ),
+    *("-std=c99", "-O2", "-fPIC", "-DPVID_PLAIN_NAMES", "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"),
     *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wvla"),
     *(f"-D{one}" for one in SIZES),
     *INCLUDES,
@@ -362,7 +347,7 @@ class Core:
         count = design.model.kind[kind].thetas + 1
         given = np.ascontiguousarray(np.stack([theta.m, theta.e], axis=-1), np.int32)
         sums = np.ascontiguousarray(window, np.int32)
-        x, exponent = np.zeros((count, design.functions), np.int32), np.zeros(count, np.int32)
+        x, exponent = (np.zeros((count, design.functions), np.int32), np.zeros(count, np.int32))
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, sums, x, exponent)]
         live = self.library(one).columns(kind, *pointers)
         return x.astype(np.int64), exponent.astype(np.int64), int(live)

@@ -15,8 +15,8 @@ bool pvid_pivot_is_significant_q31(int64_t pivot, int32_t diagonal)
 
 int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limit)
 {
-    const int64_t part = pvid_clamp_q31(pvid_round_shift_q31(total, 30), INT32_MAX);
-    return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(part * inverse.m, 31u - inverse.k), limit);
+    const int32_t part = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(total, 30), INT32_MAX);
+    return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(pvid_product_q31(part, inverse.m), 31u - inverse.k), limit);
 }
 
 void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n)
@@ -29,7 +29,7 @@ void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n)
 /* A pivot over its diagonal entry. */
 static int32_t part_of(int64_t pivot, int32_t diagonal)
 {
-    return (int32_t)pvid_clamp_q31(pivot / diagonal, PVID_ONE_Q30);
+    return (int32_t)pvid_clamp_q31((int64_t)pvid_quotient_q31((uint64_t)pivot, (uint32_t)diagonal), PVID_ONE_Q30);
 }
 
 void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j)

@@ -240,11 +240,11 @@ static inline int64_t row_times(size_t n, const int32_t m[], size_t i, const int
     size_t at = i;
     int64_t sum = 0;
     for (size_t j = 0; j < i; j++) {
-        sum += pvid_product_q31(m[at], x[j]);
+        sum += pvid_short_product_q31(m[at], x[j]);
         at += (n - 1u) - j;
     }
     for (size_t j = i; j < n; j++) {
-        sum += pvid_product_q31(m[at], x[j]);
+        sum += pvid_short_product_q31(m[at], x[j]);
         at++;
     }
     return sum;

@@ -110,11 +110,11 @@ static inline void add_column(size_t n, const int32_t m[], size_t j, int32_t a, 
 {
     size_t at = j;
     for (size_t i = 0; i < j; i++) {
-        t[i] += pvid_product_q31(m[at], a);
+        t[i] += pvid_short_product_q31(m[at], a);
         at += (n - 1u) - i;
     }
     for (size_t i = j; i < n; i++) {
-        t[i] += pvid_product_q31(m[at], a);
+        t[i] += pvid_short_product_q31(m[at], a);
         at++;
     }
 }

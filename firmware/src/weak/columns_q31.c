@@ -101,8 +101,7 @@ void pvid_weak_columns_take_q31(pvid_weak_columns_q31 *self, const pvid_weak_des
         if (below < SUM_BITS) { /* else nothing is left of it */
             const int32_t constant[2] = {2 * (int32_t)design->hop, 0};
             const int32_t *s = is_constant(design, term.channel) ? constant : window->s[term.channel][h];
-            const int32_t whole =
-                (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[term.order], design->factor[t].m), 30);
+            const int32_t whole = 4 * pvid_upper_product_q31(weight[term.order], design->factor[t].m);
             const int32_t w = pvid_floor_shift_32_q31(whole, (uint32_t)below);
             const int32_t up = (int32_t)((uint32_t)1 << lift_of(length_of(design, window, term.channel, h)));
             const bool turned = (term.order % 2u) != 0u;
@@ -111,9 +110,9 @@ void pvid_weak_columns_take_q31(pvid_weak_columns_q31 *self, const pvid_weak_des
             const int32_t of_re = ((term.order % 4u) >= 2u) ? -w : w;
             const int32_t of_im = (((term.order + 1u) % 4u) >= 2u) ? -w : w;
             int32_t *x = &self->x[term.column][h];
-            x[0] += (int32_t)pvid_floor_shift_q31(pvid_product_q31(re, of_re), PRODUCT_DOWN);
+            x[0] += pvid_floor_shift_32_q31(pvid_upper_product_q31(re, of_re), PRODUCT_DOWN - 32u);
             if (has_sine) {
-                x[harmonics - 1u] += (int32_t)pvid_floor_shift_q31(pvid_product_q31(im, of_im), PRODUCT_DOWN);
+                x[harmonics - 1u] += pvid_floor_shift_32_q31(pvid_upper_product_q31(im, of_im), PRODUCT_DOWN - 32u);
             }
         }
     }

@@ -1,11 +1,13 @@
 #include "weak/sums_q31.h"
 
+#include <string.h>
+
 #include "weak/values_q31.h"
 #include "number/integer_q31.h"
-#include "number/unroll.h"
+#include "number/exact.h"
 
 #define BLOCK ((size_t)PVID_WEAK_BLOCK_Q31)
-#define DOWN 22u
+#define DOWN 14u
 
 enum { RE = 0, IM = 1 };
 
@@ -35,77 +37,58 @@ void pvid_weak_sums_next_q31(pvid_weak_sums_q31 *self, const pvid_weak_design_q3
     }
 }
 
-/* A sum of four products of 24 by 29 bits, 2^-22 of it rounded down, which fits 32 bits. */
-#if defined(__ARM_ARCH_6M__)
-/* Without a long multiplication: a factor is high 2^12 + low, x is high 2^14 + low; four products of each fit 32 bits.
- */
+/* A sum of four products of 16 by 29 bits, 2^-14 of it rounded down, which fits 32 bits. */
 static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
 {
+#if defined(__ARM_ARCH_6M__)
+    /* without a long multiplication: x is high 2^14 + low; four products of each fit 32 bits */
     int32_t high = 0;
-    int32_t first = 0;
-    int32_t second = 0;
     int32_t low = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
         const int32_t one = x[j * PVID_MAX_CHANNELS];
-        const int32_t factor_high = pvid_floor_shift_32_q31(factor[j], 12);
-        const int32_t factor_low = (int32_t)((uint32_t)factor[j] & 0xFFFu);
-        const int32_t x_high = pvid_floor_shift_32_q31(one, 14);
-        const int32_t x_low = (int32_t)((uint32_t)one & 0x3FFFu);
-        high += factor_high * x_high;
-        first += factor_low * x_high;
-        second += factor_high * x_low;
-        low += factor_low * x_low;
+        high += factor[j] * pvid_floor_shift_32_q31(one, DOWN);
+        low += factor[j] * (int32_t)((uint32_t)one & 0x3FFFu);
     }
-    const int32_t below = (4 * first) + second + pvid_floor_shift_32_q31(low, 12);
-    return (16 * high) + pvid_floor_shift_32_q31(below, 10);
-}
+    return high + pvid_floor_shift_32_q31(low, DOWN);
 #else
-static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
-{
     int64_t sum = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
         sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
     }
     return (int32_t)pvid_floor_shift_q31(sum, DOWN);
-}
 #endif
+}
 
-/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded half up, or
- * begins these with them. */
-static void add_products(const int32_t factor[BLOCK], const int32_t *x, size_t channels, uint32_t shift, bool begins,
+/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded down. */
+static void add_products(const PVID_TABLE int16_t *factor, size_t h, const int32_t *x, size_t channels, uint32_t shift,
                          int32_t *sum)
 {
-    const int32_t c[BLOCK] = {factor[0], factor[1], factor[2], factor[3]};
-    for (size_t left = channels; left > 0u; left--) {
-        const int32_t half = pvid_floor_shift_32_q31(products(c, x), shift - 1u);
-        *sum = (begins ? 0 : *sum) + pvid_floor_shift_32_q31(half + 1, 1);
+    const int32_t c[BLOCK] = {factor[0], factor[h], factor[2u * h], factor[3u * h]};
+    const int32_t *end = &x[channels];
+    while (x != end) {
+        *sum += pvid_floor_shift_32_q31(products(c, x), shift);
         sum += 2;
         x++;
     }
 }
 
-/* The block to the sums of harmonic h, whose first step is at `angle` of the circle. */
+/* The block to the sums of harmonic h, whose first step is at `angle` of the circle. The table goes on far enough
+ * behind the circle for three quarters of it and a block. */
 static void add_block(pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *design, size_t h)
 {
-    const size_t summed = pvid_weak_summed_q31(design->model);
+    const size_t summed = PVID_COUNT(PVID_EXACT_CHANNELS, pvid_weak_summed_q31(design->model));
     const size_t turn = 2u * (size_t)design->hop;
-    const size_t three_quarters = turn - ((size_t)design->hop / 2u);
     const int32_t *x = &self->block[PVID_MAX_BLOCKS - 1u - self->filling][0][0];
-    int32_t *sum = &self->sum[self->target][h][0][0];
-    int32_t cosine[BLOCK];
-    int32_t sine[BLOCK];
-    size_t place = self->angle;
-    for (size_t j = 0; j < BLOCK; j++) {
-        const size_t quarter = place + three_quarters;
-        cosine[j] = design->circle[place];
-        sine[j] = design->circle[(quarter >= turn) ? (quarter - turn) : quarter];
-        place = (place + h >= turn) ? ((place + h) - turn) : (place + h);
+    int32_t (*sum)[2] = self->sum[self->target][h];
+    const PVID_TABLE int16_t *cosine = &design->circle[self->angle];
+    if (self->start == 0u) {
+        memset(sum, 0, summed * sizeof sum[0]);
     }
-    add_products(cosine, x, summed, design->sum_shift, self->start == 0u, &sum[RE]);
+    add_products(cosine, h, x, summed, design->sum_shift, &sum[0][RE]);
     if (h > 0u) {
-        add_products(sine, x, summed, design->sum_shift, self->start == 0u, &sum[IM]);
+        add_products(&cosine[turn - (turn / 4u)], h, x, summed, design->sum_shift, &sum[0][IM]);
     }
     const size_t next = (size_t)self->angle + self->start;
     self->angle = (uint16_t)((next >= turn) ? (next - turn) : next);
@@ -138,7 +121,7 @@ static void join(const pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *des
     const size_t first = (size_t)self->target ^ 1u;
     const int32_t (*a)[2] = self->sum[first][h];
     const int32_t (*b)[2] = self->sum[self->target][h];
-    const size_t summed = pvid_weak_summed_q31(model);
+    const size_t summed = PVID_COUNT(PVID_EXACT_CHANNELS, pvid_weak_summed_q31(model));
     const bool even = (h % 2u) == 0u;
     for (size_t k = 0; k < summed; k++) {
         const pvid_weak_channel *channel = &model->channel[k];

@@ -162,15 +162,6 @@ PVID_SELDOM static pvid_reason reject(pvid_weak_q31 *self)
     return PVID_REJECTED_SATURATED;
 }
 
-PVID_SELDOM static pvid_reason advance_finish(pvid_weak_q31 *self)
-{
-    pvid_reason reason = idle_reason(self);
-    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_weak_finish_is_busy_q31(&self->finish); i++) {
-        pvid_weak_finish_step_q31(self, &reason);
-    }
-    return reason;
-}
-
 /* The last tick of a step. */
 PVID_SELDOM static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t reading[])
 {
@@ -186,7 +177,21 @@ PVID_SELDOM static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t re
     return tick;
 }
 
-/* Behind the work of a tick. */
+/* Stages of a whole window, in a tick that adds no harmonics. */
+static inline pvid_reason advance_finish(pvid_weak_q31 *self)
+{
+    pvid_reason reason = idle_reason(self);
+    for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
+        pvid_weak_finish_step_q31(self, &reason);
+        if (!pvid_weak_finish_is_busy_q31(&self->finish)) {
+            rest(self);
+            return reason;
+        }
+    }
+    return reason;
+}
+
+/* Behind the last tick of a step or the last harmonics of a window. */
 static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
 {
     pvid_reason reason = idle_reason(self);
@@ -206,8 +211,11 @@ static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
 /* A tick that ends no step, with work. */
 PVID_SELDOM static pvid_reason work(pvid_weak_q31 *self)
 {
-    pvid_weak_collect_q31 *collect = &self->collect;
-    return after(self, (collect->sums.left > 0u) ? pvid_weak_collect_work_q31(collect) : PVID_WEAK_FREE);
+    if (self->collect.sums.left == 0u) {
+        return advance_finish(self);
+    }
+    const pvid_weak_tick tick = pvid_weak_collect_work_q31(&self->collect);
+    return (self->collect.sums.left == 0u) ? after(self, tick) : idle_reason(self);
 }
 
 /* Behind the readings of a tick. */

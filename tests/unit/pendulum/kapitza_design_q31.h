@@ -19,6 +19,7 @@
  *   -DPVID_MAX_THETA_Q31=8 -DPVID_MAX_P=4 -DPVID_MAX_MOMENTS_Q31=36 -DPVID_MAX_C_Q31=16 -DPVID_MAX_SAMPLES=2
  *       -DPVID_MAX_INPUTS=2 -DPVID_MAX_CHANNELS=8 -DPVID_MAX_INTEGRANDS=3 -DPVID_MAX_KINDS=1 -DPVID_MAX_COLUMNS=11
  *       -DPVID_MAX_RING=34 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=16
+ *       -DPVID_MAX_BLOCKS=1
  */
 #ifndef PVID_GENERATED_KAPITZA_DESIGN_Q31_H
 #define PVID_GENERATED_KAPITZA_DESIGN_Q31_H
@@ -31,16 +32,17 @@
     PVID_MAX_C_Q31 < 16 || PVID_MAX_SAMPLES < 2 || PVID_MAX_INPUTS < 2 || \
     PVID_MAX_CHANNELS < 8 || PVID_MAX_INTEGRANDS < 3 || PVID_MAX_KINDS < 1 || \
     PVID_MAX_COLUMNS < 11 || PVID_MAX_RING < 34 || PVID_MAX_HARMONICS < 7 || \
-    PVID_MAX_FUNCTIONS < 7 || PVID_MAX_POWER < 6 || PVID_MAX_DECIMATION < 16
-#error "compile pvid and this file with -DPVID_MAX_THETA_Q31=8 -DPVID_MAX_P=4 -DPVID_MAX_MOMENTS_Q31=36 -DPVID_MAX_C_Q31=16 -DPVID_MAX_SAMPLES=2 -DPVID_MAX_INPUTS=2 -DPVID_MAX_CHANNELS=8 -DPVID_MAX_INTEGRANDS=3 -DPVID_MAX_KINDS=1 -DPVID_MAX_COLUMNS=11 -DPVID_MAX_RING=34 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=16"
+    PVID_MAX_FUNCTIONS < 7 || PVID_MAX_POWER < 6 || PVID_MAX_DECIMATION < 16 || \
+    PVID_MAX_BLOCKS < 1
+#error "compile pvid and this file with -DPVID_MAX_THETA_Q31=8 -DPVID_MAX_P=4 -DPVID_MAX_MOMENTS_Q31=36 -DPVID_MAX_C_Q31=16 -DPVID_MAX_SAMPLES=2 -DPVID_MAX_INPUTS=2 -DPVID_MAX_CHANNELS=8 -DPVID_MAX_INTEGRANDS=3 -DPVID_MAX_KINDS=1 -DPVID_MAX_COLUMNS=11 -DPVID_MAX_RING=34 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=16 -DPVID_MAX_BLOCKS=1"
 #endif
 
-static const PVID_TABLE int32_t kapitza_weights_0[3] = {
-    545916544, -90446416, 7985580,
+static const PVID_TABLE int32_t kapitza_weights_0[4] = {
+    0, 715543733, -118549926, 10466860,
 };
 
-static const PVID_TABLE int32_t kapitza_weights_1[2] = {
-    -139073920, 12494920,
+static const PVID_TABLE int32_t kapitza_weights_1[3] = {
+    843314857, -109228401, 9813487,
 };
 
 static const int32_t kapitza_full_scale[2] = {
@@ -52,42 +54,42 @@ static const uint8_t kapitza_down[2] = {
 };
 
 static const pvid_weak_filter_q31 kapitza_filter[2] = {
-    {3, 0, {16, 29, 1407374884}, kapitza_weights_0},
-    {2, 30, {19, 29, 1686629713}, kapitza_weights_1},
+    {3, 15, kapitza_weights_0},
+    {2, 17, kapitza_weights_1},
 };
 
 static const pvid_weak_integral_q31 kapitza_integral[3] = {
-    {10, 16},
-    {11, 16},
-    {11, 16},
+    {10, 5},
+    {11, 4},
+    {11, 4},
 };
 
 static const pvid_weak_format_q31 kapitza_format[9] = {
-    {2, 1, 0, 0},
-    {32, 4, 34, 30},
-    {2, 1, 0, 0},
-    {32, 4, 34, 29},
-    {32, 4, 34, 29},
-    {2, 1, 0, 0},
-    {18, 4, 20, 10},
-    {12, 2, 12, 0},
-    {1, 0, 0, 0},
+    {2, 0, 1, 0, 0},
+    {1, 0, 2, 33, 31},
+    {2, 0, 1, 0, 0},
+    {1, 0, 2, 33, 30},
+    {1, 0, 2, 33, 30},
+    {2, 0, 1, 0, 0},
+    {1, 15, 2, 18, 11},
+    {1, 24, 3, 10, 0},
+    {0, 0, 0, 0, 0},
 };
 
 static const pvid_scaled_q31 kapitza_factor[13] = {
-    {-561470895, -45},
-    {-784993207, -39},
-    {-561470895, -50},
-    {-536870976, -49},
-    {-784993207, -44},
-    {784993207, -37},
-    {-536870976, -54},
-    {536870976, -47},
-    {784993207, -42},
+    {-562157055, -45},
+    {-785952528, -41},
+    {-562157055, -50},
+    {-537527073, -49},
+    {-785952528, -46},
+    {785952528, -39},
+    {-537527073, -54},
+    {537527073, -47},
+    {785952528, -44},
     {536870912, -29},
-    {587198005, -46},
-    {-561470895, -43},
-    {-574946197, -39},
+    {587915605, -46},
+    {-562157055, -43},
+    {-575648824, -41},
 };
 
 static const pvid_weak_noise_q31 kapitza_noise[21] = {
@@ -122,15 +124,23 @@ static const pvid_scaled_q31 kapitza_error_variance[1] = {
     {0, 0},
 };
 
-static const PVID_TABLE int32_t kapitza_circle[96] = {
-    8388607, 8370646, 8316841, 8227422, 8102772, 7943425, 7750062, 7523513, 7264747, 6974872, 6655129, 6306889,
-    5931641, 5530993, 5106660, 4660460, 4194304, 3710186, 3210181, 2696429, 2171131, 1636536, 1094933, 548641,
-    0, -548641, -1094933, -1636536, -2171131, -2696429, -3210181, -3710186, -4194303, -4660460, -5106660, -5530993,
-    -5931641, -6306889, -6655129, -6974872, -7264747, -7523513, -7750062, -7943425, -8102772, -8227422, -8316841, -8370646,
-    -8388607, -8370646, -8316841, -8227422, -8102772, -7943425, -7750062, -7523513, -7264747, -6974872, -6655129, -6306889,
-    -5931641, -5530993, -5106660, -4660460, -4194304, -3710186, -3210181, -2696429, -2171131, -1636536, -1094933, -548641,
-    0, 548641, 1094933, 1636536, 2171131, 2696429, 3210181, 3710186, 4194304, 4660460, 5106660, 5530993,
-    5931641, 6306889, 6655129, 6974872, 7264747, 7523513, 7750062, 7943425, 8102772, 8227422, 8316841, 8370646,
+static const PVID_TABLE int16_t kapitza_circle[186] = {
+    32728, 32658, 32448, 32099, 31613, 30991, 30237, 29353, 28343, 27212, 25965, 24606,
+    23142, 21579, 19924, 18183, 16364, 14475, 12524, 10520, 8471, 6385, 4272, 2141,
+    0, -2141, -4272, -6385, -8471, -10520, -12524, -14475, -16364, -18183, -19924, -21579,
+    -23142, -24606, -25965, -27212, -28343, -29353, -30237, -30991, -31613, -32099, -32448, -32658,
+    -32728, -32658, -32448, -32099, -31613, -30991, -30237, -29353, -28343, -27212, -25965, -24606,
+    -23142, -21579, -19924, -18183, -16364, -14475, -12524, -10520, -8471, -6385, -4272, -2141,
+    0, 2141, 4272, 6385, 8471, 10520, 12524, 14475, 16364, 18183, 19924, 21579,
+    23142, 24606, 25965, 27212, 28343, 29353, 30237, 30991, 31613, 32099, 32448, 32658,
+    32728, 32658, 32448, 32099, 31613, 30991, 30237, 29353, 28343, 27212, 25965, 24606,
+    23142, 21579, 19924, 18183, 16364, 14475, 12524, 10520, 8471, 6385, 4272, 2141,
+    0, -2141, -4272, -6385, -8471, -10520, -12524, -14475, -16364, -18183, -19924, -21579,
+    -23142, -24606, -25965, -27212, -28343, -29353, -30237, -30991, -31613, -32099, -32448, -32658,
+    -32728, -32658, -32448, -32099, -31613, -30991, -30237, -29353, -28343, -27212, -25965, -24606,
+    -23142, -21579, -19924, -18183, -16364, -14475, -12524, -10520, -8471, -6385, -4272, -2141,
+    0, 2141, 4272, 6385, 8471, 10520, 12524, 14475, 16364, 18183, 19924, 21579,
+    23142, 24606, 25965, 27212, 28343, 29353,
 };
 
 static const pvid_weak_design_q31 kapitza_design_q31 = {
@@ -166,7 +176,7 @@ static const pvid_weak_config_q31 kapitza_config_q31 = {
     .offset = kapitza_offset,
     .drive_min = kapitza_drive_min,
     .compensation = true,
-    .iterations = 3,
+    .iterations = 2,
     .estimator = {
         .start = {8302100, 9306112, 5898240, 0},
         .start_sd = {16604201, 18612224, 11796480, 67108864},

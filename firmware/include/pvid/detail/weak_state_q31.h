@@ -32,9 +32,10 @@ typedef struct {
     int64_t run[PVID_MAX_INTEGRANDS];  /* twice the sum of the derivatives of the runs up to there, by trapezoids */
     int32_t gain[PVID_MAX_CHANNELS];   /* at the step before that */
     int32_t f[3][PVID_MAX_INTEGRANDS]; /* integrands there and at the two steps before it, latest first */
-    int64_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
-    int64_t twice[PVID_MAX_INTEGRANDS];
-    int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end, rounded */
+    int32_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
+    int32_t twice[PVID_MAX_INTEGRANDS];
+    int32_t owed[PVID_MAX_INTEGRANDS]; /* what the shifts of the integrands took away and the next step gets back */
+    int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end */
     uint16_t index;                          /* of the step whose channels come next, in its half */
     uint8_t half;                            /* that fills, 0 or 1 */
     uint16_t lead;                           /* ticks from the first sample to the first step */

@@ -28,6 +28,17 @@ def round_shift(x: Int, s: npt.ArrayLike | int) -> Int:
     return (twice >> one) + (twice & one)
 
 
+def upper_product(a: Int | int, b: Int | int) -> Int:
+    """a b 2^-32 rounded down, |a|, |b| < 2^31."""
+    return np.asarray((integers(a) * b) >> 32)
+
+
+def shifted_with_rest(x: Int, s: npt.ArrayLike) -> Int:
+    """x 2^-s rounded down along the last axis, where each entry gets what the one before it lost."""
+    whole = np.cumsum(x, axis=-1) >> integers(s)
+    return np.diff(whole, axis=-1, prepend=0)
+
+
 def scale(x: Int, s: npt.ArrayLike) -> Int:
     """x 2^-s, rounded half up where s > 0, saturated at WIDE where s < 0."""
     shift = integers(s)

@@ -6,10 +6,10 @@ import numpy as np
 
 from pvid.settings.weak import NONE, WeakChannel
 from pvid.settings.weak_q31 import WeakDesignQ31
-from pvid.twin.q31.integer import Int, round_shift
+from pvid.twin.q31.integer import Int
 from pvid.twin.q31.weak_values import Steps
 
-_BLOCK, _DOWN = 4, 22
+_BLOCK, _DOWN = 4, 14
 
 
 def half_sums(channels: Int, design: WeakDesignQ31) -> Int:
@@ -24,7 +24,7 @@ def half_sums(channels: Int, design: WeakDesignQ31) -> Int:
         for part, where in enumerate((place, (place + turn - hop // 2) % turn)):
             products = blocks * circle[where].reshape(-1, _BLOCK)
             down = np.add.reduce(products, axis=-1) >> _DOWN
-            out[:, :, h, part] = np.add.reduce(round_shift(down, design.sum_shift), axis=-1)
+            out[:, :, h, part] = np.add.reduce(down >> design.sum_shift, axis=-1)
     return out
 
 
