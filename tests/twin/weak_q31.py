@@ -173,8 +173,8 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
                 const bool constant = model->channel[c].gain == PVID_WEAK_NONE;
                 for (unsigned h = 0; h < harmonics; h++) {
                     const int32_t mean = (h == 0u) ? (2 * (int32_t)rig_design_q31.hop) : 0;
-                    *window++ = constant ? mean : self.window.s[c][h][0];
-                    *window++ = constant ? 0 : self.window.s[c][h][1];
+                    *window++ = constant ? mean : self.window.s[h][c][0];
+                    *window++ = constant ? 0 : self.window.s[h][c][1];
                 }
             }
             windows++;
@@ -221,21 +221,22 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     const size_t used = own->thetas + 1u;
     const size_t count = used + own->nuisances;
     uint64_t whole[PVID_MAX_COLUMNS];
+    pvid_scaled_q31 weight[PVID_MAX_POWER];
     size_t live = 0;
     for (size_t c = 0; c < design->model->channels; c++) {
         for (size_t h = 0; h < harmonics; h++) {
             uint32_t bits = 0;
             for (size_t part = 0; part < 2u; part++) {
                 const int32_t one = *window++;
-                sums.s[c][h][part] = one;
+                sums.s[h][c][part] = one;
                 bits |= (uint32_t)((one < 0) ? -one : one);
             }
-            sums.length[c][h] = (uint8_t)pvid_bit_length_q31(bits);
+            sums.length[h][c] = (uint8_t)pvid_bit_length_q31(bits);
         }
     }
     pvid_weak_white_init_q31(&white, design);
-    pvid_weak_white_weigh_q31(&white, design, (uint8_t)kind, theta, 0, design->n_noise);
-    pvid_weak_white_spectrum_q31(&white, design, (uint8_t)kind, 0, harmonics);
+    pvid_weak_white_weigh_q31(&white, design, (uint8_t)kind, theta, 0, design->n_noise, weight);
+    pvid_weak_white_spectrum_q31(&white, design, (uint8_t)kind, weight, 0, harmonics);
     const pvid_scaled_q31 least = pvid_weak_white_floor_q31(&white, design);
     pvid_weak_white_invert_q31(&white, least, 0, harmonics);
     for (size_t k = 0; k < pvid_weak_mirrors_q31(design); k++) {
@@ -243,10 +244,11 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     }
     pvid_weak_columns_begin_q31(&made, design, kind);
     for (size_t h = 0; h < harmonics; h++) {
-        pvid_weak_columns_scan_q31(&made, design, kind, &white, &sums, h);
+        pvid_weak_columns_scan_q31(&made, design, kind, &white, sums.length[h], h);
     }
     for (size_t h = 0; h < harmonics; h++) {
-        pvid_weak_columns_take_q31(&made, design, kind, &white, &sums, h);
+        pvid_weak_columns_take_q31(&made, design, kind, &white, sums.length[h],
+                                   (const int32_t(*)[2])sums.s[h], h);
     }
     for (size_t j = 0; j < count; j++) {
         pvid_weak_columns_end_q31(&made, design, &white, j);

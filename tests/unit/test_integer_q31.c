@@ -174,20 +174,6 @@ static void a_scaled_root_keeps_thirty_bits(void **unused)
     }
 }
 
-static void a_reciprocal_is_short_by_less_than_two(void **unused)
-{
-    (void)unused;
-    uint64_t state = 4;
-    for (int i = 0; i < 20000; i++) {
-        const uint32_t x = 1u + (uint32_t)((next_random(&state) >> 33) >> (next_random(&state) % 31u)) % 0x7FFFFFFFu;
-        const pvid_reciprocal_q31 inverse = pvid_reciprocal_of_q31(x);
-        const uint64_t normal = (uint64_t)x << inverse.k;
-        assert_true((normal >> 30) == 1u);
-        assert_true((uint64_t)inverse.m * normal <= ((uint64_t)1 << 61));
-        assert_true(((uint64_t)inverse.m + 2u) * normal > ((uint64_t)1 << 61));
-    }
-}
-
 static void a_product_with_a_fraction_is_exact_before_it_is_rounded(void **unused)
 {
     (void)unused;
@@ -251,7 +237,6 @@ int main(void)
         cmocka_unit_test(bits_are_counted),
         cmocka_unit_test(a_root_is_the_largest_whose_square_fits),
         cmocka_unit_test(a_scaled_root_keeps_thirty_bits),
-        cmocka_unit_test(a_reciprocal_is_short_by_less_than_two),
         cmocka_unit_test(a_product_with_a_fraction_is_exact_before_it_is_rounded),
         cmocka_unit_test(first_pivot_is_its_remaining_part),
         cmocka_unit_test(half_an_exponent_brings_a_diagonal_near_one),

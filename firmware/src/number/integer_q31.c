@@ -142,14 +142,6 @@ uint32_t pvid_quotient_in_halves_q31(uint64_t x, uint32_t y)
     return (upper << 16) + lower;
 }
 
-pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x)
-{
-    const uint32_t k = 31u - pvid_bit_length_q31(x);
-    const uint64_t quotient = pvid_quotient_q31((uint64_t)1 << 61, x << k);
-    const pvid_reciprocal_q31 result = {(int32_t)((quotient > INT32_MAX) ? (uint64_t)INT32_MAX : quotient), (uint8_t)k};
-    return result;
-}
-
 pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent)
 {
     int32_t up = 62 - (int32_t)pvid_bit_length_q31((uint64_t)m);

@@ -183,9 +183,6 @@ static inline uint64_t pvid_quotient_q31(uint64_t x, uint32_t y)
 /* Greatest r with r^2 <= x, x <= 2^62. */
 uint32_t pvid_square_root_q31(uint64_t x);
 
-/* The reciprocal of 1 <= x < 2^31; m is short of the quotient by less than 2. */
-pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x);
-
 /* r 2^e = sqrt(m 2^exponent), r below 2^31 and of 30 bits at least unless m is 0; 0 <= m <= PVID_WIDE. The greatest
  * such r where m < 2^60; beyond that m may lose its last bit. */
 pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent);

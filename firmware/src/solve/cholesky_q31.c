@@ -2,6 +2,8 @@
 
 #include <stddef.h>
 
+#include "number/scaled_q31.h"
+
 int32_t pvid_half_exponent_q31(int64_t diagonal)
 {
     const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(diagonal));
@@ -49,7 +51,9 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     }
     self->pivot[j] = pivot;
     self->first_pivot = (j == 0u) ? part_of(pivot, diagonal) : 0;
-    self->inverse[j] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
+    const pvid_scaled_q31 root = pvid_inverse_root_q31(pvid_scaled_of_q31(pivot, 0));
+    self->inverse[j].m = 2 * root.m;
+    self->inverse[j].k = (uint8_t)((uint32_t)(root.e + 60) & 31u); /* of a pivot that is significant 0 to 11 */
     for (size_t i = 0; i < j; i++) {
         int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
         for (size_t k = j + 1u; k < n; k++) {

@@ -96,26 +96,27 @@ static void add_block(pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *desi
 
 /* The end of the first half's integrals of a channel: I^n, n = 1 or 2, that of 1 in the unit of the channel. */
 static int32_t edge_of(const pvid_weak_values_q31 *values, const pvid_weak_channel *channel, size_t first, size_t n,
-                       int32_t hop)
+                       int32_t hop, uint32_t lift)
 {
     if (channel->integrand == PVID_WEAK_NONE) {
-        if (n == 2u) {
-            return 24 * hop * hop;
-        }
-        return (channel->fold == 1u) ? (2 * hop) : (24 * hop);
+        const int32_t once = (channel->fold == 1u) ? (2 * hop) : (24 * hop);
+        return (int32_t)((uint32_t)((n == 2u) ? (once * hop) : once) << lift);
     }
     return values->edge[first][n - 1u][channel->integrand];
 }
 
-/* I^n at the end of the first half times B_h. */
-static inline int64_t shifted(int32_t end, int32_t b, uint32_t shift)
+/* I^n at the end of the first half times B_h, 2^-shift of it; of a shift below 32 the last bits are 0. */
+static inline int32_t shifted(int32_t end, int32_t b, uint32_t shift)
 {
-    return pvid_floor_shift_q31(pvid_product_q31(end, b), shift);
+    const int32_t upper = pvid_upper_product_q31(end, b);
+    return (shift >= 32u) ? pvid_floor_shift_32_q31(upper, shift - 32u)
+                          : (upper * (int32_t)((uint32_t)1 << (32u - shift)));
 }
 
-/* S_h = A_h + (-1)^h B_h; the integrals of B are shifted to the start of A: by I^fold, and by I^1 t where fold is 2. */
+/* S_h = A_h + (-1)^h B_h, which may take the place of A_h; the integrals of B are shifted to the start of A: by I^fold,
+ * and by I^1 t where fold is 2. */
 static void join(const pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *design, const pvid_weak_values_q31 *values,
-                 size_t h, pvid_weak_window_q31 *window)
+                 size_t h, uint8_t length[], int32_t s[][2])
 {
     const pvid_weak_model_q31 *model = design->model;
     const size_t first = (size_t)self->target ^ 1u;
@@ -125,22 +126,31 @@ static void join(const pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *des
     const bool even = (h % 2u) == 0u;
     for (size_t k = 0; k < summed; k++) {
         const pvid_weak_channel *channel = &model->channel[k];
-        const pvid_weak_format_q31 format = design->format[k];
-        const bool folds = channel->fold > 0u;
-        const bool ramps = channel->fold > 1u;
-        const int32_t end = folds ? edge_of(values, channel, first, channel->fold, design->hop) : 0;
-        const int32_t once = ramps ? edge_of(values, channel, first, 1, design->hop) : 0;
-        uint32_t bits = 0;
-        for (size_t part = 0; part < 2u; part++) {
-            const int32_t other = b[k][part];
-            int64_t shift = folds ? shifted(end, b[channel->plain][part], format.plain) : 0;
-            shift += ramps ? shifted(once, b[channel->ramp][part], format.ramp) : 0;
-            const int32_t own = pvid_floor_shift_32_q31(a[k][part] + (even ? other : -other), format.own);
-            const int32_t total = (int32_t)pvid_clamp_q31(own + (even ? shift : -shift), PVID_ONE_Q30);
-            window->s[k][h][part] = total;
-            bits |= (uint32_t)((total < 0) ? -total : total);
+        const pvid_weak_format_q31 *format = &design->format[k];
+        int32_t re = b[k][RE];
+        int32_t im = b[k][IM];
+        int32_t shift_re = 0;
+        int32_t shift_im = 0;
+        if (channel->fold > 0u) {
+            const int32_t end = edge_of(values, channel, first, channel->fold, design->hop, format->lift);
+            shift_re = shifted(end, b[channel->plain][RE], format->plain);
+            shift_im = shifted(end, b[channel->plain][IM], format->plain);
         }
-        window->length[k][h] = (uint8_t)pvid_bit_length_q31(bits);
+        if (channel->fold > 1u) {
+            const int32_t once = edge_of(values, channel, first, 1, design->hop, format->lift);
+            shift_re += shifted(once, b[channel->ramp][RE], format->ramp);
+            shift_im += shifted(once, b[channel->ramp][IM], format->ramp);
+        }
+        if (even) {
+            re = pvid_floor_shift_32_q31(a[k][RE] + re, format->own) + shift_re;
+            im = pvid_floor_shift_32_q31(a[k][IM] + im, format->own) + shift_im;
+        } else {
+            re = pvid_floor_shift_32_q31(a[k][RE] - re, format->own) - shift_re;
+            im = pvid_floor_shift_32_q31(a[k][IM] - im, format->own) - shift_im;
+        }
+        s[k][RE] = re;
+        s[k][IM] = im;
+        length[k] = (uint8_t)pvid_bit_length_q31((uint32_t)((re < 0) ? -re : re) | (uint32_t)((im < 0) ? -im : im));
     }
 }
 
@@ -151,7 +161,9 @@ void pvid_weak_sums_item_q31(pvid_weak_sums_q31 *self, const pvid_weak_design_q3
     if (self->item < harmonics) {
         add_block(self, design, self->item);
     } else {
-        join(self, design, values, (size_t)self->item - harmonics, window);
+        const size_t h = (size_t)self->item - harmonics;
+        window->half = (uint8_t)(self->target ^ 1u);
+        join(self, design, values, h, window->length[h], pvid_weak_window_sums_q31(self, window)[h]);
     }
     self->item++;
     self->left--;

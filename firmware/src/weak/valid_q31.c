@@ -17,6 +17,7 @@
 #define EXPONENT_MAX 8192 /* of a factor */
 #define PLACES 32u        /* of shifts of an int32 */
 #define MOST_UP 30u
+#define LEAST_SHIFT 2u /* of an integral's end */
 
 static bool counts_fit(const pvid_weak_model_q31 *model)
 {
@@ -185,7 +186,8 @@ static bool shifts_are_valid(const pvid_weak_design_q31 *design)
         const int64_t hop = design->hop;
         const int64_t most = (model->channel[i].fold == 1u) ? (2 * hop) : (24 * hop * hop);
         valid = valid && (one->value <= MOST_UP) && (one->own < PLACES) && (one->plain <= WORD) &&
-                (one->ramp <= WORD) && (one->lift <= MOST_UP) &&
+                (one->ramp <= WORD) && ((model->channel[i].fold < 1u) || (one->plain >= LEAST_SHIFT)) &&
+                ((model->channel[i].fold < 2u) || (one->ramp >= LEAST_SHIFT)) && (one->lift <= MOST_UP) &&
                 ((one->lift == 0u) || (most <= pvid_floor_shift_q31(INT32_MAX, one->lift)));
     }
     for (size_t i = 0; i < model->integrands; i++) {

@@ -9,6 +9,7 @@ from pvid.core.sizes import smallest
 from pvid.settings.weak import NONE, WeakChannel, WeakConfig
 from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
+from pvid.twin.q31 import weak_finish
 from pvid.twin.weak import WeakTwin
 
 
@@ -45,7 +46,11 @@ def fitted_sizes_q31(config: WeakConfigQ31, n_p: int, n_c: int) -> dict[str, int
     """The same in fixed point, of a model with n_p parameters and n_c non-zeros of d theta / d p."""
     model, needed = config.design.model, sizes_of_q31(config.design, n_p, n_c)
     found = smallest(needed)
-    fitted = found | {"PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0), "PVID_CHECK_TABLES": 0}
+    fitted = found | {
+        "PVID_MAX_WINDOWS": 0 if weak_finish.shares_place(config.design) else 1,
+        "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
+        "PVID_CHECK_TABLES": 0,
+    }
     if found != needed:
         return fitted
     counts = {"signals": len(model.signal), "jets": len(model.jet), "integrands": model.integrands}

@@ -273,6 +273,11 @@ class _Integral:
         return cls(down, twice, once, whole)
 
 
+def _off(shift: int) -> float:
+    """Largest error of the upper half of a product that is shifted."""
+    return 2.0 ** max(UPPER - shift, 0)
+
+
 class _Channels:
     """Shifts and bounds of the channels and their sums.
 
@@ -295,7 +300,8 @@ class _Channels:
     def edge(self, one: WeakChannel, fold: int) -> float:
         """Largest I^fold at the end of a half, as an integer."""
         if one.integrand == NONE:
-            return 24.0 * self.hop**2 if fold == 2 else 24.0 * self.hop
+            once = 2.0 * self.hop if one.fold == 1 else 24.0 * self.hop
+            return once * (self.hop if fold == 2 else 1) * 2.0 ** self.lift(one)
         own = self.integral[one.integrand]
         return own.of_once if fold == 1 else own.of_twice
 
@@ -308,7 +314,7 @@ class _Channels:
     def power(self, one: WeakChannel, fold: int) -> int:
         """Of two in the unit of I^fold at the end of a half."""
         if one.integrand == NONE:
-            return 0
+            return -self.lift(one)
         own = self.integral[one.integrand]
         return own.down if fold == 1 else own.down + own.twice
 
@@ -317,7 +323,7 @@ class _Channels:
         one = self.model.channel[k]
         if not one.fold:
             return self.value(k)
-        return self.value(k) + UPPER + self.power(one, one.fold) - self.lift(one)
+        return self.value(k) + UPPER + self.power(one, one.fold)
 
     def most(self, k: int) -> float:
         """Largest integer before the last shift."""
@@ -327,8 +333,7 @@ class _Channels:
         gain = float(self.formats.gain_most[one.gain])
         if not one.fold:
             return gain
-        steps = (2.0 * self.hop if one.fold == 1 else 24.0 * self.hop**2) * 2.0 ** self.lift(one)
-        return gain * (steps if one.integrand == NONE else self.edge(one, one.fold)) / 2.0**UPPER + 1
+        return gain * self.edge(one, one.fold) / 2.0**UPPER + 1
 
     def value(self, k: int) -> int:
         """Shift from there to the channel."""
@@ -348,11 +353,11 @@ class _Channels:
             total = 2 * self.half_sum(k) / 2.0**own + 1
             if one.fold:
                 plain = self.exponent(k) + own - self.power(one, one.fold) - self.exponent(one.plain)
-                total += self.edge(one, one.fold) * self.half_sum(one.plain) / 2.0**plain + 1
+                total += self.edge(one, one.fold) * self.half_sum(one.plain) / 2.0**plain + _off(plain)
             if one.fold == 2:
                 ramp = self.exponent(k) + own - self.power(one, 1) - self.exponent(one.ramp)
-                total += self.edge(one, 1) * self.half_sum(one.ramp) / 2.0**ramp + 1
-            if plain >= 0 and ramp >= 0 and total < 2**30:
+                total += self.edge(one, 1) * self.half_sum(one.ramp) / 2.0**ramp + _off(ramp)
+            if (plain >= 2 or not one.fold) and (ramp >= 2 or one.fold < 2) and total < 2**30:
                 self.margins.take("the sums of a window", total, 30)
                 return WeakFormatQ31(self.value(k), self.lift(one), own, plain, ramp)
             own += 1

@@ -77,13 +77,6 @@ def square_root(x: Int) -> Int:
     return root + ((root + 1) * (root + 1) <= values)
 
 
-def reciprocal(x: Int) -> tuple[Int, Int]:
-    """(m, k) with 1/x = m 2^(k - 61), 2^30 <= m < 2^31, for 1 <= x < 2^31."""
-    k = 31 - bit_length(x)
-    m = np.int64(2**61) // (x << k)
-    return np.minimum(m, 2**31 - 1), k
-
-
 def times_q31(a: Int, b: Int) -> Int:
     """a b 2^-31 rounded half up, |a| <= WIDE, |b| < 2^31."""
     return (a >> 31) * b + round_shift((a & (2**31 - 1)) * b, 31)

@@ -13,12 +13,11 @@ import numpy.typing as npt
 
 from pvid.settings.weak_q31 import WeakDesignQ31
 from pvid.twin.q31.integer import Int, bit_length, upper_product
-from pvid.twin.q31.scaled import Scaled, pick, scaled
+from pvid.twin.q31.scaled import Scaled, inverse_root, pick, scaled
 
 _COLUMN_BITS = 27
 _SUM_BITS = 30  # of the sums of a channel
 _PRODUCT_DOWN = 33
-_NEWTON_STEPS = 4
 _NONE = -(2**31)  # exponent where there is no term
 _FLOOR_BITS = 33
 _LEAST_EXPONENT = -200
@@ -32,17 +31,6 @@ def block(x: Int) -> tuple[Int, Int]:
     longest = bit_length(np.bitwise_or.reduce(np.abs(x), axis=0))
     exponent = np.where(longest > 0, longest - _COLUMN_BITS, 0)
     return (x >> np.maximum(exponent, 0)) << np.maximum(-exponent, 0), exponent
-
-
-def inverse_root(x: Scaled) -> Scaled:
-    """1 / sqrt(x), x > 0, by Newton's method."""
-    odd = x.e & 1
-    m, exponent = x.m >> odd, x.e + 30 + odd
-    y = 1181116006 - 5 * (m >> 3)
-    for _ in range(_NEWTON_STEPS):
-        part = 4 * upper_product(m, 4 * upper_product(y, y))
-        y = 8 * upper_product(y, 3 * 2**28 - part)
-    return Scaled(y, -(exponent // 2) - 29)
 
 
 def mirror_of(x: Int) -> Int:
@@ -73,7 +61,6 @@ class White:
     design : of the weak form
     gain : [H + 1, lanes]
     exponent : [H + 1, lanes]
-    weight : c_j [powers][lanes]
     mirrors : of the real parts, of the imaginary parts [n/2][entries, lanes]
     """
 
@@ -81,7 +68,6 @@ class White:
     gain: Int
     exponent: Int
     mirrors: tuple[list[Int], list[Int]]
-    weight: list[Scaled]
 
     @property
     def cosines(self) -> int:
@@ -120,8 +106,8 @@ def _number(x: int, like: Int) -> Scaled:
     return scaled(np.full_like(like, x), 0)
 
 
-def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int, list[Scaled]]:
-    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, and c_j [powers], at theta of the kind [thetas, lanes]."""
+def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]:
+    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, at theta of the kind [thetas, lanes]."""
     like = theta.m[0]
     thetas = design.model.kind[kind].thetas
     powers = design.powers
@@ -153,7 +139,7 @@ def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int,
     out = []
     for one_h in found:
         out.append(inverse_root(pick(least.exceeds(one_h), least, one_h)))
-    return np.stack([one.m for one in out]), np.stack([one.e for one in out]), weight
+    return np.stack([one.m for one in out]), np.stack([one.e for one in out])
 
 
 def _mirrors(design: WeakDesignQ31, gain: Int, exponent: Int, first: int, count: int) -> list[Int]:
@@ -173,13 +159,13 @@ def _mirrors(design: WeakDesignQ31, gain: Int, exponent: Int, first: int, count:
 
 def white(design: WeakDesignQ31, kind: int, theta: Scaled) -> White:
     """At theta of the kind [thetas, lanes]."""
-    gain, exponent, weight = spectrum(design, kind, theta)
+    gain, exponent = spectrum(design, kind, theta)
     cosines = design.highest + 1
     mirrors = (
         _mirrors(design, gain, exponent, 0, cosines),
         _mirrors(design, gain, exponent, 1, design.parts - cosines),
     )
-    return White(design, gain, exponent, mirrors, weight)
+    return White(design, gain, exponent, mirrors)
 
 
 def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
