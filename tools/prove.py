@@ -182,7 +182,7 @@ PROOFS = (
             *("-eva-split-return", "full"),
         ),
         taken=(
-            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
+            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_inverse_root_q31"),
             "pvid_to_block_q31",
         ),
     ),

@@ -320,7 +320,7 @@ static void a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_no
     assert_memory_equal(image, again, sizeof image);
     assert_int_equal(pvid_snapshot_save_weak_q31(&identifier, &config, 3, image, sizeof image), sizeof image);
     assert_int_equal(pvid_get_u32(&image[32]), 3);
-    config.iterations = 1;
+    config.iterations = 3;
     assert_int_equal(pvid_snapshot_restore_weak_q31(&identifier, &config, image, sizeof image),
                      PVID_SNAPSHOT_OTHER_CONFIG);
     config.iterations = 2;

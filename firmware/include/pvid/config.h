@@ -198,8 +198,8 @@
 #endif
 
 /* Windows whose sums have a place of their own: 1, or 0 where all columns of a window are formed before the next half's
- * first block is added, which `pvid model build` tells: they are then in the place of the older half's. Float only.
- * RAM: 8 bytes for each channel and harmonic. init refuses a design that needs 1. */
+ * first block is added, which `pvid model build` tells: they are then in the place of the older half's. RAM:
+ * 8 bytes for each channel and harmonic. init refuses a design that needs 1. */
 #ifndef PVID_MAX_WINDOWS
 #define PVID_MAX_WINDOWS 1
 #endif

@@ -9,8 +9,9 @@
  *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1)
  *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
  *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
- * twice integrals      exact int64 in dt/24 (once) and dt^2/48 (twice), that of 1 in dt/2; rounded to int32 channels
- * int32 within +-2^28 sums           of four steps exact (24-bit cosine times 29 bits), then shifted to int32 and added
+ *   integrals      int32 in dt/24 (once) and dt^2/48 (twice) of the integrand with its last bits off, that of 1 in dt/2
+ *   channels       int32 within +-2^28
+ *   sums           of four steps exact (16-bit cosine times 29 bits), then shifted to int32 and added
  *   S_h            int32, with the window's own start of every integral
  */
 #ifndef PVID_WEAK_Q31_H
@@ -29,7 +30,7 @@
 extern "C" {
 #endif
 
-/* Largest magnitude of a channel. */
+/* Largest magnitude of a block sum and of a channel. */
 #define PVID_WEAK_LIMIT_Q31 INT32_C(268435456) /* 2^28 */
 
 /* ---- the model: generated, the same for every rig ---- */
@@ -74,24 +75,25 @@ typedef struct {
     int32_t multiplier; /* > 0 */
 } pvid_weak_rescale_q31;
 
-/* Compensator that gives a jet at a step from the block sums at the steps around it (host/docs/firmware.md): of order 0
- * with the leading x 2^bits. */
+/* Compensator that gives a jet at a step from the block sums at the steps around it (host/docs/firmware.md): the exact
+ * sum of weights times block sums, 2^-down of it rounded half up. */
 typedef struct {
     uint16_t half;                     /* 0: the block sum itself */
-    uint8_t bits;                      /* of the leading x, 0..30 */
-    pvid_weak_rescale_q31 rescale;     /* from the sum to the jet */
-    const PVID_TABLE int32_t *weights; /* [half], outwards */
+    uint8_t down;                      /* 0..62 */
+    const PVID_TABLE int32_t *weights; /* [half + 1] within 2^30: of order 0 that of the block sum itself, else 0; then
+                                          outwards */
 } pvid_weak_filter_q31;
 
-/* Shifts of an integrand's integrals to int32. */
+/* Shifts of an integrand, and of what a step adds to twice its integral. */
 typedef struct {
-    uint8_t once;
+    uint8_t down;
     uint8_t twice;
 } pvid_weak_integral_q31;
 
 /* Shifts of a channel. */
 typedef struct {
-    uint8_t value; /* gain times integral to the channel; without an integral: gain to the channel */
+    uint8_t value; /* of the upper half of gain times integral to the channel; without an integral: of the gain */
+    uint8_t lift;  /* of an integral of 1 to the left */
     uint8_t own;   /* of A_h +- B_h to S_h */
     uint8_t plain; /* of an integral: of I^fold at the end of the first half times B_h of the channel `plain` */
     uint8_t ramp;  /* of fold 2: of I^1 at the end of the first half times B_h of the channel `ramp` */
@@ -112,7 +114,7 @@ typedef struct {
     uint8_t functions;         /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
     uint8_t power;             /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation;        /* D, ticks a step, 1..PVID_MAX_DECIMATION */
-    uint8_t sum_shift;         /* of four steps' products 2^-22 before they are added, 1..30 */
+    uint8_t sum_shift;         /* of four steps' products 2^-14 before they are added, 0..30 */
     uint16_t hop;              /* steps of half a window, a multiple of 4; H < hop */
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
     const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
@@ -122,7 +124,7 @@ typedef struct {
                                                0: the mean of sgn over a step */
     const pvid_weak_integral_q31 *integral; /* [integrands] */
     const pvid_weak_format_q31 *format;     /* [channels] */
-    const PVID_TABLE int32_t *circle;       /* [2 hop] (2^23 - 1) cos(pi j / hop) */
+    const PVID_TABLE int16_t *circle;       /* [2 hop + 3 hop/2 + 3 H] cos(pi j / hop) times its first entry */
     const pvid_scaled_q31 *factor;    /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_weak_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;

@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.weak_q31 import WeakDesignQ31
-from pvid.twin.q31.integer import Int, bit_length, round_shift
-from pvid.twin.q31.scaled import Scaled, pick, scaled
+from pvid.twin.q31.integer import Int, bit_length, upper_product
+from pvid.twin.q31.scaled import Scaled, inverse_root, pick, scaled
 
 _COLUMN_BITS = 27
 _SUM_BITS = 30  # of the sums of a channel
 _PRODUCT_DOWN = 33
-_NEWTON_STEPS = 4
 _NONE = -(2**31)  # exponent where there is no term
 _FLOOR_BITS = 33
 _LEAST_EXPONENT = -200
@@ -34,35 +33,23 @@ def block(x: Int) -> tuple[Int, Int]:
     return (x >> np.maximum(exponent, 0)) << np.maximum(-exponent, 0), exponent
 
 
-def inverse_root(x: Scaled) -> Scaled:
-    """1 / sqrt(x), x > 0, by Newton's method."""
-    odd = x.e & 1
-    m, exponent = x.m >> odd, x.e + 30 + odd
-    y = 1181116006 - 5 * (m >> 3)
-    for _ in range(_NEWTON_STEPS):
-        part = (m * ((y * y) >> 30)) >> 30
-        y = (y * (3 * 2**28 - part)) >> 29
-    return Scaled(y, -(exponent // 2) - 29)
-
-
 def mirror_of(x: Int) -> Int:
     """The reflection that leaves the first entry of x [n, lanes] alone; 0 stays 0."""
     square = np.add.reduce(x * x, axis=0)
     inverse = inverse_root(scaled(np.maximum(square, 1), 0))
-    shift = np.broadcast_to(-(inverse.e + 30), x.shape)
-    u = round_shift(x * inverse.m, shift)
+    u = upper_product(8 * x, inverse.m) << np.where(square > 0, inverse.e + 59, 0)
     size = np.minimum(np.abs(u[0]), _ONE)
     half = inverse_root(scaled(_ONE + size, -30))
-    v = round_shift(u * half.m, 30)
-    top = round_shift(((_ONE + size) >> 1) * half.m, 29)
+    v = 4 * upper_product(u, half.m)
+    top = 8 * upper_product((_ONE >> 1) + (size >> 1), half.m)
     v[0] = np.where(u[0] < 0, -top, top)
     return np.where(square > 0, v, 0)
 
 
 def mirrored(v: Int, x: Int) -> Int:
     """x - v (v^T x), [n, lanes] each."""
-    along = round_shift(np.add.reduce(v * x, axis=0), 30)
-    return np.asarray(x - ((v * along) >> 30))
+    along = 4 * (len(x) // 2 + np.add.reduce(upper_product(v, x), axis=0))
+    return np.asarray(x - (4 * upper_product(v, along) + 2))
 
 
 @dataclass(frozen=True)
@@ -74,7 +61,6 @@ class White:
     design : of the weak form
     gain : [H + 1, lanes]
     exponent : [H + 1, lanes]
-    weight : c_j [powers][lanes]
     mirrors : of the real parts, of the imaginary parts [n/2][entries, lanes]
     """
 
@@ -82,7 +68,6 @@ class White:
     gain: Int
     exponent: Int
     mirrors: tuple[list[Int], list[Int]]
-    weight: list[Scaled]
 
     @property
     def cosines(self) -> int:
@@ -108,7 +93,7 @@ def _weight(gain: Int, order: int, h: int) -> Int:
     """h^order / sqrt(D_h) [lanes], but for the exponents of h."""
     weight: Int = gain[h]
     for _ in range(order):
-        weight = (weight * (h << (30 - h.bit_length()))) >> 30
+        weight = 2 * upper_product(weight, h << (31 - h.bit_length()))
     return weight
 
 
@@ -121,8 +106,8 @@ def _number(x: int, like: Int) -> Scaled:
     return scaled(np.full_like(like, x), 0)
 
 
-def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int, list[Scaled]]:
-    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, and c_j [powers], at theta of the kind [thetas, lanes]."""
+def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]:
+    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, at theta of the kind [thetas, lanes]."""
     like = theta.m[0]
     thetas = design.model.kind[kind].thetas
     powers = design.powers
@@ -154,7 +139,7 @@ def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int,
     out = []
     for one_h in found:
         out.append(inverse_root(pick(least.exceeds(one_h), least, one_h)))
-    return np.stack([one.m for one in out]), np.stack([one.e for one in out]), weight
+    return np.stack([one.m for one in out]), np.stack([one.e for one in out])
 
 
 def _mirrors(design: WeakDesignQ31, gain: Int, exponent: Int, first: int, count: int) -> list[Int]:
@@ -174,13 +159,13 @@ def _mirrors(design: WeakDesignQ31, gain: Int, exponent: Int, first: int, count:
 
 def white(design: WeakDesignQ31, kind: int, theta: Scaled) -> White:
     """At theta of the kind [thetas, lanes]."""
-    gain, exponent, weight = spectrum(design, kind, theta)
+    gain, exponent = spectrum(design, kind, theta)
     cosines = design.highest + 1
     mirrors = (
         _mirrors(design, gain, exponent, 0, cosines),
         _mirrors(design, gain, exponent, 1, design.parts - cosines),
     )
-    return White(design, gain, exponent, mirrors, weight)
+    return White(design, gain, exponent, mirrors)
 
 
 def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
@@ -208,7 +193,7 @@ def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
         term = design.model.term[t]
         negative = (term.order % 4 >= 2, (term.order + 1) % 4 >= 2)
         below = top - exponent
-        whole = (_weight(made.gain, term.order, h) * design.factor[t][0]) >> 30
+        whole = 4 * upper_product(_weight(made.gain, term.order, h), design.factor[t][0])
         weight = np.where(used & (below < _SUM_BITS), whole >> np.clip(below, 0, 63), 0)
         for part in range(2 if h and made.cosines + h <= design.parts else 1):
             s = window[:, term.channel, h, (part + term.order) % 2] << lift
@@ -252,9 +237,10 @@ def columns(made: White, kind: int, window: Int) -> Columns:
             rest = x[place][begin:, at]
             left = square(rest)
             kept = (left > 0) & (left > (whole[place][at] >> _KEPT_BITS))
-            mirror = np.where(kept, mirror_of(block(rest)[0]), 0) if len(rest) else rest
+            mirror = mirror_of(block(rest)[0]) if len(rest) else rest
             for other in [*range(own.thetas + 1), *range(place + 1, own.columns)]:
-                x[other][begin:, at] = mirrored(mirror, x[other][begin:, at])
+                before = x[other][begin:, at]
+                x[other][begin:, at] = np.where(kept, mirrored(mirror, before), before)
             live[at] = begin + kept
     used = own.thetas + 1
     return Columns(x[:used], np.stack([e for _, e in plain[:used]]), live)
