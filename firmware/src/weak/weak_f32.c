@@ -92,10 +92,16 @@ static inline bool is_ready(const pvid_weak_f32 *self)
     return ready;
 }
 
+/* This tick has more to do than to take its samples. */
+static inline void mark_busy(pvid_weak_f32 *self)
+{
+    self->busy = (PVID_REFINEMENT != 0) || self->busy;
+}
+
 /* Returns whether a tick only adds its samples. */
 static inline bool is_plain(const pvid_weak_f32 *self)
 {
-    return (PVID_EXACT != 0) ? (PVID_EXACT_PLAIN != 0) : self->plain;
+    return (PVID_EXACT != 0) ? (PVID_EXACT_PLAIN != 0) : self->front.plain;
 }
 
 /* Returns whether there is a second stage. */
@@ -202,7 +208,6 @@ PVID_COLD static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config
     pvid_weak_watch_init_f32(&self->watch, config, delay_of(design));
     self->watches = (config->range != NULL) || (self->watch.moves != 0u);
     self->samples = design->model->samples;
-    self->plain = self->front.plain;
     if ((PVID_EXACT != 0) &&
         ((self->channels != PVID_EXACT_CHANNELS) || (self->front.plain != (PVID_EXACT_PLAIN != 0)))) {
         return PVID_BAD_DESIGN;
@@ -290,7 +295,7 @@ PVID_SELDOM static pvid_reason end_half(pvid_weak_f32 *self)
 /* The channels of a step to the present block. */
 PVID_SELDOM static pvid_reason form(pvid_weak_f32 *self)
 {
-    self->busy = true;
+    mark_busy(self);
     const pvid_weak_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
     pvid_reason dropped = PVID_ACCUMULATED;
@@ -322,7 +327,7 @@ static inline uint32_t items_of(const pvid_weak_f32 *self)
 /* Some harmonics of the last block are added, or of the last window joined. */
 static pvid_reason add(pvid_weak_f32 *self)
 {
-    self->busy = true;
+    mark_busy(self);
     pvid_weak_sums_f32 *sums = &self->sums;
     for (uint32_t left = items_of(self); (left > 0u) && pvid_weak_sums_is_busy_f32(sums, harmonics_of(self)); left--) {
         if (!pvid_weak_sums_joins_f32(sums)) {
@@ -343,7 +348,7 @@ static pvid_reason add(pvid_weak_f32 *self)
 /* Some stages of the last whole window. */
 static pvid_reason process(pvid_weak_f32 *self)
 {
-    self->busy = true;
+    mark_busy(self);
     uint32_t left = self->stages_per_tick;
     self->finish.report = (uint8_t)idle(self);
     do {

@@ -213,7 +213,6 @@ struct pvid_weak_f32 {
     const pvid_weak_design_f32 *design;
     const pvid_weak_refine_f32 *refine; /* second stage; NULL: none */
     uint8_t samples;                    /* of a tick; 0: `self` is not initialised */
-    bool plain;                         /* a tick only adds its samples */
     uint8_t resume;                     /* `rest` behind the channels of a step */
     uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: weak_f32.c */
     bool warm;         /* a window has been complete since the restart */
