@@ -18,7 +18,7 @@
  * The smallest sizes of the core that hold it, for little RAM:
  *   -DPVID_MAX_THETA_Q31=8 -DPVID_MAX_P=4 -DPVID_MAX_MOMENTS_Q31=36 -DPVID_MAX_C_Q31=16 -DPVID_MAX_SAMPLES=2
  *       -DPVID_MAX_INPUTS=2 -DPVID_MAX_CHANNELS=8 -DPVID_MAX_INTEGRANDS=3 -DPVID_MAX_KINDS=1 -DPVID_MAX_COLUMNS=11
- *       -DPVID_MAX_RING=34 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=16
+ *       -DPVID_MAX_RING=42 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=24
  *       -DPVID_MAX_BLOCKS=1
  */
 #ifndef PVID_GENERATED_KAPITZA_DESIGN_Q31_H
@@ -31,18 +31,18 @@
 #if PVID_MAX_THETA_Q31 < 8 || PVID_MAX_P < 4 || PVID_MAX_MOMENTS_Q31 < 36 || \
     PVID_MAX_C_Q31 < 16 || PVID_MAX_SAMPLES < 2 || PVID_MAX_INPUTS < 2 || \
     PVID_MAX_CHANNELS < 8 || PVID_MAX_INTEGRANDS < 3 || PVID_MAX_KINDS < 1 || \
-    PVID_MAX_COLUMNS < 11 || PVID_MAX_RING < 34 || PVID_MAX_HARMONICS < 7 || \
-    PVID_MAX_FUNCTIONS < 7 || PVID_MAX_POWER < 6 || PVID_MAX_DECIMATION < 16 || \
+    PVID_MAX_COLUMNS < 11 || PVID_MAX_RING < 42 || PVID_MAX_HARMONICS < 7 || \
+    PVID_MAX_FUNCTIONS < 7 || PVID_MAX_POWER < 6 || PVID_MAX_DECIMATION < 24 || \
     PVID_MAX_BLOCKS < 1
-#error "compile pvid and this file with -DPVID_MAX_THETA_Q31=8 -DPVID_MAX_P=4 -DPVID_MAX_MOMENTS_Q31=36 -DPVID_MAX_C_Q31=16 -DPVID_MAX_SAMPLES=2 -DPVID_MAX_INPUTS=2 -DPVID_MAX_CHANNELS=8 -DPVID_MAX_INTEGRANDS=3 -DPVID_MAX_KINDS=1 -DPVID_MAX_COLUMNS=11 -DPVID_MAX_RING=34 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=16 -DPVID_MAX_BLOCKS=1"
+#error "compile pvid and this file with -DPVID_MAX_THETA_Q31=8 -DPVID_MAX_P=4 -DPVID_MAX_MOMENTS_Q31=36 -DPVID_MAX_C_Q31=16 -DPVID_MAX_SAMPLES=2 -DPVID_MAX_INPUTS=2 -DPVID_MAX_CHANNELS=8 -DPVID_MAX_INTEGRANDS=3 -DPVID_MAX_KINDS=1 -DPVID_MAX_COLUMNS=11 -DPVID_MAX_RING=42 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=24 -DPVID_MAX_BLOCKS=1"
 #endif
 
-static const PVID_TABLE int32_t kapitza_weights_0[4] = {
-    0, 715543733, -118549926, 10466860,
+static const PVID_TABLE int32_t kapitza_weights_0[5] = {
+    0, 656025384, -139896732, 21927761, -1791711,
 };
 
 static const PVID_TABLE int32_t kapitza_weights_1[3] = {
-    843314857, -109228401, 9813487,
+    749613206, -99549526, 9329519,
 };
 
 static const int32_t kapitza_full_scale[2] = {
@@ -54,42 +54,42 @@ static const uint8_t kapitza_down[2] = {
 };
 
 static const pvid_weak_filter_q31 kapitza_filter[2] = {
-    {3, 15, kapitza_weights_0},
-    {2, 17, kapitza_weights_1},
+    {4, 17, kapitza_weights_0},
+    {2, 18, kapitza_weights_1},
 };
 
 static const pvid_weak_integral_q31 kapitza_integral[3] = {
-    {10, 5},
-    {11, 4},
-    {11, 4},
+    {12, 4},
+    {12, 4},
+    {12, 4},
 };
 
 static const pvid_weak_format_q31 kapitza_format[9] = {
-    {2, 0, 1, 0, 0},
-    {1, 0, 2, 33, 31},
-    {2, 0, 1, 0, 0},
-    {1, 0, 2, 33, 30},
-    {1, 0, 2, 33, 30},
-    {2, 0, 1, 0, 0},
-    {1, 15, 2, 33, 26},
-    {1, 24, 1, 32, 0},
+    {2, 0, 0, 0, 0},
+    {1, 0, 1, 32, 30},
+    {2, 0, 0, 0, 0},
+    {1, 0, 1, 32, 30},
+    {1, 0, 1, 32, 30},
+    {2, 0, 0, 0, 0},
+    {1, 16, 1, 32, 26},
+    {0, 24, 1, 31, 0},
     {0, 0, 0, 0, 0},
 };
 
 static const pvid_scaled_q31 kapitza_factor[13] = {
-    {-562157055, -45},
-    {-785952528, -41},
-    {-562157055, -50},
-    {-537527073, -49},
-    {-785952528, -46},
-    {785952528, -39},
-    {-537527073, -54},
-    {537527073, -47},
-    {785952528, -44},
+    {-564970861, -46},
+    {-710897863, -42},
+    {-564970861, -51},
+    {-540217597, -50},
+    {-710897863, -47},
+    {710897863, -40},
+    {-540217597, -55},
+    {540217597, -48},
+    {888622329, -45},
     {536870912, -29},
-    {587915605, -46},
-    {-562157055, -43},
-    {-575648824, -43},
+    {590858343, -47},
+    {-564970861, -44},
+    {-867795243, -44},
 };
 
 static const pvid_weak_noise_q31 kapitza_noise[21] = {
@@ -124,23 +124,18 @@ static const pvid_scaled_q31 kapitza_error_variance[1] = {
     {0, 0},
 };
 
-static const PVID_TABLE int16_t kapitza_circle[186] = {
-    32728, 32658, 32448, 32099, 31613, 30991, 30237, 29353, 28343, 27212, 25965, 24606,
-    23142, 21579, 19924, 18183, 16364, 14475, 12524, 10520, 8471, 6385, 4272, 2141,
-    0, -2141, -4272, -6385, -8471, -10520, -12524, -14475, -16364, -18183, -19924, -21579,
-    -23142, -24606, -25965, -27212, -28343, -29353, -30237, -30991, -31613, -32099, -32448, -32658,
-    -32728, -32658, -32448, -32099, -31613, -30991, -30237, -29353, -28343, -27212, -25965, -24606,
-    -23142, -21579, -19924, -18183, -16364, -14475, -12524, -10520, -8471, -6385, -4272, -2141,
-    0, 2141, 4272, 6385, 8471, 10520, 12524, 14475, 16364, 18183, 19924, 21579,
-    23142, 24606, 25965, 27212, 28343, 29353, 30237, 30991, 31613, 32099, 32448, 32658,
-    32728, 32658, 32448, 32099, 31613, 30991, 30237, 29353, 28343, 27212, 25965, 24606,
-    23142, 21579, 19924, 18183, 16364, 14475, 12524, 10520, 8471, 6385, 4272, 2141,
-    0, -2141, -4272, -6385, -8471, -10520, -12524, -14475, -16364, -18183, -19924, -21579,
-    -23142, -24606, -25965, -27212, -28343, -29353, -30237, -30991, -31613, -32099, -32448, -32658,
-    -32728, -32658, -32448, -32099, -31613, -30991, -30237, -29353, -28343, -27212, -25965, -24606,
-    -23142, -21579, -19924, -18183, -16364, -14475, -12524, -10520, -8471, -6385, -4272, -2141,
-    0, 2141, 4272, 6385, 8471, 10520, 12524, 14475, 16364, 18183, 19924, 21579,
-    23142, 24606, 25965, 27212, 28343, 29353,
+static const PVID_TABLE int16_t kapitza_circle[130] = {
+    32565, 32408, 31939, 31163, 30086, 28720, 27077, 25173, 23027, 20659, 18092, 15351,
+    12462, 9453, 6353, 3192, 0, -3192, -6353, -9453, -12462, -15351, -18092, -20659,
+    -23027, -25173, -27077, -28720, -30086, -31163, -31939, -32408, -32565, -32408, -31939, -31163,
+    -30086, -28720, -27077, -25173, -23027, -20659, -18092, -15351, -12462, -9453, -6353, -3192,
+    0, 3192, 6353, 9453, 12462, 15351, 18092, 20659, 23027, 25173, 27077, 28720,
+    30086, 31163, 31939, 32408, 32565, 32408, 31939, 31163, 30086, 28720, 27077, 25173,
+    23027, 20659, 18092, 15351, 12462, 9453, 6353, 3192, 0, -3192, -6353, -9453,
+    -12462, -15351, -18092, -20659, -23027, -25173, -27077, -28720, -30086, -31163, -31939, -32408,
+    -32565, -32408, -31939, -31163, -30086, -28720, -27077, -25173, -23027, -20659, -18092, -15351,
+    -12462, -9453, -6353, -3192, 0, 3192, 6353, 9453, 12462, 15351, 18092, 20659,
+    23027, 25173, 27077, 28720, 30086, 31163, 31939, 32408, 32565, 32408,
 };
 
 static const pvid_weak_design_q31 kapitza_design_q31 = {
@@ -196,7 +191,7 @@ static const pvid_weak_config_q31 kapitza_config_q31 = {
         .dead_zone = 0,
         .divider = 1,
     },
-    .trust = {.kappa_min = 32212, .se_max = 838861, .misfit_max = 262144, .groups_min = 3, .revert_after = 16, .renewal = 13107, .neglected = 0},
+    .trust = {.kappa_min = 32212, .se_max = 838861, .misfit_max = 262144, .groups_min = 3, .revert_after = 16, .renewal = 13107, .neglected = 12127225},
     .gate = {.sigmas = 262144, .patience_groups = 100},
 };
 
