@@ -102,7 +102,7 @@ static void begin_pass(pvid_refine_f32 *self)
     self->waiting = false;
 }
 
-static void begin_block(pvid_refine_f32 *self)
+PVID_COLD static void begin_block(pvid_refine_f32 *self)
 {
     if (!is_there(self)) {
         self->begin = pvid_refine_front_end_f32(&self->front); /* overwritten, or will be */
@@ -124,7 +124,7 @@ static void begin_search(pvid_refine_f32 *self)
 }
 
 /* Takes a new estimate of the weak form if it is in the region; until a block has been taken it is the prior's mean. */
-PVID_SELDOM static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
+PVID_COLD static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
 {
     float r[N];
     pvid_refine_from_p(weak->p, r);
@@ -447,7 +447,7 @@ static void next_block(pvid_refine_f32 *self)
 }
 
 /* The jobs that are not a pass's. */
-PVID_SELDOM static pvid_reason seldom(pvid_refine_f32 *self)
+PVID_COLD static pvid_reason seldom(pvid_refine_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
     switch (self->phase) {
@@ -509,7 +509,7 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
 
 /* ---- API ---- */
 
-pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config)
+PVID_COLD pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config)
 {
     pvid_status status = pvid_init_is_given(self, config) ? pvid_refine_valid_f32(config) : PVID_BAD_POINTER;
     if (status == PVID_OK) {
@@ -533,7 +533,7 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
 }
 
 /* Restarts the block with what the ring will contain. */
-static void restart(pvid_refine_f32 *self)
+PVID_COLD static void restart(pvid_refine_f32 *self)
 {
     pvid_refine_front_reset_f32(&self->front, &self->config);
     self->plain = false;
@@ -597,8 +597,8 @@ PVID_SELDOM static pvid_reason end_step(pvid_refine_f32 *self, const float sampl
 }
 
 /* A tick with a new estimate of the weak form, the first one, one while it is frozen. */
-PVID_SELDOM static pvid_reason odd_step(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak,
-                                        bool busy)
+PVID_COLD static pvid_reason odd_step(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak,
+                                      bool busy)
 {
     if (weak != NULL) {
         take_weak(self, weak);

@@ -17,7 +17,7 @@
 #define FULL_SCALE 32767.0f
 #define MASK ((uint32_t)PVID_REFINE_RING - 1u)
 
-void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+PVID_COLD void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
 {
     const float ratio = (float)config->ratio;
     self->share = 1.0f / ratio;
@@ -33,7 +33,7 @@ void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvid_refine_c
     pvid_refine_front_reset_f32(self, config);
 }
 
-void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+PVID_COLD void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
 {
     self->wait = config->ratio;
     self->means = 0;
@@ -139,8 +139,8 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
     return PVID_REFINE_ENTERED;
 }
 
-void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
-                                 const float sample[])
+PVID_COLD void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
+                                           const float sample[])
 {
     for (size_t i = 0; i < INPUTS; i++) {
         const float x = sample[config->signal[i].sample];

@@ -41,7 +41,8 @@ static const float of_velocity[AB + 1] = {
     1.0f,           1.0f / 2.0f,         5.0f / 12.0f,      3.0f / 8.0f, 251.0f / 720.0f,
     95.0f / 288.0f, 19087.0f / 60480.0f, 5257.0f / 17280.0f};
 
-void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[], float h, float gate)
+PVID_COLD void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[], float h,
+                                          float gate)
 {
     self->h = h;
     self->gate = gate;
@@ -673,7 +674,7 @@ static uint8_t job_behind_step(const pvid_refine_pass_f32 *self)
 }
 
 /* The jobs of a block's beginning. */
-PVID_SELDOM static void first_jobs(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
+PVID_COLD static void first_jobs(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {
     switch (self->job) {
     case CLEAR:

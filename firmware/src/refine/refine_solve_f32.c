@@ -53,7 +53,7 @@ float pvid_refine_difference_f32(size_t parameter, float to, float from)
     return pvid_refine_is_logarithmic_f32(parameter) ? ((2.0f * difference) / (to + from)) : difference;
 }
 
-void pvid_refine_move_f32(const float r[], const float step[], float moved[])
+PVID_COLD void pvid_refine_move_f32(const float r[], const float step[], float moved[])
 {
     for (size_t i = 0; i < N; i++) {
         const float half = 0.5f * step[i];
@@ -61,7 +61,7 @@ void pvid_refine_move_f32(const float r[], const float step[], float moved[])
     }
 }
 
-void pvid_refine_prior_f32(const float prior_sd[], float sd, float triangle[])
+PVID_COLD void pvid_refine_prior_f32(const float prior_sd[], float sd, float triangle[])
 {
     memset(triangle, 0, PVID_REFINE_TRIANGLE * sizeof triangle[0]);
     for (size_t i = 0; i < N; i++) {
@@ -292,9 +292,9 @@ static void shift(pvid_refine_solve_f32 *self, const float sums[])
     }
 }
 
-pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, float sum[], const float triangle[],
-                                               const float past[], const float linear[], const float prior_sd[],
-                                               float step_limit)
+PVID_COLD pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, float sum[],
+                                                         const float triangle[], const float past[],
+                                                         const float linear[], const float prior_sd[], float step_limit)
 {
     const uint8_t job = self->job;
     self->job++;
@@ -319,8 +319,8 @@ pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, floa
     return PVID_REFINE_SOLVING;
 }
 
-void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass,
-                               const float linear[], float state[])
+PVID_COLD void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass,
+                                         const float linear[], float state[])
 {
     for (size_t i = 0; i < STATES; i++) {
         float by_r[PVID_REFINE_MOVING];
@@ -344,7 +344,7 @@ void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_ref
 #endif
 }
 
-void pvid_refine_inverse_column_f32(const float triangle[], size_t column, float out[])
+PVID_COLD void pvid_refine_inverse_column_f32(const float triangle[], size_t column, float out[])
 {
     for (size_t i = 0; i < N; i++) {
         out[i] = 0.0f;
