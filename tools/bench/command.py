@@ -114,6 +114,21 @@ def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="refine-mechanisms")
+@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@UPDATE
+def bench_refine_mechanisms(seeds: int, update: Path | None) -> int:
+    """Both stages in C on the other mechanisms: errors beside the Cramer-Rao bound, and which have no second stage."""
+    from bench import refine_mechanisms
+
+    with progress_bar("refine-mechanisms", seeds * len(refine_mechanisms.cases()[0])) as advance:
+        done = count(1)
+        rows, refused = refine_mechanisms.refined_tables(seeds, lambda: advance(next(done)))
+    put_table(update, "refine-mechanisms", markdown(refine_mechanisms.HEADER, rows))
+    put_table(update, "refine-refused", markdown(refine_mechanisms.REFUSED, refused))
+    return DONE
+
+
 @bench.command(name="mechanisms")
 @click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
 @click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")

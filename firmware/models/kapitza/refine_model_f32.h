@@ -34,6 +34,8 @@ static const uint8_t pvid_refine_logarithmic[PVID_REFINE_PARAMETERS] = {1, 1, 1,
 
 #define PVID_REFINE_HAS_CHART 1
 
+#define PVID_REFINE_HAS_MEASURED 0
+
 /* Once a pass: m from r. 14 operations. */
 static inline void pvid_refine_constants(const float r[], float m[])
 {

@@ -20,7 +20,7 @@
 #define N PVID_REFINE_PARAMETERS
 
 /* What the next tick does. */
-enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
+enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START };
 
 /* Mean square of the rows' noise over its density at low frequencies: the trapezoids of neighbouring rows share a
  * sample. */
@@ -55,6 +55,9 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
 /* Part of the triangle that remains when a longer block begins anew: the past knows its samples already, and has next
  * to no weight then, but still shows the clash. */
 #define KEPT (1.0f / 16.0f)
+
+/* Steps between the three readings that a block's start is measured by. */
+#define APART 4u
 
 /* In the track a first pass whose step of the logarithms is this much below the limit is the block's last. */
 #define SHORT 0.25f
@@ -112,7 +115,48 @@ PVID_COLD static void begin_block(pvid_refine_f32 *self)
     memcpy(self->start, self->expected, sizeof self->start);
     self->pass = 0;
     begin_pass(self);
+#if PVID_REFINE_HAS_MEASURED
+    self->phase = self->restarted ? (uint8_t)START : (uint8_t)PASS;
+#endif
 }
+
+#if PVID_REFINE_HAS_MEASURED
+/* The start of a block that follows no other: what the sensors read, rates by a parabola through three readings. From 0
+ * a large motion is too far away. */
+static void start_job(pvid_refine_f32 *self)
+{
+    const uint32_t behind = self->begin + ((2u * APART) + 1u);
+    if ((int32_t)(pvid_refine_front_end_f32(&self->front) - behind) < 0) {
+        self->waiting = true;
+        self->due = behind;
+        return;
+    }
+    pvid_refine_signals_f32 at[3];
+    for (uint32_t k = 0; k < 3u; k++) {
+        pvid_refine_front_read_f32(&self->front, self->begin + (k * APART), &at[k]);
+    }
+    const float scale = 1.0f / ((2.0f * (float)APART) * self->h);
+    for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+        const size_t code = pvid_refine_measured[i];
+        if (code > 0u) {
+            const size_t output = (code - 1u) / 2u;
+            const float z = at[0].z[output];
+            const float rate = (((4.0f * at[1].z[output]) - at[2].z[output]) - (3.0f * z)) * scale;
+            const float x = ((code & 1u) != 0u) ? z : rate;
+            self->start[i] = pvid_refine_within_f32(x, self->config.state_limit[i]) ? x : 0.0f;
+        }
+    }
+    begin_pass(self);
+}
+
+/* Whether the first pass of a block of the track left out too much: its start, which follows from the block before, is
+ * too far away. */
+static bool is_off(const pvid_refine_f32 *self)
+{
+    return !self->restarted && (self->taken > 0u) && (self->pass == 0u) &&
+           ((uint32_t)self->work.used * 10u < (uint32_t)self->length * 6u * PVID_REFINE_OUTPUTS);
+}
+#endif
 
 /* The triangle and r are those of the weak form. */
 static void begin_search(pvid_refine_f32 *self)
@@ -362,6 +406,13 @@ static bool grows(const pvid_refine_f32 *self)
 /* The point of linearisation and the start move by the steps. */
 static void move(pvid_refine_f32 *self)
 {
+#if PVID_REFINE_HAS_MEASURED
+    if (is_off(self)) {
+        forget_state(self);
+        begin_block(self);
+        return;
+    }
+#endif
     float moved[N];
     pvid_refine_move_f32(self->linear, self->solve.step, moved);
     memcpy(self->linear, moved, sizeof self->linear);
@@ -451,6 +502,11 @@ PVID_COLD static pvid_reason seldom(pvid_refine_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
     switch (self->phase) {
+#if PVID_REFINE_HAS_MEASURED
+    case START:
+        start_job(self);
+        break;
+#endif
     case SOLVE:
         solve_job(self);
         break;

@@ -21,10 +21,11 @@ PVID_COLD void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvi
 {
     const float ratio = (float)config->ratio;
     self->share = 1.0f / ratio;
-    self->droop = (1.0f - (1.0f / (ratio * ratio))) / 24.0f;
     self->behind = 0;
     for (size_t i = 0; i < SIGNALS; i++) {
         const pvid_refine_signal_f32 *signal = &config->signal[i];
+        const float steps = 1.0f / (ratio * ratio); /* the droop of a held input's own steps stays */
+        self->droop[i] = ((signal->source == (uint8_t)PVID_SIGNAL_HELD) ? (1.0f + steps) : (1.0f - steps)) / 24.0f;
         self->sample[i] = signal->sample;
         self->to_counts[i] = signal->scale * (FULL_SCALE / signal->range);
         self->from_counts[i] = signal->range / FULL_SCALE;
@@ -123,7 +124,7 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
         const float x = self->sum[i] * self->share;
         const float middle = self->mean[0][i];
         if (known) {
-            enter(self, config, i, middle - (self->droop * ((self->mean[1][i] - (2.0f * middle)) + x)));
+            enter(self, config, i, middle - (self->droop[i] * ((self->mean[1][i] - (2.0f * middle)) + x)));
         }
         self->mean[1][i] = middle;
         self->mean[0][i] = x;

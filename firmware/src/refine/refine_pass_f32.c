@@ -562,15 +562,18 @@ PVID_ALWAYS_INLINE void end_rows(pvid_refine_pass_f32 *self, const float derivat
 {
     for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++) {
         float *row = self->row[self->rows + i];
-        float *still = &row[PVID_REFINE_COLUMNS];
 #if PVID_REFINE_SKEW
-        still[0] = (i == 0u) ? self->slip[0] : (weight[i] * self->slip[i]);
-        still++;
+        row[PVID_REFINE_COLUMNS] = (i == 0u) ? self->slip[0] : (weight[i] * self->slip[i]);
 #endif
+#if PVID_REFINE_STILL
+        float *still = &row[PVID_REFINE_COLUMNS + PVID_REFINE_SKEW];
         for (size_t j = 0; j < PVID_REFINE_STILL; j++) {
             const float entry = derivatives[(PVID_REFINE_OUTPUTS * PVID_REFINE_STATES) + (i * PVID_REFINE_STILL) + j];
             still[j] = (i == 0u) ? entry : (weight[i] * entry);
         }
+#else
+        (void)derivatives;
+#endif
         const float mean = self->mean[i] * (1.0f / (float)PVID_REFINE_SUB);
         const float e = (i == 0u) ? mean : (weight[i] * mean);
         self->mean[i] = 0.0f;

@@ -32,7 +32,7 @@ typedef struct {
     uint16_t place;                                      /* of the newest entry of `line` */
     uint32_t next;                                       /* entry of the ring that is written next */
     float share;                                         /* 1 / ratio */
-    float droop;                                         /* (1 - 1 / ratio^2) / 24 */
+    float droop[PVID_REFINE_SIGNALS];                    /* (1 - 1 / ratio^2) / 24; held (1 + 1 / ratio^2) / 24 */
     float to_counts[PVID_REFINE_SIGNALS];                /* 32767 / range, with the scale of the signal */
     float from_counts[PVID_REFINE_SIGNALS];              /* range / 32767 */
     float sum[PVID_REFINE_SIGNALS];                      /* of the block */

@@ -148,10 +148,20 @@ def header(made: RefineFunctions, command: str) -> str:
         "",
         f"#define PVID_REFINE_HAS_CHART {int('chart' in made.functions)}",
         "",
+        *_measured(made),
     ]
     for one in made.functions.values():
         body += [f"/* {_MEANING[one.name]} {one.program.cost.capitalize()}. */", function(one, FLOAT, made), ""]
     return _guarded("PVID_REFINE_MODEL_F32_H", about, [*body, *_places(made)])
+
+
+def _measured(made: RefineFunctions) -> list[str]:
+    lines = [f"#define PVID_REFINE_HAS_MEASURED {int(any(made.measured))}", ""]
+    if any(made.measured):
+        about = "/* Entries of a state: 1 + 2 output: it is that output, 2 + 2 output: its rate, 0: neither. */"
+        values = ", ".join(map(str, made.measured))
+        lines = [about, f"static const uint8_t pvid_refine_measured[{len(made.measured)}] = {{{values}}};", *lines]
+    return lines
 
 
 def _guarded(guard: str, about: list[str], body: list[str]) -> str:

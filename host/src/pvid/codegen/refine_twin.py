@@ -138,6 +138,7 @@ class GeneratedRefine:
             rates=any(is_nonzero(made, "Zv")),
             logarithmic=tuple(one.log for one in made.parameters),
             place_of_p=tuple(by_p[place] for place in sorted(by_p)),
+            measured=made.measured,
         )
 
     def _called(self, name: str, **arrays: Float32) -> dict[str, Float32]:

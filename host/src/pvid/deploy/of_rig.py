@@ -150,7 +150,7 @@ def _ticks_of(refined: RefinedRecord, settings: RefineConfig, least: int, most: 
 
 def _second(made: RefineFunctions, refined: RefinedRecord, ticks: int) -> SecondStage:
     """As it is after so many ticks of the example's motion."""
-    is_there = bool(np.any(refined.told[:ticks] == Reason.UPDATED))
+    is_there = bool(np.any(refined.r[ticks - 1]))  # not withdrawn
     value, error = (np.asarray(one[ticks - 1], np.float64) if is_there else None for one in (refined.r, refined.se))
     parameters = tuple(Quantity(one.name, one.unit) for one in made.parameters)
     return SecondStage(parameters, value, error, Reason(refined.told[ticks - 1]))

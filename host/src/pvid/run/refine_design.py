@@ -29,6 +29,7 @@ Float = npt.NDArray[np.float64]
 _STILL = 0.04  # h |lambda| up to which Adams-Bashforth is stable for a decay
 _LEAST = 4.0  # periods of the fastest motion in a block
 _STATES = 40  # of the run that are looked at
+_WITH_SIGNS, _WITHOUT = 0.75, 0.95  # part of them for which the step is short enough
 _A_PERIOD = 48.0  # steps in a period
 _MARGIN = 1.5  # ranges over what the run has of them
 
@@ -155,9 +156,10 @@ def _curvature(x: Float, rate: float, block_s: float) -> Float:
 
 
 def fastest_hz(made: RefineFunctions, p: npt.ArrayLike, run: Mapping[str, npt.ArrayLike], rate: float) -> float:
-    """Of the motion, as an oscillation that needs as short a step: at three quarters of the run's states.
+    """Of the motion, as an oscillation that needs as short a step: at most of the run's states.
 
-    The others are those in which a soft sign changes.
+    In the others a soft sign changes, or a large motion is at its fastest for a moment. (With a step for three quarters
+    of the rotary pendulum's states hardly a block fits; with one for 85 % its estimates are 2 times the bound off.)
     """
     model, n = GeneratedRefine(made), len(made.coordinates)
     m = model.constants(model.from_p(np.asarray(p, np.float32)))
@@ -170,7 +172,7 @@ def fastest_hz(made: RefineFunctions, p: npt.ArrayLike, run: Mapping[str, npt.Ar
             K = np.block([[np.zeros((n, n)), np.eye(n)], [K, np.asarray(slopes.D, float)]])
         rates = np.linalg.eigvals(K)
         found.append(max(np.abs(rates.imag).max() / (2 * np.pi), np.abs(rates.real).max() / _STILL / _A_PERIOD))
-    return float(np.quantile(found, 0.75))
+    return float(np.quantile(found, _WITH_SIGNS if signs_of(made.model) else _WITHOUT))
 
 
 def _states(

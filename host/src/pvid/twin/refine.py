@@ -29,6 +29,7 @@ _LEVEL_GAIN = _F(0.2)
 _CLASH_GAIN = _F(0.3)
 _FIRST_CLASH = _F(2)
 _KEPT = _F(1 / 16)
+_APART = 4
 _SHORT = _F(0.25)
 _JOBS = 9
 _FIRST_JOBS = 16
@@ -50,6 +51,7 @@ class Phase(Enum):
     JUDGE = auto()
     PUBLISH = auto()
     NEXT = auto()
+    START = auto()
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,27 @@ class RefineTwin:
         self.linear, self.start = self.next.copy(), self.expected.copy()
         self.passed = 0
         self._begin_pass()
+        if any(self.shape.measured) and self.restarted:
+            self.phase = Phase.START
+
+    def _start_job(self) -> None:
+        behind = self.begin + 2 * _APART + 1
+        if self.front.end < behind:
+            self.waiting, self.due = True, behind
+            return
+        at = [self.front.read(self.begin + k * _APART)[1] for k in range(3)]
+        scale = _F(1) / ((_F(2) * _F(_APART)) * self.h)
+        for i, code in enumerate(self.shape.measured):
+            if code > 0:
+                first, middle, last = (one[(code - 1) // 2] for one in at)
+                rate = (((_F(4) * middle) - last) - (_F(3) * first)) * scale
+                x = first if code % 2 else rate
+                self.start[i] = x if abs(x) < self.state_limit[i] else _F(0)
+        self._begin_pass()
+
+    def _is_off(self) -> bool:
+        few = self.work.used * 10 < self.length * 6 * self.shape.outputs
+        return any(self.shape.measured) and not self.restarted and self.taken > 0 and self.passed == 0 and few
 
     def _begin_search(self) -> None:
         self.triangle = np.diag(self.sd[0] / self.prior_sd)
@@ -334,6 +357,10 @@ class RefineTwin:
         return bool(short and self.solve.size < _ROUGH and self._mean_square() < _MAY_GROW * _F(config.chi_max))
 
     def _move(self) -> None:
+        if self._is_off():
+            self._forget_state()
+            self._begin_block()
+            return
         self.linear = self.steps.moved(self.linear, self.solve.step)
         self.start = self.start + self.solve.shift
         self.passed += 1
@@ -374,6 +401,8 @@ class RefineTwin:
             case Phase.WAIT:
                 self._wait()
                 return Reason.WARMING_UP
+            case Phase.START:
+                self._start_job()
             case Phase.PASS:
                 self._pass_jobs()
             case Phase.SOLVE:

@@ -33,10 +33,11 @@ class Front:
         signals = config.signal
         ratio = _F(config.ratio)
         self.share = _F(1) / ratio
-        self.droop = (_F(1) - _F(1) / (ratio * ratio)) / _F(24)
         self.to_counts = np.array([_F(one.scale) * (_FULL_SCALE / _F(one.range)) for one in signals], _F)
         self.from_counts = np.array([_F(one.range) / _FULL_SCALE for one in signals], _F)
         self.is_held = [one.source is Source.HELD for one in signals]
+        steps = _F(1) / (ratio * ratio)
+        self.droop = np.where(self.is_held, _F(1) + steps, _F(1) - steps) / _F(24)
         self.derived = [one.order == 2 for one in signals]
         self.sample = [one.sample for one in signals]
         self.second = None if config.second is None else np.asarray(config.second, _F)

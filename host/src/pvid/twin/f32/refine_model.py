@@ -25,6 +25,7 @@ class RefineShape:
     rates: bool  # an output depends on v
     logarithmic: tuple[bool, ...]
     place_of_p: tuple[int, ...]
+    measured: tuple[int, ...] = ()  # of the states: 1 + 2 output: that output, 2 + 2 output: its rate, 0: neither
 
     @property
     def states(self) -> int:
