@@ -73,7 +73,7 @@ static const pvid_weak_format_q31 kapitza_format[9] = {
     {2, 0, 1, 0, 0},
     {1, 15, 2, 33, 26},
     {1, 24, 1, 32, 0},
-    {0, 0, 0, 0, 0},
+    {1, 0, 0, 0, 0},
 };
 
 static const pvid_scaled_q31 kapitza_factor[13] = {
@@ -124,7 +124,7 @@ static const pvid_scaled_q31 kapitza_error_variance[1] = {
     {0, 0},
 };
 
-static const PVID_TABLE int16_t kapitza_circle[186] = {
+static const PVID_TABLE int32_t kapitza_circle[186] = {
     32728, 32658, 32448, 32099, 31613, 30991, 30237, 29353, 28343, 27212, 25965, 24606,
     23142, 21579, 19924, 18183, 16364, 14475, 12524, 10520, 8471, 6385, 4272, 2141,
     0, -2141, -4272, -6385, -8471, -10520, -12524, -14475, -16364, -18183, -19924, -21579,
@@ -150,6 +150,7 @@ static const pvid_weak_design_q31 kapitza_design_q31 = {
     .decimation = 16,
     .sum_shift = 5,
     .hop = 48,
+    .fine = false,
     .n_noise = 21,
     .full_scale = kapitza_full_scale,
     .down = kapitza_down,
