@@ -16,7 +16,7 @@ from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_weak
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.sources import INCLUDES, sources_of
-from pvid.design.weak_q31 import DOWN, Sensing, fixed_design
+from pvid.design.weak_q31 import DOWN, FINE_DOWN, Sensing, fixed_design
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.design import WeakDesign
@@ -130,7 +130,7 @@ class Rig:
             whole = np.abs(made.channels[place]).astype(np.float64)
             window = np.convolve(whole, np.ones(2 * design.hop), "valid").max()
             # a sum of the channel at h = 0, where the cosine is 1
-            down = 2.0 ** (DOWN + design.sum_shift + design.format[place].own)
+            down = 2.0 ** ((FINE_DOWN if design.fine else DOWN) + design.sum_shift + design.format[place].own)
             out[place] = 4.0**one.fold * window * float(design.circle[0]) / down * design.units[place]
         return out
 

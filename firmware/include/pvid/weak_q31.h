@@ -11,7 +11,8 @@
  *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
  *   integrals      int32 in dt/24 (once) and dt^2/48 (twice) of the integrand with its last bits off, that of 1 in dt/2
  *   channels       int32 within +-2^28
- *   sums           of four steps exact (16-bit cosine times 29 bits), then shifted to int32 and added
+ *   sums           of four steps exact (cosine of 16 bits, or of 24 where the signals have many counts, times 29
+ *                  bits), then shifted to int32 and added
  *   S_h            int32, with the window's own start of every integral
  */
 #ifndef PVID_WEAK_Q31_H
@@ -114,7 +115,7 @@ typedef struct {
     uint8_t functions;         /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
     uint8_t power;             /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation;        /* D, ticks a step, 1..PVID_MAX_DECIMATION */
-    uint8_t sum_shift;         /* of four steps' products 2^-14 before they are added, 0..30 */
+    uint8_t sum_shift;         /* of four steps' products 2^-14 (fine: 2^-22) before they are added, 0..30 */
     uint16_t hop;              /* steps of half a window, a multiple of 4; H < hop */
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
     const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
@@ -124,7 +125,8 @@ typedef struct {
                                                0: the mean of sgn over a step */
     const pvid_weak_integral_q31 *integral; /* [integrands] */
     const pvid_weak_format_q31 *format;     /* [channels] */
-    const PVID_TABLE int16_t *circle;       /* [2 hop + 3 hop/2 + 3 H] cos(pi j / hop) times its first entry */
+    bool fine;                              /* the cosine has 24 bits; else 16 */
+    const PVID_TABLE int32_t *circle;       /* [2 hop + 3 hop/2 + 3 H] cos(pi j / hop) times its first entry */
     const pvid_scaled_q31 *factor;    /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_weak_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;

@@ -182,9 +182,8 @@ uint32_t pvid_fingerprint_weak_design_q31(const pvid_weak_design_q31 *design)
     hash = formats_of(hash, design);
     const size_t highest = ((size_t)design->functions / 2u) + (design->power / 2u);
     const size_t entries = ((7u * (size_t)design->hop) / 2u) + (3u * highest);
-    for (size_t i = 0; i < entries; i++) {
-        hash = pvid_fnv_word(hash, (uint32_t)(int32_t)design->circle[i]);
-    }
+    hash = pvid_fingerprint_table(hash, design->circle, entries);
+    hash = pvid_fnv_word(hash, design->fine ? 1u : 0u);
     hash = scaled_of(hash, design->factor, terms_end(model));
     hash = pvid_fnv_word(hash, design->n_noise);
     hash = noise_of(hash, design->noise, design->n_noise);

@@ -121,7 +121,8 @@ void pvid_weak_columns_take_q31(pvid_weak_columns_q31 *self, const pvid_weak_des
         if (below < SUM_BITS) { /* else nothing is left of it */
             const int32_t constant[2] = {2 * (int32_t)design->hop, 0};
             const int32_t *s = is_constant(design, term.channel) ? constant : sums[term.channel];
-            const int32_t whole = 4 * pvid_upper_product_q31(weight[term.order], design->factor[t].m);
+            const int32_t whole =
+                (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[term.order], design->factor[t].m), 30);
             const int32_t w = pvid_floor_shift_32_q31(whole, (uint32_t)below);
             const int32_t up = (int32_t)((uint32_t)1 << lift);
             const bool turned = (term.order % 2u) != 0u;

@@ -14,6 +14,9 @@
 /* x[n] 2^(returned) = the same before, the largest of PVID_WEAK_COLUMN_BITS_Q31 bits. */
 int32_t pvid_weak_block_q31(size_t n, int32_t x[]);
 
+/* 1 / sqrt(x), x.m > 0. */
+pvid_scaled_q31 pvid_weak_inverse_root_q31(pvid_scaled_q31 x);
+
 /* x[n] of PVID_WEAK_COLUMN_BITS_Q31 bits becomes the v of the reflection that leaves of it its first entry alone; 0
  * stays 0: no reflection. */
 void pvid_weak_mirror_of_q31(size_t n, int32_t x[]);

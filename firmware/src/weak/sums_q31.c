@@ -8,6 +8,7 @@
 
 #define BLOCK ((size_t)PVID_WEAK_BLOCK_Q31)
 #define DOWN 14u
+#define FINE_DOWN 22u
 
 enum { RE = 0, IM = 1 };
 
@@ -61,14 +62,63 @@ static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
 #endif
 }
 
-/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded down. */
-static void add_products(const PVID_TABLE int16_t *factor, size_t h, const int32_t *x, size_t channels, uint32_t shift,
-                         int32_t *sum)
+/* The same of 24 by 29 bits and 2^-22. */
+static inline int32_t fine_products(const int32_t factor[BLOCK], const int32_t *x)
+{
+#if defined(__ARM_ARCH_6M__)
+    /* a factor is high 2^12 + low, x is high 2^14 + low; four products of each fit 32 bits */
+    int32_t high = 0;
+    int32_t first = 0;
+    int32_t second = 0;
+    int32_t low = 0;
+    PVID_UNROLL
+    for (size_t j = 0; j < BLOCK; j++) {
+        const int32_t one = x[j * PVID_MAX_CHANNELS];
+        const int32_t factor_high = pvid_floor_shift_32_q31(factor[j], 12);
+        const int32_t factor_low = (int32_t)((uint32_t)factor[j] & 0xFFFu);
+        const int32_t x_high = pvid_floor_shift_32_q31(one, 14);
+        const int32_t x_low = (int32_t)((uint32_t)one & 0x3FFFu);
+        high += factor_high * x_high;
+        first += factor_low * x_high;
+        second += factor_high * x_low;
+        low += factor_low * x_low;
+    }
+    const int32_t below = (4 * first) + second + pvid_floor_shift_32_q31(low, 12);
+    return (16 * high) + pvid_floor_shift_32_q31(below, 10);
+#else
+    int64_t sum = 0;
+    PVID_UNROLL
+    for (size_t j = 0; j < BLOCK; j++) {
+        sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
+    }
+    return (int32_t)pvid_floor_shift_q31(sum, FINE_DOWN);
+#endif
+}
+
+/* x 2^-s rounded half up, s >= 1. */
+static inline int32_t rounded(int32_t x, uint32_t s)
+{
+    return pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(x, s - 1u) + 1, 1);
+}
+
+/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded half up: what
+ * is lost must not have a mean. */
+static void add_products(const PVID_TABLE int32_t *factor, size_t h, const int32_t *x, size_t channels,
+                         const pvid_weak_design_q31 *design, int32_t *sum)
 {
     const int32_t c[BLOCK] = {factor[0], factor[h], factor[2u * h], factor[3u * h]};
     const int32_t *end = &x[channels];
+    const uint32_t shift = design->sum_shift;
+    if (design->fine) {
+        while (x != end) {
+            *sum += rounded(fine_products(c, x), shift);
+            sum += 2;
+            x++;
+        }
+        return;
+    }
     while (x != end) {
-        *sum += pvid_floor_shift_32_q31(products(c, x), shift);
+        *sum += rounded(products(c, x), shift);
         sum += 2;
         x++;
     }
@@ -82,13 +132,13 @@ static void add_block(pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *desi
     const size_t turn = 2u * (size_t)design->hop;
     const int32_t *x = &self->block[PVID_MAX_BLOCKS - 1u - self->filling][0][0];
     int32_t (*sum)[2] = self->sum[self->target][h];
-    const PVID_TABLE int16_t *cosine = &design->circle[self->angle];
+    const PVID_TABLE int32_t *cosine = &design->circle[self->angle];
     if (self->start == 0u) {
         memset(sum, 0, summed * sizeof sum[0]);
     }
-    add_products(cosine, h, x, summed, design->sum_shift, &sum[0][RE]);
+    add_products(cosine, h, x, summed, design, &sum[0][RE]);
     if (h > 0u) {
-        add_products(&cosine[turn - (turn / 4u)], h, x, summed, design->sum_shift, &sum[0][IM]);
+        add_products(&cosine[turn - (turn / 4u)], h, x, summed, design, &sum[0][IM]);
     }
     const size_t next = (size_t)self->angle + self->start;
     self->angle = (uint16_t)((next >= turn) ? (next - turn) : next);

@@ -179,14 +179,15 @@ static bool shifts_are_valid(const pvid_weak_design_q31 *design)
     const pvid_weak_model_q31 *model = design->model;
     /* products of hop steps of 29 bits, and one off for each block, fit 30 bits */
     const int64_t sums = (int64_t)design->hop * ((int64_t)1 << 29);
-    bool valid = (design->sum_shift <= MOST_UP) &&
+    bool valid = (design->sum_shift >= 1u) && (design->sum_shift <= MOST_UP) &&
                  ((pvid_floor_shift_q31(sums, design->sum_shift) + design->hop) < PVID_ONE_Q30);
     for (size_t i = 0; i < model->channels; i++) {
         const pvid_weak_format_q31 *one = &design->format[i];
         const int64_t hop = design->hop;
         const int64_t most = (model->channel[i].fold == 1u) ? (2 * hop) : (24 * hop * hop);
-        valid = valid && (one->value <= MOST_UP) && (one->own < PLACES) && (one->plain <= WORD) &&
-                (one->ramp <= WORD) && ((model->channel[i].fold < 1u) || (one->plain >= LEAST_SHIFT)) &&
+        valid = valid && ((one->value >= 1u) || (model->channel[i].gain == PVID_WEAK_NONE)) &&
+                (one->value <= MOST_UP) && (one->own < PLACES) && (one->plain <= WORD) && (one->ramp <= WORD) &&
+                ((model->channel[i].fold < 1u) || (one->plain >= LEAST_SHIFT)) &&
                 ((model->channel[i].fold < 2u) || (one->ramp >= LEAST_SHIFT)) && (one->lift <= MOST_UP) &&
                 ((one->lift == 0u) || (most <= pvid_floor_shift_q31(INT32_MAX, one->lift)));
     }

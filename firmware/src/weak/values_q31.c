@@ -148,7 +148,7 @@ static void write_channels(const pvid_weak_values_q31 *self, const pvid_weak_des
         if (one->fold > 0u) {
             value = pvid_upper_product_q31(value, integral_of(self, one, format->lift));
         }
-        value = pvid_floor_shift_32_q31(value, format->value);
+        value = pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(value, (uint32_t)format->value - 1u) + 1, 1);
         channel[k] = (value > PVID_WEAK_LIMIT_Q31) ? PVID_WEAK_LIMIT_Q31
                                                    : ((value < -PVID_WEAK_LIMIT_Q31) ? -PVID_WEAK_LIMIT_Q31 : value);
     }

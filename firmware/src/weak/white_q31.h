@@ -30,11 +30,11 @@ pvid_scaled_q31 pvid_weak_white_floor_q31(const pvid_weak_white_q31 *self, const
 /* 1 / sqrt(D_h) in place of D_h, of harmonics first..last-1. */
 void pvid_weak_white_invert_q31(pvid_weak_white_q31 *self, pvid_scaled_q31 least, size_t first, size_t last);
 
-/* weight h 2^-(bits of h), which loses two bits at most. */
+/* weight h 2^-(bits of h), which loses one bit at most. */
 static inline int32_t pvid_weak_white_times_q31(int32_t weight, size_t h)
 {
-    const uint32_t up = 31u - pvid_byte_length_q31(h);
-    return 2 * pvid_upper_product_q31(weight, (int32_t)((uint32_t)h << up));
+    const uint32_t up = 30u - pvid_byte_length_q31(h);
+    return (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight, (int32_t)((uint32_t)h << up)), 30);
 }
 
 /* The exponent of 1 / sqrt(D_h) behind `order` of them. */

@@ -251,7 +251,7 @@ class MechanismBoardQ31:
         kinds = {"filter": _filter, "run": _rescale, "format": _format, "noise": _noise}
         design |= {key: tuple(make(one) for one in design[key]) for key, make in kinds.items()}
         highest = design["functions"] // 2 + design["power"] // 2
-        circle = circle_of(design["hop"], highest)
+        circle = circle_of(design["hop"], highest, design["fine"])
         tables = WeakDesignQ31(model=made.model, circle=circle, units=(), margins={}, **design)
         config = WeakConfigQ31(
             design=tables,

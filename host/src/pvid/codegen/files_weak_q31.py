@@ -197,13 +197,14 @@ def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
         ),
         "error_order": _numbers("uint8_t", f"{prefix}_error_order", design.error_order),
         "error_variance": _structs("pvid_scaled_q31", f"{prefix}_error_variance", design.error_variance),
-        "circle": _numbers("PVID_TABLE int16_t", f"{prefix}_circle", design.circle.tolist()),
+        "circle": _numbers("PVID_TABLE int32_t", f"{prefix}_circle", design.circle.tolist()),
     }
     sizes = ("functions", "power", "decimation", "sum_shift", "hop")
     struct = [
         f"static const pvid_weak_design_q31 {prefix}_design_q31 = {{",
         f"    .model = &{prefix}_weak_q31,",
         *(f"    .{name} = {getattr(design, name)}," for name in sizes),
+        f"    .fine = {'true' if design.fine else 'false'},",
         f"    .n_noise = {len(design.noise)},",
         *(f"    .{name} = {prefix}_{name if text else ''}," for name, text in tables.items() if text),
         "};",

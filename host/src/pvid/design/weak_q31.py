@@ -21,11 +21,12 @@ Float = npt.NDArray[np.float64]
 
 BLOCK = 4  # steps that are added together
 CHANNEL_BITS = 28  # of a channel
-CIRCLE = 2**15 - 1  # largest cosine in the table
-DOWN = 14  # of a block's products, to 32 bits
+CIRCLE, FINE_CIRCLE = 2**15 - 1, 2**23 - 1  # largest cosine in the table
+DOWN, FINE_DOWN = 14, 22  # of a block's products, to 32 bits
 UPPER = 32  # bits that the upper half of a product is short of
 _WORD = 30  # bits of a sum: one is spare
 _BLOCK_BITS = 28  # of a block sum: a pair of differences fits a word
+_FEW_COUNTS = 2.0**12  # of a sample times the root of D, with which a cosine of 16 bits is exact enough
 _AMPLITUDES = 256  # of the cosine, among which there is one whose rounding is good-natured
 
 # Of each source: its largest integer in full scales, and its unit in counts.
@@ -127,10 +128,15 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
     if any(width > 0 and whole < 1 for width, whole in zip(sizes.sign_width, widths, strict=True)):
         raise PvidError("the width of a soft sign is below the resolution of its velocity")
     integral = tuple(_Integral.of(most, sizes.hop, margins) for most in formats.integrand_most)
-    circle = circle_of(sizes.hop, sizes.functions // 2 + sizes.power // 2)
+    # a second derivative has no large slow part
+    slow = {model.signal[jet.signal].sample for jet in model.jet if jet.order < 2}
+    fine = any(sensing.full_scale[one] * math.sqrt(sizes.decimation) > _FEW_COUNTS for one in slow)
+    circle = circle_of(sizes.hop, sizes.functions // 2 + sizes.power // 2, fine)
     # products of four steps have 31 bits
-    sum_shift = shift_to(sizes.hop * (2.0**29 + 2), _WORD - 1e-6)
-    channels = _Channels(model, sizes.hop, sum_shift, formats, integral, float(circle[0]), margins)
+    sum_shift = max(1, shift_to(sizes.hop * (2.0**29 + 2), _WORD - 1e-6))
+    channels = _Channels(
+        model, sizes.hop, sum_shift, formats, integral, (float(circle[0]), FINE_DOWN if fine else DOWN), margins
+    )
     units = tuple(channels.unit(k, dt) for k in range(len(model.channel)))
     omega = math.pi / (sizes.hop * dt)
     terms = zip(sizes.model.term, model.term, strict=True)
@@ -148,6 +154,7 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
         sign_width=widths,
         integral=tuple((one.down, one.twice) for one in integral),
         format=tuple(channels.format(k) for k in range(len(model.channel))),
+        fine=fine,
         circle=circle,
         factor=tuple(
             scaled_number(float(theirs.factor) * units[mine.channel] * omega**mine.order) for theirs, mine in terms
@@ -166,24 +173,25 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
     )
 
 
-def circle_of(hop: int, highest: int) -> npt.NDArray[np.int16]:
+def circle_of(hop: int, highest: int, fine: bool) -> npt.NDArray[np.int32]:
     """The table of cosines of a half window [2 hop + 3 hop/2 + 3 highest], which goes on behind the circle.
 
     A sum at harmonic h takes every h-th entry, and the errors of these let other frequencies of the signal into it. The
-    amplitude is the one of the largest that lets in least of the slow ones, which the motion has.
+    amplitude is the largest, or of those of 16 bits the one that lets in least of the slow ones, which the motion has.
     """
     turn = 2 * hop
     place = np.outer(np.arange(1, highest + 1), np.arange(turn)) % turn
     cosine = np.cos(np.pi * np.arange(turn) / hop)
     best, chosen = np.inf, cosine
-    for amplitude in range(CIRCLE, CIRCLE - _AMPLITUDES, -1):
+    largest, tried = (FINE_CIRCLE, 1) if fine else (CIRCLE, _AMPLITUDES)
+    for amplitude in range(largest, largest - tried, -1):
         whole = np.rint(amplitude * cosine)
         let_in = np.fft.rfft((whole / amplitude - cosine)[place])[:, : 2 * highest]
         total = float(np.sum(np.abs(let_in) ** 2))
         if total < best:
             best, chosen = total, whole
     n = turn + 3 * (hop // 2) + 3 * highest
-    return np.asarray(chosen[np.arange(n) % turn], np.int16)
+    return np.asarray(chosen[np.arange(n) % turn], np.int32)
 
 
 def scaled_number(x: float) -> tuple[int, int]:
@@ -291,11 +299,12 @@ class _Channels:
         sum_shift: int,
         formats: Formats,
         integral: tuple[_Integral, ...],
-        one: float,
+        cosine: tuple[float, int],
         margins: _Margins,
     ) -> None:
         self.model, self.hop, self.sum_shift = model, hop, sum_shift
-        self.formats, self.integral, self.one, self.margins = formats, integral, one, margins
+        self.formats, self.integral, self.margins = formats, integral, margins
+        self.one, self.down = cosine  # 1, and the shift of the products
 
     def edge(self, one: WeakChannel, fold: int) -> float:
         """Largest I^fold at the end of a half, as an integer."""
@@ -337,11 +346,11 @@ class _Channels:
 
     def value(self, k: int) -> int:
         """Shift from there to the channel."""
-        return shift_to(self.most(k), CHANNEL_BITS - 1e-6)
+        return max(1, shift_to(self.most(k), CHANNEL_BITS - 1e-6))
 
     def half_sum(self, k: int) -> float:
         """Largest sum of half a window."""
-        size = self.hop * (self.most(k) / 2.0 ** self.value(k) + 1) * CIRCLE / 2.0**DOWN
+        size = self.hop * (self.most(k) / 2.0 ** self.value(k) + 1) * 2  # the cosine times 2^-DOWN is below 2
         return size / 2.0**self.sum_shift + self.hop
 
     def format(self, k: int) -> WeakFormatQ31:
@@ -372,5 +381,5 @@ class _Channels:
             unit *= dt / 2 if one.fold == 1 else dt**2 / 48
         elif one.fold:
             unit *= (dt / 120 if one.fold == 1 else dt**2 / 240) * 2.0 ** -self.formats.integrands[one.integrand]
-        power = self.exponent(k) + self.format(k).own + DOWN + self.sum_shift
+        power = self.exponent(k) + self.format(k).own + self.down + self.sum_shift
         return unit * 2.0**power / self.one

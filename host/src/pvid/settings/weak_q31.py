@@ -11,7 +11,6 @@ import numpy.typing as npt
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak import WeakChannel, WeakJet, WeakKind, WeakSignal
 
-Int16 = npt.NDArray[np.int16]
 Int32 = npt.NDArray[np.int32]
 Int64 = npt.NDArray[np.int64]
 Function = Callable[[Int64], tuple[Int64, npt.NDArray[np.bool_]]]
@@ -114,7 +113,7 @@ class WeakDesignQ31:
     power : n of sin^n
     decimation : D, ticks a step
     hop : steps of half a window, a multiple of 4
-    sum_shift : of four steps' products 2^-14 before they are added
+    sum_shift : of four steps' products 2^-14 (fine: 2^-22) before they are added
     full_scale : of the counts about their offsets [samples]
     down : shift of the block sums of each signal to 28 bits
     filter : of each jet, at the steps: its compensator
@@ -122,7 +121,8 @@ class WeakDesignQ31:
     sign_width : of the soft sign, in the format of its argument [signs]; 0: the mean of sgn over a step
     integral : shifts (down, twice) of each integrand
     format : of each channel
-    circle : int16 cos(pi j / hop) times its first entry [2 hop + 3 hop/2 + 3 H]
+    fine : the cosine has 24 bits; else 16
+    circle : int32 cos(pi j / hop) times its first entry [2 hop + 3 hop/2 + 3 H]
     factor : of each term (m, e), of h^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
@@ -144,7 +144,8 @@ class WeakDesignQ31:
     sign_width: tuple[int, ...]
     integral: tuple[tuple[int, int], ...]
     format: tuple[WeakFormatQ31, ...]
-    circle: Int16
+    fine: bool
+    circle: Int32
     factor: tuple[tuple[int, int], ...]
     noise: tuple[WeakNoiseQ31, ...]
     error_order: tuple[int, ...]

@@ -6,10 +6,10 @@ import numpy as np
 
 from pvid.settings.weak import NONE, WeakChannel
 from pvid.settings.weak_q31 import WeakDesignQ31
-from pvid.twin.q31.integer import Int, upper_product
+from pvid.twin.q31.integer import Int, round_shift, upper_product
 from pvid.twin.q31.weak_values import Steps
 
-_BLOCK, _DOWN, _UPPER = 4, 14, 32
+_BLOCK, _DOWN, _FINE_DOWN, _UPPER = 4, 14, 22, 32
 
 
 def half_sums(channels: Int, design: WeakDesignQ31) -> Int:
@@ -23,8 +23,8 @@ def half_sums(channels: Int, design: WeakDesignQ31) -> Int:
         place = (h * np.arange(hop)) % turn
         for part, where in enumerate((place, (place + turn - hop // 2) % turn)):
             products = blocks * circle[where].reshape(-1, _BLOCK)
-            down = np.add.reduce(products, axis=-1) >> _DOWN
-            out[:, :, h, part] = np.add.reduce(down >> design.sum_shift, axis=-1)
+            down = np.add.reduce(products, axis=-1) >> (_FINE_DOWN if design.fine else _DOWN)
+            out[:, :, h, part] = np.add.reduce(round_shift(down, design.sum_shift), axis=-1)
     return out
 
 

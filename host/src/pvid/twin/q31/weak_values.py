@@ -140,5 +140,5 @@ def _channels(gains: Int, once: Int, twice: Int, design: WeakDesignQ31) -> Int:
         value, form = gains[one.gain], design.format[k]
         if one.fold:
             value = upper_product(value, _integral(one, form.lift, once, twice, index))
-        out[k] = value >> form.value
+        out[k] = round_shift(value, form.value)
     return out

@@ -12,13 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.weak_q31 import WeakDesignQ31
-from pvid.twin.q31.integer import Int, bit_length, upper_product
-from pvid.twin.q31.scaled import Scaled, inverse_root, pick, scaled
+from pvid.twin.q31.integer import Int, bit_length, round_shift
+from pvid.twin.q31.scaled import Scaled, pick, scaled
 
 _COLUMN_BITS = 27
 _SUM_BITS = 30  # of the sums of a channel
 _PRODUCT_DOWN = 33
 _NONE = -(2**31)  # exponent where there is no term
+_NEWTON_STEPS = 4
 _FLOOR_BITS = 33
 _LEAST_EXPONENT = -200
 _KEPT_BITS = 20
@@ -33,23 +34,35 @@ def block(x: Int) -> tuple[Int, Int]:
     return (x >> np.maximum(exponent, 0)) << np.maximum(-exponent, 0), exponent
 
 
+def inverse_root(x: Scaled) -> Scaled:
+    """1 / sqrt(x), x > 0, by Newton's method."""
+    odd = x.e & 1
+    m, exponent = x.m >> odd, x.e + 30 + odd
+    y = 1181116006 - 5 * (m >> 3)
+    for _ in range(_NEWTON_STEPS):
+        part = (m * ((y * y) >> 30)) >> 30
+        y = (y * (3 * 2**28 - part)) >> 29
+    return Scaled(y, -(exponent // 2) - 29)
+
+
 def mirror_of(x: Int) -> Int:
     """The reflection that leaves the first entry of x [n, lanes] alone; 0 stays 0."""
     square = np.add.reduce(x * x, axis=0)
     inverse = inverse_root(scaled(np.maximum(square, 1), 0))
-    u = upper_product(8 * x, inverse.m) << np.where(square > 0, inverse.e + 59, 0)
+    shift = np.broadcast_to(-(inverse.e + 30), x.shape)
+    u = round_shift(x * inverse.m, shift)
     size = np.minimum(np.abs(u[0]), _ONE)
     half = inverse_root(scaled(_ONE + size, -30))
-    v = 4 * upper_product(u, half.m)
-    top = 8 * upper_product((_ONE >> 1) + (size >> 1), half.m)
+    v = round_shift(u * half.m, 30)
+    top = round_shift(((_ONE + size) >> 1) * half.m, 29)
     v[0] = np.where(u[0] < 0, -top, top)
     return np.where(square > 0, v, 0)
 
 
 def mirrored(v: Int, x: Int) -> Int:
     """x - v (v^T x), [n, lanes] each."""
-    along = 4 * (len(x) // 2 + np.add.reduce(upper_product(v, x), axis=0))
-    return np.asarray(x - (4 * upper_product(v, along) + 2))
+    along = round_shift(np.add.reduce(v * x, axis=0), 30)
+    return np.asarray(x - ((v * along) >> 30))
 
 
 @dataclass(frozen=True)
@@ -93,7 +106,7 @@ def _weight(gain: Int, order: int, h: int) -> Int:
     """h^order / sqrt(D_h) [lanes], but for the exponents of h."""
     weight: Int = gain[h]
     for _ in range(order):
-        weight = 2 * upper_product(weight, h << (31 - h.bit_length()))
+        weight = (weight * (h << (30 - h.bit_length()))) >> 30
     return weight
 
 
@@ -193,7 +206,7 @@ def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
         term = design.model.term[t]
         negative = (term.order % 4 >= 2, (term.order + 1) % 4 >= 2)
         below = top - exponent
-        whole = 4 * upper_product(_weight(made.gain, term.order, h), design.factor[t][0])
+        whole = (_weight(made.gain, term.order, h) * design.factor[t][0]) >> 30
         weight = np.where(used & (below < _SUM_BITS), whole >> np.clip(below, 0, 63), 0)
         for part in range(2 if h and made.cosines + h <= design.parts else 1):
             s = window[:, term.channel, h, (part + term.order) % 2] << lift
