@@ -106,7 +106,7 @@ def run_case(case: Case, seed: int) -> Outcome:
 
 
 @cache
-def cases() -> tuple[list[tuple[str, float, Case]], list[tuple[str, str, str]]]:
+def cases() -> tuple[list[tuple[str, float, Case]], list[tuple[str, ...]]]:
     """Those that a board can refine, and why it cannot the others."""
     made, refused = [], []
     for name in NAMES:
@@ -146,7 +146,7 @@ def rows_of(name: str, rate: float, case: Case, runs: list[Outcome]) -> Iterator
 
 def refined_tables(
     seeds: int, progress: Callable[[], None] = lambda: None
-) -> tuple[list[tuple[str, ...]], list[tuple[str, str, str]]]:
+) -> tuple[list[tuple[str, ...]], list[tuple[str, ...]]]:
     """Rows of HEADER, and of REFUSED."""
     made, refused = cases()
     rows = []
