@@ -108,7 +108,8 @@ def run_case(case: Case, seed: int) -> Outcome:
 @cache
 def cases() -> tuple[list[tuple[str, float, Case]], list[tuple[str, ...]]]:
     """Those that a board can refine, and why it cannot the others."""
-    made, refused = [], []
+    made: list[tuple[str, float, Case]] = []
+    refused: list[tuple[str, ...]] = []
     for name in NAMES:
         for rate in RATES.get(name, (simulated_rig(name).sample_rate,)):
             try:
