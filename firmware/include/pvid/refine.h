@@ -31,8 +31,8 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
-#include "pvid/weak.h"
 #include "pvid/refine_shape.h"
+#include "pvid/weak.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -31,9 +31,9 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
-#include "pvid/weak_parts.h"
 #include "pvid/gate.h"
 #include "pvid/trust.h"
+#include "pvid/weak_parts.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -21,9 +21,9 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
-#include "pvid/weak_parts.h"
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
+#include "pvid/weak_parts.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -9,9 +9,9 @@
 
 #include <string.h>
 
+#include "number/integer_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/white_q31.h"
-#include "number/integer_q31.h"
 
 #define SUM_BITS 30
 #define PRODUCT_DOWN 33u

@@ -1,8 +1,8 @@
 #include "weak/sums_q31.h"
 
-#include "weak/values_q31.h"
 #include "number/integer_q31.h"
 #include "number/unroll.h"
+#include "weak/values_q31.h"
 
 #define BLOCK ((size_t)PVID_WEAK_BLOCK_Q31)
 #define DOWN 22u
