@@ -51,9 +51,9 @@ typedef struct {
     uint16_t groups_min; /* groups before the first publication */
     uint16_t
         revert_after; /* consecutive uninformative groups after which p reverts to the published estimate; 0: never */
-    float renewal; /* relative change, 0.01..1e3; 0: never. The old sums are renewed when a positive parameter has
-                      converged this far from its value at their rows, and the residual variance of all rows is above
-                      the alarm's limit */
+    float renewal;    /* relative change, 0.01..1e3; 0: never. The old sums are renewed when a positive parameter has
+                         converged this far from its value at their rows, and the residual variance of all rows is above
+                         the alarm's limit */
     float neglected; /* relative error of the positive parameters because the equations are approximate, for example for
                         small angles, 0..1; 0: they are exact */
 } pvid_trust_config_f32;

@@ -149,13 +149,13 @@ typedef struct {
     pvid_trust_config_f32 trust;         /* conditions of publication */
     pvid_gate_config_f32 gate;           /* outlier gate on the residuals of a window, for each kind */
     const pvid_weak_refine_f32 *refine;  /* second stage, refine.h: gets every sample, each new estimate, gaps and
-                                               freezes; must outlive the identifier. NULL: none */
+                                            freezes; must outlive the identifier. NULL: none */
 } pvid_weak_config_f32;
 
 /* State: detail/weak_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_weak_f32 pvid_weak_f32;
 
-/* Initialises `self`. Fails iff
+/* Initialises `self`. *config is copied; design, range, drive_min and refine must outlive the identifier. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
  *   - a field of config, design or model is out of its range (the status names it),
  *   - a table is NULL or contains a number that is not finite (PVID_BAD_DESIGN),

@@ -10,7 +10,8 @@
  *   divider 1, exact_every 8: a solve at every row; S and F come from all sums at every eighth row. In between, each
  *                             row adds the square of its gradient to S, and F is the innovation of the row
  *   divider 8:                a solve at every eighth row; the projection, the solve and the folding of the sums are
- *                             done at different rows (divider: any multiple of 4 from 8 to 64)
+ *                             done at different rows. The same for all multiples of 4 from 8 to 64, without a dead
+ *                             zone; any other divider above 1 does the whole solve in one row
  *
  *   static pvid_strong_f32 identifier;
  *   static pvid_strong_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .bank = ... };
@@ -46,8 +47,7 @@ typedef struct {
     pvid_gate_config_f32 gate; /* outlier gate on the innovation of a row */
     uint16_t exact_every;      /* rows from one exact projection to the next if divider is 1, 1..255; 0: 8, with the law
                                   pseudovelocity or a dead zone 1 */
-    pvid_estimator_config_f32
-        estimator; /* model, update_rate_hz, noise_margin and row_weight are not used */
+    pvid_estimator_config_f32 estimator; /* model, update_rate_hz, noise_margin and row_weight are not used */
 } pvid_strong_config_f32;
 
 /* State: detail/strong_state.h, not API. Only the functions below write to it. */
