@@ -1,9 +1,9 @@
 #include "frames_f32.h"
 #include "identifier.h"
 #include "pvid/fnv.h"
-#include "pvid/weak.h"
 #include "pvid/little_endian.h"
 #include "pvid/pvid.h"
+#include "pvid/weak.h"
 #include "stream_tables.h"
 
 static pvid_weak_f32 identifier;

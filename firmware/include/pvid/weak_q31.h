@@ -9,7 +9,7 @@
  *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1)
  *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
  *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
- *   integrals      int32 in dt/24 (once) and dt^2/48 (twice) of the integrand with its last bits off, that of 1 in dt/2
+ *   integrals      int32 in dt/120 (once) and dt^2/240 (twice) of the integrand with its last bits off, that of 1 in dt/2
  *   channels       int32 within +-2^28
  *   sums           of four steps exact (cosine of 16 bits, or of 24 where the signals have many counts, times 29
  *                  bits), then shifted to int32 and added
@@ -23,9 +23,9 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
-#include "pvid/weak_parts.h"
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
+#include "pvid/weak_parts.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -45,12 +45,12 @@ typedef struct {
 
 typedef struct {
     uint8_t samples;    /* entries of the argument of step */
-    uint8_t signals;    /* with those that are made of samples */
+    uint8_t signals;    /* samples, and signals made of them: weak_parts.h */
     uint8_t jets;       /* inputs of `prepare`, the first inputs of `values` */
-    uint8_t runs;       /* integrals since the start of the run: inputs of `values` behind the jets */
-    uint8_t signs;      /* arguments of sgn: inputs of `values` behind the runs */
+    uint8_t runs;       /* integrals since the start of the run: inputs of `values` after the jets */
+    uint8_t signs;      /* arguments of sgn: inputs of `values` after the runs */
     uint8_t gains;      /* first results of `values` */
-    uint8_t integrands; /* its further results */
+    uint8_t integrands; /* results of `values` after the gains */
     uint8_t channels;
     uint8_t kinds;
     const pvid_weak_signal *signal;   /* [signals] */
@@ -100,7 +100,7 @@ typedef struct {
     uint8_t ramp;  /* of fold 2: of I^1 at the end of the first half times B_h of the channel `ramp` */
 } pvid_weak_format_q31;
 
-/* Share of the variance D_h of the sums at harmonic h in the rows of a kind by the sensors' noise:
+/* A part of the variance D_h at harmonic h, in the rows of a kind, that the sensors' noise causes:
  * += W_h factor theta_a theta_b h^(2 power), with theta = -1 for the column of Y; W_h: 2 hop at h = 0, else hop. */
 typedef struct {
     uint8_t kind;
@@ -130,7 +130,7 @@ typedef struct {
     const pvid_scaled_q31 *factor;    /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_weak_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;
-    const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const uint8_t *error_order; /* [kinds] the equation error is the derivative of this order of white noise */
     const pvid_scaled_q31
         *error_variance; /* [kinds] of that noise at a step, times W_h h^(2 order) the share in D_h; or 0 */
 } pvid_weak_design_q31;
@@ -140,8 +140,8 @@ typedef struct {
 typedef struct {
     const pvid_weak_design_q31 *design; /* must outlive the identifier, with its tables */
     const int32_t *offset;              /* [samples] reading of each sensor at 0, within +-2^30 [counts] */
-    const int32_t *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, 0..2^24
-                                 [counts]; NULL: no check */
+    const int32_t *drive_min; /* [samples] a window in which a sample has a smaller standard deviation is dropped,
+                                 0..2^24 [counts]; NULL: no check */
     bool compensation;        /* corrects the bias by the sensors' noise (errors in variables), as in weak.h */
     uint8_t iterations; /* Gauss-Newton steps in each of the first eight windows, 1..PVID_MAX_ITERATIONS; then one.
                            Recommended: 2, as in weak.h */
@@ -158,7 +158,7 @@ typedef struct pvid_weak_q31 pvid_weak_q31;
  *   - a pointer is NULL (PVID_BAD_POINTER),
  *   - a field of config, design or model is out of its range (the status names it), or
  *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS).
- * The tables must be those of the design tool: it proves that no sum overflows. */
+ * The tables must come from the design tool, which proves that no sum overflows. */
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config);
 
 /* One tick: the readings [samples], taken at the same time. Returns as pvid_weak_step_f32. */

@@ -8,8 +8,8 @@
 
 #include <stdbool.h>
 
-#include "weak/weak_front_q31.h"
 #include "pvid/weak_q31.h"
+#include "weak/weak_front_q31.h"
 
 typedef enum {
     PVID_WEAK_BUSY,    /* the tick did a part of its block's work */

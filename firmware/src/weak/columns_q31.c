@@ -9,6 +9,7 @@
 
 #include <string.h>
 
+#include "number/integer_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/white_q31.h"
 #include "number/integer_q31.h"

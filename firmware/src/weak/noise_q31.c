@@ -6,11 +6,11 @@
  * reflected by its own reflection and then by those before it, from the last to the first. */
 #include "weak/noise_q31.h"
 
+#include "number/integer_q31.h"
+#include "number/scaled_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/sums_q31.h"
 #include "weak/white_q31.h"
-#include "number/integer_q31.h"
-#include "number/scaled_q31.h"
 
 void pvid_weak_noise_leverage_q31(const pvid_weak_white_q31 *white, const pvid_weak_design_q31 *design, size_t place,
                                   int32_t u[], int32_t leverage[])

@@ -5,10 +5,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "weak/weak_front_f32.h"
-#include "weak/weak_signals.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
+#include "weak/weak_front_f32.h"
+#include "weak/weak_signals.h"
 
 static bool all_within(const float values[], size_t n, float low)
 {

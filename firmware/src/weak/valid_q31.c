@@ -3,11 +3,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "weak/weak_front_q31.h"
-#include "weak/weak_signals.h"
+#include "number/integer_q31.h"
 #include "weak/sums_q31.h"
 #include "weak/values_q31.h"
-#include "number/integer_q31.h"
+#include "weak/weak_front_q31.h"
+#include "weak/weak_signals.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define LEAST_FUNCTIONS 4u

@@ -12,7 +12,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/rescale_q31.h"
 #include "pvid/elementary_q31.h"
 #include "number/exact.h"
 

@@ -5,19 +5,19 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/weak_finish_f32.h"
-#include "weak/weak_front_f32.h"
-#include "weak/weak_step_f32.h"
-#include "weak/sums_f32.h"
-#include "weak/ticks_f32.h"
-#include "weak/valid_f32.h"
-#include "weak/watch_f32.h"
-#include "weak/white_f32.h"
 #include "judge/publication.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "number/init.h"
 #include "number/unroll.h"
+#include "weak/sums_f32.h"
+#include "weak/ticks_f32.h"
+#include "weak/valid_f32.h"
+#include "weak/watch_f32.h"
+#include "weak/weak_finish_f32.h"
+#include "weak/weak_front_f32.h"
+#include "weak/weak_step_f32.h"
+#include "weak/white_f32.h"
 
 /* The largest finite number. */
 #define LARGEST 3.40282347e38f

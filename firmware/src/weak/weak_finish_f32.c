@@ -8,11 +8,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/columns_f32.h"
-#include "weak/scores_f32.h"
-#include "weak/steps.h"
-#include "weak/sums_f32.h"
-#include "weak/white_f32.h"
 #include "judge/trust_f32.h"
 #include "number/count.h"
 #include "number/exact.h"
@@ -20,6 +15,11 @@
 #include "solve/pattern_f32.h"
 #include "solve/products_f32.h"
 #include "solve/staged_f32.h"
+#include "weak/columns_f32.h"
+#include "weak/scores_f32.h"
+#include "weak/steps.h"
+#include "weak/sums_f32.h"
+#include "weak/white_f32.h"
 
 enum {
     /* for each kind of rows */

@@ -3,18 +3,18 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/columns_q31.h"
-#include "weak/mirror_q31.h"
-#include "weak/noise_q31.h"
-#include "weak/steps.h"
-#include "weak/sums_q31.h"
-#include "weak/white_q31.h"
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
+#include "weak/columns_q31.h"
+#include "weak/mirror_q31.h"
+#include "weak/noise_q31.h"
+#include "weak/steps.h"
+#include "weak/sums_q31.h"
+#include "weak/white_q31.h"
 
 enum {
     /* for each kind of rows; the first four only where the noise is computed anew */

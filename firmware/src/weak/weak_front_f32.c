@@ -15,8 +15,8 @@
 
 #include <string.h>
 
-#include "weak/weak_signals.h"
 #include "number/exact.h"
+#include "weak/weak_signals.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
 

@@ -3,15 +3,15 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/collect_q31.h"
-#include "weak/weak_finish_q31.h"
-#include "weak/weak_front_q31.h"
-#include "weak/valid_q31.h"
 #include "judge/publication.h"
 #include "number/count.h"
 #include "number/init.h"
 #include "number/integer_q31.h"
 #include "number/unroll.h"
+#include "weak/collect_q31.h"
+#include "weak/valid_q31.h"
+#include "weak/weak_finish_q31.h"
+#include "weak/weak_front_q31.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define OFFSET_LIMIT ((int32_t)1 << 30)

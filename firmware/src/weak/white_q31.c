@@ -11,10 +11,10 @@
 
 #include <stdbool.h>
 
-#include "weak/mirror_q31.h"
-#include "weak/sums_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
+#include "weak/mirror_q31.h"
+#include "weak/sums_q31.h"
 
 #define FLOOR_BITS 33
 #define LEAST_EXPONENT (-200) /* of D_h, where there is no noise at all */
