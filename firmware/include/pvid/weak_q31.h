@@ -9,11 +9,12 @@
  *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1)
  *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
  *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
- *   integrals      int32 in dt/120 (once) and dt^2/240 (twice) of the integrand with its last bits off, that of 1 in dt/2
+ *   integrals      int32 in dt/120 (once) and dt^2/240 (twice) of the integrand without its last bits
+ *   time           the integrals of 1 in dt/2 and dt^2/48
  *   channels       int32 within +-2^28
- *   sums           of four steps exact (cosine of 16 bits, or of 24 where the signals have many counts, times 29
- *                  bits), then shifted to int32 and added
- *   S_h            int32, with the window's own start of every integral
+ *   sums           of four steps exact: a cosine of 16 bits, or of 24 if the signals have many counts, times 29 bits;
+ *                  then shifted to int32 and added
+ *   S_h            int32; every integral starts at the start of the window
  */
 #ifndef PVID_WEAK_Q31_H
 #define PVID_WEAK_Q31_H

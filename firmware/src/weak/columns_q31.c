@@ -10,10 +10,9 @@
 #include <string.h>
 
 #include "number/integer_q31.h"
+#include "number/unroll.h"
 #include "weak/mirror_q31.h"
 #include "weak/white_q31.h"
-#include "number/integer_q31.h"
-#include "number/unroll.h"
 
 #define SUM_BITS 30
 #define PRODUCT_DOWN 33u

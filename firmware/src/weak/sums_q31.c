@@ -2,9 +2,9 @@
 
 #include <string.h>
 
-#include "weak/values_q31.h"
-#include "number/integer_q31.h"
 #include "number/exact.h"
+#include "number/integer_q31.h"
+#include "weak/values_q31.h"
 
 #define BLOCK ((size_t)PVID_WEAK_BLOCK_Q31)
 #define DOWN 14u

@@ -12,8 +12,9 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "pvid/elementary_q31.h"
 #include "number/exact.h"
+#include "pvid/elementary_q31.h"
+#include "weak/rescale_q31.h"
 
 void pvid_weak_values_init_q31(pvid_weak_values_q31 *self, uint16_t lead)
 {

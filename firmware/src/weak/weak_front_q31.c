@@ -13,10 +13,8 @@
 
 #include <string.h>
 
-#include "weak/weak_signals.h"
 #include "number/integer_q31.h"
 #include "number/unroll.h"
-#include "weak/rescale_q31.h"
 #include "weak/weak_signals.h"
 
 uint16_t pvid_weak_front_half_q31(const pvid_weak_design_q31 *design)
