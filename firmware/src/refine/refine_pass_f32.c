@@ -367,6 +367,25 @@ PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[
 }
 
 #if PVID_REFINE_SKEW
+/* Derivative of output i by the skew, from those by the coordinates and their rates. */
+PVID_ALWAYS_INLINE float slip_of(const pvid_refine_pass_f32 *self, const float derivatives[], size_t i)
+{
+    float sum = 0.0f;
+    PVID_UNROLL for (size_t k = 0; k < N_Q; k++)
+    {
+        const float a = self->difference[k][0];
+#if PVID_REFINE_ORDER == 2
+        sum += derivatives[(i * N_Q) + k] * (self->state[V + k] + (self->skew[0] * a));
+#else
+        sum += derivatives[(i * N_Q) + k] * a;
+#endif
+#if PVID_REFINE_OUTPUT_RATES
+        sum += derivatives[((PVID_REFINE_OUTPUTS + i) * N_Q) + k] * a;
+#endif
+    }
+    return sum;
+}
+
 /* Derivatives of the outputs by the skew, at the middle of the big step. */
 PVID_ALWAYS_INLINE void slip(pvid_refine_pass_f32 *self, const float r[], const float u[])
 {
@@ -380,20 +399,7 @@ PVID_ALWAYS_INLINE void slip(pvid_refine_pass_f32 *self, const float r[], const 
 #endif
     PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++)
     {
-        float sum = 0.0f;
-        PVID_UNROLL for (size_t k = 0; k < N_Q; k++)
-        {
-            const float a = self->difference[k][0];
-#if PVID_REFINE_ORDER == 2
-            sum += derivatives[(i * N_Q) + k] * (self->state[V + k] + (self->skew[0] * a));
-#else
-            sum += derivatives[(i * N_Q) + k] * a;
-#endif
-#if PVID_REFINE_OUTPUT_RATES
-            sum += derivatives[((PVID_REFINE_OUTPUTS + i) * N_Q) + k] * a;
-#endif
-        }
-        self->slip[i] = sum;
+        self->slip[i] = slip_of(self, derivatives, i);
     }
 }
 #endif
