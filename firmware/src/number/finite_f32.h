@@ -28,7 +28,10 @@ static inline bool pvid_finite_f32(float x)
     return (pvid_bits_f32(x) & 0x7F800000u) != 0x7F800000u;
 }
 
-/* Finite and low <= x <= high: the check of a setting. */
-bool pvid_within_f32(float x, float low, float high);
+/* finite and low <= x <= high */
+static inline bool pvid_within_f32(float x, float low, float high)
+{
+    return pvid_finite_f32(x) && (x >= low) && (x <= high);
+}
 
 #endif

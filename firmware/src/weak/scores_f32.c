@@ -15,7 +15,6 @@
 #include <string.h>
 
 #include "number/count.h"
-#include "number/unroll.h"
 
 /* Far below: this part of the mean. By chance the mean square of 9 residuals is below it once in 10^6 windows. */
 #define FAR_BELOW 0.05f
@@ -31,8 +30,7 @@ void pvid_weak_scores_skip_f32(pvid_weak_scores_f32 *self)
     self->known = false;
 }
 
-PVID_COLD void pvid_weak_scores_take_f32(pvid_weak_scores_f32 *self, const pvid_estimator_f32 *estimator,
-                                         const float sum[])
+void pvid_weak_scores_take_f32(pvid_weak_scores_f32 *self, const pvid_estimator_f32 *estimator, const float sum[])
 {
     const pvid_model_f32 *model = estimator->model;
     float c[PVID_MAX_THETA * PVID_MAX_P];
@@ -43,7 +41,7 @@ PVID_COLD void pvid_weak_scores_take_f32(pvid_weak_scores_f32 *self, const pvid_
     }
 }
 
-PVID_COLD void pvid_weak_scores_add_f32(pvid_weak_scores_f32 *self, size_t n_p, float residual)
+void pvid_weak_scores_add_f32(pvid_weak_scores_f32 *self, size_t n_p, float residual)
 {
     if (residual < (FAR_BELOW * self->residual)) {
         self->windows = 0;

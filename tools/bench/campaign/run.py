@@ -17,6 +17,9 @@ from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.rig.file import Core
 
+_CONNECT_S = 10
+_WORKERS_S = 30  # until a running scheduler must have a worker
+
 
 @dataclass(frozen=True)
 class Campaign:
@@ -64,7 +67,7 @@ def run(
     scheduler
         Address of a running scheduler; by default processes on this machine.
     workers
-        Number of them; by default, one a processor. One is this process.
+        Number of them; by default, one a processor.
     """
     rigs = range(campaign.rigs)
     missing = [rig for rig in rigs if rig not in store.records]

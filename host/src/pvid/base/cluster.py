@@ -24,7 +24,7 @@ def each(client: Any, work: Callable[..., Done], items: Sequence[Item], **fixed:
 
     Parameters
     ----------
-    client : of `client`; None: this process does the work
+    client : of `client`
     work : a function that a worker can import
 
     Raises
@@ -32,9 +32,6 @@ def each(client: Any, work: Callable[..., Done], items: Sequence[Item], **fixed:
     PvidError
         That of the work, or where a worker cannot run it.
     """
-    if client is None:
-        yield from (work(item, **fixed) for item in items)
-        return
     futures = client.map(work, items, pure=False, **fixed)
     for future in _distributed().as_completed(futures, loop=client.loop):
         try:
@@ -49,8 +46,7 @@ def each(client: Any, work: Callable[..., Done], items: Sequence[Item], **fixed:
 
 @contextmanager
 def client(scheduler: str | None, workers: int) -> Iterator[Any]:
-    """A client of the scheduler, or of worker processes of its own that nobody else can reach; None for one worker on
-    this machine, for which another process and a scheduler take longer to start than most recordings to identify.
+    """A client of the scheduler, or of worker processes of its own that nobody else can reach.
 
     Parameters
     ----------
@@ -62,9 +58,6 @@ def client(scheduler: str | None, workers: int) -> Iterator[Any]:
     PvidError
         When the scheduler cannot be reached or has no worker, or dask.distributed is not installed.
     """
-    if scheduler is None and workers == 1:
-        yield None
-        return
     distributed = _distributed()
     if scheduler is not None:
         try:

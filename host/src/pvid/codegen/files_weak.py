@@ -112,9 +112,6 @@ def source(made: WeakFunctions, model: WeakModel, command: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-_FORM = "static void form(const float *restrict gain, const float *restrict integral, float t, float *restrict channel)"
-
-
 def _form(model: WeakModel) -> str:
     """The function that makes the channels of a step."""
     square = "half_square"
@@ -135,7 +132,7 @@ def _form(model: WeakModel) -> str:
     ]
     return "\n".join(
         [
-            _FORM,
+            "static void form(const float gain[], const float integral[], float t, float channel[])",
             "{",
             *unused,
             *first,

@@ -14,7 +14,7 @@ Int64 = npt.NDArray[np.int64]
 
 
 class Folded:
-    """What folded tables [5, half], whose taps are `stride` points of `block` samples apart, span."""
+    """What folded tables [5, half], whose points are `stride` samples apart, span."""
 
     weights: npt.NDArray[Any]
     stride: int
@@ -28,22 +28,18 @@ class Folded:
     @property
     def window(self) -> int:
         """Samples from the first to the last, both included."""
-        return self.memory * self.every
+        return 2 * self.half * self.stride + self.block
 
     @property
     def memory(self) -> int:
-        """Points from the first to the last, both included: places of PVID_MAX_WINDOW."""
-        return 2 * self.half * self.stride + 1
-
-    @property
-    def every(self) -> int:
-        """Samples from a result to the next."""
-        return max(self.block, 1)
+        """Places of PVID_MAX_WINDOW that they need."""
+        points = 2 * self.half * self.stride + 1
+        return points + self.block + 2 if self.block > 1 else points
 
     @property
     def delay(self) -> int:
         """Samples from the newest one back to the instant the derivatives refer to."""
-        return (self.window - 1) // 2
+        return self.half * self.stride + (self.block - 1) // 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +49,7 @@ class FirBankQ31(Folded):
     Attributes
     ----------
     weights : int32 [5, half], folded
-    stride : points from tap to tap
+    stride : samples from point to point
     block : samples whose sum is a point
     centre : weight of the centre point in order 0
     phi_max, y_max : full scale of the counts
@@ -77,6 +73,12 @@ class FirBankQ31(Folded):
     tau_bits: int
     margins: dict[str, float]
     block: int = 1
+
+    @property
+    def memory(self) -> int:
+        """Places of PVID_MAX_WINDOW that it needs: sums of integers are exact, so one sum of a block is enough."""
+        points = 2 * self.half * self.stride + 1
+        return points + self.block + 1 if self.block > 1 else points
 
 
 RATE_BITS = 24  # after the point of u, u', u'' and w_r in fixed point; w has one more

@@ -51,10 +51,9 @@ class LiveSimulation:
             return
         if history.model.name != MODEL.name or constants is None or not history.newest or len(t) < 100:
             return
-        newest = history.published
-        p = np.array([newest.get(name, math.nan) for name in history.model.mapped_names])
+        p = np.array([history.newest.get(name, math.nan) for name in history.model.mapped_names])
         offset = next(one.name for one in history.model.parameters if one.role == "offset")
-        rest = newest.get(offset, math.nan)
+        rest = history.newest.get(offset, math.nan)
         if not np.isfinite(p).all():
             return
         whole = np.append(p, rest) if math.isfinite(rest) else p

@@ -21,11 +21,15 @@ class RefineShape:
     outputs: int
     moving: int
     parameters: int
-    skew: bool  # the entry of r behind the moving ones
+    skew: bool
     rates: bool  # an output depends on v
     logarithmic: tuple[bool, ...]
     place_of_p: tuple[int, ...]
-    measured: tuple[int, ...] = ()  # of the states: 1 + 2 output: that output, 2 + 2 output: its rate, 0: neither
+
+    @property
+    def reach(self) -> int:
+        """Steps before and behind whose inputs a skew needs."""
+        return 2 if self.skew else 0
 
     @property
     def states(self) -> int:
@@ -50,16 +54,20 @@ class RefineShape:
     @property
     def rows(self) -> int:
         """That are added to the sums together."""
-        return max(2, self.outputs)
+        return 3 if self.outputs == 3 else 4
 
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Accelerations (order 1: rates) a [q], their derivatives K, D [q, q], B [moving, q]."""
+    """Accelerations (order 1: rates) a [q], their derivatives K, D [q, q], U [q, inputs], B [moving, q].
+
+    The row of the skew is 0.
+    """
 
     a: Float32
     K: Float32
     D: Float32
+    U: Float32
     B: Float32
 
 
