@@ -77,7 +77,8 @@ def _left_in(space: dict[str, Any], path: Path) -> Model:
     others = {id(value): value for value in space.values() if isinstance(value, Model)}
     if len(others) == 1 and model is None:
         return next(iter(others.values()))
-    found = "no pvid.model.Model" if not others else f"{len(others)} models and none of them"
+    count = f"{len(others)} model{'s' if len(others) > 1 else ''}"
+    found = f"{count} and none of them" if others else "no pvid.model.Model"
     raise PvidError(f"{path.name}: the file leaves {found} in a variable `model`")
 
 
