@@ -202,8 +202,8 @@ RANGES = {
 }
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
 SIZES = {
-    "strong": {**BANK, "bank.block": Range(0, 314, Status.BAD_STRIDE)},
-    "strong q31": {**BANK, "bank.block": Range(0, 315, Status.BAD_STRIDE)},
+    "strong": {**BANK, "bank.block": Range(0, 65535, Status.OK)},
+    "strong q31": {**BANK, "bank.block": Range(0, 65535, Status.BAD_FULL_SCALE, (Status.BAD_FULL_SCALE,))},
     "weak": {},
     "weak q31": {},
     "estimator": {},

@@ -9,6 +9,9 @@ A deviation names a tool, a rule, a reason, and what it covers: files and a regu
 finding has to match. One that covers nothing any more is an error. So is one of a required rule with more findings than
 its `most`, until a person has looked and run --update. build/analysis/deviations.md is the list with all counts.
 
+A source is not read again while nothing that a tool reads has changed: cppcheck keeps its findings itself, those of the
+others tools/kept.py keeps.
+
 Ports are read as their processor's compilers read them, the applications as for this machine; Debian's avr-gcc is too
 old to have -fanalyzer.
 """
@@ -28,6 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from kept import kept, preprocessed, version
 from units import FIRMWARE, PORTS, ROOT, Unit, applications, chosen, core, demand, ports, take_files
 
 DEVIATIONS = ROOT / "firmware" / "analysis.toml"
@@ -55,6 +59,7 @@ PACKAGES = {
     "gcc": "gcc",
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf",
+    "clang": "clang",
     "clang-tidy": "clang-tidy",
     "cppcheck": "cppcheck",
 }
@@ -132,18 +137,31 @@ def gcc(unit: Unit) -> set[Finding]:
     if unit.machine not in GCC:
         return set()
     for_it = [*GCC[unit.machine], *unit.common, "-O2", "-fanalyzer", "-Wall", "-Wextra", *asserts(unit)]
-    output = run([*for_it, "-c", str(unit.source), "-o", "/dev/null"])
-    if re.search(r"(?<!\w)error:", output):
-        raise SystemExit(f"gcc does not compile {unit.name}:\n{output}")
+
+    def made() -> str:
+        output = run([*for_it, "-c", str(unit.source), "-o", "/dev/null"])
+        if re.search(r"(?<!\w)error:", output):
+            raise SystemExit(f"gcc does not compile {unit.name}:\n{output}")
+        return output
+
+    output = kept([version(for_it[0], "--version"), *for_it, preprocessed(for_it, unit.source)], made) or ""
     return located(
         "gcc", output, r"^(?P<file>[^\s:]+):(?P<line>\d+):\d+: warning: (?P<text>.*) \[(?P<rule>-W[^\]]+)\]$"
     )
 
 
 def clang_tidy(unit: Unit) -> set[Finding]:
-    output = run(["clang-tidy", "--quiet", str(unit.source), "--", *unit.options, *asserts(unit)])
-    if re.search(r"(?<!\w)error:", output):
-        raise SystemExit(f"clang-tidy does not read {unit.name}:\n{output}")
+    options = [*unit.options, *asserts(unit)]
+
+    def made() -> str:
+        output = run(["clang-tidy", "--quiet", str(unit.source), "--", *options])
+        if re.search(r"(?<!\w)error:", output):
+            raise SystemExit(f"clang-tidy does not read {unit.name}:\n{output}")
+        return output
+
+    checks = (ROOT / ".clang-tidy").read_text(encoding="utf-8")
+    source = preprocessed(["clang", *options], unit.source)
+    output = kept([version("clang-tidy", "--version"), checks, *options, source], made) or ""
     return located(
         "clang-tidy", output, r"^(?P<file>/[^:]+):(?P<line>\d+):\d+: warning: (?P<text>.*) \[(?P<rule>[^\]]+)\]$"
     )

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Branch coverage of the C core and the link by the quick tests: the CMocka programs, and what tests/playback.py
-plays through the shared library.
+"""Branch coverage of the C core and the link by the quick tests: the CMocka programs, what tests/playback.py plays
+through the shared library, and the tests of MECHANISMS, which compile the core with the generated C of mechanisms.
 
     build/venv/bin/python tools/coverage.py
 
 Prints a table by file and the missed branches with their reasons of tests/coverage.toml, and writes the latter to
-build/coverage.md. A minute of one core. Exits 1 below 95 % of the branches. PVID_ASSERT is compiled out: its other
+build/coverage.md. Five minutes of one core. Exits 1 below 95 % of the branches. PVID_ASSERT is compiled out: its other
 branch is misuse, and ends the program.
 """
 
@@ -40,6 +40,21 @@ FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(c
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
 PLAY = "import playback; from pvid.core.native import Native; list(playback.digests(Native()))"
+# The weak engine in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
+MECHANISMS = (
+    *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_bits_q31", "weak_snapshot_q31", "weak_rows_q31")),
+    *(f"tests/twin/test_{name}.py" for name in ("second_stage", "refinement", "trust_q31", "kinds", "kinds_q31")),
+    *(f"tests/twin/test_{name}.py" for name in ("estimator_q31", "gate", "misfit")),
+    *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
+    "tests/core/test_weak_valid_q31.py",
+)
+# A compiler that counts branches; each call has a folder of its own, since objects of several builds have one name.
+COUNTING = """#!/bin/sh
+for one; do
+    [ "$one" != -E ] || exec "{gcc}" "$@"
+done
+exec "{gcc}" "$@" -O0 --coverage -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
+"""
 
 
 @dataclass(frozen=True)
@@ -91,6 +106,33 @@ def build() -> list[Path]:
     return programs
 
 
+def play_mechanisms() -> None:
+    """Runs the tests of mechanisms with a compiler that counts."""
+    tools, counts = BUILD / "bin", BUILD / "counts"
+    for folder in (tools, counts):
+        folder.mkdir()
+    for name in ("gcc", "cc"):
+        (tools / name).write_text(COUNTING.format(gcc=shutil.which(name), folder=counts), encoding="utf-8")
+        (tools / name).chmod(0o755)
+    kept = (
+        ROOT / "build" / "cache" / "models"
+    )  # libraries are kept by the name of their compiler: those of the last run
+    before = set(kept.iterdir()) if kept.is_dir() else set()
+    options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q")
+    path = os.pathsep.join((str(tools), os.environ["PATH"]))
+    compiler = tools / "gcc"
+    try:
+        run(
+            *(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS),
+            PATH=path,
+            CC=str(compiler),
+            CCACHE_DISABLE="1",
+        )
+    finally:
+        for made in set(kept.iterdir()) - before:
+            shutil.rmtree(made)
+
+
 def measured() -> list[File]:
     """What the counters of all runs say."""
     filters = [
@@ -138,8 +180,9 @@ def report_of(files: list[File]) -> str:
     return f"""# Branch coverage
 
 {taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
-are taken by the CMocka programs and by what `tests/playback.py` plays, as gcov counts them at -O0: every
-operand of a `&&` or `||` has two. The slower tests were not asked. PVID_ASSERT, which ends the program,
+are taken by the CMocka programs, by what `tests/playback.py` plays, and by {len(MECHANISMS)} files of tests
+that compile the core with a mechanism, as gcov counts them at -O0: every operand of a `&&` or `||` has
+two. Other tests do not count. PVID_ASSERT, which ends the program,
 was compiled out. Missed:
 
 | where | line | branches | why |
@@ -155,6 +198,7 @@ def main() -> int:
         run(program)
     path = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
     run(sys.executable, "-c", PLAY, PYTHONPATH=path, PVID_NATIVE_LIBRARY=str(BUILD / "libnative.so"))
+    play_mechanisms()
     files = measured()
     print("| file | branches taken | of |\n|---|---:|---:|")
     for file in files:

@@ -17,6 +17,7 @@ tests/loops.toml lists the loops that end for another reason, or are not meant t
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import subprocess
 import sys
@@ -27,6 +28,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 
+from kept import kept, preprocessed, version
 from units import ROOT, Unit, chosen, demand, everything, take_files
 
 LISTED = ROOT / "tests" / "loops.toml"
@@ -73,6 +75,20 @@ class Found:
     open: set[Loop] = field(default_factory=set)
     calls: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))  # "*..." for a call by pointer
     shapes: dict[str, str] = field(default_factory=dict)  # of functions whose address is taken
+
+    @property
+    def text(self) -> str:
+        """For a file."""
+        places = [[(one.file, one.line) for one in sorted(loops)] for loops in (self.ends, self.open)]
+        return json.dumps([*places, {name: sorted(called) for name, called in self.calls.items()}, self.shapes])
+
+    @classmethod
+    def of(cls, text: str) -> Found:
+        """From `text`."""
+        ends, opened, calls, shapes = json.loads(text)
+        found = cls({Loop(*one) for one in ends}, {Loop(*one) for one in opened}, shapes=shapes)
+        found.calls.update({name: set(called) for name, called in calls.items()})
+        return found
 
 
 class Debug:
@@ -201,6 +217,15 @@ def read_calls(code: str, bodies: dict[str, str], file: str, found: Found) -> No
 
 
 def read(unit: Unit) -> Found:
+    """Of a source, anew where it has changed."""
+    versions = (version("clang", "--version"), version("opt", "--version"), Path(__file__).read_text(encoding="utf-8"))
+    source = preprocessed(["clang", *unit.options], unit.source)
+    text = kept([*versions, str(unit.source), *unit.options, source], lambda: _read(unit).text)
+    assert text is not None, "_read ends the program where clang refuses a source"
+    return Found.of(text)
+
+
+def _read(unit: Unit) -> Found:
     code = run(["clang", *unit.options, *COMPILE, str(unit.source)]).stdout
     done = run(["opt", "-S", f"-passes={PASSES}", "-o", "-"], code)
     if "mustprogress" in code + done.stdout:

@@ -29,6 +29,8 @@ import click
 import numpy as np
 from click.testing import CliRunner
 
+from pvid.core.host_compiler import compiled_once
+
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
 
@@ -49,11 +51,11 @@ SHORT = (
     (r"\b(mps2-an386|microbit)\b", "stream-host", "tests/board has the emulators; they compute the same bits"),
     (r"--on all\b", "--on stream-host", "the same"),
     (r"/dev/ttyACM0 run", "stream-host board", "a board behind a pseudo-terminal of this machine; run.pvlog exists"),
-    (r"(model predict \S+)", r"\1 --drive steps --duration 4", "one drive is enough"),
+    (r"(model predict \S+)(?: --duration \d+)?", r"\1 --drive steps --duration 4", "one short drive is enough"),
     (r"(pvid simulate \S+)", r"\1 --duration 8", "a shorter run"),
     (r"(model simulate \S+ \S+)", r"\1 --duration 5", "a shorter run"),
     (r"(pvid log .*)", r"\1 --paced --samples 3000 --quiet", "a shorter log"),
-    (r"(pvid batch .* -o \S+)(?: --workers 4)?", r"\1 --workers 1", "one process more is enough"),
+    (r"(pvid batch .* -o \S+)(?: --workers 4)?", r"\1 --workers 1", "tests/fleet has a batch by two processes"),
     (r"MODEL --for \S+ --run RUN.csv -o DIR", "dc_motor --for arduino --run motor.csv -o made", "a form, filled in"),
 )
 # ---- blocks that are neither commands nor programs: page, pattern of the first line, what they are and their test
@@ -246,8 +248,14 @@ def executed(line: str, folder: Path, full: bool) -> Printed:
         line = line if full else short_form(line)
         with contextlib.chdir(folder):
             return pvid(shlex.split(line.replace("mps2-an386", "stream-host"))[1:])
+    # Three pages build the same package, each in a folder of its own.
+    once = {**compiled_once(), "CCACHE_BASEDIR": str(folder)}
+    if shutil.which("ccache"):
+        once["CMAKE_C_COMPILER_LAUNCHER"] = "ccache"
     pipe = subprocess.PIPE
-    done = subprocess.run(line, shell=True, cwd=folder, stdout=pipe, stderr=subprocess.STDOUT, text=True, check=False)
+    done = subprocess.run(
+        line, shell=True, cwd=folder, env=once, stdout=pipe, stderr=subprocess.STDOUT, text=True, check=False
+    )
     return Printed(done.returncode, done.stdout)
 
 

@@ -22,6 +22,7 @@ STATUS = ROOT / "firmware" / "include" / "pvid" / "status.h"
 ENUMS = {
     "Reason": ("pvid_reason", "Outcome of a tick"),
     "Status": ("pvid_status", "Answer of an init"),
+    "Stage": ("pvid_stage", "Whose estimate is published"),
     "Law": ("pvid_law", "How the estimate follows the data"),
     "SnapshotStatus": ("pvid_snapshot_status", "Answer of a snapshot's restore"),
 }

@@ -11,6 +11,8 @@ out of bounds, no division by zero, no bad shift, no uninitialised read, and the
 of `taken` are replaced by their contracts in tests/proofs/contracts.h, and their conditions are shown to be met; the
 proof of their own module shows that they keep the contract.
 
+A proof is not done again while nothing that it reads has changed (tools/kept.py).
+
 Where the bound is a relation between several numbers, which intervals do not see, the functions of `deduced` carry
 contracts and loop invariants in their source, and Frama-C's WP proves these, the same absence of faults and that every
 loop ends, goal by goal, with z3.
@@ -19,16 +21,20 @@ loop ends, goal by goal, with z3.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+
+from kept import kept, preprocessed, version
 
 from pvid.cli.page_table import put_table
 
@@ -42,6 +48,7 @@ INCLUDES = " ".join(
 )
 PAGE = ROOT / "host" / "docs" / "proofs.md"
 GENERATED = ROOT / "build" / "proofs"  # of this run: the design of the weak engine
+PREPROCESSOR = f"{INCLUDES} -I'{GENERATED}' -DPVID_PLAIN_NAMES"  # contracts and options name functions
 LONGEST = 3600  # seconds: many times what the slowest needs on a machine that is busy
 
 
@@ -175,7 +182,7 @@ PROOFS = (
             *("-eva-split-return", "full"),
         ),
         taken=(
-            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_square_root_q31", "pvid_reciprocal_of_q31"),
+            *("pvid_scale_q31", "pvid_bit_length_q31", "pvid_scaled_of_q31", "pvid_inverse_root_q31"),
             "pvid_to_block_q31",
         ),
     ),
@@ -455,7 +462,7 @@ def program_of(proof: Proof) -> Path:
 
 def command_of(proof: Proof) -> list[str]:
     files = [str(program_of(proof)), *(str(ROOT / "firmware" / source) for source in proof.sources)]
-    cpp = f"-cpp-extra-args={INCLUDES} -I'{GENERATED}' -DPVID_PLAIN_NAMES"  # contracts and options name functions
+    cpp = f"-cpp-extra-args={PREPROCESSOR}"
     return ["frama-c", "-machdep", "gcc_x86_64", cpp, "-warn-signed-downcast", *files]
 
 
@@ -477,8 +484,29 @@ def deduce(proof: Proof) -> Result:
 
 
 def prove(proof: Proof) -> Result:
-    if proof.deduced:
-        return deduce(proof)
+    """Anew where something that the proof reads has changed since it was proved."""
+    versions = [version(*one) for one in (("frama-c", "-version"), ("why3", "--version"), ("z3", "--version"))]
+    # As Frama-C preprocesses, with its own headers of the C library.
+    library = f"{version('frama-c', '-print-share-path').strip()}/libc"
+    compiler = shlex.split(f"gcc -D__FRAMAC__ -D__FC_MACHDEP_GCC_X86_64 -nostdinc -isystem {library} {PREPROCESSOR}")
+    command = command_of(proof)
+    sources = [preprocessed(compiler, Path(one)) for one in command if one.endswith(".c")]
+
+    def made() -> str | None:
+        result = deduce(proof) if proof.deduced else evaluate(proof)
+        found.append(result)
+        return json.dumps(asdict(result)) if result.proved else None
+
+    found: list[Result] = []
+    text = kept([*versions, Path(__file__).read_text(encoding="utf-8"), proof.name, *command, *sources], made)
+    if found or text is None:
+        return found[0]
+    before = Result(**json.loads(text))
+    return replace(before, text=f"{before.text}; since then nothing has changed that it reads")
+
+
+def evaluate(proof: Proof) -> Result:
+    """Eva."""
     started = time.monotonic()
     quiet = ["-eva", "-eva-no-show-progress", "-eva-msg-key=-initial-state,-final-states"]
     taken = ["-eva-use-spec", ",".join(proof.taken)] if proof.taken else []

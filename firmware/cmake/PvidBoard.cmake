@@ -32,6 +32,7 @@ target_compile_options(pvid_board INTERFACE
   -fstack-usage     # read by `pvid sizes`
   -fno-math-errno   # sqrtf is one instruction where there is one
   -fno-schedule-insns # gcc hoists so many loads that it runs out of FPU registers: 5 % of the strong form's tick
+  -fno-cse-follow-jumps # else gcc keeps copies of the arguments: 4 instructions of each tick of the weak form
 )
 target_link_options(pvid_board INTERFACE ${PVID_BOARD_CPU} -Wl,--gc-sections)
 

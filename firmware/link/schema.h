@@ -5,7 +5,7 @@
 #define PVID_LINK_VERSION 1u
 
 /* CRC-32 of the text. */
-#define PVID_LINK_SCHEMA 0xEABBFAA1u
+#define PVID_LINK_SCHEMA 0xBDEE6285u
 
 #define PVID_LINK_SCHEMA_TEXT \
     "pvid 1\n" \
@@ -22,7 +22,8 @@
     "11 count data:i32[]\n" \
     "12 raw_count session:u32 tick_high:u16 samples:u8 data:i32[]\n" \
     "13 estimate_q31 session:u32 updates:u32 p:i32[8] se:i32[8] correlation:i32[36] kappa:i32 residual_sd:i32 weight:u32 reason:u8 tick_high:u16\n" \
-    "14 names text:char[]"
+    "14 names text:char[]\n" \
+    "15 refined_estimate session:u32 number:u32 p:f32[8] covariance:f32[36] r:f32[8] se:f32[8] level:f32 clash:f32 reason:u8 stage:u8 tick_high:u16"
 
 /* Frame types; offsets of their fields and the bytes before an open end. */
 
@@ -166,6 +167,20 @@
 #define PVID_NAMES 14u
 #define PVID_NAMES_TEXT 0u /* char[] */
 #define PVID_NAMES_BYTES 0u
+
+#define PVID_REFINED_ESTIMATE 15u
+#define PVID_REFINED_ESTIMATE_SESSION 0u /* u32 */
+#define PVID_REFINED_ESTIMATE_NUMBER 4u /* u32 */
+#define PVID_REFINED_ESTIMATE_P 8u /* f32[8] */
+#define PVID_REFINED_ESTIMATE_COVARIANCE 40u /* f32[36] */
+#define PVID_REFINED_ESTIMATE_R 184u /* f32[8] */
+#define PVID_REFINED_ESTIMATE_SE 216u /* f32[8] */
+#define PVID_REFINED_ESTIMATE_LEVEL 248u /* f32 */
+#define PVID_REFINED_ESTIMATE_CLASH 252u /* f32 */
+#define PVID_REFINED_ESTIMATE_REASON 256u /* u8 */
+#define PVID_REFINED_ESTIMATE_STAGE 257u /* u8 */
+#define PVID_REFINED_ESTIMATE_TICK_HIGH 258u /* u16 */
+#define PVID_REFINED_ESTIMATE_BYTES 260u
 
 /* Status.code */
 #define PVID_CODE_WAITING 0u

@@ -27,7 +27,8 @@ void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_sa
         memcpy(weak.p, p, PVID_REFINE_P * sizeof weak.p[0]);
         memcpy(weak.se, &weak_se[(size_t)tick * PVID_REFINE_P], PVID_REFINE_P * sizeof weak.se[0]);
         const bool given = (p[0] - p[0]) >= 0.0f;
-        const pvid_reason one = pvid_refine_step_f32(self, &samples[(size_t)tick * n_samples], given ? &weak : NULL);
+        const pvid_reason one =
+            pvid_refine_step_f32(self, &samples[(size_t)tick * n_samples], given ? &weak : NULL, false);
         if (reason != NULL) {
             reason[tick] = (uint8_t)one;
         }
@@ -40,8 +41,8 @@ void pvid_replay_refine_f32(pvid_refine_f32 *self, uint32_t ticks, uint32_t n_sa
 }
 
 void pvid_replay_both_stages_f32(pvid_weak_f32 *self, uint32_t ticks, const float samples[], uint8_t told[],
-                                 float weak_p[], float weak_se[], float r[], float se[], uint32_t *running_hash,
-                                 uint32_t hash[])
+                                 uint8_t busy[], float weak_p[], float weak_se[], float r[], float se[],
+                                 uint32_t *running_hash, uint32_t hash[])
 {
     const uint32_t n_samples = self->design->model->samples;
     const pvid_refine_f32 *refinement = self->refine->storage;
@@ -55,6 +56,7 @@ void pvid_replay_both_stages_f32(pvid_weak_f32 *self, uint32_t ticks, const floa
         }
         if (told != NULL) {
             told[tick] = (uint8_t)pvid_refine_reason_f32(refinement);
+            busy[tick] = (uint8_t)refinement->busy;
         }
         if (hash != NULL) {
             *running_hash = pvid_fnv_estimator_f32(*running_hash, &self->estimator, reason);

@@ -79,7 +79,7 @@ def test_four_rigs_through_the_command_line(population: Path, native: Native, tm
 
 def test_an_interrupted_campaign_keeps_its_records_and_goes_on(population: Path, tmp_path: Path) -> None:
     out, partial = tmp_path / "results.parquet", tmp_path / "results.partial.jsonl"
-    arguments = (population, "--rigs", "300", "--workers", "1", "-o", out)
+    arguments = (population, "--rigs", "300", "--workers", "2", "-o", out)
     with subprocess.Popen(
         command(*arguments), stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts
     ) as process:
@@ -164,7 +164,7 @@ def test_other_files_are_not_overwritten(tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.campaign.run._CONNECT_S", 0.5)
+    monkeypatch.setattr("pvid.base.cluster._CONNECT_S", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://x", "127.0.0.1:notaport"):
         store = Store(tmp_path / "r.parquet", "key")
         with pytest.raises(PvidError, match="no scheduler of dask.distributed can be reached at"):
@@ -192,7 +192,7 @@ def test_a_running_scheduler_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_scheduler_without_workers_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.campaign.run._WORKERS_S", 0.3)
+    monkeypatch.setattr("pvid.base.cluster._WORKERS_S", 0.3)
     with _distributed().LocalCluster(
         n_workers=0, processes=False, host="127.0.0.1", dashboard_address=None, protocol="tcp"
     ) as cluster:

@@ -350,7 +350,6 @@ def test_an_error_is_charged_beyond_the_filter_s_own(
 
 
 def test_a_bias_of_the_weak_form_s_front_end_is_charged_beyond_it(library: ctypes.CDLL) -> None:
-    # seen in 10^7 ticks without forgetting alone, whose standard errors are 0.0007 %
     assert (longevity.weak_bias(library) < np.array(FILTER_BIAS["weak"])).all()
 
 

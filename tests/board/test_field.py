@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
+import field_board
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -26,6 +27,7 @@ from pvid.core.native import Native
 from pvid.link.frames import SCHEMA_TEXT, Core, Source, encode
 from pvid.link.port import Port
 from pvid.rig.file import RigFile
+from pvid.run.nominal_run import nominal_run
 from pvid.twin.sensor import SensorConstants, counts
 
 TICKS = 9000  # two announcements more in the weak form's 1 kHz
@@ -194,3 +196,14 @@ def test_the_sensors_motion_stays_what_it_was() -> None:
     first, last = np.abs(long[:60_000]).max(axis=0), np.abs(long[-60_000:]).max(axis=0)
     assert np.allclose(first, last, rtol=0.1)  # after 10 minutes neither grown nor died away
     assert 0.05 < first[0] < 0.15 and 0.005 < first[1] < 0.015
+
+
+def test_errors_of_a_board_without_a_recording_contain_what_small_angles_neglect() -> None:
+    """The square of the largest angle of the guess, as of a recorded one."""
+    made = nominal_run(field_board.rig())
+    phi = np.asarray(made.run["phi"])
+    part = float(np.max(np.abs(phi - phi.mean()))) ** 2
+    assert 1e-3 < part < 0.1
+    assert MechanismBoard.of_rig_file(field_board.rig()).config.trust.neglected == pytest.approx(part)
+    fixed = MechanismBoardQ31.of_rig_file(field_board.rig()).config.trust.neglected
+    assert fixed / 2**30 == pytest.approx(part, rel=1e-6)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.board.field import collect
@@ -90,3 +92,10 @@ def test_log_is_verified_and_exported_in_the_units_of_the_model(pendulum: Mechan
     last = list(csv.DictReader(paths[1].open()))[-1]
     truth = dict(zip(pendulum.p_names, pendulum.engine.values(pendulum.config.estimator.start), strict=True))
     assert set(truth) <= set(last) and float(last["w_se"]) > 0
+    # The rig in the log is enough, though the pendulum has a rig file of its own too.
+    for named in ((), ("--model", "kapitza")):
+        done = pvid(tmp_path, "identify", "a.pvlog", "--json", *named)
+        answer = json.loads(done.stdout)
+        assert done.returncode == 0 and answer["samples"] == TICKS, done.stderr
+        assert answer["parameters"]["w"]["value"] == pytest.approx(truth["w"], rel=0.01)
+    assert pvid(tmp_path, "plot", "a.pvlog").stdout == "a.png\n"

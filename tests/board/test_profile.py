@@ -7,7 +7,8 @@ from conftest import ROOT
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
-from pvid.board.profile import HEADER, Profile, profile, table_rows
+from pvid.board.profile import HEADER, Profile, profile, refined, table_rows
+from pvid.board.sizes import REFINED
 from pvid.settings.forms import FORMS
 
 BOARD = "mps2-an386"
@@ -16,7 +17,7 @@ MOST_OF_A_CALL = 12  # instructions of the main loop between the two readings: a
 
 @pytest.fixture(scope="module")
 def profiles() -> dict[str, Profile]:
-    return {form: profile(BOARDS[BOARD], form) for form in FORMS}
+    return {**{form: profile(BOARDS[BOARD], form) for form in FORMS}, REFINED: refined(BOARDS[BOARD])}
 
 
 @pytest.mark.parametrize("form", FORMS)

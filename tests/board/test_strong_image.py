@@ -52,8 +52,13 @@ def test_inertias_of_a_rigid_body_by_either_core(body: Path) -> None:
             assert abs(one["value"] - value) < 5 * one["se"], name
 
 
-def test_the_board_has_the_hash_of_the_twin(body: Path) -> None:
-    done = pvid("compare", body, "--form", "strong", "--on", "mps2-an386")
+@pytest.mark.parametrize(
+    "target",
+    ["mps2-an386", *(pytest.param(one, marks=pytest.mark.slow) for one in ("microbit", "virt-rv32imac"))],
+)
+def test_the_board_has_the_hash_of_the_twin(body: Path, target: str) -> None:
+    """With a floating-point unit and without: every operation of the generic path."""
+    done = pvid("compare", body, "--form", "strong", "--on", target)
     host, board = [line.split("│") for line in done.stdout.splitlines() if "rigid" not in line and "equal" in line]
     assert done.return_value == DONE and host[6] == board[6] and len(host[6].strip()) == 8
 

@@ -13,7 +13,7 @@ from conftest import ROOT
 
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31, replay_image, sizes
-from pvid.board.boards import BOARDS, run
+from pvid.board.boards import BOARDS, Board, run
 from pvid.board.engine_image import engine_image
 from pvid.board.replay_image import (
     REPORT_EVERY,
@@ -52,14 +52,18 @@ def measured(request: pytest.FixtureRequest) -> Measured:
 
 
 @cache
+def refined_hashes(board: Board) -> npt.NDArray[np.uint32]:
+    """Of both stages of the C core here; without a floating point unit a tick has fewer jobs."""
+    replay = sizes.refined_replay(board)
+    return replay.native().run_both(replay.weak.samples).hash
+
+
+@cache
 def expected_hashes(form: str, core: str) -> npt.NDArray[np.uint32]:
     """Running hash after every tick of the run that `pvid sizes` plays: of the weak form that of the twin, which other
     tests compare with the C core here; of the others that of the C core, since their twins are slow."""
     if form == "strong":
         return native_hashes(standard_run(sizes.TICKS, core), Native())
-    if form == sizes.REFINED:
-        replay = sizes.refined_replay()
-        return replay.native().run_both(replay.weak.samples).hash
     if core == "q31":
         return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run(DEFAULT))
     return mechanism_image.twin_hashes(mechanism_image.mechanism_run(DEFAULT))
@@ -91,7 +95,8 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
     boards = set()
     for configuration, (_, report) in measured.items():
         if (configuration.form, configuration.core) == (form, core):
-            assert_same_hashes(report, expected_hashes(form, core))
+            refined = form == sizes.REFINED
+            assert_same_hashes(report, refined_hashes(configuration.board) if refined else expected_hashes(form, core))
             boards.add(configuration.board.name)
     wanted = BOARDS if (form, core) == ON_ALL else FEW
     there = {one.board.name for one in sizes.CONFIGURATIONS if (one.form, one.core) == (form, core)}

@@ -59,7 +59,9 @@ def test_a_run_is_refined_and_shown_beside_its_simulation(motor: Path, tmp_path:
     for name, truth in TRUTH.items():
         one = shown["parameters"][name]
         assert abs(one["value"] - truth) < 4 * one["se"], name
-    with pytest.raises(PvidError, match="--refine is in float64"):
+    with pytest.raises(PvidError, match="--refine is in float32 and float64; omit --core q31"):
+        pvid("identify", motor, "--refine", "--core", "q31")
+    with pytest.raises(PvidError, match=r"--core f32 --refine: dc_motor has a sharp friction, sgn\(phi_1\)"):
         pvid("identify", motor, "--refine", "--core", "f32")
 
 

@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
+from pvid.board.target import HOST_TARGET
 from pvid.cli.main import commands
 from pvid.cli.mechanism import recording_of
 from pvid.models.simulated_rig import simulated_rig
@@ -22,8 +23,11 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.engine_design import config_to_identify
 from pvid.run.mechanism import identify_mechanism
 from pvid.run.mechanism_core import identify_in_c
+from pvid.run.refine_design import refine_design
 from pvid.settings.enums import Reason
+from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
+from pvid.twin.refine import RefineTwin
 from pvid.twin.weak import WeakTwin
 
 
@@ -123,6 +127,80 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     answer = pvid("compare", recorded["dc_motor"])
     assert answer.return_value == DIFFERENT
     assert "DIFFERENT: tick" in " ".join(answer.stdout.split())
+
+
+def test_both_stages_in_c_identify_a_recording_and_the_answer_is_the_refined_one(recorded: dict[str, Path]) -> None:
+    answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--refine")
+    assert answer.return_value == DONE
+    assert "rigid body, gyros and torques: refined, C in float32" in answer.stdout
+    assert "refined by the second stage, first after" in answer.stdout
+    shown = json.loads(pvid("identify", recorded["rigid_body"], "--core", "f32", "--refine", "--json").stdout)
+    weak = json.loads(pvid("identify", recorded["rigid_body"], "--core", "f32", "--json").stdout)
+    assert shown["identified"] and shown["refinement"]["adopted"] and shown["refinement"]["reason"] == "updated"
+    assert set(weak) < set(shown) and shown["hash"] != weak["hash"] and 0.5 < shown["refinement"]["level"] < 2
+    for name, truth in simulated_rig("rigid_body").truth.items():
+        one = shown["parameters"][name]
+        assert one["value"] != weak["parameters"][name]["value"]
+        assert abs(one["value"] - truth) < 4 * one["se"], name
+
+
+def test_both_stages_in_c_refine_a_pendulum_of_its_own_rig_file(tmp_path: Path) -> None:
+    """Full equations: the linear ones of the weak form are 0.5 % off, which its standard errors contain."""
+    run = tmp_path / "run.csv"
+    assert pvid("simulate", run, "--duration", "12", "--truth", "full", "--seed", "2").return_value == DONE
+    shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
+    assert shown["refinement"]["adopted"] and list(shown["parameters"])[-3:] == ["k1", "k2", "tau"]
+    for name, truth in {**simulated_rig("kapitza").truth, "k1": 0.0, "k2": 0.0, "tau": 0.0}.items():
+        one = shown["parameters"][name]
+        assert abs(one["value"] - truth) < 3.5 * one["se_noise"], name
+    assert shown["w"]["se"] < 1e-3 * shown["w"]["value"]
+    streamed = pvid("identify", run, "--core", "f32", "--refine", "--on", HOST_TARGET, "--json")
+    on_board = json.loads(streamed.stdout)
+    assert on_board["on"] == HOST_TARGET and on_board["hash"] == shown["hash"]  # of both stages, at every report
+    assert on_board["parameters"] == shown["parameters"]
+    answer = pvid("compare", run, "--core", "f32")
+    assert answer.return_value == DONE and "refined" in answer.stdout and answer.stdout.count("equal") == 2
+    rig = tmp_path / "described.toml"
+    step = 2 * np.pi / 2**14
+    rig.write_text(
+        f'sample_rate = 1000\n[model]\nname = "kapitza"\n[sensor.phi]\nresolution = {step}\n', encoding="utf-8"
+    )
+    described = json.loads(pvid("identify", run, "--rig", rig, "--refine", "--json").stdout)
+    assert "refined over" in described["refinement"]["text"]
+    for name, truth in simulated_rig("kapitza").truth.items():
+        assert abs(described["parameters"][name]["value"] - truth) < 3.5 * described["parameters"][name]["se_noise"], (
+            name
+        )
+
+
+def test_where_nothing_is_refined_the_answer_is_that_of_the_weak_form_and_says_so(
+    recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A noise of a millionth of the sensors': no block fits."""
+
+    def exact(*given: Any) -> RefineConfig:
+        settings = refine_design(*given)
+        return replace(settings, sd=settings.sd * np.float32(1e-6))
+
+    monkeypatch.setattr("pvid.run.refined_core.refine_design", exact)
+    answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--refine")
+    assert answer.return_value == DONE and "weak form, C in float32" in answer.stdout
+    assert "not refined: held searching; the estimate is that of the weak form" in answer.stdout
+
+
+def test_the_second_stage_is_compared_with_its_twin_too(
+    recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer = pvid("compare", recorded["rigid_body"])
+    rows = [line.split() for line in answer.stdout.splitlines() if "host" in line]
+    assert answer.return_value == DONE and [row[5] for row in rows] == ["weak", "refined"]
+    assert rows[0][11] != rows[1][11] and answer.stdout.count("equal") == 2  # hashes of one stage and of both
+    changed = "pvid.run.refined_core.RefineTwin"
+    monkeypatch.setattr(changed, lambda model, config: RefineTwin(model, replace(config, gate=1.0)))
+    answer = pvid("compare", recorded["rigid_body"])
+    assert answer.return_value == DIFFERENT
+    assert answer.stdout.count("equal") == 1 and "DIFFERENT: tick" in " ".join(answer.stdout.split())
+    assert "note: no second stage: dc_motor has a sharp friction" in pvid("compare", recorded["dc_motor"]).stderr
 
 
 @pytest.mark.parametrize(

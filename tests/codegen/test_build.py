@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,15 +13,15 @@ from conftest import ROOT
 from described import CHAIN, MOTOR
 
 from pvid.base.errors import PvidError
-from pvid.codegen.build import Options, build, check, files_of, fixed_point_refusal
+from pvid.codegen.build import Options, build, check, files_of, fixed_point_refusal, refine_functions
 from pvid.codegen.reaches import Reaches
+from pvid.codegen.weak_library import weak_native
 from pvid.core.sizes import raised
 from pvid.core.sources import source
 from pvid.models.mechanisms import compiled_of
-from pvid.models.simulated_rig import simulated_rig
-from pvid.run.engine_design import config_for_simulated_rig
+from pvid.run.engine_design import config_for_simulated_rig, samples_of, simulated_run_of
+from pvid.run.refine_design import refine_design
 from pvid.setup.weak_sizes import sizes_of_design
-from pvid.sim.simulated_run import RigSimulation
 
 USER = """
 cmake_minimum_required(VERSION 3.20)
@@ -59,12 +60,17 @@ target_link_libraries(user PRIVATE rigid_body)
 WEAK_PROGRAM = """
 #include <stdio.h>
 #include "rigid_body_design_f32.h"
+#include "rigid_body_refine_design_f32.h"
 static pvid_weak_f32 identifier;
+static pvid_refine_f32 refinement;
+static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &rigid_body_refine_config_f32};
 int main(int count, char **names)
 {
     float sample[RIGID_BODY_WEAK_SAMPLES];
     FILE *file = fopen(names[count - 1], "rb");
-    if (pvid_weak_init_f32(&identifier, &rigid_body_config_f32) != PVID_OK) {
+    pvid_weak_config_f32 config = rigid_body_config_f32;
+    config.refine = &second;
+    if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) {
         return 1;
     }
     while (fread(sample, sizeof sample, 1, file) == 1) {
@@ -72,6 +78,9 @@ int main(int count, char **names)
     }
     for (int k = 0; k < RIGID_BODY_WEAK_P; k++) {
         printf("%.9g ", (double)pvid_weak_estimate_f32(&identifier)->p[k]);
+    }
+    for (int k = 0; k < PVID_REFINE_PARAMETERS; k++) {
+        printf("%.9g ", (double)pvid_refine_latest_f32(&refinement)->r[k]);
     }
     return 0;
 }
@@ -119,11 +128,12 @@ def test_the_strong_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
     assert done.returncode != 0 and "compile pvid and this file with -DPVID_MAX_P=6" in done.stdout
 
 
-def test_the_weak_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
-    """With the sizes that its design names, and a program that takes it from init to an estimate."""
+def test_the_weak_form_and_its_refinement_are_options_of_the_folder(tmp_path: Path) -> None:
+    """With the sizes that the design names, and a program that takes both stages from init to an estimate."""
     compiled = compiled_of("rigid_body")
-    design = config_for_simulated_rig(compiled)
-    options = Options(design=design)
+    design, (run_of_rig, _, p_of_rig) = config_for_simulated_rig(compiled), simulated_run_of(compiled)
+    refined = refine_design(compiled, design, run_of_rig, p_of_rig)
+    options = Options(design=design, refine_design=refined)
     build(compiled, tmp_path / "rigid_body", options=options)
     check(compiled, tmp_path / "rigid_body", options=options)
     (tmp_path / "CMakeLists.txt").write_text(WEAK.format(root=ROOT), encoding="utf-8")
@@ -131,13 +141,34 @@ def test_the_weak_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
     debug = ["-DCMAKE_BUILD_TYPE=Debug"]
     sizes = [f"-D{macro}={size}" for macro, size in raised(sizes_of_design(design.design)).items()]
     run("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_WEAK=ON", *debug, *sizes)
+    done = subprocess.run(["ninja", "-C", str(tmp_path / "b"), "user"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and re.search(r"reference to `pvid_refine_stage_f32_model0x\w{8}u_", done.stdout)
+    run("cmake", "-DRIGID_BODY_REFINE=ON", tmp_path / "b")
     run("ninja", "-C", tmp_path / "b", "user")
-    samples = RigSimulation.of(compiled, simulated_rig("rigid_body")).run()
-    table = np.stack([samples[name] for name in design.design.model.sample_names], axis=1).astype(np.float32)
+    table = samples_of(design, run_of_rig)
     (tmp_path / "samples").write_bytes(table.tobytes())
-    p = [float(x) for x in run(tmp_path / "b" / "user", tmp_path / "samples").split()]
-    truth = [simulated_rig("rigid_body").truth[name] for name in compiled.p_names]
-    assert np.allclose(p[:3], truth[:3], rtol=1e-3) and np.allclose(p, truth, atol=2e-5)
+    printed = np.array(run(tmp_path / "b" / "user", tmp_path / "samples").split(), np.float32)
+    host = weak_native(compiled, design.design, refine_functions(compiled)).refined_of(design, refined)
+    host.run_both(table)
+    assert host.refined is not None
+    assert printed.tolist() == [*host.estimator.p, *host.refined["r"].tolist()]
+    assert np.allclose(printed[-6:-3], p_of_rig[:3], rtol=2e-4) and np.allclose(printed[-6:], p_of_rig, atol=2e-6)
+
+
+def test_what_the_refinement_in_c_lacks_is_a_sentence() -> None:
+    refused = {
+        "cart_pendulum": r"cart_pendulum has a sharp friction, sgn\(x_1\), .* --soft-sign x_1=WIDTH",
+        "battery_2rc": r"battery_2rc has the input Integral\(i, 1\)",
+    }
+    for name, sentence in refused.items():
+        compiled = compiled_of(name)
+        run_of_rig, _, p = simulated_run_of(compiled)
+        with pytest.raises(PvidError, match=sentence):
+            refine_design(compiled, config_for_simulated_rig(compiled), run_of_rig, p)
+    compiled = compiled_of("dc_motor")
+    run_of_rig, _, p = simulated_run_of(compiled)
+    with pytest.raises(PvidError, match=r"a sample rate of \d+ Hz, not 1000"):
+        refine_design(compiled, config_for_simulated_rig(compiled), run_of_rig, p, {"phi_1": 3.0})
 
 
 def test_a_soft_sign_is_one_of_the_design_too() -> None:

@@ -162,6 +162,8 @@ def test_c_and_twin_have_the_same_bits(name: str, tmp_path: Path) -> None:
         want = getattr(twin, function.name)(*(given[key] for key, _ in function.given))
         got = in_c(function.name, given)
         for (key, n), b in zip(function.written, want, strict=True):
+            if key == "U":  # the core needs none
+                continue
             if key == "Zr":  # the core has the columns behind the motion's
                 b = b.reshape(len(made.outputs), -1, VECTORS)
                 assert (b[:, : made.moving - made.skew] == 0).all()

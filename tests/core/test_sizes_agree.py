@@ -37,7 +37,11 @@ OTHER = {
     "PVID_MAX_POWER": 6,
     "PVID_MAX_BLOCKS": 1,
     "PVID_MAX_WINDOWS": 0,
+    "PVID_FEEDBACK": 0,
 }
+
+# Of a build for one design, whose structs have no more than it needs.
+EXACT = ("", *(f"_{one}" for one in "SIGNALS JETS RUNS SIGNS GAINS INTEGRANDS CHANNELS PLAIN".split()))
 
 LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
 
@@ -105,7 +109,7 @@ def link(folder: Path, language: str, compiled: Path, library: Path) -> subproce
 
 def test_every_size_of_the_headers_is_tried() -> None:
     text = "".join(path.read_text(encoding="utf-8") for path in public_headers())
-    assert set(re.findall(r"#ifndef (PVID_MAX_\w+)", text)) == set(OTHER)
+    assert set(re.findall(r"#ifndef (PVID_MAX_\w+|PVID_FEEDBACK)", text)) == set(OTHER)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -130,6 +134,16 @@ def test_another_size_is_refused(language: str, name: str, libraries: dict[str, 
         assert refused == set(FUNCTIONS), done.stderr
 
 
+def test_a_build_for_one_design_is_refused(libraries: dict[str, Path], tmp_path: Path) -> None:
+    """Its counts of the model have places of their own in the names."""
+    compiled = user(tmp_path, "c", *(f"-DPVID_EXACT{name}={place}" for place, name in enumerate(EXACT, 1)))
+    done = link(tmp_path, "c", compiled, libraries["static"])
+    names = re.findall(
+        r"`(pvid_\w+[fq]3[12])_window\w+_exact1_plain9_runs4_signs5_gains6_integrals7_enum\d", done.stderr
+    )
+    assert set(names) == set(FUNCTIONS), done.stderr
+
+
 def test_every_function_that_takes_a_struct_has_its_sizes_in_its_name() -> None:
     all_text = "".join(
         re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL) for path in public_headers()
@@ -140,9 +154,9 @@ def test_every_function_that_takes_a_struct_has_its_sizes_in_its_name() -> None:
     pointer = re.compile(rf"\b({'|'.join(sorted(structs))}) \*")
     prototypes = re.findall(r"^(?!static|typedef|extern)([a-z][\w *]*?(pvid_\w+)\([^;{]*\));", all_text, re.MULTILINE)
     given = {name for prototype, name in prototypes if pointer.search(prototype)}
-    listed = re.findall(r"^#define (pvid_\w+) PVID_SIZED\((pvid_\w+)\)$", all_text, re.MULTILINE)
-    assert all(one == other for one, other in listed)
-    assert given and given | {"pvid_estimator_defaults_f32", "pvid_refine_stage_f32"} == {one for one, _ in listed}
+    listed = re.findall(r"^#define (pvid_\w+) PVID_(SIZED|REFINED)\((pvid_\w+)\)$", all_text, re.MULTILINE)
+    assert all(one == other and ("_refine_" in one) == (how == "REFINED") for one, how, other in listed)
+    assert given and given | {"pvid_estimator_defaults_f32", "pvid_refine_stage_f32"} == {one for one, _, _ in listed}
 
 
 def test_a_size_costs_nothing_on_a_board(tmp_path: Path) -> None:

@@ -60,9 +60,9 @@ def from_exact(
 
 
 def in_float64(
-    rig: RigFile, law: Law, seed: int, phi: npt.NDArray[np.float64], u: npt.NDArray[np.float64]
+    rig: RigFile, law: Law, seed: int, phi: npt.NDArray[np.float64], u: npt.NDArray[np.float64], rate: float = 1000.0
 ) -> npt.NDArray[np.float64]:
-    """Final p of the law in float64 on rows of these derivatives."""
+    """Final p of the law in float64 on rows of these derivatives at this rate [Hz]."""
     settings = estimator_config(rig, bank_of(rig, 1000.0), standard_start(seed))
     n, y = oracle.strong_rows(phi, u)
     return oracle.identify_strong(
@@ -74,7 +74,7 @@ def in_float64(
             lower=settings.lower.astype(np.float64),
             upper=settings.upper.astype(np.float64),
             row_sd=settings.row_sd,
-            rate=1000.0,
+            rate=rate,
             law=law,
             feedback_hz=settings.feedback_hz,
             correlation=settings.correlation,
@@ -109,14 +109,14 @@ def test_points_of_several_samples_end_where_float64_ends(
     native: Native, standard_20_bits: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """287 samples as 41 sums of seven: within a hundredth of a per cent of the law in float64 on the same samples."""
-    bank, run = savitzky_golay(41, 12, 7, 7), standard_20_bits.run
+    bank, run = savitzky_golay(41, 12, 1, 7), standard_20_bits.run
     monkeypatch.setattr("pvid.setup.q31.bank_of", lambda *_: bank)
     config = strong_config_q31(STRONG, 1000.0, standard_start(0))
     assert config.bank.block == 7
     phi, y = counts_of(STRONG, run)
     p = p_of(config, native.identifier(config).run(phi, y, sums=False, hashes=False).p[-1])
     derivatives = bank.apply(phi * STRONG.sensor.phi_lsb, 1000.0).T, bank.apply(y * STRONG.sensor.y_lsb, 1000.0).T
-    reference = in_float64(STRONG, "stationary", 0, derivatives[0], derivatives[1][:, 2:] / STRONG.l1)
+    reference = in_float64(STRONG, "stationary", 0, derivatives[0], derivatives[1][:, 2:] / STRONG.l1, 1000 / 7)
     assert np.abs(p / reference - 1).max() < 1e-4
 
 

@@ -81,13 +81,14 @@ def _in_model(field: str, place: int = 0) -> Callable[[Tables], Any]:
 
 
 HOSTILE: list[tuple[Callable[[Tables], None], Status]] = [
-    *((_set(_of("format"), one, value), Status.BAD_SHIFT) for one, value in (("value", 0), ("value", 63), ("own", 40))),
+    *((_set(_of("format"), one, value), Status.BAD_SHIFT) for one, value in (("value", 31), ("lift", 31), ("own", 40))),
     *((_set(_of("format"), one, 63), Status.BAD_SHIFT) for one in ("plain", "ramp")),
-    *((_set(_of("integral"), one, value), Status.BAD_SHIFT) for one in ("once", "twice") for value in (0, 63)),
+    *(
+        (_set(_of("integral"), one, value), Status.BAD_SHIFT)
+        for one, value in (("down", 31), ("twice", 0), ("twice", 31))
+    ),
     *((_set(lambda t: t.design, "sum_shift", value), Status.BAD_SHIFT) for value in (0, 1, 31)),
-    *((_set(lambda t: t.design.filter[0].rescale, one, 63), Status.BAD_DESIGN) for one in ("down", "shift")),
-    (_set(lambda t: t.design.filter[0].rescale, "multiplier", 0), Status.BAD_DESIGN),
-    (_set(_of("filter"), "bits", 31), Status.BAD_DESIGN),
+    (_set(_of("filter"), "down", 63), Status.BAD_DESIGN),
     (_set(_of("filter"), "half", 60000), Status.BAD_DESIGN),
     (_set(lambda t: t.design.down, 0, 40), Status.BAD_FULL_SCALE),
     *((_set(lambda t: t.design.full_scale, 0, value), Status.BAD_FULL_SCALE) for value in (0, -1, 2**24)),

@@ -60,22 +60,27 @@ static void start(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
     }
 }
 
-static void prepare_variants(pvid_strong_config_f32 config)
+/* The configurations, which the identifiers read where they are. */
+static pvid_strong_config_f32 lazily, exactly, in_stages, smoothly;
+
+static void prepare_variants(const pvid_strong_config_f32 *config)
 {
+    lazily = *config;
+    exactly = *config;
+    in_stages = *config;
+    smoothly = *config;
     for (uint32_t order = 0; order < PVID_ORDERS; order++) {
         for (uint32_t i = 0; i < 2u; i++) {
             long_bank[(order * POINTS) + i] = pvid_five_points_f32[(2u * order) + i];
         }
     }
-    start(&identifier, &config);
-    config.exact_every = 1;
-    start(&exact, &config);
-    config.exact_every = 0;
-    config.estimator.divider = 8;
-    start(&staged, &config);
-    config.estimator.divider = 1;
-    config.bank = (pvid_fir_bank_f32){.half = POINTS, .stride = BLOCK, .block = BLOCK, .weights = long_bank};
-    start(&smoothing, &config);
+    start(&identifier, &lazily);
+    exactly.exact_every = 1;
+    start(&exact, &exactly);
+    in_stages.estimator.divider = 8;
+    start(&staged, &in_stages);
+    smoothly.bank = (pvid_fir_bank_f32){.half = POINTS, .stride = 1, .block = BLOCK, .weights = long_bank};
+    start(&smoothing, &smoothly);
 }
 
 /* The filter's u is a second difference of the nearest samples, its other taps 0: they cost the same. */
@@ -128,7 +133,7 @@ static void prepare(void)
     config.estimator.row_sd = 1000.0f;
     config.estimator.feedback_hz = 10.0f;
     config.estimator.forgetting_s = 10.0f;
-    prepare_variants(config);
+    prepare_variants(&config);
     prepare_kalman();
     rls_init_f32(&rls, 0.9999f, 1.0e6f);
     ud_init_f32(&ud, 0.9999f, 1.0e6f);

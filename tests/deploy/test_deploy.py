@@ -26,6 +26,7 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
 from pvid.run.engine_design_q31 import engine_for_simulated_rig
+from pvid.run.refine_design import full_motion_of, refine_for_simulated_rig
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 
@@ -40,6 +41,15 @@ def motor() -> Deployment:
 def fixed_motor() -> Deployment:
     compiled = compiled_of("dc_motor")
     return deployment_q31(engine_for_simulated_rig(compiled), simulated_run_of(compiled)[0], "a test")
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> Deployment:
+    """With its second stage; the example's motion has the full equations, those of the weak form are linear."""
+    compiled = compiled_of("kapitza")
+    config = config_for_simulated_rig(compiled)
+    refine = refine_for_simulated_rig(compiled, config)
+    return deployment_f32(compiled, config, full_motion_of(compiled), "a test", refine)
 
 
 def written(deployment: Deployment, target: str, folder: Path) -> Path:
@@ -59,6 +69,59 @@ def test_the_example_comes_near_the_truth(motor: Deployment, fixed_motor: Deploy
 def test_cmake(motor: Deployment, tmp_path: Path) -> None:
     tree = built(written(motor, "cmake", tmp_path / "p"), tmp_path / "b")
     assert run(tree / "dc_motor_example").splitlines() == expected(motor)
+
+
+def test_the_example_of_a_refined_mechanism_prints_the_refined_estimate(pendulum: Deployment, tmp_path: Path) -> None:
+    """It is right where the weak form, whose equations are linear in the angle, is several standard errors off."""
+    tree = built(written(pendulum, "cmake", tmp_path / "p"), tmp_path / "b", "-DCMAKE_C_FLAGS=-Wall -Wextra -Werror")
+    lines = run(tree / "kapitza_example").splitlines()
+    assert lines == expected(pendulum)
+    found = {
+        name: (float(value), float(error))
+        for name, value, error in re.findall(r"^(\w+(?: \w+)?) = (\S+) \+- (\S+)", "\n".join(lines), re.MULTILINE)
+    }
+    truth = simulated_rig("kapitza").truth
+    for name in ("w", "d1", "d2"):
+        value, error = found[f"refined {name}"]
+        assert abs(value - truth[name]) < 3 * error < 0.005 * truth[name]
+        assert abs(found[name][0] - truth[name]) > 2 * abs(value - truth[name])
+    for name in ("k1", "k2", "tau"):  # there is neither friction nor skew
+        value, error = found[f"refined {name}"]
+        assert abs(value) < 3 * error
+
+
+def test_without_its_call_the_second_stage_is_not_linked(pendulum: Deployment, tmp_path: Path) -> None:
+    folder = written(pendulum, "cmake", tmp_path / "p")
+    main = folder / "example" / "main.c"
+    text = main.read_text(encoding="utf-8")
+    assert text.count("kapitza_begin_refined()") == 1
+    lines = text.replace("kapitza_begin_refined()", "kapitza_begin()").replace("_EXAMPLE_LINES", "_PARAMETERS")
+    main.write_text(lines, encoding="utf-8")
+    example = folder / "example" / "kapitza_example.c"
+    own = example.read_text(encoding="utf-8")
+    first, last = own.index("    if (k >= KAPITZA_PARAMETERS)"), own.index("    float value[KAPITZA_PARAMETERS]")
+    example.write_text(own[:first] + own[last:], encoding="utf-8")
+    tree = built(folder, tmp_path / "b")
+    assert run(tree / "kapitza_example").splitlines() == expected(pendulum)[: len(pendulum.parameters)]
+    symbols = run("nm", tree / "kapitza_example")
+    assert "pvid_weak_step_f32" in symbols and "pvid_refine" not in symbols
+
+
+def test_a_refined_mechanism_in_two_files_has_no_public_name_of_the_core(pendulum: Deployment, tmp_path: Path) -> None:
+    written(pendulum, "amalgamation", tmp_path)
+    c = (*WARNINGS, "-Wno-maybe-uninitialized", "-std=c99", "-O1", "-I.", "-Iexample")
+    run("gcc", *c, "-c", "pvid_kapitza.c", cwd=tmp_path)
+    run("gcc", *c, "pvid_kapitza.o", "example/main.c", "example/kapitza_example.c", "-lm", "-o", "it", cwd=tmp_path)
+    assert run(tmp_path / "it").splitlines() == expected(pendulum)
+    symbols = re.findall(r"^\w+ ([A-Z]) (\w+)$", run("nm", "--defined-only", tmp_path / "pvid_kapitza.o"), re.MULTILINE)
+    assert not [name for kind, name in symbols if kind != "W" and not name.startswith("kapitza_")]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_ecosystems_example_switches_the_second_stage_on(target: str, pendulum: Deployment) -> None:
+    files = TARGETS[target](pendulum)
+    assert sum(text.count("= kapitza_begin_refined()") for text in files.values()) == 1
+    assert "kapitza_begin_refined()" in files["README.md"]
 
 
 def test_a_folder_of_something_else_is_refused(motor: Deployment, tmp_path: Path) -> None:

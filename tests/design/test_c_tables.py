@@ -57,7 +57,7 @@ def test_five_points_of_the_core_are_what_is_generated(tmp_path: Path) -> None:
         "-std=c99",
         *INCLUDES,
         str(tmp_path / "print.c"),
-        str(source("differentiator_f32.c")),
+        *(str(source(name)) for name in ("differentiator_f32.c", "finite_f32.c")),
     ]
     subprocess.run([*command, "-o", str(tmp_path / "print")], check=True)
     printed = subprocess.run([str(tmp_path / "print")], capture_output=True, text=True, check=True).stdout.split()

@@ -34,7 +34,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two folders, of one run each, and a table that is none."""
     top = tmp_path_factory.mktemp("fleet")
     for seed, name in ((1, "a"), (2, "b")):
-        run = simulate(sensors=standard_sensors(14), truth="full", duration=20.0, seed=seed).run
+        run = simulate(sensors=standard_sensors(14), truth="full", duration=8.0, seed=seed).run
         (top / name).mkdir()
         np.savez(top / name / "run.npz", t=run.t, phi=run.phi, y=run.y)
     (top / "b" / "broken.csv").write_text("t,phi,y\n0,one,two\n")
@@ -77,7 +77,7 @@ def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> Non
     rows = {f"{Path(row['board']).name}/{Path(row['path']).name}": row for row in table.to_pylist()}
     assert set(rows) == {"a/run.npz", "b/run.npz", "b/broken.csv"}
     good = rows["a/run.npz"]
-    assert good["identified"] and good["samples"] == 20000
+    assert good["identified"] and good["samples"] == 8000
     assert abs(good["g"] - 9.5) < 5 * good["g_se"] and table.schema.field("g").metadata[b"unit"] == b"m/s^2"
     assert rows["b/broken.csv"]["g"] is None and rows["b/broken.csv"]["identified"] is None
     assert "<svg" in (tmp_path / "fleet.html").read_text() and not (tmp_path / "fleet.partial.jsonl").exists()

@@ -368,8 +368,8 @@ static void check_strong(bool published)
 {
     const pvid_strong_estimator_f32 *estimator = &strong.self.estimator;
     for (size_t i = 0; i < PVID_KAPITZA_P; i++) {
-        require(isfinite(estimator->p[i]) && (estimator->p[i] >= estimator->lower[i]) &&
-                    (estimator->p[i] <= estimator->upper[i]),
+        require(isfinite(estimator->p[i]) && (estimator->p[i] >= strong.config.estimator.lower[i]) &&
+                    (estimator->p[i] <= strong.config.estimator.upper[i]),
                 "p within its bounds");
     }
     if (published && one_in(50)) {

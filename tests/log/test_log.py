@@ -673,6 +673,15 @@ def test_full_disk_is_reported_with_the_content_of_the_log(tmp_path: Path, board
     assert f"{account.samples} samples in 1 segment; lost 0 frames" in done.stdout
 
 
+def test_a_board_that_sends_faster_than_its_frames_are_decoded_ends_at_the_samples_asked_for(tmp_path: Path) -> None:
+    out = tmp_path / "out.pvlog"
+    arguments = ["log", HOST_TARGET, str(out), "--paced", "--samples", "3000", "-q"]
+    CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
+    _, account = read(out)
+    assert 3000 <= account.samples <= 3100  # some frames more were under way
+    assert (account.missing, account.damaged, account.missing_samples) == (0, 0, 0)
+
+
 def test_unwritable_folder_is_reported(tmp_path: Path, boards: Boards) -> None:
     boards(ticks=100)
     (tmp_path / "folder").mkdir()

@@ -71,7 +71,7 @@ def test_core_is_as_near_the_oracle_as_its_conditioning_allows(native: Native, s
     config = strong_config(STRONG, 1000.0, standard_start(3))
     rows, row_reason = StrongTwin(config).rows(run.phi, run.y)
     n32, y32 = regressors(rows)
-    ready = row_reason == Reason.ACCUMULATED
+    ready = row_reason == Reason.UPDATED
     n, y = n32[ready].astype(np.float64), y32[ready].astype(np.float64)
     n = n * oracle.BINOMIAL
     m, b = n.T @ n, n.T @ y
@@ -94,7 +94,7 @@ def test_standard_errors_and_kappa_agree_with_the_oracle(native: Native, standar
     last = identifier.assess()
     rows, row_reason = StrongTwin(config).rows(run.phi, run.y)
     n32, y32 = regressors(rows)
-    ready = row_reason == Reason.ACCUMULATED
+    ready = row_reason == Reason.UPDATED
     n = n32[ready].astype(np.float64) * oracle.BINOMIAL
     y = y32[ready].astype(np.float64)
     p = last["p"][:3].astype(np.float64)

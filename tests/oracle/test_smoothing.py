@@ -10,9 +10,10 @@ from pvid.sim.simulated_run import PERFECT, simulation_of
 
 
 def test_derivative_that_is_smoothed_too_long_is_named() -> None:
-    """The pivot's acceleration over 131 samples by degree 4, not 6: p is 24 standard errors off at a chi2 of 1."""
+    """The pivot's acceleration from steps of 16 samples with two exact frequencies, not four: p is 25 standard errors
+    off at a chi2 of 1."""
     simulation = simulation_of("kapitza")
-    run, design = simulation.run(0), design_of(simulation, PERFECT)
+    run, design = simulation.run(0), replace(design_of(simulation, PERFECT), decimation=16)
     right, blurred = (
         identify(simulation.model, run, 1000.0, simulation.truth, replace(design, rate_taps=131, rate_degree=degree))
         for degree in (6, 4)

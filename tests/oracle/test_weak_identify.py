@@ -14,7 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.errors import clustered_variance, uncertainty
+from pvid.oracle.weak.errors import clustered_variance, covariance_of, uncertainty
 from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.reversals import located
 from pvid.oracle.weak.rows import EquationError, WeakRows
@@ -196,6 +196,22 @@ def test_clustered_errors_count_neighbours_and_longer_ties() -> None:
     assert alone == pytest.approx(4000, rel=0.2)  # of a variance, by estimates of covariances at some twenty lags
     assert pairs == pytest.approx(4 * 4000, rel=0.2)
     assert long > 0.6 * 64 * 4000
+
+
+def test_a_combination_of_which_the_run_says_nothing_has_a_large_variance_and_no_negative_one() -> None:
+    """Two columns that are opposite but for rounding, as of a plant whose input is a law of its output."""
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        column = 10 ** rng.uniform(-10, 19) * rng.normal(size=40)
+        scores = np.stack([column, -column * (1 + 1e-16 * rng.normal(size=40))], axis=1)
+        information = scores.T @ scores
+        covariance = covariance_of(information, 0.2 * scores[1:].T @ scores[:-1])
+        assert np.all(np.diag(covariance) * np.diag(information) > 1e6)
+    # of a well-posed one it is that of the scores, neighbours counted
+    scores = rng.normal(size=(4000, 2))
+    both = scores[1:] + scores[:-1]
+    covariance = covariance_of(2 * scores.T @ scores, both[1:].T @ both[:-1])
+    assert np.linalg.inv(covariance) == pytest.approx(4000 * np.eye(2), abs=400)
 
 
 def test_the_design_is_chosen_and_a_good_run_is_called_good() -> None:

@@ -30,12 +30,6 @@ uint32_t pvid_bit_length_q31(uint64_t x);
     ensures x < 0x4000000000000000 ==> \result <= 0x7FFFFFFF; */
 uint32_t pvid_square_root_q31(uint64_t x);
 
-/*@ requires 1 <= x <= 0x7FFFFFFF;
-    assigns \result \from x;
-    ensures 0x3FFFFFFF <= \result.m <= 0x7FFFFFFF;
-    ensures 0 <= \result.k <= 30; */
-pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x);
-
 /*@ requires 0 <= m <= 0x4000000000000000;
     requires -100000 <= exponent <= 100000;
     assigns \result \from m, exponent;
@@ -52,6 +46,13 @@ pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent);
     ensures x >= 0 ==> \result.m >= 0;
     ensures exponent - 30 <= \result.e <= exponent + 34; */
 pvid_scaled_q31 pvid_scaled_of_q31(int64_t x, int32_t exponent);
+
+/*@ requires 0x20000000 <= x.m <= 0x40000000;
+    requires -10000 <= x.e <= 10000;
+    assigns \result \from x;
+    ensures 0x20000000 <= \result.m <= 0x3FFFFFFF;
+    ensures -6000 <= \result.e <= 6000; */
+pvid_scaled_q31 pvid_inverse_root_q31(pvid_scaled_q31 x);
 
 /* Sums: exponents between those of the parts and what 60 bits of mantissa may take away or a carry add. */
 /*@ requires -0x40000000 <= a.m <= 0x40000000 && -0x40000000 <= b.m <= 0x40000000;
@@ -99,7 +100,7 @@ int32_t pvid_half_exponent_q31(int64_t diagonal);
     ensures self->positive != 0 ==> \subset(self->u[0 .. j - 1][j], (-0x40000000 .. 0x40000000));
     ensures self->positive != 0 ==> \initialized(&self->pivot[j]) && 1 <= self->pivot[j] <= 0x1000000000000000;
     ensures self->positive != 0 ==> \initialized(&self->inverse[j].m) && 0x3FFFFFFF <= self->inverse[j].m <= 0x7FFFFFFF;
-    ensures self->positive != 0 ==> \initialized(&self->inverse[j].k) && 0 <= self->inverse[j].k <= 30;
+    ensures self->positive != 0 ==> \initialized(&self->inverse[j].k) && 0 <= self->inverse[j].k <= 31;
     ensures self->positive != 0 ==> 0x10000000 <= s[j][j] <= 0x40000000; */
 void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j);
 

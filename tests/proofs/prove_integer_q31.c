@@ -69,7 +69,4 @@ void main(void)
         (void)pvid_scale_q31(any_i64(PVID_WIDE + 1, INT64_MAX - 1), s);
         (void)pvid_scale_q31(any_i64(-INT64_MAX, -PVID_WIDE - 1), s);
     }
-    for (uint32_t bits = 1; bits <= 31u; bits++) {
-        (void)pvid_reciprocal_of_q31((uint32_t)of_bits(bits, false));
-    }
 }

@@ -52,4 +52,6 @@ void main(void)
     }
     (void)pvid_scaled_shifted_q31(any_scaled(POSITIVE, -EXPONENT_MAX, EXPONENT_MAX),
                                   any_i32(-EXPONENT_MAX, EXPONENT_MAX));
+    const pvid_scaled_q31 positive = {any_i32(PVID_ONE_Q30 / 2, PVID_ONE_Q30), any_i32(-10000, 10000)};
+    (void)pvid_inverse_root_q31(positive);
 }

@@ -51,13 +51,21 @@ def with_identifier(**changed: object) -> RigFile:
     return replace(RIG, identifier=replace(RIG.identifier, **changed))  # type: ignore[arg-type]
 
 
-def advised(run: Run, rig: RigFile, native: Native) -> tuple[Identification | None, tuple[str, ...]]:
+Advised = tuple[Identification | None, tuple[str, ...]]
+_ADVISED: dict[tuple[object, ...], Advised] = {}  # many cures end in the same run
+
+
+def advised(run: Run, rig: RigFile, native: Native) -> Advised:
     """What `identify` gives and the advice on it, as the command has it."""
-    try:
-        result = answered(run, rig, native, refine=False)
-    except PvidError:
-        return None, advice_on_refusal(run, rig)
-    return result, advice(run, rig, result)
+    key = (run.t.tobytes(), run.phi.tobytes(), run.y.tobytes(), run.sample_rate, run.notes, repr(rig))
+    if key not in _ADVISED:
+        try:
+            result = answered(run, rig, native, refine=False)
+        except PvidError:
+            _ADVISED[key] = None, advice_on_refusal(run, rig)
+        else:
+            _ADVISED[key] = result, advice(run, rig, result)
+    return _ADVISED[key]
 
 
 @dataclass(frozen=True)

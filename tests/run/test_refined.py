@@ -17,9 +17,9 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.answer import as_json, refinement_line
 from pvid.run.engine_identify import identify_by_engine
-from pvid.run.refined import Cut, Prior
-from pvid.run.refined_identify import refined_identification
-from pvid.run.refined_kernel import kernel_of
+from pvid.run.refined import GOOD, Cut, Prior
+from pvid.run.refined_identify import AGREE, BEARABLE, refined_identification
+from pvid.run.refined_kernel import PlayedKernel, kernel_of
 from pvid.run.refined_mechanism import refine_mechanism
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, simulate, standard_sensors
@@ -137,16 +137,97 @@ def test_identify_takes_the_refined_answer_where_the_weak_one_is_refused() -> No
     assert line is not None and "k1 0.02" in line
 
 
+def played(run: Run, half: float) -> Run:
+    """The run through an encoder that follows only when a play of +-half is taken up [rad]."""
+    phi = run.phi.copy()
+    for k in range(1, len(phi)):
+        phi[k] = min(max(phi[k - 1], run.phi[k] - half), run.phi[k] + half)
+    return replace(run, phi=phi)
+
+
+def shaken(run: Run, amplitude: float, hz: float) -> Run:
+    """The run with a vibration of the encoder [rad] that no equation has."""
+    return replace(run, phi=run.phi + amplitude * np.sin(2 * np.pi * hz * run.t))
+
+
+def test_a_play_of_the_encoder_is_found_and_costs_no_accuracy() -> None:
+    found = refine_pendulum(played(run_of(), 2.5e-3), rig(), [start(1.05)], sure=True)
+    value, error = found.extras["play"]
+    se = np.sqrt(np.diag(found.found.covariance))[:3]
+    errors = found.found.r[:3] / TRUTH - 1
+    assert found.found.converged and abs(value - 2.5e-3) < 0.02 * 2.5e-3 and error < 0.02 * 2.5e-3
+    assert (np.abs(errors) < 3 * se).all() and (np.abs(errors) < 2e-3).all()
+
+
+def test_derivatives_with_a_play_are_those_of_finite_differences() -> None:
+    """But for the few samples at which the encoder begins or ceases to follow."""
+    kernel = PlayedKernel(kernel_of(compiled_of("kapitza")), "rad")
+    names = [one.name for one in kernel.made.parameters]
+    values = dict(zip(NAMES, TRUTH, strict=True)) | {
+        "l1": STANDARD_PENDULUM.l1,
+        "play": 4e-3,
+        "k1": 0.02,
+    }
+    r = np.array([values.get(name, 0.0) for name in (*names, *kernel.made.settings)])
+    starts, first = np.array([[0.1, 0.25, 0.3, -0.2]]), np.zeros(1, np.int32)
+    u = np.zeros((1500, 3, 1))
+    z, found, _ = kernel.blocks(r, first, 1500, 1, 1e-3, u, u, starts)
+    assert found is not None and 0.05 < np.mean(np.diff(z[0, :, 0]) == 0) < 0.5
+    for name in ("w", "d1", "d2", "k1", "c", "play"):
+        place, ends = names.index(name), []
+        unit = r[place] if kernel.made.parameters[place].log else 1.0
+        for sign in (1e-6, -1e-6):
+            near = r.copy()
+            near[place] += sign * unit
+            ends.append(kernel.blocks(near, first, 1500, 1, 1e-3, u, u, starts, False)[0])
+        wanted = ((ends[0] - ends[1]) / 2e-6)[..., 0].ravel()
+        far = np.abs(found[0, :, 0, kernel.states + place] - wanted) > 1e-5 * np.abs(wanted).max()
+        assert far.mean() < 0.02, name
+
+
+def test_where_residuals_are_noise_blocks_grow() -> None:
+    """Each block has a start of its own to find: with fewer of them the noise leaves smaller standard errors."""
+    run = simulate(DAMPED, STANDARD_DRIVE, standard_sensors(14), 1000.0, 20.0, (0.05, 0.12), "full", 1).run
+    outcome = refine_pendulum(run, RigFile.standard(), [start(1.05)], sure=True)
+    found, problem = outcome.found, outcome.problem
+    prior = Prior(found.r, np.full(problem.n, 10.0), np.diag(found.covariance) > 0)
+    cut = Cut.of(len(problem.measured.z), len(problem.measured.z) // 9)
+    starts = problem.starts_along(found.r, found, cut)
+    in_blocks = problem.searched(found.r, prior, cut, starts, problem.used(cut))
+    assert len(found.cut.first) < 4
+    assert (np.diag(found.noise)[:3] < 0.9 * np.diag(in_blocks.noise)[:3]).all()
+    assert (np.abs(found.r[:3] / TRUTH - 1) < 3 * np.sqrt(np.diag(found.covariance)[:3])).all()
+
+
 def test_the_weak_answer_stands_where_the_sensor_is_not_that_of_the_model() -> None:
-    """A backlash of 5 mrad: residuals far above the noise, and it says so."""
+    """A vibration of the encoder: residuals far above the noise, and the answer says so."""
     given, weak = answers()
-    run = run_of()
-    played = run.phi.copy()
-    for k in range(1, len(played)):
-        played[k] = min(max(played[k - 1], run.phi[k] - 2.5e-3), run.phi[k] + 2.5e-3)
-    found = refined_identification(replace(run, phi=played), given, weak)  # type: ignore[arg-type]
+    found = refined_identification(shaken(run_of(), 5e-3, 1.7), given, weak)  # type: ignore[arg-type]
     assert not found.refinement.adopted and found.value == weak.value  # type: ignore[attr-defined]
     assert "slow residuals" in found.refinement.text or "converge" in found.refinement.text
+
+
+def test_where_the_weak_form_has_no_answer_residuals_above_noise_give_one_with_a_warning() -> None:
+    """A small vibration: both halves give the same parameters, within standard errors that contain the residuals."""
+    given, weak = answers()
+    held = replace(weak, trusted_s=None)  # type: ignore[type-var]
+    found = refined_identification(shaken(run_of(), 6e-5, 1.7), given, held)  # type: ignore[arg-type]
+    outcome = found.refinement.outcome.found
+    assert found.identified and found.refinement.adopted and GOOD < outcome.slow_chi2 < BEARABLE
+    assert found.warning is not None and "times the variance" in found.warning
+    values, se = (np.array([one[name] for name in NAMES]) for one in (found.value, found.se))
+    assert (np.abs(values - TRUTH) < 3 * se).all()
+    assert (se > 1.5 * np.sqrt(np.diag(outcome.noise)[:3]) * TRUTH).all()
+
+
+def test_a_run_whose_halves_differ_has_no_answer() -> None:
+    """The drive's sensor drifts by 6 %: w of the second half is larger, and the residuals do not show by how much."""
+    given, weak = answers()
+    run = run_of()
+    drifting = replace(run, y=run.y * (1 + 0.06 * np.clip((run.t - 5.0) / 10.0, 0.0, 1.0)))
+    found = refined_identification(drifting, given, replace(weak, trusted_s=None))  # type: ignore[type-var, arg-type]
+    assert not found.refinement.adopted and not found.identified
+    assert found.refinement.outcome.halves_differ().max() > AGREE
 
 
 def test_a_run_that_is_too_short_says_so() -> None:

@@ -55,7 +55,7 @@ reason = "There is none."
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A repository with the tool, the firmware and two more of its files that are full of faults."""
     top = tmp_path_factory.mktemp("analysis")
-    for name in ("tools/analyse.py", "tools/units.py", ".clang-tidy"):
+    for name in ("tools/analyse.py", "tools/kept.py", "tools/units.py", ".clang-tidy"):
         (top / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, top / name)
     for folder in ("firmware", "tests/analysis"):

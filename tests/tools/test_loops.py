@@ -105,7 +105,7 @@ void planted_start(planted *self)
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     """What the tool reads, to be spoiled."""
-    for name in ("tools/loops.py", "tools/units.py", "tests/loops.toml"):
+    for name in ("tools/loops.py", "tools/kept.py", "tools/units.py", "tests/loops.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     shutil.copytree(ROOT / "firmware", tmp_path / "firmware")

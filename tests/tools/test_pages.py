@@ -21,14 +21,19 @@ from pvid.models.mechanisms import path_of  # noqa: E402
 from pvid.rig.file import RigFile  # noqa: E402
 from pvid.rig.mechanism_file import MechanismRig  # noqa: E402
 
+SETTINGS = """
+#include "pvid/pvid.h"
+#include "pvid/refine.h"
+extern const pvid_weak_config_f32 kapitza_config_f32;
+extern const pvid_refine_config_f32 kapitza_refine_config_f32;
+"""
 # What the C of a page uses beside its headers: page, declarations.
 SURROUNDINGS = {
     "models.md": "#include <stdbool.h>\n#include <pvid/pvid.h>\nvoid use(const float *, const float *);\n",
-    "compiler.md": '#include "pvid/pvid.h"\n#include "pvid/refine.h"\n'
-    "extern const pvid_refine_config_f32 refine_config;\n",
+    "refine.md": SETTINGS,
     "tutorial.md": "#include <pvid/pvid.h>\nfloat force(void);\nfloat place(void);\n"
     "void show(const float *, const float *);\n",
-    "firmware.md": '#include "pvid/pvid.h"\nfloat read_encoder(void);\nfloat read_pivot(void);\n'
+    "firmware.md": SETTINGS + "float read_encoder(void);\nfloat read_pivot(void);\n"
     "void show(const pvid_estimate_f32 *);\n",
 }
 # Printed once whatever the page; they write nothing that a later command reads.

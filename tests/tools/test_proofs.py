@@ -19,7 +19,7 @@ def prove(top: Path, name: str = "link") -> subprocess.CompletedProcess[str]:
 
 def copy(top: Path, *names: str) -> None:
     """These files and folders of the repository, what proves them, and the contracts."""
-    for name in ("firmware/include", "firmware/models", "tests/proofs", "tools/prove.py", *names):
+    for name in ("firmware/include", "firmware/models", "tests/proofs", "tools/prove.py", "tools/kept.py", *names):
         (top / name).parent.mkdir(parents=True, exist_ok=True)
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, top / name)
@@ -36,6 +36,7 @@ def change(place: Path, old: str, new: str) -> None:
 def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
     copy(tmp_path, "firmware/link", "firmware/src/keep/crc32.c")
     assert prove(tmp_path).returncode == 0
+    assert "since then nothing has changed" in prove(tmp_path).stdout
     link = tmp_path / "firmware" / "link" / "link.c"
     change(link, "if (self->filled == sizeof self->raw) {", "if (self->filled > sizeof self->raw) {")
     done = prove(tmp_path)

@@ -133,7 +133,7 @@ def test_gradient_of_a_row_is_that_of_its_innovation(changed: Run) -> None:
     rig = rig_of(FINE_BITS)
     config = strong_config_q31(rig, SLOW_HZ)
     rows, row_reason = StrongTwinQ31(config).rows(*counts_of(rig, changed))
-    taken = rows[row_reason == Reason.ACCUMULATED][::50].T
+    taken = rows[row_reason == Reason.UPDATED][::50].T
 
     def innovation(factors: tuple[float, float, float]) -> tuple[Any, Any]:
         start = strong_config_q31(rig, SLOW_HZ, np.multiply(nominal_start(rig), factors)).estimator

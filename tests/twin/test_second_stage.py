@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from weak_rig import EngineRig, engine_rig
 
@@ -21,7 +22,9 @@ from pvid.run.refine_design import refine_settings
 from pvid.settings.enums import Reason, SnapshotStatus
 from pvid.settings.f32 import TrustConfig
 from pvid.settings.refine import RefineConfig
+from pvid.twin.both_stages import BothStagesTwin
 from pvid.twin.refine import RefineTwin
+from pvid.twin.weak import WeakTwin
 
 NAME = "rigid_body"  # of order 1, three outputs
 
@@ -65,11 +68,40 @@ def test_the_twin_has_the_bits_of_a_first_order_model() -> None:
     settings = replace(given.settings, distance=0.1)
     core, twin = given.identifier(distance=0.1), RefineTwin(given.model, settings)
     record = core.run_both(given.rig.samples[:6000])
-    expected = twin.run(given.rig.samples[:6000], record.weak_p, record.weak_se)
+    expected = twin.run(given.rig.samples[:6000], record.weak_p, record.weak_se, record.busy)
     np.testing.assert_array_equal(record.r, expected.r)
     np.testing.assert_array_equal(record.se, expected.se)
     np.testing.assert_array_equal(np.array(list(core.refinement.work.state), np.float32), twin.work.state)
     assert Reason.UPDATED in record.told
+
+
+def test_the_twin_of_both_stages_publishes_what_the_core_does() -> None:
+    """Wrong inputs for more than two blocks: the track is lost, the estimate withdrawn, and one published again."""
+    given, samples = refined(), refined().rig.samples[:15500].copy()
+    samples[5000:9200, :3] *= 1.3
+    core = given.identifier(distance=0.1)
+    twin = BothStagesTwin(WeakTwin(core.config), RefineTwin(given.model, replace(given.settings, distance=0.1)))
+    stages, best = [], []
+
+    def after(tick: int, reasons: npt.NDArray[np.uint8]) -> None:
+        stage, estimate = twin.best()
+        stages.append(stage)
+        if (tick + 1) % 500 == 0:
+            best.append((stage, estimate))
+
+    twin.follow(samples, after)
+    changes = np.flatnonzero(np.diff(stages))
+    assert len(changes) >= 3, changes
+    for k, (stage, estimate) in enumerate(best):
+        core.run_both(samples[500 * k : 500 * (k + 1)])
+        own_stage, own = core.best
+        assert own_stage == stage, k
+        n = len(twin.weak.estimator.p)
+        for name in ("p", "se"):
+            np.testing.assert_array_equal(own[name][:n], estimate[name][:n])
+        np.testing.assert_array_equal(own["covariance"][:n, :n], estimate["covariance"][:n, :n])
+        for name in ("kappa", "residual_sd", "weight", "misfit", "least_pivot"):
+            assert own[name] == estimate[name]
 
 
 def test_the_refined_estimate_is_sharper_than_the_weak_one_and_right() -> None:
@@ -141,5 +173,5 @@ def test_without_a_second_stage_the_weak_form_has_the_same_bits() -> None:
 def test_a_running_integral_is_no_input() -> None:
     made, rig = refine_functions(compiled_of("battery_2rc")), engine_rig("battery_2rc")
     run = {one: rig.samples[:, k] for k, one in enumerate(_samples("battery_2rc"))}
-    with pytest.raises(PvidError, match="the refinement in C has no input"):
+    with pytest.raises(PvidError, match=r"battery_2rc has the input Integral\(i, 1\)"):
         refine_settings(made, run, 10.0, rig.truth, 100.0)

@@ -75,7 +75,7 @@ def test_twenty_starts_with_both_laws_with_and_without_forgetting_equal_the_twin
 ) -> None:
     """Rows through eighty estimators and one twin of eighty lanes, compared after every tick."""
     rows, row_reason = StrongTwinQ31(configuration(rig_of())).rows(*counts(standard_20_bits.run))
-    ready = row_reason == Reason.ACCUMULATED
+    ready = row_reason == Reason.UPDATED
     rigs = [rig_of(law=law, tau=tau) for law in LAWS for tau in (0.0, 2.0)]
     lanes = [configuration(rig, seed).estimator for rig in rigs for seed in range(STARTS)]
     assert len({(lane.gain, lane.forgetting_groups) for lane in lanes}) == 4
@@ -145,7 +145,7 @@ def test_far_from_the_reference_a_solve_equals_the_twin(native: Native, standard
     """w at its bounds and between: shifts of the moments in 64 bits, and units of time."""
     config = configuration(rig_of())
     rows, row_reason = StrongTwinQ31(config).rows(*counts(standard_20_bits.run))
-    ready = rows[row_reason == Reason.ACCUMULATED][:60]
+    ready = rows[row_reason == Reason.UPDATED][:60]
     for w in np.geomspace(config.estimator.lower[0], config.estimator.upper[0], 8):
         for gain in (2**30, 0):
             lane = replace(config.estimator, start=(int(w), *config.estimator.start[1:]), gain=gain, step_limit=655)

@@ -82,7 +82,10 @@ def test_the_verdicts_are_those_of_float32(label: str) -> None:
         fixed, floating = (played(label, seed, core) for core in ("q31", "f32"))
         one, other = verdicts(fixed), verdicts(floating)
         assert len(one) == len(other) > 20
-        assert one[SETTLED:] == other[SETTLED:]
+        apart = [pair for pair in zip(one[SETTLED:], other[SETTLED:], strict=True) if pair[0] != pair[1]]
+        # Equations that do not fit keep moving p, by about the step above which it has not converged: rounding decides.
+        assert len(apart) <= (1 if one[-1] == Reason.MISFIT else 0)
+        assert all(set(pair) == {Reason.HELD_UNCERTAIN, Reason.MISFIT} for pair in apart)
         assert (fixed.published, fixed.alarm) == (floating.published, floating.alarm)
 
 

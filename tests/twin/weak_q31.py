@@ -16,7 +16,7 @@ from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_weak
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.sources import INCLUDES, sources_of
-from pvid.design.weak_q31 import CIRCLE, DOWN, Sensing, fixed_design
+from pvid.design.weak_q31 import DOWN, FINE_DOWN, Sensing, fixed_design
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.design import WeakDesign
@@ -68,13 +68,7 @@ class Rig:
             [np.rint(self.run[one] / lsb) for one, lsb in zip(self.made.samples, self.lsb, strict=True)]
         ).astype(np.int64)
         # what the integers are made of, for float64
-        self.exact = dict(
-            zip(
-                self.made.samples,
-                self.counts * np.array(self.lsb)[:, np.newaxis],
-                strict=True,
-            )
-        )
+        self.exact = dict(zip(self.made.samples, self.counts * np.array(self.lsb)[:, np.newaxis], strict=True))
         self.record = record_of(self.compiled, self.exact, self.oracle_design)
         of_jets = {str(one): x for one, x in self.record.grid.jets.items()}
         reaches = {one: _HIGHEST * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in self.made.jet_names}
@@ -119,10 +113,7 @@ class Rig:
             for mine, theirs in zip(self.made.term[first:], ordered, strict=False):
                 whole = np.zeros((sums.shape[1], functions.highest + 1, 2))
                 whole[:, 0, 0] = sums[theirs.channel, :, 0]
-                whole[:, 1:, 0], whole[:, 1:, 1] = (
-                    sums[theirs.channel, :, 1::2],
-                    sums[theirs.channel, :, 2::2],
-                )
+                whole[:, 1:, 0], whole[:, 1:, 1] = (sums[theirs.channel, :, 1::2], sums[theirs.channel, :, 2::2])
                 out[mine.channel] = whole
             first += len(row.terms)
         return out
@@ -138,8 +129,9 @@ class Rig:
                 continue
             whole = np.abs(made.channels[place]).astype(np.float64)
             window = np.convolve(whole, np.ones(2 * design.hop), "valid").max()
-            down = 2.0 ** (DOWN + design.sum_shift + design.format[place].own)
-            out[place] = 4.0**one.fold * window * CIRCLE / down * design.units[place]
+            # a sum of the channel at h = 0, where the cosine is 1
+            down = 2.0 ** ((FINE_DOWN if design.fine else DOWN) + design.sum_shift + design.format[place].own)
+            out[place] = 4.0**one.fold * window * float(design.circle[0]) / down * design.units[place]
         return out
 
 
@@ -181,8 +173,8 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
                 const bool constant = model->channel[c].gain == PVID_WEAK_NONE;
                 for (unsigned h = 0; h < harmonics; h++) {
                     const int32_t mean = (h == 0u) ? (2 * (int32_t)rig_design_q31.hop) : 0;
-                    *window++ = constant ? mean : self.window.s[c][h][0];
-                    *window++ = constant ? 0 : self.window.s[c][h][1];
+                    *window++ = constant ? mean : self.window.s[h][c][0];
+                    *window++ = constant ? 0 : self.window.s[h][c][1];
                 }
             }
             windows++;
@@ -229,21 +221,22 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     const size_t used = own->thetas + 1u;
     const size_t count = used + own->nuisances;
     uint64_t whole[PVID_MAX_COLUMNS];
+    pvid_scaled_q31 weight[PVID_MAX_POWER];
     size_t live = 0;
     for (size_t c = 0; c < design->model->channels; c++) {
         for (size_t h = 0; h < harmonics; h++) {
             uint32_t bits = 0;
             for (size_t part = 0; part < 2u; part++) {
                 const int32_t one = *window++;
-                sums.s[c][h][part] = one;
+                sums.s[h][c][part] = one;
                 bits |= (uint32_t)((one < 0) ? -one : one);
             }
-            sums.length[c][h] = (uint8_t)pvid_bit_length_q31(bits);
+            sums.length[h][c] = (uint8_t)pvid_bit_length_q31(bits);
         }
     }
     pvid_weak_white_init_q31(&white, design);
-    pvid_weak_white_weigh_q31(&white, design, (uint8_t)kind, theta, 0, design->n_noise);
-    pvid_weak_white_spectrum_q31(&white, design, (uint8_t)kind, 0, harmonics);
+    pvid_weak_white_weigh_q31(&white, design, (uint8_t)kind, theta, 0, design->n_noise, weight);
+    pvid_weak_white_spectrum_q31(&white, design, (uint8_t)kind, weight, 0, harmonics);
     const pvid_scaled_q31 least = pvid_weak_white_floor_q31(&white, design);
     pvid_weak_white_invert_q31(&white, least, 0, harmonics);
     for (size_t k = 0; k < pvid_weak_mirrors_q31(design); k++) {
@@ -251,10 +244,11 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     }
     pvid_weak_columns_begin_q31(&made, design, kind);
     for (size_t h = 0; h < harmonics; h++) {
-        pvid_weak_columns_scan_q31(&made, design, kind, &white, &sums, h);
+        pvid_weak_columns_scan_q31(&made, design, kind, &white, sums.length[h], h);
     }
     for (size_t h = 0; h < harmonics; h++) {
-        pvid_weak_columns_take_q31(&made, design, kind, &white, &sums, h);
+        pvid_weak_columns_take_q31(&made, design, kind, &white, sums.length[h],
+                                   (const int32_t(*)[2])sums.s[h], h);
     }
     for (size_t j = 0; j < count; j++) {
         pvid_weak_columns_end_q31(&made, design, &white, j);
@@ -290,14 +284,7 @@ SIZES = (
 )
 # Not -O1: with -fsanitize=undefined the compiler of Debian 12 (gcc 12.2) then takes the sign off a negative sine.
 _OPTIONS = (
-    *(
-        "-std=c99",
-        "-O2",
-        "-fPIC",
-        "-DPVID_PLAIN_NAMES",
-        "-fsanitize=undefined",
-        "-fsanitize-undefined-trap-on-error",
-    ),
+    *("-std=c99", "-O2", "-fPIC", "-DPVID_PLAIN_NAMES", "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"),
     *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wvla"),
     *(f"-D{one}" for one in SIZES),
     *INCLUDES,
@@ -362,7 +349,7 @@ class Core:
         count = design.model.kind[kind].thetas + 1
         given = np.ascontiguousarray(np.stack([theta.m, theta.e], axis=-1), np.int32)
         sums = np.ascontiguousarray(window, np.int32)
-        x, exponent = np.zeros((count, design.functions), np.int32), np.zeros(count, np.int32)
+        x, exponent = (np.zeros((count, design.functions), np.int32), np.zeros(count, np.int32))
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, sums, x, exponent)]
         live = self.library(one).columns(kind, *pointers)
         return x.astype(np.int64), exponent.astype(np.int64), int(live)

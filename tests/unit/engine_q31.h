@@ -9,7 +9,7 @@
 #include "pendulum/kapitza_weak_q31.c"
 #include "plant.h"
 
-#define ENGINE_HOP_TICKS (48 * 16) /* from window to window, of kapitza_design_q31.h */
+#define ENGINE_HOP_TICKS (32 * 24) /* from window to window, of kapitza_design_q31.h */
 
 enum { ENGINE_Y, ENGINE_PHI };
 

@@ -66,6 +66,53 @@ static void a_shift_left_saturates(void **unused)
     assert_int_equal(pvid_clamp_q31(4, 5), 4);
 }
 
+static void a_quotient_in_halves_is_the_quotient(void **unused)
+{
+    (void)unused;
+    static const uint32_t edges[] = {1,       2,          3,          0x7FFF,     0x8000,     0xFFFF,    0x10000,
+                                     0x10001, 0x7FFFFFFF, 0x80000000, 0x8000FFFF, 0xFFFF0000, 0xFFFFFFFF};
+    const size_t n = sizeof edges / sizeof edges[0];
+    for (size_t i = 0; i < n; i++) {
+        for (size_t j = 0; j < n; j++) {
+            const uint32_t y = edges[i];
+            const uint64_t most = ((uint64_t)(y - 1u) << 32) | 0xFFFFFFFFu; /* the largest quotient */
+            const uint64_t x = most - (most % edges[j]) / 2u;
+            assert_int_equal(pvid_quotient_in_halves_q31(x, y), x / y);
+            assert_int_equal(pvid_quotient_in_halves_q31(edges[j], y), edges[j] / y);
+            assert_int_equal(pvid_quotient_q31(x, y), x / y);
+        }
+    }
+    uint64_t state = 9;
+    for (int i = 0; i < 200000; i++) {
+        const uint32_t y = 1u + ((uint32_t)next_random(&state) >> (next_random(&state) % 31u)) / 2u;
+        const uint64_t x = ((uint64_t)((uint32_t)next_random(&state) % y) << 32) | (uint32_t)next_random(&state);
+        assert_int_equal(pvid_quotient_in_halves_q31(x, y), x / y);
+    }
+}
+
+static void a_byte_has_its_length(void **unused)
+{
+    (void)unused;
+    for (uint32_t x = 0; x < 256u; x++) {
+        assert_int_equal(pvid_byte_length_q31(x), pvid_bit_length_q31(x));
+    }
+}
+
+static void an_upper_product_is_the_floor_of_the_product(void **unused)
+{
+    (void)unused;
+    uint64_t state = 11;
+    assert_int_equal(pvid_upper_product_q31(-1, 1), -1);
+    assert_int_equal(pvid_upper_product_q31(INT32_MIN, INT32_MIN), (int64_t)1 << 30);
+    for (int i = 0; i < 20000; i++) {
+        const int32_t a = (int32_t)(next_random(&state) >> 33) - (int32_t)(next_random(&state) >> 33);
+        const int32_t b = (int32_t)(next_random(&state) >> 33) - (int32_t)(next_random(&state) >> 33);
+        const int64_t product = (int64_t)a * b;
+        const int64_t rest = ((product % ((int64_t)1 << 32)) + ((int64_t)1 << 32)) % ((int64_t)1 << 32);
+        assert_int_equal(pvid_upper_product_q31(a, b), (product - rest) / ((int64_t)1 << 32));
+    }
+}
+
 static void a_product_in_halves_is_the_product(void **unused)
 {
     (void)unused;
@@ -127,20 +174,6 @@ static void a_scaled_root_keeps_thirty_bits(void **unused)
     }
 }
 
-static void a_reciprocal_is_short_by_less_than_two(void **unused)
-{
-    (void)unused;
-    uint64_t state = 4;
-    for (int i = 0; i < 20000; i++) {
-        const uint32_t x = 1u + (uint32_t)((next_random(&state) >> 33) >> (next_random(&state) % 31u)) % 0x7FFFFFFFu;
-        const pvid_reciprocal_q31 inverse = pvid_reciprocal_of_q31(x);
-        const uint64_t normal = (uint64_t)x << inverse.k;
-        assert_true((normal >> 30) == 1u);
-        assert_true((uint64_t)inverse.m * normal <= ((uint64_t)1 << 61));
-        assert_true(((uint64_t)inverse.m + 2u) * normal > ((uint64_t)1 << 61));
-    }
-}
-
 static void a_product_with_a_fraction_is_exact_before_it_is_rounded(void **unused)
 {
     (void)unused;
@@ -198,10 +231,12 @@ int main(void)
         cmocka_unit_test(a_shift_right_rounds_half_up),
         cmocka_unit_test(a_shift_left_saturates),
         cmocka_unit_test(a_product_in_halves_is_the_product),
+        cmocka_unit_test(a_quotient_in_halves_is_the_quotient),
+        cmocka_unit_test(a_byte_has_its_length),
+        cmocka_unit_test(an_upper_product_is_the_floor_of_the_product),
         cmocka_unit_test(bits_are_counted),
         cmocka_unit_test(a_root_is_the_largest_whose_square_fits),
         cmocka_unit_test(a_scaled_root_keeps_thirty_bits),
-        cmocka_unit_test(a_reciprocal_is_short_by_less_than_two),
         cmocka_unit_test(a_product_with_a_fraction_is_exact_before_it_is_rounded),
         cmocka_unit_test(first_pivot_is_its_remaining_part),
         cmocka_unit_test(half_an_exponent_brings_a_diagonal_near_one),

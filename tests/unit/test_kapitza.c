@@ -128,9 +128,10 @@ static void projection_by_shifts_is_the_dense_product(void **state)
         double n[N];
         double y;
         if (r < ROWS - 4) {
-            estimator.block[r % PVID_STRONG_ROWS] = factors[r];
             if ((r % PVID_STRONG_ROWS) == (PVID_STRONG_ROWS - 1)) {
-                pvid_kapitza_add_rows_f32(estimator.block, estimator.sums.low);
+                pvid_kapitza_add_rows_f32(estimator.block, &factors[r], estimator.sums.low);
+            } else {
+                estimator.block[r % PVID_STRONG_ROWS] = factors[r];
             }
         }
         paper_row(r, n, &y);
@@ -151,7 +152,7 @@ static void projection_by_shifts_is_the_dense_product(void **state)
     float packed[6];
     float f[PVID_KAPITZA_P];
     pvid_kapitza_residual_f32 residual;
-    pvid_kapitza_gather_f32(&estimator, packed, f, &residual);
+    pvid_kapitza_gather_residuals_f32(&estimator, packed, f, &residual);
     assert_float_equal(residual.weight, ROWS - 1, 0.0f);
     const float s[3][3] = {{packed[0], packed[1], packed[2]}, {0.0f, packed[3], packed[4]}, {0.0f, 0.0f, packed[5]}};
     paper_theta(t);

@@ -173,12 +173,16 @@ static void products_with_blocks_equal_dense_products(void **state)
             }
         }
     }
+    size_t end = 0;
     for (size_t a = 0; a < N_P; a++) {
-        const size_t start = pvid_pattern_start_f32(&model, a);
-        const size_t end = pvid_pattern_end_f32(&model, start);
+        const size_t start = end;
+        assert_int_equal(model.c_column[start], a);
+        end = pvid_pattern_end_f32(&model, start);
         float column[N_THETA] = {0.0f};
         float row[PVID_MAX_P];
-        pvid_pattern_add_columns_f32(&model, c, start, end, packed, column);
+        for (size_t k = start; k < end; k++) {
+            pvid_pattern_add_column_f32(&model, model.c_row[k], c[k], packed, column);
+        }
         pvid_pattern_project_row_f32(&model, c, start, column, row);
         for (size_t i = 0; i < N_THETA; i++) {
             double sum = 0.0;

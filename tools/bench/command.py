@@ -114,6 +114,21 @@ def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="refine-mechanisms")
+@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
+@UPDATE
+def bench_refine_mechanisms(seeds: int, update: Path | None) -> int:
+    """Both stages in C on the other mechanisms: errors beside the Cramer-Rao bound, and which have no second stage."""
+    from bench import refine_mechanisms
+
+    with progress_bar("refine-mechanisms", seeds * len(refine_mechanisms.cases()[0])) as advance:
+        done = count(1)
+        rows, refused = refine_mechanisms.refined_tables(seeds, lambda: advance(next(done)))
+    put_table(update, "refine-mechanisms", markdown(refine_mechanisms.HEADER, rows))
+    put_table(update, "refine-refused", markdown(refine_mechanisms.REFUSED, refused))
+    return DONE
+
+
 @bench.command(name="mechanisms")
 @click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
 @click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
@@ -249,11 +264,24 @@ def bench_tick_methods(update: Path | None) -> int:
 @bench.command(name="strong-bytes")
 @UPDATE
 def bench_strong_bytes(update: Path | None) -> int:
-    """Where the bytes of code and state of the strong form go on a Cortex-M4F."""
+    """Where the bytes of code and state of the strong form go on a Cortex-M4F; its cost in fixed point."""
     from bench import strong_bytes
 
     put_table(update, "strong-text", markdown(strong_bytes.TEXT_HEADER, strong_bytes.text_rows()))
     put_table(update, "strong-state", markdown(strong_bytes.STATE_HEADER, strong_bytes.state_rows()))
+    put_table(update, "strong-fixed", markdown(strong_bytes.FIXED_HEADER, strong_bytes.fixed_rows()))
+    return DONE
+
+
+@bench.command(name="strong-mechanisms")
+@UPDATE
+def bench_strong_mechanisms(update: Path | None) -> int:
+    """The strong form of every described mechanism on emulated boards: its bits and the cost of a tick."""
+    from bench import strong_mechanisms
+
+    with progress_bar("mechanisms", strong_mechanisms.STEPS) as advance:
+        rows = list(strong_mechanisms.rows_of(progress=advance))
+    put_table(update, "strong-mechanisms", markdown(strong_mechanisms.HEADER, rows))
     return DONE
 
 

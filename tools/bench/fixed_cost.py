@@ -40,13 +40,15 @@ _STRUCTS = (
     ("block sums and the line of the compensators", "sizeof(pvid_weak_front_q31)"),
     ("inputs, gains and integrals of the last steps", "sizeof(pvid_weak_values_q31)"),
     ("sums of two half windows", "sizeof(((pvid_weak_sums_q31 *)0)->sum)"),
-    ("two blocks of four steps", "sizeof(((pvid_weak_sums_q31 *)0)->block)"),
-    ("sums of the last whole window", "sizeof(pvid_weak_window_q31)"),
+    ("a block of four steps", "sizeof(((pvid_weak_sums_q31 *)0)->block)"),
+    ("lengths of the window's sums, with these if they need a place", "sizeof(pvid_weak_window_q31)"),
     ("rows while they are made, or a solve", "sizeof(pvid_weak_work_q31)"),
     (
         "gates, noise, formats of the rows",
-        "sizeof(pvid_weak_finish_q31) - sizeof(pvid_weak_work_q31) - sizeof(pvid_estimate_q31)",
+        "sizeof(pvid_weak_finish_q31) - sizeof(pvid_weak_work_q31) - sizeof(pvid_estimate_q31)"
+        " - sizeof(((pvid_weak_finish_q31 *)0)->white)",
     ),
+    ("what whitens the rows, kept between windows", "sizeof(((pvid_weak_finish_q31 *)0)->white)"),
     ("estimates: candidate, published, its copy", "3 * sizeof(pvid_estimate_q31)"),
     ("sums M, b and rr", "sizeof(pvid_information_q31)"),
     ("the rest of the estimator", "sizeof(pvid_estimator_q31) - sizeof(pvid_information_q31)"),

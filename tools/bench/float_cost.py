@@ -27,8 +27,7 @@ _PARTS = (
     ("jets at a step", r"weak_front_f32"),
     ("channels and integrals of a step", r"weak_step_f32|\w+_weak_f32|elementary_f32"),
     ("half-window sums and their join", r"sums_f32"),
-    ("a window: white columns, rows, residuals", r"weak_finish_f32|columns_f32|white_f32|products_f32"),
-    ("a window: the sensors' noise", r"noise_f32"),
+    ("a window: white columns, rows, residuals, noise", r"weak_finish_f32|columns_f32|white_f32|products_f32"),
     ("a window: scatter of the scores", r"scores_f32"),
     (
         "a window: sums, solves, assessment",

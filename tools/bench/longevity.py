@@ -64,8 +64,8 @@ JUDGED = (
 BACK = 3.0  # standard errors
 PATIENCE = 1.0  # of the gate, in times of forgetting, as a rig file has it that does not say
 # What the filters make of the standard rig, relative, of w, d1, d2, and of which the standard errors know nothing: see
-# `filter_bias`; of the weak form with exact samples 0.9e-5, 1.0e-5 and 1.8e-5.
-FILTER_BIAS = {"weak": (1.3e-5, 1.4e-5, 2.6e-5), "strong": (0.0015, 0.0015, 0.0035)}
+# `filter_bias`; of the weak form with exact samples 0.9e-6, 0.8e-6 and 1.3e-6.
+FILTER_BIAS = {"weak": (1.4e-6, 1.2e-6, 2.0e-6), "strong": (0.0015, 0.0015, 0.0035)}
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ def run_fault(fault: Fault, seed: int) -> Published:
     gain_sd = np.asarray(about.gain_sd, np.float32)
     identifier = engine_of(BITS).identifier(standard_start(seed), gain_sd=gain_sd)
     found = identifier.run_both(np.stack([y, phi], axis=1))
-    new = np.flatnonzero(np.any(np.diff(found.r, axis=0, prepend=0.0) != 0, axis=1))
+    new = np.flatnonzero(np.any(np.diff(found.r, axis=0, prepend=0.0) != 0, axis=1) & (found.r[:, 0] > 0))
     return Published(
         found.r[new, :3] / TRUTH - 1, found.se[new, :3] / TRUTH, float(identifier.refinement.estimate.clash)
     )

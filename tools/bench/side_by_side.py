@@ -223,14 +223,14 @@ def side_by_side(
     """
     cost = instructions or {}
     sensors = standard_sensors(bits)
-    savitzky_golay = through_strong(native, window_s=0.321, degree=10)
+    savitzky_golay = through_strong(native, window_s=0.315, degree=10, block=9)
     differences = through_strong(native, differentiator="finite-difference", stride=40)
     weak = through_engine(bits)
     half = "+-50 %"
     jobs: list[tuple[str, str, Callable[[], Outcome], str]] = [
         ("strong form, finite differences 40 ms apart", half, lambda: accuracy(differences, sensors, seeds), "tick"),
         (
-            "strong form, Savitzky-Golay 321 ms, degree 10",
+            "strong form, Savitzky-Golay 315 ms in blocks of nine, degree 10",
             half,
             lambda: accuracy(savitzky_golay, sensors, seeds),
             "smoothing",

@@ -1,4 +1,4 @@
-"""Where the bytes of the strong form go: code by part in each build, state by member, on a Cortex-M4F."""
+"""Where the bytes of the strong form go: code by part, state by member, on a Cortex-M4F; its cost in fixed point."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pvid.board.sizes import ARITHMETIC, CODE, CORE, TICKS, TIMEOUT_S, sections
 from pvid.settings.enums import Core
 
 BOARD = "mps2-an386"
-TEXT_HEADER = ("code", "float32", "float32, PVID_SMALL", "fixed point")
+TEXT_HEADER = ("code", "float32", "fixed point")
 STATE_HEADER = ("state", "bytes")
 
 # What a function belongs to, by its source and its name; the first that fits.
@@ -37,16 +37,16 @@ _OTHERS = "hash, text, the rest"
 
 _STATE = (
     ("58 sums at two levels", "sizeof(pvid_strong_sums_f32)"),
-    ("block of four rows", "PVID_STRONG_ROWS * sizeof(pvid_strong_row_f32)"),
+    ("block of rows", "(PVID_STRONG_ROWS - 1) * sizeof(pvid_strong_row_f32)"),
     ("window of five points", "sizeof(((pvid_strong_window_f32 *)0)->samples)"),
-    ("bank, factors, places of the window", "sizeof(pvid_strong_window_f32) - PVID_MAX_WINDOW * 8"),
+    ("factors and places of the window", "sizeof(pvid_strong_window_f32) - PVID_MAX_WINDOW * 8"),
     ("counters", "sizeof(pvid_counters)"),
     ("gate", "sizeof(pvid_gate_f32)"),
     ("verdict", "sizeof(pvid_misfit_f32)"),
     (
-        "p, bounds, prior, equations of the next step, settings",
+        "p, prior, equations of the next step, schedule",
         "sizeof(pvid_strong_estimator_f32) - sizeof(pvid_strong_sums_f32) - sizeof(pvid_counters) - "
-        "PVID_STRONG_ROWS * sizeof(pvid_strong_row_f32)",
+        "(PVID_STRONG_ROWS - 1) * sizeof(pvid_strong_row_f32)",
     ),
 )
 
@@ -60,9 +60,9 @@ class Build(NamedTuple):
     report: ReplayReport
 
 
-def measured(core: Core, macros: dict[str, str] | None = None) -> Build:
+def measured(core: Core) -> Build:
     """Builds and runs the standard image of the strong form, without a dead zone."""
-    image, _ = build_image(BOARDS[BOARD], standard_run(TICKS, core), macros)
+    image, _ = build_image(BOARDS[BOARD], standard_run(TICKS, core))
     parts: Counter[str] = Counter()
     compiler = application = 0
     for section, size, file in sections(image.with_suffix(".map").read_text(encoding="utf-8")):
@@ -79,7 +79,7 @@ def measured(core: Core, macros: dict[str, str] | None = None) -> Build:
 
 def text_rows() -> list[tuple[str, ...]]:
     """Bytes of code and constants by part, and instructions a tick, as in TEXT_HEADER."""
-    builds = (measured("f32"), measured("f32", {"PVID_SMALL": "1"}), measured("q31"))
+    builds = (measured("f32"), measured("q31"))
     titles = [*dict.fromkeys(title for title, _, _ in _PARTS), _OTHERS]
     rows = [(title, *(str(build.parts[title]) for build in builds)) for title in titles]
     return [
@@ -90,6 +90,20 @@ def text_rows() -> list[tuple[str, ...]]:
         ("instructions a tick, mean", *(f"{build.report.instructions_mean:.0f}" for build in builds)),
         ("instructions, longest tick", *(f"{build.report.instructions_longest:.0f}" for build in builds)),
     ]
+
+
+SOFT = ("mps2-an386", "mps2-an385", "microbit", "virt-rv32imac")
+FIXED_HEADER = ("instructions per tick", "q31", "q31, a solve at every eighth row", "float32", "ratio")
+
+
+def fixed_rows() -> list[tuple[str, ...]]:
+    """A tick in fixed point beside float32, by a floating-point unit (Cortex-M4F) or soft float, as in FIXED_HEADER."""
+    rows = []
+    for name in SOFT:
+        runs = (standard_run(TICKS, "q31"), standard_run(TICKS, "q31", 8), standard_run(TICKS))
+        means = [play(BOARDS[name], build_image(BOARDS[name], run)[0], TIMEOUT_S).instructions_mean for run in runs]
+        rows.append((BOARDS[name].core, *(f"{one:.0f}" for one in means), f"{means[2] / means[0]:.1f}"))
+    return rows
 
 
 def _part_of(section: str, file: str) -> str:

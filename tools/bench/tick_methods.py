@@ -1,8 +1,8 @@
 """A tick of recursive least squares, its U-D form, an extended Kalman filter and the strong form, side by side.
 
 Instructions and state: on a board's emulator, the same samples through every method, from the samples to the
-parameters. Longest safe run: rows of the standard rig, again and again, until an estimate is no number, a variance is
-not positive, or w is off by more than a factor of two.
+parameters; the Savitzky-Golay bank has the standard rig's samples at 1 kHz. Longest safe run: rows of the standard rig,
+again and again, until an estimate is no number, a variance is not positive, or w is off by more than a factor of two.
 """
 
 from __future__ import annotations
@@ -20,11 +20,15 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, board, build, keep_header
-from pvid.board.replay_image import ReplayReport, ReplayRun, build_image, header, play, standard_run
+from pvid.board.replay_image import SAMPLING, ReplayReport, ReplayRun, build_image, header, play, standard_run
+from pvid.cases import case_of
 from pvid.core.native import Native
 from pvid.core.sources import ROOT
+from pvid.rig.file import RigFile
+from pvid.settings.enums import Core
 from pvid.settings.f32 import StrongConfig
-from pvid.sim.pendulum import STANDARD_PENDULUM
+from pvid.settings.kinds import Settings
+from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors, standard_start
 from pvid.twin.kapitza.strong import regressors
 from pvid.twin.strong import StrongTwin
 
@@ -177,19 +181,46 @@ def safe_rows(name: str, n: Float32, y: Float32, ticks: int = LONG) -> int:
     return min(int(periods) * len(rows), ticks)
 
 
-def safe_ticks(native: Native, config: StrongConfig, run: ReplayRun, ticks: int = LONG) -> int:
+def safe_ticks(native: Native, config: Settings, run: ReplayRun, ticks: int = LONG) -> int:
     """The same of a variant of the strong form: the run's samples again and again, a gap between."""
-    identifier = native.identifier(config)
+    identifier, case = native.identifier(config), case_of(config)
     truth = STANDARD_PENDULUM.linear
     done = 0
     while done < ticks:
         identifier.gap()
-        p = identifier.run(*run.samples, sums=False, hashes=False).p[-1].astype(np.float64)
+        p = case.p_of(config, identifier.run(*run.samples, sums=False, hashes=False).p[-1].astype(np.float64))
         estimate = identifier.assess()
         if not np.isfinite(estimate["se"][:3]).all() or not 0.5 < p[0] / truth[0] < 2.0:
             break
         done += run.ticks
     return min(done, ticks)
+
+
+def smoothed_run(ticks: int, core: Core = "f32", divider: int = 1) -> ReplayRun:
+    """The standard rig at 1 kHz: the strong form behind a Savitzky-Golay bank of 35 taps on means of nine samples."""
+    sensors = replace(standard_sensors(SAMPLING.bits), random_offset=False)
+    run = simulate(sensors=sensors, truth="linear", duration=ticks / 1000, seed=1).run
+    rig = RigFile.standard()
+    settings = replace(
+        rig.identifier,
+        form="strong",
+        core=core,
+        differentiator="savitzky-golay",
+        window_s=0.315,
+        degree=10,
+        block=9,
+        divider=divider,
+    )
+    rig = replace(rig, identifier=settings, sensor=replace(rig.sensor, phi_lsb=sensors.phi_lsb))
+    case = case_of(settings)
+    counts = np.rint(np.stack([run.phi / sensors.phi_lsb, run.y / sensors.y_lsb], axis=1))[:ticks]
+    return ReplayRun(
+        config=case.settings(rig, run.sample_rate, standard_start(1)),
+        counts=counts.astype(np.int16),
+        phi_lsb=np.float32(sensors.phi_lsb),
+        y_lsb=np.float32(sensors.y_lsb),
+        measure_from=case.alike_from(ticks),
+    )
 
 
 @dataclass(frozen=True)
@@ -214,6 +245,16 @@ VARIANTS = (
 BASELINES = (("rls", "packed recursive least squares, 11 parameters"), ("ud", "the same as U D U^T"))
 
 
+def others(ticks: int = TICKS) -> Iterator[tuple[str, ReplayRun]]:
+    """The strong form behind a long bank and in fixed point."""
+    bank = "Savitzky-Golay, 315 samples in blocks of nine, a row for each"
+    yield f"strong form, {bank}", smoothed_run(ticks)
+    yield f"strong form, staged, {bank}", smoothed_run(ticks, divider=8)
+    yield "strong form in fixed point, a solve at every row", standard_run(ticks, "q31")
+    yield "strong form in fixed point, a solve at every eighth row", standard_run(ticks, "q31", 8)
+    yield f"strong form in fixed point, {bank}", smoothed_run(ticks, "q31")
+
+
 def rows_of(
     native: Native, ticks: int = LONG, progress: Callable[[int], None] = lambda _: None
 ) -> Iterator[tuple[str, ...]]:
@@ -225,14 +266,14 @@ def rows_of(
         yield _row(label, baseline_report(on, run, name), safe_rows(name, n, y, ticks), ticks)
     progress(2)
     yield _row("extended Kalman filter, 7 states", baseline_report(on, run, "ekf"), None, ticks)
-    for done, variant in enumerate(VARIANTS, 3):
+    own = [(one.name, replace(run, config=one.of(_strong(run)))) for one in VARIANTS]
+    for done, (label, variant) in enumerate([*own, *others()], 3):
         progress(done)
-        own = replace(run, config=variant.of(_strong(run)))
-        report = play(on, build_image(on, own)[0], _RUN_TIMEOUT_S)
-        yield _row(variant.name, report, safe_ticks(native, variant.of(_strong(run)), run, ticks), ticks)
+        report = play(on, build_image(on, variant)[0], _RUN_TIMEOUT_S)
+        yield _row(label, report, safe_ticks(native, variant.config, variant, ticks), ticks)
 
 
-STEPS = 6
+STEPS = 11
 
 
 def _row(label: str, report: ReplayReport, safe: int | None, ticks: int) -> tuple[str, ...]:

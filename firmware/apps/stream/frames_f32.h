@@ -31,6 +31,23 @@ static inline void get_estimator_config(pvid_estimator_config_f32 *estimator,
     estimator->divider = pvid_get_u16(&payload[PVID_CONFIGURE_DIVIDER]);
 }
 
+/* Writes p and the upper triangle of its covariance. */
+static inline void put_p(uint8_t p[4u * LINK_MAX_P], uint8_t covariance[], const pvid_estimate_f32 *estimate)
+{
+    size_t at = 0;
+    for (size_t i = 0; i < LINK_MAX_P; i++) {
+        for (size_t j = i; j < LINK_MAX_P; j++) {
+            if (j < STREAM_N_P) {
+                pvid_put_f32(&covariance[at], estimate->covariance[i][j]);
+            }
+            at += 4u;
+        }
+        if (i < STREAM_N_P) {
+            pvid_put_f32(&p[4u * i], estimate->p[i]);
+        }
+    }
+}
+
 /* Writes an Estimate frame without the upper bits of its tick. */
 static inline void put_estimate(uint8_t payload[PVID_ESTIMATE_BYTES], const pvid_estimate_f32 *estimate,
                                 uint32_t session, uint32_t updates, pvid_reason reason)
@@ -38,18 +55,7 @@ static inline void put_estimate(uint8_t payload[PVID_ESTIMATE_BYTES], const pvid
     memset(payload, 0, PVID_ESTIMATE_BYTES);
     pvid_put_u32(&payload[PVID_ESTIMATE_SESSION], session);
     pvid_put_u32(&payload[PVID_ESTIMATE_UPDATES], updates);
-    size_t at = PVID_ESTIMATE_COVARIANCE;
-    for (size_t i = 0; i < LINK_MAX_P; i++) {
-        for (size_t j = i; j < LINK_MAX_P; j++) {
-            if (j < STREAM_N_P) {
-                pvid_put_f32(&payload[at], estimate->covariance[i][j]);
-            }
-            at += 4u;
-        }
-        if (i < STREAM_N_P) {
-            pvid_put_f32(&payload[PVID_ESTIMATE_P + (4u * i)], estimate->p[i]);
-        }
-    }
+    put_p(&payload[PVID_ESTIMATE_P], &payload[PVID_ESTIMATE_COVARIANCE], estimate);
     pvid_put_f32(&payload[PVID_ESTIMATE_KAPPA], estimate->kappa);
     pvid_put_f32(&payload[PVID_ESTIMATE_RESIDUAL_SD], estimate->residual_sd);
     pvid_put_f32(&payload[PVID_ESTIMATE_WEIGHT], estimate->weight);

@@ -64,6 +64,11 @@ uint32_t identifier_hash(uint32_t hash, pvid_reason reason);
 /* The payload of an Estimate frame, without the upper bits of its tick. */
 void identifier_estimate(uint8_t payload[IDENTIFIER_ESTIMATE_BYTES], uint32_t session, pvid_reason reason);
 
+#ifdef STREAM_REFINED
+/* The payload of a RefinedEstimate frame, without the upper bits of its tick. */
+void identifier_refined(uint8_t payload[PVID_REFINED_ESTIMATE_BYTES], uint32_t session);
+#endif
+
 const pvid_counters *identifier_counters(void);
 
 #endif

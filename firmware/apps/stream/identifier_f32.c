@@ -13,7 +13,8 @@ uint32_t identifier_arithmetic_faults(void)
 
 pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
 {
-    STREAM_CONFIG config = stream_config;
+    static STREAM_CONFIG config; /* the identifier reads it where it is */
+    config = stream_config;
     get_estimator_config(&config.estimator, payload);
     return STREAM_INIT(&identifier, &config);
 }

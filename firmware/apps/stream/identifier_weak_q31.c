@@ -1,8 +1,8 @@
 #include "frames_q31.h"
 #include "identifier.h"
 #include "pvid/fnv_q31.h"
-#include "pvid/weak_q31.h"
 #include "pvid/little_endian.h"
+#include "pvid/weak_q31.h"
 #include "stream_tables.h"
 
 static pvid_weak_q31 identifier;

@@ -28,7 +28,12 @@
 
 #define WINDOW (512u / STREAM_SAMPLES)   /* ticks that may be in transit */
 #define RAW_TICKS (64u / STREAM_SAMPLES) /* ticks in a frame to the PC */
-#define ANSWER_ROOM 640u                 /* bytes of all answers to one sample or request, without announcements */
+#ifdef STREAM_REFINED
+#define REFINED_ROOM PVID_LINK_ENCODED_BYTES(PVID_REFINED_ESTIMATE_BYTES)
+#else
+#define REFINED_ROOM 0u
+#endif
+#define ANSWER_ROOM (640u + REFINED_ROOM) /* bytes of all answers to one sample or request, without announcements */
 #define CHUNK 64u
 #define ANNOUNCE_S 4u
 
@@ -166,6 +171,12 @@ static void answer_estimate(void)
     identifier_estimate(payload, stream.session, stream.verdict);
     pvid_put_u16(&payload[IDENTIFIER_ESTIMATE_TICK_HIGH], stream.tick_high);
     answer(IDENTIFIER_ESTIMATE, payload, sizeof payload);
+#ifdef STREAM_REFINED
+    uint8_t refined[PVID_REFINED_ESTIMATE_BYTES];
+    identifier_refined(refined, stream.session);
+    pvid_put_u16(&refined[PVID_REFINED_ESTIMATE_TICK_HIGH], stream.tick_high);
+    answer(PVID_REFINED_ESTIMATE, refined, sizeof refined);
+#endif
 }
 
 static void answer_raw(void)

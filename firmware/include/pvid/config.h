@@ -45,7 +45,7 @@
 #error "PVID_MAX_MOMENTS must lie in 1..528"
 #endif
 
-/* Largest decimation of the weak form's front end. RAM: 8 bytes for each of taps + decimation. */
+/* Largest decimation of the weak form's front end [ticks a step]. No array depends on it. */
 #ifndef PVID_MAX_DECIMATION
 #define PVID_MAX_DECIMATION 32
 #endif
@@ -53,7 +53,7 @@
 #error "PVID_MAX_DECIMATION must lie in 1..255"
 #endif
 
-/* Largest number of test functions. RAM: 160 bytes each and 4 per pair. */
+/* Largest number of test functions. RAM: see PVID_MAX_COLUMNS. */
 #ifndef PVID_MAX_FUNCTIONS
 #define PVID_MAX_FUNCTIONS 16
 #endif
@@ -122,8 +122,8 @@
 #error "PVID_MAX_SAMPLES must lie in 1..32"
 #endif
 
-/* Numbers in the front end's line: signals times (4 half + 5), half that of the longest compensator [steps]; in the
- * fixed-point core signals times (2 half + decimation), half that of the longest filter [ticks]. RAM: 4 bytes each. */
+/* Numbers in the front end's line: signals times (4 half + 5), with the half of the longest compensator [steps]. RAM:
+ * 4 bytes each. */
 #ifndef PVID_MAX_RING
 #define PVID_MAX_RING 256
 #endif
@@ -171,7 +171,7 @@
 #error "PVID_MAX_KINDS must lie in 1..8"
 #endif
 
-/* Most columns of a kind: theta's, Y and nuisances. RAM: 4 bytes for each and each function. */
+/* Most columns of a kind: theta's, Y and nuisances. RAM: 4 bytes for each column and function. */
 #ifndef PVID_MAX_COLUMNS
 #define PVID_MAX_COLUMNS 12
 #endif
@@ -179,7 +179,7 @@
 #error "PVID_MAX_COLUMNS must lie in 2..48"
 #endif
 
-/* Largest n of the test functions sin^n. RAM: 4 bytes for each and each function. */
+/* Largest n of the test functions sin^n. RAM: 4 bytes for each power and harmonic. */
 #ifndef PVID_MAX_POWER
 #define PVID_MAX_POWER 8
 #endif
@@ -187,9 +187,9 @@
 #error "PVID_MAX_POWER must lie in 2..12"
 #endif
 
-/* Blocks of steps in the sums: 2, one of which fills while the other is added; 1 where the ticks of one step add and
- * join a whole block, which `pvid model build` tells. RAM: 32 bytes each for a channel, 16 in the fixed-point core.
- * init refuses a design that needs 2. */
+/* Blocks of steps in the sums. 2: one fills while the other is added. 1 suffices where the ticks of one step add and
+ * join a whole block; `pvid model build` prints the number. RAM: 32 bytes for each block and channel, 16 in the
+ * fixed-point core. init refuses a design that needs 2 if it is 1. */
 #ifndef PVID_MAX_BLOCKS
 #define PVID_MAX_BLOCKS 2
 #endif
@@ -197,9 +197,9 @@
 #error "PVID_MAX_BLOCKS must lie in 1..2"
 #endif
 
-/* Windows whose sums have a place of their own: 1, or 0 where all columns of a window are formed before the next half's
- * first block is added, which `pvid model build` tells: they are then in the place of the older half's. Float only.
- * RAM: 8 bytes for each channel and harmonic. init refuses a design that needs 1. */
+/* Windows whose sums have memory of their own: 1 or 0. 0 suffices where all columns of a window are formed before the
+ * first block of the next half is added: the sums then overwrite those of the older half. `pvid model build` prints the
+ * number. RAM: 8 bytes for each channel and harmonic. init refuses a design that needs 1 if it is 0. */
 #ifndef PVID_MAX_WINDOWS
 #define PVID_MAX_WINDOWS 1
 #endif
@@ -207,9 +207,9 @@
 #error "PVID_MAX_WINDOWS must lie in 0..1"
 #endif
 
-/* 1: a build for one model and one design of the weak form of described mechanisms. Its sizes are those that `pvid
- * model build` prints with the design, exactly; init refuses others (PVID_BAD_DESIGN). Their loops are of constant
- * length: fewer instructions, more flash, the same bits. */
+/* 1: a build for one model and one design of the weak form. The sizes must be exactly those that `pvid model build`
+ * prints with the design; init refuses any other design (PVID_BAD_DESIGN). Loops have a constant length: fewer
+ * instructions, more flash, the same bits. */
 #ifndef PVID_EXACT
 #define PVID_EXACT 0
 #endif
@@ -221,17 +221,32 @@
 #define PVID_EXACT_JETS 0
 #define PVID_EXACT_RUNS 0
 #define PVID_EXACT_SIGNS 0
+#define PVID_EXACT_GAINS 0
 #define PVID_EXACT_INTEGRANDS 0
 #define PVID_EXACT_CHANNELS 0 /* that are summed */
+#define PVID_EXACT_PLAIN 0    /* 1: the signals are the samples */
 #endif
 
-/* Parts that a design or its settings may do without, for less flash; `pvid model build` tells. init refuses settings
- * that need a part which is left out: a dead zone with PVID_BAD_DEAD_ZONE, a second stage with PVID_BAD_POINTER. */
+/* Parts that a design or its settings may not need; 0 leaves a part out, for less flash. `pvid model build` prints
+ * them. init refuses settings that need a part that is left out: a dead zone with PVID_BAD_DEAD_ZONE, g < 1 with
+ * PVID_BAD_FEEDBACK, neglected terms with PVID_BAD_NEGLECTED, a second stage with PVID_BAD_POINTER. */
 #ifndef PVID_DEAD_ZONE /* dead zone of estimator.h */
 #define PVID_DEAD_ZONE 1
 #endif
 #if PVID_DEAD_ZONE != 0 && PVID_DEAD_ZONE != 1
 #error "PVID_DEAD_ZONE must be 0 or 1"
+#endif
+#ifndef PVID_FEEDBACK /* laws of the weak form with g < 1 (estimator.h) */
+#define PVID_FEEDBACK 1
+#endif
+#if PVID_FEEDBACK != 0 && PVID_FEEDBACK != 1
+#error "PVID_FEEDBACK must be 0 or 1"
+#endif
+#ifndef PVID_NEGLECTED /* errors from neglected terms (trust.h) */
+#define PVID_NEGLECTED 1
+#endif
+#if PVID_NEGLECTED != 0 && PVID_NEGLECTED != 1
+#error "PVID_NEGLECTED must be 0 or 1"
 #endif
 #ifndef PVID_REFINEMENT /* second stage of weak.h */
 #define PVID_REFINEMENT 1
@@ -239,21 +254,13 @@
 #if PVID_REFINEMENT != 0 && PVID_REFINEMENT != 1
 #error "PVID_REFINEMENT must be 0 or 1"
 #endif
-#ifndef PVID_CHECK_TABLES /* init checks every number of a float model and design; 0: their counts alone, of tables    \
-                             that are as printed, which pvid has checked */
+/* init checks every number of a float model and design. 0: only the counts, for unchanged tables of `pvid model build`,
+ * which has checked them. */
+#ifndef PVID_CHECK_TABLES
 #define PVID_CHECK_TABLES 1
 #endif
 #if PVID_CHECK_TABLES != 0 && PVID_CHECK_TABLES != 1
 #error "PVID_CHECK_TABLES must be 0 or 1"
-#endif
-
-/* 1: the strong form in float32 has loops and calls instead of written-out sums: a fifth less flash, and a tenth more
- * instructions; the same bits. */
-#ifndef PVID_SMALL
-#define PVID_SMALL 0
-#endif
-#if PVID_SMALL != 0 && PVID_SMALL != 1
-#error "PVID_SMALL must be 0 or 1"
 #endif
 
 /* Called with a false condition on misuse: NULL instead of an object, or an object before its init. Define your

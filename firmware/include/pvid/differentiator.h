@@ -1,13 +1,13 @@
 /* pvid/differentiator.h - derivatives of order 0 to 4 of one sampled channel.
  *
- * A window of 2 * half * stride + block samples and a bank of five symmetric FIR filters: central finite differences
- * with a stride, Savitzky-Golay of any degree, or your own table. All orders refer to the centre of the window, half *
- * stride + (block - 1) / 2 samples ago. Never allocates; the time of a step does not depend on the data.
+ * A window of 2 * half * stride + 1 points and a bank of five symmetric FIR filters: central finite differences with a
+ * stride, Savitzky-Golay of any degree, or your own table. All orders refer to the centre of the window. Never
+ * allocates; the time of a step does not depend on the data.
  *
- * Long windows: each point of the filters is the mean of `block` samples, by a sum that is updated by the newest and
- * the oldest of them. 35 points with stride = block cover a window of any length at the cost of 35 taps; its noise is
- * that of the polynomial through all samples plus 2 % (order 0) to 14 % (order 4). Every `block` samples the sum is
- * replaced by one that was begun anew, so that rounding does not add up over a run.
+ * Long windows: a point is the mean of `block` samples, and there is one result for each block. 35 points cover a
+ * window of any length in 35 places, at the cost of 35 taps a block and one addition a sample: O(1) a sample. The noise
+ * is that of the polynomial through all samples plus 2 % (order 0) to 14 % (order 4). Every sum of a block begins anew,
+ * so that no rounding adds up over a run.
  *
  *   pvid_differentiator_f32 phi;                              (static)
  *   if (pvid_differentiator_init_f32(&phi, &bank, 1000.0f) != PVID_OK) ...
@@ -29,20 +29,18 @@
 extern "C" {
 #endif
 
-/* A bank in folded form. With x[0] the centre sample (the mean of the `block` samples there) and x[+-i] those i *
- * stride away,
+/* A bank in folded form. With x[0] the centre point and x[+-i] those i * stride points away,
  *   q_i = (x[i] - x[0]) + (x[-i] - x[0]),   d_i = x[i] - x[-i],   i = 1..half,
  *   order 0:      x[0] + sum w[0][i-1] q_i
- *   orders 2, 4:  rate^k sum w[k][i-1] q_i        rate = sample rate / stride
+ *   orders 2, 4:  rate^k sum w[k][i-1] q_i        rate = sample rate / (stride block)
  *   orders 1, 3:  rate^k sum w[k][i-1] d_i
  *
  * A constant is reproduced exactly for any rounding of the weights, and the large common part of the readings
  * enters no product. */
 typedef struct {
-    uint16_t half;   /* points on each side, >= 2; 2 half stride + 1 <= PVID_MAX_WINDOW, with a block 2 half stride +
-                        block + 3 */
-    uint16_t stride; /* samples between points, >= 1 */
-    const float *weights; /* [PVID_ORDERS][half], order k in units of 1/point^k; kept by reference */
+    uint16_t half;        /* taps on each side, >= 2; 2 half stride + 1 <= PVID_MAX_WINDOW */
+    uint16_t stride;      /* points from tap to tap, >= 1 */
+    const float *weights; /* [PVID_ORDERS][half], order k in units of 1/(stride points)^k; kept by reference */
     uint16_t block;       /* samples of a point; 0 and 1: the sample itself */
 } pvid_fir_bank_f32;
 
@@ -63,8 +61,8 @@ pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pv
 /* Empties the window; call it after a gap, when samples are no longer equidistant. */
 void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self);
 
-/* Adds a finite sample. When the window is full, writes the derivatives out[k] [unit/s^k] and returns true. Cost:
- * 5 half multiplications. */
+/* Adds a finite sample. When it completes a point and the window is full, writes the derivatives out[k] [unit/s^k] and
+ * returns true. Cost then: 5 half multiplications; else an addition. */
 bool pvid_differentiator_step_f32(pvid_differentiator_f32 *self, float sample, float out[PVID_ORDERS]);
 
 #ifdef __cplusplus

@@ -11,8 +11,8 @@
  * Never wraps: init sums the weights' magnitudes and refuses a bank in which counts within full scale could
  * overflow a sum or a derivative. Without a block a weight times a difference of counts fits 32 bits.
  *
- * Long windows: each point is the sum of `block` samples, kept by adding the newest and taking the oldest away, which
- * is exact in integers. 35 points with stride = block cover a window of any length at the cost of 35 taps.
+ * Long windows: a point is the sum of `block` samples, and there is one result for each block: 35 points cover a window
+ * of any length in 35 places.
  * Not thread-safe.
  */
 #ifndef PVID_DIFFERENTIATOR_Q31_H
@@ -41,12 +41,12 @@ extern "C" {
 /* A folded bank as in differentiator.h, with integer weights w and a weighted centre sample in order 0:
  *   order 0:  centre x[0] + sum w[0][i-1] q_i,   2, 4:  sum w[k][i-1] q_i,   1, 3:  sum w[k][i-1] d_i
  *
- * times 2^-shift, with x[i] the sum of the `block` samples about a point. An order k whose weights are 2^b times those
+ * times 2^-shift, with x[i] the sum of the `block` samples of a point. An order k whose weights are 2^b times those
  * of a derivative per time unit^k has 2^(shift - b) counts per time unit^k. */
 typedef struct {
-    uint16_t half;   /* points on each side, 2..; 2 half stride + 1 <= PVID_MAX_WINDOW */
-    uint16_t stride; /* samples between points, 1.. */
-    uint16_t block;  /* samples of a point, 0 or 1: one; 2 half stride + block + 2 <= PVID_MAX_WINDOW if more */
+    uint16_t half;   /* taps on each side, 2..; 2 half stride + 1 <= PVID_MAX_WINDOW */
+    uint16_t stride; /* points from tap to tap, 1.. */
+    uint16_t block;  /* samples of a point, 0 or 1: one */
     int32_t phi_max; /* full scale of the counts, 1..; times the block at most PVID_COUNTS_LIMIT_Q31 */
     int32_t y_max;
     int32_t centre;                     /* 1..2^30 */
@@ -71,8 +71,9 @@ pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pv
 /* Empties the window; call it after a gap, when samples are no longer equidistant. */
 void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self);
 
-/* Adds one sample of each channel, within full scale. When the window is full, writes the derivatives of phi and y
- * and returns true. Cost: 8 half multiplications, whatever the block; five points without a shift are written out. */
+/* Adds one sample of each channel, within full scale. When it completes a point and the window is full, writes the
+ * derivatives of phi and y and returns true. Cost then: 8 half multiplications; five points without a shift are written
+ * out. */
 bool pvid_differentiator_step_q31(pvid_differentiator_q31 *self, int32_t phi, int32_t y, int32_t d_phi[PVID_ORDERS],
                                   int32_t d_y[PVID_Y_ORDERS_Q31]);
 

@@ -50,10 +50,14 @@ static inline int32_t pvid_fixed_shift_q31(int32_t x, uint32_t s)
 }
 
 /* a b 2^-s rounded half up; it fits an int32. */
+#if defined(__ARM_ARCH_6M__) /* by four multiplications of 16 by 16 bits */
+int32_t pvid_fixed_product_q31(int32_t a, int32_t b, uint32_t s);
+#else
 static inline int32_t pvid_fixed_product_q31(int32_t a, int32_t b, uint32_t s)
 {
     return (int32_t)pvid_round_shift_q31((int64_t)a * b, s);
 }
+#endif
 
 /* a 2^s / b rounded towards 0, s <= 31; it fits an int32. 0 for b = 0. */
 static inline int32_t pvid_fixed_quotient_q31(int32_t a, int32_t b, uint32_t s)

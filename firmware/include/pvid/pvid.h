@@ -12,7 +12,6 @@
 #include "pvid/estimator.h"
 #include "pvid/fnv.h"
 #include "pvid/fnv_refine.h"
-#include "pvid/weak.h"
 #include "pvid/gate.h"
 #include "pvid/information.h"
 #include "pvid/little_endian.h"
@@ -22,12 +21,13 @@
 #include "pvid/publication.h"
 #include "pvid/refine.h"
 #include "pvid/snapshot.h"
-#include "pvid/snapshot_weak.h"
 #include "pvid/snapshot_refine.h"
+#include "pvid/snapshot_weak.h"
 #include "pvid/status.h"
 #include "pvid/strong.h"
 #include "pvid/text.h"
 #include "pvid/trust.h"
 #include "pvid/version.h"
+#include "pvid/weak.h"
 
 #endif

@@ -11,7 +11,6 @@
 #include "pvid/differentiator_q31.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/fnv_q31.h"
-#include "pvid/weak_q31.h"
 #include "pvid/gate_q31.h"
 #include "pvid/mechanism_q31.h"
 #include "pvid/misfit_q31.h"
@@ -23,5 +22,6 @@
 #include "pvid/text.h"
 #include "pvid/trust_q31.h"
 #include "pvid/version.h"
+#include "pvid/weak_q31.h"
 
 #endif

@@ -1,26 +1,29 @@
 /* pvid/refine.h - refines an estimate of the weak form to the statistical limit: the full equations, any angle.
  *
- * The weak form converges from anywhere, but neglects what its equation does not contain (large angles, friction, a
- * skew of the sensors). Behind it this stage fits the full equations of the model to blocks of about two slow periods:
+ * The weak form converges from any start, but its equation is approximate: it has no large angles, no friction, no skew
+ * of the sensors. This stage starts at its estimate and fits the full equations of the model to blocks of samples, each
+ * about two slow periods long:
  *
- *   - a block is integrated from a start of its own, with the derivatives of the motion by start and parameters;
- *   - Cholesky eliminates the start; what remains joins a square-root triangle, which is carried and forgets in
- * seconds;
- *   - search: short blocks that grow, with the weak form's estimate as prior, until one fits; then track;
- *   - a block is taken if its residuals, its clash with the past and its last step are small enough, relative to the
- *     best of the last blocks; after two refusals in a row the search begins again.
+ *   - A block is integrated from a start of its own, with the derivatives of the motion with respect to start and
+ *     parameters.
+ *   - Cholesky eliminates the start. The information on the parameters is added to a square-root triangle, which is
+ *     kept from block to block and forgets (forgetting_s).
+ *   - Search: short blocks that grow, with the weak form's estimate as prior, until one fits. Then track.
+ *   - A block is accepted if its residuals, its clash with the past and its last step are small enough, relative to the
+ *     best of the last blocks. After two refused blocks in a row the search begins again.
  *
  *   static pvid_refine_f32 refinement;
  *   static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &refine_config};
  *   config.refine = &second;
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick:     reason = pvid_weak_step_f32(&identifier, sample);          both stages
- *   same context:  estimate = pvid_refine_latest_f32(&refinement);               NULL: the weak form's stands
- *   other context: if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
+ *   same context:  stage = pvid_refine_best_f32(&refinement, pvid_weak_estimate_f32(&identifier), &estimate);
+ *   other context: pvid_publication_put_f32 of that estimate (publication.h), or
+ *                  if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
- * The model: refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is spread over the ticks,
- * one job each; that of a tick is bounded (with the weak form 1 500 instructions on a Cortex-M4F for the pendulum). A
- * tick with a new estimate of the weak form has none, unless the tick before had such an estimate too.
+ * The model is refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is divided into jobs; a
+ * tick does a few of them, so its time is bounded. A tick in which the weak form is busy does none, but no more than
+ * `rests` ticks in a row do none.
  */
 #ifndef PVID_REFINE_H
 #define PVID_REFINE_H
@@ -30,8 +33,8 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
-#include "pvid/weak.h"
 #include "pvid/refine_shape.h"
+#include "pvid/weak.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -59,29 +62,34 @@ typedef struct {
 
 typedef struct pvid_refine_config_f32 {
     float sample_rate_hz; /* ticks per second [Hz], 1e-3..1e6 */
-    uint8_t ratio;        /* ticks of a step of the motion, 1..255. A step of 1/40 of the fastest period or less */
+    uint8_t ratio;        /* ticks a step of the motion, 1..255; a step is at most 1/40 of the fastest period */
     const float *second;  /* [PVID_REFINE_HALF + 1] weights of second derivatives, centre first [1/s^2]; NULL: no
                              signal has order 2. Must outlive the object */
     const pvid_refine_signal_f32 *signal; /* [inputs + outputs]; must outlive the object */
     uint16_t block;                       /* big steps (4 steps) of a full block, about two slow periods, 8..ring / 6 */
     uint16_t first_block;                 /* of the first block of a search, 8..block; recommended: block / 4 */
-    uint8_t passes;                       /* of a block, at least, 1..most_passes; recommended: 2 */
-    uint8_t most_passes;                  /* of a block whose steps do not become small, 1..16; recommended: 8 */
-    float sd[PVID_REFINE_OUTPUTS];        /* of the noise of a row, at low frequencies [unit of the output], > 0 */
+    uint8_t passes;      /* least passes over a block, 1..most_passes; in the track one pass suffices if its step is
+                            below step_max / 4; recommended: 2 */
+    uint8_t most_passes; /* most passes over a block, 1..16, if its steps do not become small; recommended: 8 */
+    uint8_t jobs;        /* jobs of a pass in one tick, 1..16; recommended: 3 with a floating-point unit, 1 without */
+    uint8_t rests;       /* most ticks in a row without jobs because the weak form is busy, 0..255. 255 makes the
+                            longest tick short where the weak form is seldom busy, as the pendulum's is; otherwise 1 */
+    float sd[PVID_REFINE_OUTPUTS];          /* of the noise of a row, at low frequencies [unit of the output], > 0 */
     float prior_sd[PVID_REFINE_PARAMETERS]; /* of the weak form's estimate, in the search; relative if logarithmic */
-    float gain_sd[PVID_REFINE_PARAMETERS];  /* errors of the steps by one error of a sensor's gain, with their signs */
+    float gain_sd[PVID_REFINE_PARAMETERS];  /* change of each step of r by one s.d. of a sensor's gain, with its sign */
     float state_limit[PVID_REFINE_ORDER *
                       PVID_REFINE_COORDINATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
     float forgetting_s;                         /* time constant of the triangle [s], > 0; 0: it does not forget */
-    float gate;       /* rows with a larger residual are left out in track [standard deviations], 0: none */
+    float gate;       /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */
     float chi_max;    /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
     float clash_max;  /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
     float step_max;   /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
     float step_limit; /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 0.9 at most;
                          recommended: 2 */
     float se_max;     /* largest relative standard error of a published estimate, > 0 */
-    float distance;   /* relative distance from the weak form's estimate that the bias of its equations allows, >= 0. 0:
-                         they are the refinement's, and the geometric mean of the standard errors must be below its */
+    float distance;   /* relative distance from the weak form's estimate that the bias of its equations explains, >= 0.
+                         0: the weak form has the same equations; an estimate is then published only if the geometric
+                         mean of its standard errors is below that of the weak form */
 } pvid_refine_config_f32;
 
 /* An estimate; all numbers are finite. */
@@ -90,16 +98,19 @@ typedef struct {
     float se[PVID_REFINE_PARAMETERS];                                 /* standard errors [units of r] */
     float covariance[PVID_REFINE_PARAMETERS][PVID_REFINE_PARAMETERS]; /* of the steps of r: relative if logarithmic */
     float level; /* residual variance over its expectation from the sensors' noise */
-    float clash; /* square by which blocks differ from their past, over its expectation from that noise. The standard
-                    errors contain the root of the larger one of the two; well above 1 the equations lack something. A
-                    block that is refused in the track counts with clash_max times the level */
+    float clash; /* squared difference of the blocks from their past, over its expectation from that noise. The standard
+                    errors contain the root of the larger one of level and clash. Well above 1: the equations lack
+                    something. A block that is refused in the track counts as clash_max times the level */
 } pvid_refine_estimate_f32;
+
+/* Whose estimate is published. */
+typedef enum { PVID_STAGE_WEAK, PVID_STAGE_REFINED } pvid_stage;
 
 /* State: detail/refine_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_refine_f32 pvid_refine_f32;
 
-/* The functions below, for the configuration of the weak form, which then calls them: only latest, read and
- * reason are left to the application. */
+/* Table of init, step, gap and freeze for the configuration of the weak form, which then calls them. The application
+ * calls only best, latest, read and reason. */
 extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
 
 /* Initialises `self`. Fails iff
@@ -107,32 +118,46 @@ extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
  *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config);
 
-/* One tick: the samples of signal[].sample, taken at the same time, and an estimate of the weak form that is new at
- * this tick, with its standard errors, whether the weak form trusts it already or not (NULL: none). Returns
+/* One tick.
+ *   sample:  the samples of signal[].sample, taken at the same time
+ *   weak:    the estimate of the weak form with its standard errors, published or not, if it is new at this tick;
+ *            else NULL
+ *   busy:    the weak form's tick was long
+ * Returns
  *   - PVID_WARMING_UP until there is an estimate of the weak form,
  *   - PVID_REJECTED_NOT_FINITE if a sample of an input is not finite, at the end of its step: the block restarts.
  *     (An output that is not finite is a missing row.)
  *   - PVID_HELD_FROZEN while frozen,
  *   - at the end of a block PVID_UPDATED if an estimate was published, else PVID_HELD_SEARCHING (no block fits yet),
- *     PVID_HELD_BLOCK (the block does not fit to its past), PVID_HELD_UNCERTAIN (standard errors, or one block alone)
- * or PVID_HELD_DISAGREES (the estimate differs from the weak form's beyond the errors of both),
+ *     PVID_HELD_BLOCK (the block does not fit its past), PVID_HELD_UNCERTAIN (standard errors too large, or one block
+ *     alone), or PVID_HELD_DISAGREES (the estimate differs from the weak form's by more than the errors of both),
  *   - PVID_ACCUMULATED at all other ticks. */
-pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak);
+pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy);
 
-/* The published estimate, for the context that calls step; NULL before the first one. */
+/* The published estimate, for the context that calls step; NULL: there is none. It stands until the next one, unless it
+ * is withdrawn: when the track is lost (two blocks in a row do not fit their past), or when a block's estimate is too
+ * uncertain or disagrees with the weak form's. The next one may be published many blocks later. */
 const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self);
 
-/* What the last block told: as step, at the end of a block. PVID_WARMING_UP before the first one, PVID_NOT_READY
- * without init. */
+/* The outcome of the last block: the reason that step returned at its end. PVID_WARMING_UP before the first one,
+ * PVID_NOT_READY without init. */
 pvid_reason pvid_refine_reason_f32(const pvid_refine_f32 *self);
 
-/* Copies the published estimate from any context (publication.h). *number: estimates published so far, 0: none; may be
- * NULL. Fails iff
+/* The better one of the two published estimates, for the context that calls step. *estimate is a copy of `weak`, the
+ * published estimate of the weak form; while an estimate of the refinement stands (see latest), p, standard errors and
+ * covariance are those of the refinement. Returns the stage that they are from. pvid_refine_reason_f32 returns
+ * PVID_UPDATED, or why the last block gave no new estimate. Without init it is the weak form's. Nothing is copied iff
+ * `weak` or `estimate` is NULL. Cost: a copy of *weak and O(p^2). */
+pvid_stage pvid_refine_best_f32(const pvid_refine_f32 *self, const pvid_estimate_f32 *weak,
+                                pvid_estimate_f32 *estimate);
+
+/* Copies the published estimate from any context (publication.h). *number: estimates published so far, 0: there is
+ * none, or it was withdrawn; may be NULL. Fails iff
  *   - an estimate was published during each of PVID_READ_ATTEMPTS attempts, or
  *   - `self` is not initialised. */
 bool pvid_refine_read_f32(const pvid_refine_f32 *self, pvid_refine_estimate_f32 *estimate, uint32_t *number);
 
-/* Call this when samples are missing: the block restarts, what is known of r is kept. */
+/* Call this when samples are missing: the block restarts, the information on r is kept. */
 void pvid_refine_gap_f32(pvid_refine_f32 *self);
 
 /* Freezes the refinement (true) or resumes it (false). */

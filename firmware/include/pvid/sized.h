@@ -24,20 +24,26 @@
 
 #define PVID_SIZED_AS(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31,       \
                       c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks,    \
-                      windows, enums)                                                                                  \
-    name##_window##window##_theta##theta##_p##p##_moments##moments##_decimation##decimation##_functions##functions##_iterations##iterations##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_blocks##blocks##_windows##windows##_enum##enums
+                      windows, feedback, exact, plain, runs, signs, gains, exact_integrands, enums)                    \
+    name##_window##window##_theta##theta##_p##p##_moments##moments##_decimation##decimation##_functions##functions##_iterations##iterations##_q31theta##integers##_q31moments##moments_q31##_q31c##c_q31##_samples##samples##_ring##ring##_inputs##inputs##_channels##channels##_integrands##integrands##_harmonics##harmonics##_kinds##kinds##_columns##columns##_power##power##_blocks##blocks##_windows##windows##_feedback##feedback##_exact##exact##_plain##plain##_runs##runs##_signs##signs##_gains##gains##_integrals##exact_integrands##_enum##enums
 #define PVID_SIZED_OF(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31,       \
                       c_q31, samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks,    \
-                      windows, enums)                                                                                  \
+                      windows, feedback, exact, plain, runs, signs, gains, exact_integrands, enums)                    \
     PVID_SIZED_AS(name, window, theta, p, moments, decimation, functions, iterations, integers, moments_q31, c_q31,    \
                   samples, ring, inputs, channels, integrands, harmonics, kinds, columns, power, blocks, windows,      \
-                  enums)
+                  feedback, exact, plain, runs, signs, gains, exact_integrands, enums)
 #define PVID_SIZED(name)                                                                                               \
     PVID_SIZED_OF(name, PVID_MAX_WINDOW, PVID_MAX_THETA, PVID_MAX_P, PVID_MAX_MOMENTS, PVID_MAX_DECIMATION,            \
                   PVID_MAX_FUNCTIONS, PVID_MAX_ITERATIONS, PVID_MAX_THETA_Q31, PVID_MAX_MOMENTS_Q31, PVID_MAX_C_Q31,   \
                   PVID_MAX_SAMPLES, PVID_MAX_RING, PVID_MAX_INPUTS, PVID_MAX_CHANNELS, PVID_MAX_INTEGRANDS,            \
                   PVID_MAX_HARMONICS, PVID_MAX_KINDS, PVID_MAX_COLUMNS, PVID_MAX_POWER, PVID_MAX_BLOCKS,               \
-                  PVID_MAX_WINDOWS, PVID_ENUM_SIZE)
+                  PVID_MAX_WINDOWS, PVID_FEEDBACK, PVID_EXACT, PVID_EXACT_PLAIN, PVID_EXACT_RUNS, PVID_EXACT_SIGNS,    \
+                  PVID_EXACT_GAINS, PVID_EXACT_INTEGRANDS, PVID_ENUM_SIZE)
+
+/* Symbols of the refinement contain its mechanism too (refine_shape.h): with another one it is a link error. */
+#define PVID_REFINED_AS(name, id) name##_model##id
+#define PVID_REFINED_OF(name, id) PVID_REFINED_AS(name, id)
+#define PVID_REFINED(name) PVID_SIZED(PVID_REFINED_OF(name, PVID_REFINE_MODEL_ID))
 
 /* differentiator.h */
 #define pvid_differentiator_init_f32 PVID_SIZED(pvid_differentiator_init_f32)
@@ -139,25 +145,26 @@
 #define pvid_snapshot_restore_strong_q31 PVID_SIZED(pvid_snapshot_restore_strong_q31)
 
 /* refine.h */
-#define pvid_refine_init_f32 PVID_SIZED(pvid_refine_init_f32)
-#define pvid_refine_step_f32 PVID_SIZED(pvid_refine_step_f32)
-#define pvid_refine_latest_f32 PVID_SIZED(pvid_refine_latest_f32)
-#define pvid_refine_read_f32 PVID_SIZED(pvid_refine_read_f32)
-#define pvid_refine_gap_f32 PVID_SIZED(pvid_refine_gap_f32)
-#define pvid_refine_freeze_f32 PVID_SIZED(pvid_refine_freeze_f32)
-#define pvid_refine_reason_f32 PVID_SIZED(pvid_refine_reason_f32)
-#define pvid_refine_stage_f32 PVID_SIZED(pvid_refine_stage_f32)
+#define pvid_refine_init_f32 PVID_REFINED(pvid_refine_init_f32)
+#define pvid_refine_step_f32 PVID_REFINED(pvid_refine_step_f32)
+#define pvid_refine_best_f32 PVID_REFINED(pvid_refine_best_f32)
+#define pvid_refine_latest_f32 PVID_REFINED(pvid_refine_latest_f32)
+#define pvid_refine_read_f32 PVID_REFINED(pvid_refine_read_f32)
+#define pvid_refine_gap_f32 PVID_REFINED(pvid_refine_gap_f32)
+#define pvid_refine_freeze_f32 PVID_REFINED(pvid_refine_freeze_f32)
+#define pvid_refine_reason_f32 PVID_REFINED(pvid_refine_reason_f32)
+#define pvid_refine_stage_f32 PVID_REFINED(pvid_refine_stage_f32)
 
 /* fnv_refine.h */
-#define pvid_fnv_refine_f32 PVID_SIZED(pvid_fnv_refine_f32)
+#define pvid_fnv_refine_f32 PVID_REFINED(pvid_fnv_refine_f32)
 
 /* snapshot_weak.h */
 #define pvid_snapshot_save_weak_f32 PVID_SIZED(pvid_snapshot_save_weak_f32)
 #define pvid_snapshot_restore_weak_f32 PVID_SIZED(pvid_snapshot_restore_weak_f32)
 
 /* snapshot_refine.h */
-#define pvid_snapshot_save_refine_f32 PVID_SIZED(pvid_snapshot_save_refine_f32)
-#define pvid_snapshot_restore_refine_f32 PVID_SIZED(pvid_snapshot_restore_refine_f32)
+#define pvid_snapshot_save_refine_f32 PVID_REFINED(pvid_snapshot_save_refine_f32)
+#define pvid_snapshot_restore_refine_f32 PVID_REFINED(pvid_snapshot_restore_refine_f32)
 
 /* snapshot_weak_q31.h */
 #define pvid_snapshot_save_weak_q31 PVID_SIZED(pvid_snapshot_save_weak_q31)

@@ -8,8 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pvid/weak.h"
 #include "pvid/snapshot_slots.h"
+#include "pvid/weak.h"
 
 #ifdef __cplusplus
 extern "C" {

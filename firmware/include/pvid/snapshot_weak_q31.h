@@ -8,8 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pvid/weak_q31.h"
 #include "pvid/snapshot_slots.h"
+#include "pvid/weak_q31.h"
 
 #ifdef __cplusplus
 extern "C" {

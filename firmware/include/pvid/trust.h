@@ -5,25 +5,26 @@
  *
  *   PVID_UPDATED            published
  *   PVID_MISFIT             published, but the residuals exceed the sensors' noise: the model does not fit
- *   PVID_HELD_NOT_EXCITED   held: too little information on p[0], or no more than noise gives
+ *   PVID_HELD_NOT_EXCITED   held: too little information on p[0], or no more than noise alone gives
  *   PVID_HELD_PIVOT         held: the system could not be solved
  *   PVID_HELD_UNCERTAIN     held: standard errors too large, or p not converged
  *
- * The published estimate is the start with start_sd until the first one is trusted; then it is held until the next
- * one.
+ * Until the first estimate is trusted, the published one is the start with start_sd. A published estimate is held until
+ * the next one.
  *
  * Misfit alarm. Residual variances are compared with their expectation from the sensors' noise: that of all rows
  * in the sums at the present p, and those of the latest windows at the p before each window.
  *
- * Renewal. Rows added far from the solution may have too much weight, and float32 sums lose digits when p moves
- * far. When p has converged far from them, the old sums are faded over the next groups.
+ * Renewal. Rows that were added while p was far from the solution may have too much weight, and float32 sums lose
+ * digits when p moves far. When p has converged far from its value at those rows, the old sums are faded over the next
+ * groups.
  *
- * Beginning anew. When the gate opens to a changed mechanism, next to nothing of the old sums remains. p stays,
- * and what is published is held until p is trusted as after the start.
+ * Beginning anew. When the gate opens to a changed mechanism, almost nothing of the old sums remains. p stays. The
+ * published estimate is held until p passes the checks of a first publication.
  *
  * Neglected terms. Residuals do not show a small error of the equations, and more data do not reduce the error of p
- * that it causes. `neglected` joins the standard errors of what is published, the same part of each positive parameter;
- * the verdict does not depend on it.
+ * that it causes. `neglected` is therefore added to the published standard errors, the same share of each positive
+ * parameter. Whether an estimate is published does not depend on it.
  *
  * Every input is allowed. Cost: O(n_p^2).
  */
@@ -44,17 +45,17 @@ typedef struct {
     float kappa_min;  /* least kappa and least pivot of a published estimate, 0 <= . < 1. A single mode of motion gives
                          below 2e-5, by rounding */
     float se_max;     /* largest relative standard error of the positive parameters, > 0 */
-    float misfit_max; /* alarm when the residual variance exceeds its expectation by this factor, >= 1; 0: no alarm. Of
-                         all rows in the sums: times 1 + 3 sqrt(2 / degrees of freedom); of the mean of PVID_TRUST_LONG
-                         groups and more: times 1; of the last PVID_TRUST_SHORT groups: times 1.5 */
+    float misfit_max; /* alarm when the residual variance exceeds its expectation by this factor, >= 1; 0: no alarm. The
+                         factor is multiplied by 1 + 3 sqrt(2 / degrees of freedom) for all rows in the sums, by 1 for
+                         the mean of PVID_TRUST_LONG groups or more, by 1.5 for the last PVID_TRUST_SHORT groups */
     uint16_t groups_min; /* groups before the first publication */
     uint16_t
         revert_after; /* consecutive uninformative groups after which p reverts to the published estimate; 0: never */
-    float renewal; /* the old sums are renewed when a positive parameter has converged this far from its value at their
-                      rows, relative, and the residual variance of all rows is beyond the alarm's limit; 0.01..1e3; 0:
-                      never */
-    float neglected; /* relative error of the positive parameters because the equations are approximate, as of small
-                        angles, 0..1; 0: they are exact */
+    float renewal;    /* relative change, 0.01..1e3; 0: never. The old sums are renewed when a positive parameter has
+                         converged this far from its value at their rows, and the residual variance of all rows is above
+                         the alarm's limit */
+    float neglected; /* relative error of the positive parameters because the equations are approximate, for example for
+                        small angles, 0..1; 0: they are exact */
 } pvid_trust_config_f32;
 
 /* Defaults: kappa_min 3e-5, se_max 5 %, misfit_max 4, groups_min 3, revert_after 16, renewal 20 %, neglected 0. */
@@ -75,8 +76,8 @@ void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
 /* Renews the sums and restarts the alarm; call it when the rows change their meaning. */
 void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
-/* The mechanism has changed: the sums and the alarm begin anew with the next group, and the estimate has to be trusted
- * anew. */
+/* The mechanism has changed: the sums and the alarm begin anew with the next group, and the estimate must pass the
+ * checks again. */
 void pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator);
 
 /* Factor on the sums before the rows of the next group are added; 1: no renewal, or too little would remain. Call
@@ -93,8 +94,8 @@ const float *pvid_trust_fallback_f32(const pvid_trust_f32 *self);
  *   reason, size:    of that solve
  *   above_noise:     of the assessment
  *   variance_ratio:  residual variance of the group over its expectation
- *   candidate:       the assessed estimate; what is published has the neglected terms
- * Returns and counts the reason of the table above. */
+ *   candidate:       the assessed estimate; the published copy also contains the neglected terms
+ * Returns a reason of the table above and counts it. */
 pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason reason, float size,
                                  bool above_noise, float variance_ratio, pvid_estimate_f32 *candidate);
 

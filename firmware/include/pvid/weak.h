@@ -4,15 +4,15 @@
  *
  *   sum_j theta_j(p) N_j = Y,     N_j, Y = sum_m D^m[channel]
  *
- * with channels that are functions of the signals at one instant, or such a function times a running integral. Rows are
+ * A channel is a function of the signals at one instant, or such a function times a running integral. Rows are
  * multiplied by K test functions sin^n(pi t/T) e^(2 pi i f t/T) over windows of T that overlap by half, and D^m moves
- * to the test function. Each test function is a sum of few exponentials, so that a window needs of each channel only
+ * to the test function. Each test function is a sum of few exponentials: a window needs only these sums of a channel:
  *
  *   S_h = sum_k channel(t_k) e^(2 pi i h k / (2 hop)),   h = 0 .. H = K/2 + n/2,
  *
- * added once for each half of a window: S_h = A_h + (-1)^h B_h. Derivatives are factors (i omega_h)^m. The noise of the
- * S_h is independent, of a variance that follows from p: the white rows of a window are the S_h over their standard
- * deviations, less what no test function contains (src/weak/white_f32.c).
+ * Each half of a window is summed once: S_h = A_h + (-1)^h B_h. Derivatives are factors (i omega_h)^m. The noise of the
+ * S_h is independent, and its variance follows from p. The white rows of a window are the S_h divided by their standard
+ * deviations, without the directions that no test function contains (src/weak/white_f32.c).
  *
  *   static pvid_weak_f32 identifier;
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...     config: printed by `pvid model build`
@@ -31,9 +31,9 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator.h"
-#include "pvid/weak_parts.h"
 #include "pvid/gate.h"
 #include "pvid/trust.h"
+#include "pvid/weak_parts.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -51,12 +51,12 @@ typedef struct {
 
 typedef struct {
     uint8_t samples;    /* entries of the argument of step */
-    uint8_t signals;    /* with those that are made of samples */
+    uint8_t signals;    /* samples, and signals made of them: weak_parts.h */
     uint8_t jets;       /* inputs of `prepare`, the first inputs of `values` */
-    uint8_t runs;       /* integrals since the start of the run: inputs of `values` behind the jets */
-    uint8_t signs;      /* arguments of sgn: inputs of `values` behind the runs */
+    uint8_t runs;       /* integrals since the start of the run: inputs of `values` after the jets */
+    uint8_t signs;      /* arguments of sgn: inputs of `values` after the runs */
     uint8_t gains;      /* first results of `values` */
-    uint8_t integrands; /* its further results */
+    uint8_t integrands; /* results of `values` after the gains */
     uint8_t channels;
     uint8_t kinds;
     const pvid_weak_signal *signal;   /* [signals] */
@@ -68,23 +68,24 @@ typedef struct {
     void (*prepare)(const float jet[], float out[]);
     /* From jets, runs and signs: the gains, then the integrands. */
     void (*values)(const float in[], float out[]);
-    /* From the gains of a step, I^1 and I^2 of each integrand, and the time since the start of its half [s]: the values
-     * of the channels that are summed. */
+    /* The values of the summed channels, from the gains of a step, I^1 and I^2 of each integrand, and the time since
+     * the start of the half [s]. */
     void (*form)(const float gain[], const float integral[], float t, float channel[]);
     const pvid_model_f32 *model; /* theta and C of all kinds */
 } pvid_weak_model_f32;
 
 /* ---- the design: tables for a rig ---- */
 
-/* Compensator: gives a jet at a step from the block sums x of its signal (src/weak/weak_front_f32.c), with D = 1
- * from the signal: of even order x + sum_i w_i ((x_+i - x) + (x_-i - x)), without the leading x if
- * the order is above 0; of odd order sum_i w_i (x_+i - x_-i), i = 1..half. */
+/* Compensator: gives a jet at a step from the block sums x of its signal (src/weak/weak_front_f32.c); with D = 1 x is
+ * the signal. i = 1..half.
+ *   even order:  x + sum_i w_i ((x_+i - x) + (x_-i - x)), without the leading x if the order is above 0
+ *   odd order:   sum_i w_i (x_+i - x_-i) */
 typedef struct {
     uint16_t half;        /* steps on either side; 0: x itself */
     const float *weights; /* [half], outwards, per second^order */
 } pvid_weak_filter_f32;
 
-/* Share of the variance D_h of the sums at harmonic h in the rows of a kind by the sensors' noise:
+/* A part of the variance D_h at harmonic h, in the rows of a kind, that the sensors' noise causes:
  * += factor theta_a theta_b omega_h^(2 power), with theta = -1 for the column of Y. */
 typedef struct {
     uint8_t kind;
@@ -105,8 +106,8 @@ typedef struct {
     const float *circle;                     /* [5 hop / 2] sin(pi j / hop): a turn and a quarter */
     const pvid_weak_noise_f32 *noise;        /* [n_noise] */
     uint16_t n_noise;
-    const uint8_t *error_order;  /* [kinds] order of the derivative of white noise that the equation's own error is */
-    const float *error_variance; /* [kinds] variance of that noise at a step, >= 0; 0: the sensors explain the rows */
+    const uint8_t *error_order;  /* [kinds] the equation error is the derivative of this order of white noise */
+    const float *error_variance; /* [kinds] variance of that noise at a step, >= 0; 0: no equation error */
     const float *sign_width;     /* [signs] of the soft sign tanh(v / width); 0: the mean of sgn over a step */
     float overlap;               /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_weak_design_f32;
@@ -116,11 +117,11 @@ typedef struct {
 struct pvid_refine_f32;
 struct pvid_refine_config_f32;
 
-/* Its functions: pvid_refine_stage_f32 of refine.h. The weak form knows them by this table alone: without a second
- * stage none of it is linked. */
+/* Its functions: pvid_refine_stage_f32 of refine.h. The weak form calls them through this table alone: without a second
+ * stage no code of it is linked. */
 typedef struct {
     pvid_status (*init)(struct pvid_refine_f32 *self, const struct pvid_refine_config_f32 *config);
-    void (*step)(struct pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak);
+    pvid_reason (*step)(struct pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy);
     void (*gap)(struct pvid_refine_f32 *self);
     void (*freeze)(struct pvid_refine_f32 *self, bool frozen);
 } pvid_weak_stage_f32;
@@ -128,7 +129,7 @@ typedef struct {
 /* A refinement, with its storage. */
 typedef struct {
     const pvid_weak_stage_f32 *stage; /* &pvid_refine_stage_f32 */
-    struct pvid_refine_f32 *storage;  /* must outlive the identifier; its init is that of the identifier */
+    struct pvid_refine_f32 *storage;  /* must outlive the identifier, whose init initialises it */
     const struct pvid_refine_config_f32 *config;
 } pvid_weak_refine_f32;
 
@@ -137,8 +138,8 @@ typedef struct {
 typedef struct {
     float sample_rate_hz;               /* ticks per second [Hz], 1e-3..1e6 */
     const pvid_weak_design_f32 *design; /* must outlive the identifier, with its tables */
-    const float *range;     /* [samples] window dropped if a sample's absolute value is beyond, > 0; NULL: no check */
-    const float *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, >= 0;
+    const float *range;     /* [samples] a window with a larger absolute value is dropped, > 0; NULL: no check */
+    const float *drive_min; /* [samples] a window in which a sample has a smaller standard deviation is dropped, >= 0;
                                NULL: no check */
     bool compensation;      /* corrects the bias by the sensors' noise (errors in variables) */
     uint8_t iterations;     /* Gauss-Newton steps in each of the first eight windows, 1..PVID_MAX_ITERATIONS; then one.
@@ -148,13 +149,13 @@ typedef struct {
     pvid_trust_config_f32 trust;         /* conditions of publication */
     pvid_gate_config_f32 gate;           /* outlier gate on the residuals of a window, for each kind */
     const pvid_weak_refine_f32 *refine;  /* second stage, refine.h: gets every sample, each new estimate, gaps and
-                                               freezes; must outlive the identifier. NULL: none */
+                                            freezes; must outlive the identifier. NULL: none */
 } pvid_weak_config_f32;
 
 /* State: detail/weak_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_weak_f32 pvid_weak_f32;
 
-/* Initialises `self`. Fails iff
+/* Initialises `self`. *config is copied; design, range, drive_min and refine must outlive the identifier. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
  *   - a field of config, design or model is out of its range (the status names it),
  *   - a table is NULL or contains a number that is not finite (PVID_BAD_DESIGN),
@@ -170,14 +171,14 @@ pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *
  *     PVID_REJECTED_OUTLIER when the gate rejects its rows, PVID_HELD_FROZEN while frozen,
  *   - the reason of trust.h at the tick that completes a window's processing,
  *   - PVID_ACCUMULATED at all other ticks.
- * The work of a window is spread over the ticks of half a window; that of a tick does not depend on the data. */
+ * The work of a window is spread over the ticks of half a window; the work of a tick does not depend on the data. */
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, const float sample[]);
 
 /* The published estimate, for the context that calls step; the start before the first one. */
 const pvid_estimate_f32 *pvid_weak_estimate_f32(const pvid_weak_f32 *self);
 
-/* The estimate of the last window, with its standard errors, whether it was published or not; it is new at the ticks
- * that return PVID_UPDATED, PVID_MISFIT or PVID_HELD_UNCERTAIN. All zeros before the first one. NULL without object. */
+/* The estimate of the last window with its standard errors, published or not. It is new at the ticks that return
+ * PVID_UPDATED, PVID_MISFIT or PVID_HELD_UNCERTAIN. All zeros before the first one; NULL if `self` is NULL. */
 const pvid_estimate_f32 *pvid_weak_candidate_f32(const pvid_weak_f32 *self);
 
 /* Copies the published estimate from any context, also while another one calls step (publication.h). *number:

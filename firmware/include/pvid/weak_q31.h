@@ -9,9 +9,12 @@
  *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1)
  *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
  *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
- * twice integrals      exact int64 in dt/24 (once) and dt^2/48 (twice), that of 1 in dt/2; rounded to int32 channels
- * int32 within +-2^28 sums           of four steps exact (24-bit cosine times 29 bits), then shifted to int32 and added
- *   S_h            int32, with the window's own start of every integral
+ *   integrals      int32 in dt/120 (once) and dt^2/240 (twice) of the integrand without its last bits
+ *   time           the integrals of 1 in dt/2 and dt^2/48
+ *   channels       int32 within +-2^28
+ *   sums           of four steps exact: a cosine of 16 bits, or of 24 if the signals have many counts, times 29 bits;
+ *                  then shifted to int32 and added
+ *   S_h            int32; every integral starts at the start of the window
  */
 #ifndef PVID_WEAK_Q31_H
 #define PVID_WEAK_Q31_H
@@ -21,15 +24,15 @@
 
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
-#include "pvid/weak_parts.h"
 #include "pvid/gate_q31.h"
 #include "pvid/trust_q31.h"
+#include "pvid/weak_parts.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Largest magnitude of a channel. */
+/* Largest magnitude of a block sum and of a channel. */
 #define PVID_WEAK_LIMIT_Q31 INT32_C(268435456) /* 2^28 */
 
 /* ---- the model: generated, the same for every rig ---- */
@@ -43,12 +46,12 @@ typedef struct {
 
 typedef struct {
     uint8_t samples;    /* entries of the argument of step */
-    uint8_t signals;    /* with those that are made of samples */
+    uint8_t signals;    /* samples, and signals made of them: weak_parts.h */
     uint8_t jets;       /* inputs of `prepare`, the first inputs of `values` */
-    uint8_t runs;       /* integrals since the start of the run: inputs of `values` behind the jets */
-    uint8_t signs;      /* arguments of sgn: inputs of `values` behind the runs */
+    uint8_t runs;       /* integrals since the start of the run: inputs of `values` after the jets */
+    uint8_t signs;      /* arguments of sgn: inputs of `values` after the runs */
     uint8_t gains;      /* first results of `values` */
-    uint8_t integrands; /* its further results */
+    uint8_t integrands; /* results of `values` after the gains */
     uint8_t channels;
     uint8_t kinds;
     const pvid_weak_signal *signal;   /* [signals] */
@@ -74,30 +77,31 @@ typedef struct {
     int32_t multiplier; /* > 0 */
 } pvid_weak_rescale_q31;
 
-/* Compensator that gives a jet at a step from the block sums at the steps around it (host/docs/firmware.md): of order 0
- * with the leading x 2^bits. */
+/* Compensator that gives a jet at a step from the block sums at the steps around it (host/docs/firmware.md): the exact
+ * sum of weights times block sums, 2^-down of it rounded half up. */
 typedef struct {
     uint16_t half;                     /* 0: the block sum itself */
-    uint8_t bits;                      /* of the leading x, 0..30 */
-    pvid_weak_rescale_q31 rescale;     /* from the sum to the jet */
-    const PVID_TABLE int32_t *weights; /* [half], outwards */
+    uint8_t down;                      /* 0..62 */
+    const PVID_TABLE int32_t *weights; /* [half + 1] within 2^30: of order 0 that of the block sum itself, else 0; then
+                                          outwards */
 } pvid_weak_filter_q31;
 
-/* Shifts of an integrand's integrals to int32. */
+/* Shifts of an integrand, and of what a step adds to twice its integral. */
 typedef struct {
-    uint8_t once;
+    uint8_t down;
     uint8_t twice;
 } pvid_weak_integral_q31;
 
 /* Shifts of a channel. */
 typedef struct {
-    uint8_t value; /* gain times integral to the channel; without an integral: gain to the channel */
+    uint8_t value; /* of the upper half of gain times integral to the channel; without an integral: of the gain */
+    uint8_t lift;  /* of an integral of 1 to the left */
     uint8_t own;   /* of A_h +- B_h to S_h */
     uint8_t plain; /* of an integral: of I^fold at the end of the first half times B_h of the channel `plain` */
     uint8_t ramp;  /* of fold 2: of I^1 at the end of the first half times B_h of the channel `ramp` */
 } pvid_weak_format_q31;
 
-/* Share of the variance D_h of the sums at harmonic h in the rows of a kind by the sensors' noise:
+/* A part of the variance D_h at harmonic h, in the rows of a kind, that the sensors' noise causes:
  * += W_h factor theta_a theta_b h^(2 power), with theta = -1 for the column of Y; W_h: 2 hop at h = 0, else hop. */
 typedef struct {
     uint8_t kind;
@@ -112,7 +116,7 @@ typedef struct {
     uint8_t functions;         /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
     uint8_t power;             /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation;        /* D, ticks a step, 1..PVID_MAX_DECIMATION */
-    uint8_t sum_shift;         /* of four steps' products 2^-22 before they are added, 1..30 */
+    uint8_t sum_shift;         /* of four steps' products 2^-14 (fine: 2^-22) before they are added, 0..30 */
     uint16_t hop;              /* steps of half a window, a multiple of 4; H < hop */
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
     const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
@@ -122,11 +126,12 @@ typedef struct {
                                                0: the mean of sgn over a step */
     const pvid_weak_integral_q31 *integral; /* [integrands] */
     const pvid_weak_format_q31 *format;     /* [channels] */
-    const PVID_TABLE int32_t *circle;       /* [2 hop] (2^23 - 1) cos(pi j / hop) */
+    bool fine;                              /* the cosine has 24 bits; else 16 */
+    const PVID_TABLE int32_t *circle;       /* [2 hop + 3 hop/2 + 3 H] cos(pi j / hop) times its first entry */
     const pvid_scaled_q31 *factor;    /* of each term, of h^order times a unit of S_h: [model->kind[kinds - 1].end] */
     const pvid_weak_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;
-    const uint8_t *error_order; /* [kinds] order of the derivative of white noise that the equation's own error is */
+    const uint8_t *error_order; /* [kinds] the equation error is the derivative of this order of white noise */
     const pvid_scaled_q31
         *error_variance; /* [kinds] of that noise at a step, times W_h h^(2 order) the share in D_h; or 0 */
 } pvid_weak_design_q31;
@@ -136,8 +141,8 @@ typedef struct {
 typedef struct {
     const pvid_weak_design_q31 *design; /* must outlive the identifier, with its tables */
     const int32_t *offset;              /* [samples] reading of each sensor at 0, within +-2^30 [counts] */
-    const int32_t *drive_min; /* [samples] window dropped if the standard deviation of a sample in it is below, 0..2^24
-                                 [counts]; NULL: no check */
+    const int32_t *drive_min; /* [samples] a window in which a sample has a smaller standard deviation is dropped,
+                                 0..2^24 [counts]; NULL: no check */
     bool compensation;        /* corrects the bias by the sensors' noise (errors in variables), as in weak.h */
     uint8_t iterations; /* Gauss-Newton steps in each of the first eight windows, 1..PVID_MAX_ITERATIONS; then one.
                            Recommended: 2, as in weak.h */
@@ -154,7 +159,7 @@ typedef struct pvid_weak_q31 pvid_weak_q31;
  *   - a pointer is NULL (PVID_BAD_POINTER),
  *   - a field of config, design or model is out of its range (the status names it), or
  *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS).
- * The tables must be those of the design tool: it proves that no sum overflows. */
+ * The tables must come from the design tool, which proves that no sum overflows. */
 pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config);
 
 /* One tick: the readings [samples], taken at the same time. Returns as pvid_weak_step_f32. */

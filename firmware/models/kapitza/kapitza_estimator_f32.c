@@ -32,8 +32,8 @@ static void prepare_folds(pvid_strong_estimator_f32 *self, float forgetting_rows
     if ((forgetting_rows > 0.0f) && (forgetting_rows < (FOLDS_PER_CONSTANT * (float)FOLD_MAX))) {
         rows = (uint32_t)(forgetting_rows / FOLDS_PER_CONSTANT);
     }
-    const uint32_t unit =
-        (self->staged != 0u) ? self->divider : PVID_STRONG_ROWS; /* rows from one chance to the next */
+    const uint32_t unit = (self->staged != 0u) ? self->config->estimator.divider
+                                               : PVID_STRONG_ROWS; /* rows from one chance to the next */
     rows = (rows < unit) ? unit : (rows - (rows % unit));
     self->fold_every = (uint8_t)rows;
     self->sums.retention = 1.0f;
@@ -46,7 +46,7 @@ static uint8_t exact_every_of(const pvid_strong_config_f32 *config)
 {
     const pvid_estimator_config_f32 *estimator = &config->estimator;
     if (estimator->dead_zone > 0.0f) {
-        return 0;
+        return 1;
     }
     if (config->exact_every > 0u) {
         return (uint8_t)config->exact_every;
@@ -55,10 +55,10 @@ static uint8_t exact_every_of(const pvid_strong_config_f32 *config)
 }
 
 PVID_COLD pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self,
-                                                      const pvid_strong_config_f32 *config)
+                                                      const pvid_strong_config_f32 *config, float rate_hz)
 {
     const pvid_estimator_config_f32 *estimator = &config->estimator;
-    const pvid_status status = pvid_settings_are_valid_f32(estimator, PVID_KAPITZA_P, 7u, config->sample_rate_hz);
+    const pvid_status status = pvid_settings_are_valid_f32(estimator, PVID_KAPITZA_P, 7u, rate_hz);
     if (status != PVID_OK) {
         return status;
     }
@@ -74,24 +74,16 @@ PVID_COLD pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 
         const float square = ratio * ratio;
         /* not 0: row_variance over it is the square of a start_sd */
         self->prior[a] = (square > PVID_LEAST_NORMAL_F32) ? square : PVID_LEAST_NORMAL_F32;
-        self->lower[a] = estimator->lower[a];
-        self->upper[a] = estimator->upper[a];
     }
-    const float forgetting_rows = estimator->forgetting_s * config->sample_rate_hz;
-    self->row_variance = estimator->row_sd * estimator->row_sd;
-    self->correlation = estimator->correlation;
-    self->step_limit = estimator->step_limit;
-    self->kappa_min = estimator->kappa_min;
-    self->dead_zone = estimator->dead_zone * estimator->dead_zone;
-    self->divider = estimator->divider;
+    const float forgetting_rows = estimator->forgetting_s * rate_hz;
+    const uint32_t divider = estimator->divider;
+    self->config = config;
     self->exact_every = exact_every_of(config);
-    const uint32_t every = (self->exact_every > 1u) ? self->exact_every : 1u;
-    const float interval = (float)((self->divider > 1u) ? self->divider : every);
-    self->gain = pvid_settings_gain_f32(estimator, config->sample_rate_hz, interval);
-    const bool long_enough = (forgetting_rows <= 0.0f) || (forgetting_rows >= (float)self->divider);
-    self->staged = ((self->divider % PVID_STRONG_ROWS) == 0u) && (self->divider >= (2u * PVID_STRONG_ROWS)) &&
-                   (self->divider <= FOLD_MAX) && !(self->dead_zone > 0.0f) && long_enough;
-    self->projects_at = (self->staged != 0u) ? 1u : 0u;
+    const float interval = (float)((divider > 1u) ? divider : self->exact_every);
+    self->gain = pvid_settings_gain_f32(estimator, rate_hz, interval);
+    const bool long_enough = (forgetting_rows <= 0.0f) || (forgetting_rows >= (float)divider);
+    self->staged = ((divider % PVID_STRONG_ROWS) == 0u) && (divider >= (2u * PVID_STRONG_ROWS)) &&
+                   (divider <= FOLD_MAX) && !(estimator->dead_zone > 0.0f) && long_enough;
     self->mixes = self->gain < 1.0f;
     prepare_folds(self, forgetting_rows);
     return PVID_OK;
@@ -99,36 +91,28 @@ PVID_COLD pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 
 
 /* ---- the equations from all rows ---- */
 
-/* Completes theta^T M theta - 2 theta^T B to the residuals of all rows. */
-static PVID_COLD void add_residuals(const pvid_strong_estimator_f32 *self, pvid_kapitza_residual_f32 *residual)
+/* Adds the first rows of the block to S and F. Returns the sum of their squared residuals. */
+static inline float add_block(const pvid_strong_estimator_f32 *self, size_t rows, const float p[3], float s[6],
+                              float force[3])
 {
-    const float yy = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_YY);
     float squares = 0.0f;
-    for (size_t i = 0; i < self->in_block; i++) {
-        float g[PVID_KAPITZA_P];
-        const float e = pvid_kapitza_innovate_f32(self->p, &self->block[i], g);
-        squares += e * e;
-    }
-    residual->rss = (yy + residual->rss) + squares;
-    residual->floor = RESIDUAL_FLOOR * yy;
-    residual->weight = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_WEIGHT) + (float)self->in_block;
-}
-
-void pvid_kapitza_gather_f32(const pvid_strong_estimator_f32 *self, float s[6], float force[3],
-                             pvid_kapitza_residual_f32 *residual)
-{
-    const size_t rows = self->in_block;
-    const float p[PVID_KAPITZA_P] = {self->p[0], self->p[1], self->p[2]};
-    float all_s[6];
-    float all_force[PVID_KAPITZA_P];
-    float *rss = (residual != NULL) ? &residual->rss : NULL;
-    pvid_kapitza_project_f32(&self->sums, p, all_s, all_force, rss);
     for (size_t i = 0; i < rows; i++) {
         float g[PVID_KAPITZA_P];
         const float e = pvid_kapitza_innovate_f32(p, &self->block[i], g);
-        pvid_kapitza_add_squares_f32(g, all_s);
-        pvid_kapitza_add_products_f32(g, e, all_force);
+        squares += e * e;
+        pvid_kapitza_add_squares_f32(g, s);
+        pvid_kapitza_add_products_f32(g, e, force);
     }
+    return squares;
+}
+
+void pvid_kapitza_gather_f32(const pvid_strong_estimator_f32 *self, size_t rows, float s[6], float force[3])
+{
+    const float p[PVID_KAPITZA_P] = {self->p[0], self->p[1], self->p[2]};
+    float all_s[6];
+    float all_force[PVID_KAPITZA_P];
+    pvid_kapitza_project_f32(&self->sums, p, all_s, all_force);
+    (void)add_block(self, rows, p, all_s, all_force);
     PVID_UNROLL
     for (size_t i = 0; i < 6u; i++) {
         s[i] = all_s[i];
@@ -137,22 +121,52 @@ void pvid_kapitza_gather_f32(const pvid_strong_estimator_f32 *self, float s[6], 
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
         force[a] = all_force[a];
     }
-    if (residual != NULL) {
-        add_residuals(self, residual);
-    }
+}
+
+/* theta^T M theta - 2 theta^T B at p from the sums alone, by their S and F: with N^T theta = Q + d1 n_1 + d2 n_2 and Q
+ * = w A + w^2 E it is <Q (Q - 2 Y)> - sum_a d_a (<n_a (Y - Q)> + F_a). */
+static float rss_minus_yy(const pvid_strong_estimator_f32 *self, const float s[6], const float force[3])
+{
+    const float w = self->p[PVID_KAPITZA_W];
+    const float d1 = self->p[PVID_KAPITZA_D1];
+    const float d2 = self->p[PVID_KAPITZA_D2];
+    const float w2 = w * w;
+    const float aa = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_AA);
+    const float ae = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_AE);
+    const float ee = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_EE);
+    const float ya = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_YA);
+    const float ye = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_YE);
+    const float q_q = (w * ((w * aa) + (w2 * ae))) + (w2 * ((w * ae) + (w2 * ee)));
+    const float q_y = (w * ya) + (w2 * ye);
+    const float r_1 = force[1] + ((d1 * s[3]) + (d2 * s[4]));
+    const float r_2 = force[2] + ((d1 * s[4]) + (d2 * s[5]));
+    return (q_q - (2.0f * q_y)) - ((d1 * (r_1 + force[1])) + (d2 * (r_2 + force[2])));
+}
+
+PVID_COLD void pvid_kapitza_gather_residuals_f32(const pvid_strong_estimator_f32 *self, float s[6], float force[3],
+                                                 pvid_kapitza_residual_f32 *residual)
+{
+    const float yy = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_YY);
+    pvid_kapitza_gather_f32(self, 0, s, force);
+    const float of_sums = yy + rss_minus_yy(self, s, force);
+    residual->rss = of_sums + add_block(self, self->in_block, self->p, s, force);
+    residual->floor = RESIDUAL_FLOOR * yy;
+    residual->weight = pvid_kapitza_sum_f32(&self->sums, PVID_SUM_WEIGHT) + (float)self->in_block;
 }
 
 /* ---- accuracy ---- */
 
 static void settings_of(const pvid_strong_estimator_f32 *self, pvid_solve_settings_f32 *settings)
 {
+    const pvid_estimator_config_f32 *config = &self->config->estimator;
     memset(settings, 0, sizeof *settings);
-    settings->row_variance = self->row_variance;
-    settings->correlation = self->correlation;
+    settings->row_variance = config->row_sd * config->row_sd;
+    settings->correlation = config->correlation;
+    settings->dead_zone = config->dead_zone * config->dead_zone;
     settings->n_p = PVID_KAPITZA_P;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
         settings->prior[a] = self->prior[a];
-        settings->start_sd[a] = sqrtf(self->row_variance / self->prior[a]);
+        settings->start_sd[a] = sqrtf(settings->row_variance / self->prior[a]);
     }
 }
 
@@ -171,7 +185,7 @@ PVID_COLD void pvid_kapitza_assess_f32(const pvid_strong_estimator_f32 *self, pv
     pvid_system_f32 system;
     pvid_solve_settings_f32 settings;
     settings_of(self, &settings);
-    pvid_kapitza_gather_f32(self, s, system.force, &residual);
+    pvid_kapitza_gather_residuals_f32(self, s, system.force, &residual);
     system_of(&residual, &system);
     size_t next = 0;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
@@ -193,6 +207,6 @@ PVID_COLD bool pvid_kapitza_is_at_rest_f32(const pvid_strong_estimator_f32 *self
     settings_of(self, &settings);
     system_of(residual, &system);
     const float variance = pvid_assess_variance_f32(&system, &settings);
-    const float noise = (variance < self->row_variance) ? variance : self->row_variance;
-    return square <= (self->dead_zone * (self->correlation * noise));
+    const float noise = (variance < settings.row_variance) ? variance : settings.row_variance;
+    return square <= (settings.dead_zone * (settings.correlation * noise));
 }

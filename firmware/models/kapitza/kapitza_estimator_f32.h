@@ -3,11 +3,13 @@
 #define PVID_KAPITZA_ESTIMATOR_F32_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "pvid/strong.h"
 
-/* Initialises `self`, which is all zeros. Fails as pvid_strong_init_f32. */
-pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self, const pvid_strong_config_f32 *config);
+/* Initialises `self`, which is all zeros, for rows at rate_hz. Fails as pvid_strong_init_f32. */
+pvid_status pvid_kapitza_estimator_init_f32(pvid_strong_estimator_f32 *self, const pvid_strong_config_f32 *config,
+                                            float rate_hz);
 
 /* Residuals at p. */
 typedef struct {
@@ -16,9 +18,12 @@ typedef struct {
     float weight; /* rows */
 } pvid_kapitza_residual_f32;
 
-/* S, F and, unless it is NULL, *residual at p of all rows: those in the sums and those in `block`. */
-void pvid_kapitza_gather_f32(const pvid_strong_estimator_f32 *self, float s[6], float force[3],
-                             pvid_kapitza_residual_f32 *residual);
+/* S and F at p of the rows in the sums and of the first `rows` in `block`. */
+void pvid_kapitza_gather_f32(const pvid_strong_estimator_f32 *self, size_t rows, float s[6], float force[3]);
+
+/* S, F and the residuals of all rows. */
+void pvid_kapitza_gather_residuals_f32(const pvid_strong_estimator_f32 *self, float s[6], float force[3],
+                                       pvid_kapitza_residual_f32 *residual);
 
 /* pvid_strong_assess_f32. */
 void pvid_kapitza_assess_f32(const pvid_strong_estimator_f32 *self, pvid_estimate_f32 *estimate);

@@ -40,7 +40,7 @@ typedef struct {
 } pvid_shifted_triple;
 
 /* r = 2: A, E or Y times -G^2 phi'' and -G^3 phi''. */
-PVID_INLINE_IF_FAST pvid_shifted_pair pvid_kapitza_pair_2_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
+PVID_ALWAYS_INLINE pvid_shifted_pair pvid_kapitza_pair_2_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
 {
     float m[4];
     pvid_kapitza_family_f32(self, first, 4, m);
@@ -52,7 +52,7 @@ PVID_INLINE_IF_FAST pvid_shifted_pair pvid_kapitza_pair_2_f32(const pvid_strong_
 }
 
 /* r = 3: A, E or Y times -G^3 phi and -G^4 phi. */
-PVID_INLINE_IF_FAST pvid_shifted_pair pvid_kapitza_pair_0_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
+PVID_ALWAYS_INLINE pvid_shifted_pair pvid_kapitza_pair_0_f32(const pvid_strong_sums_f32 *self, size_t first, float w)
 {
     float m[5];
     pvid_kapitza_family_f32(self, first, 5, m);
@@ -67,15 +67,15 @@ PVID_INLINE_IF_FAST pvid_shifted_pair pvid_kapitza_pair_0_f32(const pvid_strong_
 
 /* The triple with the coefficients c[i] = binom(n, i + 1) w^(i + 1) of its lowest power, n = 4 .. 6, from the n + 3
  * sums at `first`. */
-PVID_INLINE_IF_FAST pvid_shifted_triple pvid_kapitza_triple_f32(const pvid_strong_sums_f32 *self, size_t first,
-                                                                const float c[], size_t n, float w)
+PVID_ALWAYS_INLINE pvid_shifted_triple pvid_kapitza_triple_f32(const pvid_strong_sums_f32 *self, size_t first,
+                                                               const float c[], size_t n, float w)
 {
     float s2 = pvid_kapitza_sum_f32(self, first);
     float s1 = pvid_kapitza_sum_f32(self, first + 1u);
     float s0 = pvid_kapitza_sum_f32(self, first + 2u);
     float m1 = s1;
     float m2 = s0;
-    PVID_UNROLL_IF_FAST
+    PVID_UNROLL
     for (size_t i = 0; i < n; i++) {
         const float m3 = pvid_kapitza_sum_f32(self, first + i + 3u);
         s2 += c[i] * m1;
@@ -89,10 +89,9 @@ PVID_INLINE_IF_FAST pvid_shifted_triple pvid_kapitza_triple_f32(const pvid_stron
     return triple;
 }
 
-/* s = C^T M C, upper triangle by rows, and force = C^T (B - M theta) at p. Writes *rss_minus_yy = theta^T M theta - 2
- * theta^T B if it is not NULL. */
+/* s = C^T M C, upper triangle by rows, and force = C^T (B - M theta) at p. */
 PVID_ALWAYS_INLINE void pvid_kapitza_project_f32(const pvid_strong_sums_f32 *self, const float p[3], float s[6],
-                                                 float force[3], float *rss_minus_yy)
+                                                 float force[3])
 {
     const float w = p[0];
     const float d1 = p[1];
@@ -146,11 +145,6 @@ PVID_ALWAYS_INLINE void pvid_kapitza_project_f32(const pvid_strong_sums_f32 *sel
     force[0] = (y_w - q_w) - ((d1 * s[1]) + (d2 * s[2]));
     force[1] = r_1 - ((d1 * s[3]) + (d2 * s[4]));
     force[2] = r_2 - ((d1 * s[4]) + (d2 * s[5]));
-    if (rss_minus_yy != NULL) {
-        const float q_q = (w * q_a) + (w2 * q_e);
-        const float q_y = (w * ya) + (w2 * ye);
-        *rss_minus_yy = (q_q - (2.0f * q_y)) - ((d1 * (r_1 + force[1])) + (d2 * (r_2 + force[2])));
-    }
 }
 
 #endif

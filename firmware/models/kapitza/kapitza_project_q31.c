@@ -48,7 +48,7 @@ static bool shifts_of(const pvid_kapitza_system_q31 *scales, uint32_t shift[N_FA
     return (a >= least) && (x >= least) && (z >= least) && (a <= most) && (x <= most) && (z <= most);
 }
 
-PVID_SELDOM static void take_any(const int64_t sums[], const uint32_t shift[N_FAMILIES], int32_t m[])
+PVID_COLD static void take_any(const int64_t sums[], const uint32_t shift[N_FAMILIES], int32_t m[])
 {
     for (size_t family = 0; family < N_FAMILIES; family++) {
         for (size_t i = first_of[family]; i < first_of[family + 1u]; i++) {
@@ -60,7 +60,7 @@ PVID_SELDOM static void take_any(const int64_t sums[], const uint32_t shift[N_FA
 PVID_ALWAYS_INLINE void take_family(const int64_t sums[], size_t count, uint32_t shift, int32_t m[])
 {
     const pvid_shift_down_q31 by = pvid_shift_down_by_q31(shift);
-    PVID_UNROLL_BY_FOUR
+    PVID_UNROLL
     for (size_t i = 0; i < count; i++) {
         m[i] = pvid_shifted_down_q31(&by, sums[i]);
     }
@@ -310,7 +310,7 @@ static int32_t length_64(int64_t square)
 }
 
 /* m[0], m[1], m[2] = <a b G^(count - 1)>, .. at the rate G + d; d in Q31. */
-static void shift_64(int64_t m[], size_t count, int32_t d)
+PVID_COLD static void shift_64(int64_t m[], size_t count, int32_t d)
 {
     for (size_t left = count - 1u; left > 0u; left--) {
         for (size_t i = 0; i < left; i++) {
@@ -319,7 +319,7 @@ static void shift_64(int64_t m[], size_t count, int32_t d)
     }
 }
 
-static int32_t out_64(int64_t x, int32_t shift)
+PVID_COLD static int32_t out_64(int64_t x, int32_t shift)
 {
     return (int32_t)pvid_clamp_q31(pvid_scale_q31(x, shift), (int64_t)1 << MANTISSA_BITS);
 }
@@ -345,7 +345,7 @@ static int32_t longer(int64_t a, int32_t less_a, int64_t b, int32_t less_b)
 }
 
 /* The moments in units of a time 2^t: scales of their families, then 53 bits of each. */
-static void take_64(const int64_t sums[], int32_t t, pvid_kapitza_system_q31 *scales, int64_t m[])
+PVID_COLD static void take_64(const int64_t sums[], int32_t t, pvid_kapitza_system_q31 *scales, int64_t m[])
 {
     const int32_t of_a = longer(sums[PVID_SUM_AA], 2 * t, sums[PVID_SUM_YY], 4 * t);
     const int32_t a = half_of(pvid_larger_q31(length_64(sums[PVID_SUM_EE]), of_a), FAR_BITS);
@@ -363,8 +363,8 @@ static void take_64(const int64_t sums[], int32_t t, pvid_kapitza_system_q31 *sc
 }
 
 /* Returns d in the time unit that it chooses, Q30: a quarter at most. */
-PVID_SELDOM static int32_t shift_far(const int64_t sums[], int32_t beyond, const int32_t lengths[2],
-                                     pvid_kapitza_system_q31 *scales, shifted_sums *out)
+PVID_COLD static int32_t shift_far(const int64_t sums[], int32_t beyond, const int32_t lengths[2],
+                                   pvid_kapitza_system_q31 *scales, shifted_sums *out)
 {
     const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(beyond));
     const int32_t t = pvid_larger_q31(length - PVID_KAPITZA_W_BITS, 0);

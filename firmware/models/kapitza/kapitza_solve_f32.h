@@ -49,7 +49,8 @@ static inline pvid_reason pvid_kapitza_factorise_f32(const pvid_strong_estimator
         return PVID_HELD_PIVOT;
     }
     const bool own = factor->pivot0 >= (2.0f * self->prior[0]);
-    const bool excited = (factor->pivot0 >= (self->kappa_min * s00)) && (own || !(self->kappa_min > 0.0f));
+    const float kappa_min = self->config->estimator.kappa_min;
+    const bool excited = (factor->pivot0 >= (kappa_min * s00)) && (own || !(kappa_min > 0.0f));
     return excited ? PVID_UPDATED : PVID_HELD_NOT_EXCITED;
 }
 
@@ -64,17 +65,18 @@ static inline void pvid_kapitza_back_f32(const pvid_kapitza_factor_f32 *factor, 
 }
 
 /* Negative iff x is beyond a bound of parameter a. */
-static inline float pvid_kapitza_slack_f32(const pvid_strong_estimator_f32 *self, size_t a, float x)
+static inline float pvid_kapitza_slack_f32(const pvid_estimator_config_f32 *config, size_t a, float x)
 {
-    return (x - self->lower[a]) * (self->upper[a] - x);
+    return (x - config->lower[a]) * (config->upper[a] - x);
 }
 
 /* Stops p at its bounds. */
 static PVID_COLD void pvid_kapitza_clamp_f32(pvid_strong_estimator_f32 *self)
 {
+    const pvid_estimator_config_f32 *config = &self->config->estimator;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
-        self->p[a] = (self->p[a] > self->upper[a]) ? self->upper[a] : self->p[a];
-        self->p[a] = (self->p[a] < self->lower[a]) ? self->lower[a] : self->p[a];
+        self->p[a] = (self->p[a] > config->upper[a]) ? config->upper[a] : self->p[a];
+        self->p[a] = (self->p[a] < config->lower[a]) ? config->lower[a] : self->p[a];
     }
     pvid_count_up(&self->counters.bounded);
 }
@@ -88,17 +90,18 @@ static inline uint32_t pvid_kapitza_relative_f32(const pvid_strong_estimator_f32
 /* p += dp, shortened to the step limit and kept within the bounds. Fails iff dp is not finite: PVID_HELD_PIVOT. */
 static inline pvid_reason pvid_kapitza_move_f32(pvid_strong_estimator_f32 *self, const float dp[3])
 {
+    const pvid_estimator_config_f32 *config = &self->config->estimator;
     const uint32_t first = pvid_kapitza_relative_f32(self, 0, dp[0]);
     const uint32_t second = pvid_kapitza_relative_f32(self, 1, dp[1]);
     const uint32_t last = pvid_kapitza_relative_f32(self, 2, dp[2]);
     const uint32_t larger = (second > first) ? second : first;
     const uint32_t size = (last > larger) ? last : larger;
     float part = 1.0f;
-    if (size > pvid_bits_f32(self->step_limit)) {
+    if (size > pvid_bits_f32(config->step_limit)) {
         if (!pvid_finite_f32(pvid_from_bits_f32(size))) {
             return PVID_HELD_PIVOT;
         }
-        part = self->step_limit / pvid_from_bits_f32(size);
+        part = config->step_limit / pvid_from_bits_f32(size);
         pvid_count_up(&self->counters.limited);
     }
     const float p0 = self->p[0] + (part * dp[0]);
@@ -108,8 +111,8 @@ static inline pvid_reason pvid_kapitza_move_f32(pvid_strong_estimator_f32 *self,
     self->p[1] = p1;
     self->p[2] = p2;
     const uint32_t signs =
-        (pvid_bits_f32(pvid_kapitza_slack_f32(self, 0, p0)) | pvid_bits_f32(pvid_kapitza_slack_f32(self, 1, p1))) |
-        pvid_bits_f32(pvid_kapitza_slack_f32(self, 2, p2));
+        (pvid_bits_f32(pvid_kapitza_slack_f32(config, 0, p0)) | pvid_bits_f32(pvid_kapitza_slack_f32(config, 1, p1))) |
+        pvid_bits_f32(pvid_kapitza_slack_f32(config, 2, p2));
     if ((signs & 0x80000000u) != 0u) {
         pvid_kapitza_clamp_f32(self);
     }

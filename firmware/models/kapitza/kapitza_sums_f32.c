@@ -47,9 +47,10 @@ PVID_ALWAYS_INLINE void add_powers(float *end, size_t n, size_t least, size_t mo
     }
 }
 
-#define OF_ROWS(field) {rows[0].field, rows[1].field, rows[2].field, rows[3].field}
+#define OF_ROWS(field) {block[0].field, block[1].field, block[2].field, last->field}
 
-void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 rows[restrict], float low[restrict])
+void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 block[restrict], const pvid_strong_row_f32 *restrict last,
+                               float low[restrict])
 {
     const four u = OF_ROWS(u);
     const four a = OF_ROWS(x[PVID_ROW_A]);
@@ -64,7 +65,7 @@ void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 rows[restrict], float l
     low[PVID_SUM_WEIGHT] += (float)PVID_STRONG_ROWS;
     const four f2 = OF_ROWS(f2);
     const four f0 = OF_ROWS(f0);
-    PVID_UNROLL_IF_FAST
+    PVID_ROLLED
     for (size_t i = 0; i < 3u; i++) {
         const four x = OF_ROWS(x[i]);
         add_powers(&low[(PVID_SUM_A2 + 3u) + (4u * i)], 4, 4, 4, times(x, f2), u);
@@ -72,7 +73,7 @@ void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 rows[restrict], float l
     }
     four x = times(f2, f2);
     float *end = &low[PVID_SUM_K22 + 6u];
-    PVID_UNROLL_IF_FAST
+    PVID_ROLLED
     for (size_t n = 7; n <= 9u; n++) {
         add_powers(end, n, 7, 9, x, u);
         x = (n == 7u) ? times(f2, f0) : times(f0, f0);

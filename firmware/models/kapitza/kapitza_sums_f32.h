@@ -7,8 +7,9 @@
 
 #include "pvid/detail/strong_state.h"
 
-/* Adds PVID_STRONG_ROWS rows. Cost: 10 operations a sum. */
-void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 rows[restrict], float low[restrict]);
+/* Adds PVID_STRONG_ROWS rows: those of a block and the last one. Cost: 10 operations a sum. */
+void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 block[restrict], const pvid_strong_row_f32 *restrict last,
+                               float low[restrict]);
 
 /* Folds the sums first..end-1 into the second level, after forgetting (information.h). */
 void pvid_kapitza_fold_f32(pvid_strong_sums_f32 *self, size_t first, size_t end);

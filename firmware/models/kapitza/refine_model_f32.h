@@ -34,6 +34,8 @@ static const uint8_t pvid_refine_logarithmic[PVID_REFINE_PARAMETERS] = {1, 1, 1,
 
 #define PVID_REFINE_HAS_CHART 1
 
+#define PVID_REFINE_HAS_MEASURED 0
+
 /* Once a pass: m from r. 14 operations. */
 static inline void pvid_refine_constants(const float r[], float m[])
 {
@@ -142,9 +144,9 @@ PVID_ALWAYS_INLINE void pvid_refine_motion(const float m[], const float q[], con
     a[1] = v55;
 }
 
-/* a, da/dq, da/dv, da/du by rows; B[parameter][row] = da/d(steps of the motion's parameters). 125 operations. */
+/* a, da/dq, da/dv by rows; B[parameter][row] = da/d(steps of the motion's parameters). 125 operations. */
 PVID_ALWAYS_INLINE void pvid_refine_jacobian(const float m[], const float q[], const float v[], const float u[],
-                                             float a[], float K[], float D[], float U[], float B[])
+                                             float a[], float K[], float D[], float B[])
 {
     const float m1 = m[1];
     const float m0 = m[0];
@@ -305,8 +307,6 @@ PVID_ALWAYS_INLINE void pvid_refine_jacobian(const float m[], const float q[], c
     D[1] = v96;
     D[2] = v99;
     D[3] = v102;
-    U[0] = v107;
-    U[1] = v110;
     B[0] = v111;
     B[1] = v112;
     B[2] = v125;

@@ -38,86 +38,69 @@ static inline pvid_strong_filters_f32 pvid_strong_five_f32(const float x[5])
     return sums;
 }
 
-static inline pvid_strong_filters_f32 pvid_strong_begin_f32(const float *weight, size_t half, float middle, float after,
-                                                            float before)
+/* phi and y by the bank; of y the order 0 is not computed. */
+void pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank,
+                                   pvid_strong_filters_f32 sums[2]);
+
+/* The place in the ring so many places after another. */
+static inline size_t pvid_strong_after_f32(const pvid_strong_window_f32 *self, size_t place, size_t ahead)
 {
-    const float even = (after - middle) + (before - middle);
-    const pvid_strong_filters_f32 sums = {middle, weight[0] * even, weight[2u * half] * even,
-                                          weight[3u * half] * (after - before), weight[4u * half] * even};
-    return sums;
+    const size_t after = place + ahead;
+    return (after >= self->length) ? (after - self->length) : after;
 }
 
-static inline void pvid_strong_add_f32(pvid_strong_filters_f32 *self, const float *weight, size_t half, float after,
-                                       float before)
+/* Both channels by five points `stride` apart in a ring whose oldest sample is at this place; the newest are given. */
+static inline void pvid_strong_five_points_f32(const pvid_strong_window_f32 *self, size_t oldest, float newest_phi,
+                                               float newest_y, pvid_strong_filters_f32 *phi, pvid_strong_filters_f32 *y)
 {
-    const pvid_strong_filters_f32 more = pvid_strong_begin_f32(weight, half, self->middle, after, before);
-    self->order0 += more.order0;
-    self->order2 += more.order2;
-    self->order3 += more.order3;
-    self->order4 += more.order4;
-}
-
-/* Channel 0, phi, or 1, y, by the bank. */
-pvid_strong_filters_f32 pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, size_t channel);
-
-/* Both channels by five points `stride` apart in a ring of `length` whose oldest sample is at head. */
-static inline void pvid_strong_five_points_f32(const pvid_strong_window_f32 *self, pvid_strong_filters_f32 *phi,
-                                               pvid_strong_filters_f32 *y)
-{
-    const size_t stride = self->bank.stride;
-    const size_t length = self->length;
-    size_t place = self->head;
-    float phis[5];
-    float ys[5];
+    const size_t stride = self->stride;
+    size_t place = oldest;
+    float phis[5] = {[4] = newest_phi};
+    float ys[5] = {[4] = newest_y};
     PVID_UNROLL
-    for (size_t i = 0; i < 5u; i++) {
+    for (size_t i = 0; i < 4u; i++) {
         phis[i] = self->samples[place][0];
         ys[i] = self->samples[place][1];
-        place += stride;
-        place = (place >= length) ? (place - length) : place;
+        place = pvid_strong_after_f32(self, place, stride);
     }
     *phi = pvid_strong_five_f32(phis);
     *y = pvid_strong_five_f32(ys);
 }
 
-/* Takes a sample of each channel into the sums of their blocks, whose values become the points at `head`. */
-void pvid_strong_window_blocks_f32(pvid_strong_window_f32 *self, size_t head);
+/* pvid_strong_window_f32.five_points of a full window. */
+#define PVID_FIVE_POINTS_READY 2u
 
-/* Counts a sample of a window that is not full yet. Returns whether it is full. */
-static inline bool pvid_strong_window_fills_f32(pvid_strong_window_f32 *self)
-{
-    if (self->missing > 0u) {
-        self->missing--;
-    }
-    return self->missing == 0u;
-}
+/* Takes a sample of each channel into a window of another bank, or one that is not full yet. Returns whether it
+ * completes a block, and the window is full. */
+bool pvid_strong_window_takes_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, float phi, float y);
 
-/* Stores a sample of each channel. When the window is full, writes phi, phi'', phi''', phi'''' (its order 1 is not set)
- * and u, u', u'', and returns true. */
-static inline bool pvid_strong_window_step_f32(pvid_strong_window_f32 *self, float phi, float y,
-                                               float d_phi[PVID_ORDERS], float u[3])
+/* Takes a sample of each channel. When it completes a block and the window is full, writes phi, phi'', phi''', phi''''
+ * (its order 1 is not set) and u, u', u'', and returns true. */
+static inline bool pvid_strong_window_step_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, float phi,
+                                               float y, float d_phi[PVID_ORDERS], float u[3])
 {
     const size_t head = self->head;
-    self->samples[head][0] = phi;
-    self->samples[head][1] = y;
-    self->head = (uint16_t)((head + 1u == self->length) ? 0u : (head + 1u));
+    const size_t oldest = pvid_strong_after_f32(self, head, 1);
+    const uint32_t five_points = self->five_points;
+    if (five_points == PVID_FIVE_POINTS_READY) {
+        self->samples[head][0] = phi;
+        self->samples[head][1] = y;
+        self->head = (uint16_t)oldest;
+    } else if (!pvid_strong_window_takes_f32(self, bank, phi, y)) {
+        return false;
+    } else {
+        /* the window is full */
+    }
     pvid_strong_filters_f32 of_phi;
     pvid_strong_filters_f32 of_y;
-    if (self->five_points) {
-        if (!pvid_strong_window_fills_f32(self)) {
-            return false;
-        }
-        pvid_strong_five_points_f32(self, &of_phi, &of_y);
+    if (five_points != 0u) {
+        pvid_strong_five_points_f32(self, oldest, phi, y, &of_phi, &of_y);
         d_phi[0] = of_phi.middle;
     } else {
-        if (self->bank.block > 1u) {
-            pvid_strong_window_blocks_f32(self, head);
-        }
-        if (!pvid_strong_window_fills_f32(self)) {
-            return false;
-        }
-        of_phi = pvid_strong_window_filter_f32(self, 0);
-        of_y = pvid_strong_window_filter_f32(self, 1);
+        pvid_strong_filters_f32 sums[2];
+        pvid_strong_window_filter_f32(self, bank, sums);
+        of_phi = sums[0];
+        of_y = sums[1];
         d_phi[0] = (of_phi.middle + of_phi.order0) * self->phi_scale[0];
     }
     d_phi[2] = of_phi.order2 * self->phi_scale[1];

@@ -24,7 +24,7 @@
 /* Whether init has accepted a configuration. */
 static inline bool is_ready(const pvid_strong_f32 *self)
 {
-    const bool ready = (self != NULL) && (self->window.length != 0u);
+    const bool ready = (self != NULL) && (self->estimator.config != NULL);
     PVID_ASSERT(ready);
     return ready;
 }
@@ -42,15 +42,16 @@ static pvid_status prepare(pvid_strong_f32 *self, const pvid_strong_config_f32 *
     if (status != PVID_OK) {
         return status;
     }
-    self->drive_forgetting = (config->sample_rate_hz > 1.0f) ? (1.0f / config->sample_rate_hz) : 1.0f;
+    const float rate = config->sample_rate_hz / (float)pvid_fir_block_f32(&config->bank); /* of rows */
+    self->drive_forgetting = (rate > 1.0f) ? (1.0f / rate) : 1.0f;
     self->drive_min = config->drive_min * config->drive_min;
-    status = pvid_kapitza_estimator_init_f32(&self->estimator, config);
+    status = pvid_kapitza_estimator_init_f32(&self->estimator, config, rate);
     if (status != PVID_OK) {
         return status;
     }
-    pvid_misfit_init_f32(&self->misfit, config->sample_rate_hz, config->estimator.forgetting_s);
-    return pvid_gate_init_f32(&self->gate, &config->gate, config->sample_rate_hz,
-                              GATE_MEMORY_S * config->sample_rate_hz, GATE_FLOOR * self->estimator.row_variance);
+    pvid_misfit_init_f32(&self->misfit, rate, config->estimator.forgetting_s);
+    const float row_variance = config->estimator.row_sd * config->estimator.row_sd;
+    return pvid_gate_init_f32(&self->gate, &config->gate, rate, GATE_MEMORY_S * rate, GATE_FLOOR * row_variance);
 }
 
 PVID_COLD pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config)
@@ -94,12 +95,14 @@ void pvid_strong_read_sums_f32(const pvid_strong_f32 *self, float sums[])
 
 /* ---- the step of p ---- */
 
-/* What a row leads to. */
+/* What is done at a row, beside adding it to the sums. */
 typedef enum {
-    ROW_ALONE, /* a row in the sums */
-    AT_REST,   /* a solve within the dead zone */
-    SOLVE_DUE  /* a step of p from self->s and `rhs` */
-} due;
+    ROW_ALONE,         /* nothing */
+    LAZY_STEP,         /* its square to S, a step */
+    PROJECTED_STEP,    /* S and the right-hand side from all rows, a step */
+    STAGED_PROJECTION, /* the same without the step, */
+    STAGED_STEP        /* which follows at the next row */
+} work;
 
 /* Solves (S + H0) dp = rhs and moves p. In one place, for all schedules. */
 PVID_ALWAYS_INLINE pvid_reason solve(pvid_strong_estimator_f32 *self, const float rhs[3])
@@ -123,14 +126,25 @@ static inline void mix(float gain, const float from[3], float to[3])
     to[2] = (gain * from[2]) + (rest * to[2]);
 }
 
-/* A solve with a dead zone is always exact and needs the residuals. rhs: the innovation, which becomes the right-hand
- * side. */
-static PVID_COLD due solve_in_zone(pvid_strong_estimator_f32 *self, const float g[3], float e, float rhs[3])
+/* S and the right-hand side at p from all rows and this one, whose C^T N e is `own`; rhs: the same sum of the rows
+ * since the last projection. The square of this row is not in S yet. */
+static inline void project(pvid_strong_estimator_f32 *self, const float own[3], float rhs[3])
+{
+    float force[PVID_KAPITZA_P];
+    pvid_kapitza_gather_f32(self, self->in_block, self->s, force);
+    force[0] += own[0];
+    force[1] += own[1];
+    force[2] += own[2];
+    mix(self->gain, force, rhs);
+}
+
+/* The same with a dead zone, which needs the residuals: returns whether p is at rest. The square is in S. */
+static PVID_COLD bool project_in_zone(pvid_strong_estimator_f32 *self, const float g[3], float e, float rhs[3])
 {
     float force[PVID_KAPITZA_P];
     pvid_kapitza_residual_f32 residual;
     pvid_kapitza_factor_f32 factor;
-    pvid_kapitza_gather_f32(self, self->s, force, &residual);
+    pvid_kapitza_gather_residuals_f32(self, self->s, force, &residual);
     pvid_kapitza_add_squares_f32(g, self->s);
     pvid_kapitza_add_products_f32(g, e, force);
     residual.rss += e * e;
@@ -141,45 +155,25 @@ static PVID_COLD due solve_in_zone(pvid_strong_estimator_f32 *self, const float 
         const float square = ((force[0] * x[0]) + (force[1] * x[1])) + (force[2] * x[2]);
         if (pvid_kapitza_is_at_rest_f32(self, square, &residual)) {
             pvid_count_up(&self->counters.at_rest);
-            return AT_REST;
+            return true;
         }
     }
     mix(self->gain, force, rhs);
-    return SOLVE_DUE;
+    return false;
 }
 
-/* A row with divider 1: a solve, from all sums at every exact_every-th row. */
-PVID_ALWAYS_INLINE due step_at_every_row(pvid_strong_estimator_f32 *self, const float g[3], float e, float rhs[3])
+/* A row with divider 1: a step, from all sums at every exact_every-th row. */
+PVID_ALWAYS_INLINE work at_every_row(pvid_strong_estimator_f32 *self, const float own[3], float rhs[3])
 {
-    uint32_t phase = self->phase;
-    rhs[0] = g[0] * e;
-    rhs[1] = g[1] * e;
-    rhs[2] = g[2] * e;
-    if (phase == 0u) {
-        phase = self->exact_every;
-        if ((PVID_DEAD_ZONE != 0) && (phase == 0u)) {
-            const float gradient[PVID_KAPITZA_P] = {g[0], g[1], g[2]};
-            float zone[PVID_KAPITZA_P] = {rhs[0], rhs[1], rhs[2]};
-            const due next = solve_in_zone(self, gradient, e, zone);
-            rhs[0] = zone[0];
-            rhs[1] = zone[1];
-            rhs[2] = zone[2];
-            return next;
-        }
-        float force[PVID_KAPITZA_P];
-        pvid_kapitza_gather_f32(self, self->s, force, NULL);
-        force[0] += rhs[0];
-        force[1] += rhs[1];
-        force[2] += rhs[2];
-        mix(self->gain, force, rhs);
-    }
-    self->phase = (uint16_t)(phase - 1u);
-    pvid_kapitza_add_squares_f32(g, self->s);
-    return SOLVE_DUE;
+    const uint32_t left = self->phase;
+    rhs[0] = own[0];
+    rhs[1] = own[1];
+    rhs[2] = own[2];
+    self->phase = (uint16_t)(((left == 0u) ? self->exact_every : left) - 1u);
+    return (left == 0u) ? PROJECTED_STEP : LAZY_STEP;
 }
 
-/* Rows of a staged round, by their number from 1; the last has number 0. */
-#define PROJECTION 1u
+/* Rows of a staged round, by their number from 1; the last has number 0. The projection is at row 1. */
 #define SOLUTION 2u
 #define FIRST_FOLD 5u
 #define FOLDS 3u
@@ -200,39 +194,39 @@ static PVID_SELDOM void fold_in_stages(pvid_strong_estimator_f32 *self)
     }
 }
 
-/* S and the right-hand side from all rows at this row; the sum of C^T N e begins anew. */
-static PVID_SELDOM due project(pvid_strong_estimator_f32 *self, const float g[3], float e)
+/* rhs = the sum of C^T N e, or the right-hand side of a staged step; the sum begins anew. */
+static inline void take_force(pvid_strong_estimator_f32 *self, float rhs[3])
 {
-    float force[PVID_KAPITZA_P];
-    for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
-        self->force[a] = self->innovation[a];
-        self->innovation[a] = 0.0f;
-    }
-    if ((PVID_DEAD_ZONE != 0) && (self->dead_zone > 0.0f)) {
-        return solve_in_zone(self, g, e, self->force);
-    }
-    pvid_kapitza_gather_f32(self, self->s, force, NULL);
-    pvid_kapitza_add_squares_f32(g, self->s);
-    pvid_kapitza_add_products_f32(g, e, force);
-    mix(self->gain, force, self->force);
-    return (self->staged != 0u) ? ROW_ALONE : SOLVE_DUE;
+    rhs[0] = self->force[0];
+    rhs[1] = self->force[1];
+    rhs[2] = self->force[2];
+    self->force[0] = 0.0f;
+    self->force[1] = 0.0f;
+    self->force[2] = 0.0f;
 }
 
-/* A row with a divider above 1; a right-hand side is in self->force. */
-PVID_ALWAYS_INLINE due step_at_divider(pvid_strong_estimator_f32 *self, const float g[3], float e)
+/* A row with a divider above 1. */
+PVID_ALWAYS_INLINE work at_divider(pvid_strong_estimator_f32 *self, const float own[3], float rhs[3])
 {
-    const uint32_t next = (uint32_t)self->phase + 1u;
-    const uint32_t phase = (next == self->divider) ? 0u : next;
+    const uint32_t after = (uint32_t)self->phase + 1u;
+    const uint32_t phase = (after == self->config->estimator.divider) ? 0u : after;
+    const uint32_t staged = self->staged;
+    const bool steps = (staged != 0u) && (phase == SOLUTION);
     self->phase = (uint16_t)phase;
+    if (steps) {
+        take_force(self, rhs);
+    }
     if (self->mixes) {
-        pvid_kapitza_add_products_f32(g, e, self->innovation);
+        self->force[0] += own[0];
+        self->force[1] += own[1];
+        self->force[2] += own[2];
     }
-    if (phase == self->projects_at) {
-        const float gradient[PVID_KAPITZA_P] = {g[0], g[1], g[2]};
-        return project(self, gradient, e);
+    if (steps) {
+        return STAGED_STEP;
     }
-    if (phase == SOLUTION) {
-        return (self->staged != 0u) ? SOLVE_DUE : ROW_ALONE;
+    if (phase == staged) {
+        take_force(self, rhs);
+        return (staged != 0u) ? STAGED_PROJECTION : PROJECTED_STEP;
     }
     if ((phase - FIRST_FOLD) < FOLDS) {
         fold_in_stages(self);
@@ -243,30 +237,42 @@ PVID_ALWAYS_INLINE due step_at_divider(pvid_strong_estimator_f32 *self, const fl
 /* A row in either schedule. */
 PVID_ALWAYS_INLINE pvid_reason step(pvid_strong_estimator_f32 *self, const float g[3], float e)
 {
+    const float own[PVID_KAPITZA_P] = {g[0] * e, g[1] * e, g[2] * e};
     float rhs[PVID_KAPITZA_P];
-    due next;
-    if (self->divider == 1u) {
-        next = step_at_every_row(self, g, e, rhs);
-    } else {
-        next = step_at_divider(self, g, e);
-        if (next == ROW_ALONE) {
-            return PVID_ACCUMULATED;
-        }
-        rhs[0] = self->force[0];
-        rhs[1] = self->force[1];
-        rhs[2] = self->force[2];
+    const bool every = self->config->estimator.divider == 1u;
+    const work now = every ? at_every_row(self, own, rhs) : at_divider(self, own, rhs);
+    if (now == ROW_ALONE) {
+        return PVID_ACCUMULATED;
     }
-    return ((PVID_DEAD_ZONE != 0) && (next == AT_REST)) ? PVID_UPDATED : solve(self, rhs);
+    if ((now == PROJECTED_STEP) || (now == STAGED_PROJECTION)) {
+        if ((PVID_DEAD_ZONE != 0) && (self->config->estimator.dead_zone > 0.0f)) {
+            /* copies: g and rhs themselves stay in registers */
+            const float gradient[PVID_KAPITZA_P] = {g[0], g[1], g[2]};
+            float sum[PVID_KAPITZA_P] = {rhs[0], rhs[1], rhs[2]};
+            return project_in_zone(self, gradient, e, sum) ? PVID_UPDATED : solve(self, sum);
+        }
+        project(self, own, rhs);
+    }
+    if (now != STAGED_STEP) {
+        pvid_kapitza_add_squares_f32(g, self->s);
+    }
+    if (now == STAGED_PROJECTION) {
+        self->force[0] = rhs[0];
+        self->force[1] = rhs[1];
+        self->force[2] = rhs[2];
+        return PVID_ACCUMULATED;
+    }
+    return solve(self, rhs);
 }
 
 /* ---- rows ---- */
 
-/* Adds a complete block to the sums; folds them where no other row does. */
-static inline void end_block(pvid_strong_estimator_f32 *self)
+/* Adds a complete block and its last row to the sums; folds them where no other row does. */
+static inline void end_block(pvid_strong_estimator_f32 *self, const pvid_strong_row_f32 *last)
 {
     self->in_block = 0;
     self->age = (uint8_t)(self->age + PVID_STRONG_ROWS);
-    pvid_kapitza_add_rows_f32(self->block, self->sums.low);
+    pvid_kapitza_add_rows_f32(self->block, last, self->sums.low);
     if ((self->staged == 0u) && (self->age >= self->fold_every)) {
         self->age = 0;
         pvid_kapitza_fold_f32(&self->sums, 0, PVID_STRONG_SUMS);
@@ -290,10 +296,10 @@ static PVID_COLD pvid_reason misfit(pvid_counters *counters)
     return PVID_MISFIT;
 }
 
-/* The verdict on the residuals, at the end of a block of misfit.h. */
-static inline void judge_misfit(pvid_strong_f32 *self)
+/* The verdict on the residuals, at the end of a block of misfit.h: no row is left. */
+static inline void judge_misfit(pvid_strong_f32 *self, uint32_t left)
 {
-    if (self->misfit.left == 0u) {
+    if (left == 0u) {
         self->alarm = pvid_misfit_judge_f32(&self->misfit);
     }
 }
@@ -306,27 +312,29 @@ PVID_ALWAYS_INLINE pvid_reason take(pvid_strong_f32 *self, const float phi[PVID_
     pvid_strong_row_f32 row;
     float g[PVID_KAPITZA_P];
     pvid_kapitza_row_f32(phi, u, &row);
-    estimator->block[place] = row;
     const float squares = pvid_kapitza_row_squares_f32(&row);
     const float e = pvid_kapitza_innovate_f32(estimator->p, &row, g);
-    pvid_misfit_add_f32(&self->misfit, e, g[PVID_KAPITZA_W] * estimator->p[PVID_KAPITZA_W]);
+    const uint32_t left = pvid_misfit_add_f32(&self->misfit, e, g[PVID_KAPITZA_W] * estimator->p[PVID_KAPITZA_W]);
     if (!pvid_gate_judges_f32(&self->gate, e * e)) {
         pvid_count_up(&estimator->counters.rejected_outlier);
-        judge_misfit(self);
+        judge_misfit(self, left);
         return PVID_REJECTED_OUTLIER;
     }
     if (!(squares <= (PVID_ROW_LIMIT * PVID_ROW_LIMIT))) {
-        judge_misfit(self);
-        return refuse(&estimator->counters, &estimator->block[place]);
+        judge_misfit(self, left);
+        return refuse(&estimator->counters, &row);
     }
     pvid_count_up(&estimator->counters.rows);
     const pvid_reason reason = step(estimator, g, e);
     if (place < (PVID_STRONG_ROWS - 1u)) {
+        estimator->block[place] = row;
         estimator->in_block = (uint8_t)(place + 1u);
-        judge_misfit(self);
+        judge_misfit(self, left);
     } else {
-        end_block(estimator);
-        pvid_misfit_defer_f32(&self->misfit); /* to a row that does less */
+        end_block(estimator, &row);
+        if (left == 0u) {
+            pvid_misfit_defer_f32(&self->misfit); /* to a row that does less */
+        }
     }
     return ((reason == PVID_UPDATED) && self->alarm) ? misfit(&estimator->counters) : reason;
 }
@@ -354,8 +362,8 @@ pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y)
     }
     float d_phi[PVID_ORDERS];
     float u[3];
-    if (!pvid_strong_window_step_f32(&self->window, phi, y, d_phi, u)) {
-        return PVID_WARMING_UP;
+    if (!pvid_strong_window_step_f32(&self->window, &self->estimator.config->bank, phi, y, d_phi, u)) {
+        return (self->window.missing > 0u) ? PVID_WARMING_UP : PVID_ACCUMULATED; /* or in a block */
     }
     const float drive = self->drive + (self->drive_forgetting * ((u[0] * u[0]) - self->drive));
     self->drive = pvid_finite_f32(drive) ? drive : self->drive;

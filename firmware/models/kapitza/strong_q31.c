@@ -190,7 +190,7 @@ pvid_reason pvid_strong_step_q31(pvid_strong_q31 *self, int32_t phi, int32_t y)
     int32_t d_phi[PVID_ORDERS];
     int32_t d_y[PVID_Y_ORDERS_Q31];
     if (!pvid_differentiator_step_q31(&self->differentiator, (int32_t)angle, (int32_t)height, d_phi, d_y)) {
-        return PVID_WARMING_UP;
+        return (self->differentiator.missing > 0u) ? PVID_WARMING_UP : PVID_ACCUMULATED; /* or in a block */
     }
     int32_t u[PVID_Y_ORDERS_Q31] = {0, 0, 0};
     if (!accelerations(self, d_y, u)) {

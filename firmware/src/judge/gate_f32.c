@@ -38,15 +38,27 @@ PVID_COLD pvid_status pvid_gate_init_f32(pvid_gate_f32 *self, const pvid_gate_co
     return PVID_OK;
 }
 
-bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square)
+PVID_COLD bool pvid_gate_passes_f32(pvid_gate_f32 *self, float square)
 {
-    return pvid_gate_judges_f32(self, square);
+    if (!(self->limit > 0.0f) || !pvid_finite_f32(square)) {
+        return true;
+    }
+    if (self->judged < self->memory) {
+        self->judged += 1.0f;
+    } else if (square > (self->limit * self->scale)) {
+        const float wider = self->scale * self->widening;
+        self->scale = (wider < PVID_GATE_SCALE_MAX) ? wider : PVID_GATE_SCALE_MAX;
+        return false;
+    } else {
+        /* the memory is complete */
+    }
+    return pvid_gate_accept_f32(self, square);
 }
 
-pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square)
+PVID_COLD pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float square)
 {
     const bool widened = self->scale > self->usual;
-    if (!pvid_gate_judges_f32(self, square)) {
+    if (!pvid_gate_passes_f32(self, square)) {
         return PVID_GATE_REJECTS;
     }
     if (!pvid_finite_f32(square)) {

@@ -13,19 +13,21 @@ void pvid_misfit_init_f32(pvid_misfit_f32 *self, float rate_hz, float forgetting
 /* Ends a block. Returns whether it is a misfit. */
 bool pvid_misfit_judge_f32(pvid_misfit_f32 *self);
 
-/* Adds a row: its residual e and its sensitivity, p[0] times its gradient in p[0]. The block ends when no row is left:
- * it must then be judged, or deferred. */
-static inline void pvid_misfit_add_f32(pvid_misfit_f32 *self, float e, float sensitivity)
+/* Adds a row: its residual e and its sensitivity, p[0] times its gradient in p[0]. Returns the rows that are left of
+ * the block: it ends when there is none, and must then be judged, or deferred. */
+static inline uint32_t pvid_misfit_add_f32(pvid_misfit_f32 *self, float e, float sensitivity)
 {
+    const uint32_t left = (uint32_t)self->left - 1u;
     self->rss += e * e;
     self->signal += sensitivity * sensitivity;
-    self->left--;
+    self->left = (uint16_t)left;
+    return left;
 }
 
 /* A block that ends takes one row more. */
 static inline void pvid_misfit_defer_f32(pvid_misfit_f32 *self)
 {
-    self->left = (self->left == 0u) ? 1u : self->left;
+    self->left = 1;
 }
 
 #endif

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "number/count.h"
+#include "solve/settings_f32.h"
 #include "solve/staged_f32.h"
 #include "solve/state_f32.h"
 #include "number/finite_f32.h"
@@ -51,27 +52,21 @@ const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
 /* Largest variance with neglected terms: a covariance of two such is finite. */
 #define VARIANCE_MAX 1.0e36f
 
-static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
+PVID_COLD static pvid_status config_is_valid(const pvid_trust_config_f32 *config)
 {
-    if (!pvid_within_f32(config->kappa_min, 0.0f, 0.999f)) {
-        return PVID_BAD_PUBLISH_KAPPA;
-    }
-    if (!pvid_within_f32(config->se_max, 1.0e-9f, 1.0e9f)) {
-        return PVID_BAD_SE_MAX;
-    }
-    if (!pvid_within_f32(config->misfit_max, 1.0f, 1.0e6f) && !pvid_within_f32(config->misfit_max, 0.0f, 0.0f)) {
-        return PVID_BAD_MISFIT_MAX;
-    }
-    if (!pvid_within_f32(config->renewal, 0.01f, 1.0e3f) && !pvid_within_f32(config->renewal, 0.0f, 0.0f)) {
-        return PVID_BAD_RENEWAL;
-    }
-    if (!pvid_within_f32(config->neglected, 0.0f, 1.0f)) {
-        return PVID_BAD_NEGLECTED;
-    }
-    return PVID_OK;
+    /* in the order of `values` */
+    static const pvid_range_f32 ranges[] = {
+        {0.0f, 0.999f, PVID_BAD_PUBLISH_KAPPA, false},
+        {1.0e-9f, 1.0e9f, PVID_BAD_SE_MAX, false},
+        {1.0f, 1.0e6f, PVID_BAD_MISFIT_MAX, true},
+        {0.01f, 1.0e3f, PVID_BAD_RENEWAL, true},
+        {0.0f, (PVID_NEGLECTED != 0) ? 1.0f : 0.0f, PVID_BAD_NEGLECTED, false},
+    };
+    const float values[] = {config->kappa_min, config->se_max, config->misfit_max, config->renewal, config->neglected};
+    return pvid_settings_within_f32(values, ranges, sizeof values / sizeof values[0]);
 }
 
-static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 *estimator)
+PVID_COLD static void publish_start(pvid_estimate_f32 *estimate, const pvid_estimator_f32 *estimator)
 {
     memcpy(estimate->p, estimator->p, sizeof estimate->p);
     for (size_t a = 0; a < estimator->model->n_p; a++) {
@@ -87,8 +82,8 @@ void pvid_trust_place_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estima
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
 }
 
-pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
-                                const pvid_estimator_f32 *estimator)
+PVID_COLD pvid_status pvid_trust_init_f32(pvid_trust_f32 *self, const pvid_trust_config_f32 *config,
+                                          const pvid_estimator_f32 *estimator)
 {
     PVID_ASSERT((self != NULL) && (config != NULL) && (estimator != NULL));
     if ((self == NULL) || (config == NULL) || (estimator == NULL)) {
@@ -142,7 +137,7 @@ static bool add_variance_ratio(pvid_trust_f32 *self, float variance_ratio)
     return short_exceeds || long_exceeds;
 }
 
-static void restart_alarm(pvid_trust_f32 *self)
+PVID_COLD static void restart_alarm(pvid_trust_f32 *self)
 {
     self->judged = 0;
     self->next = 0;
@@ -159,7 +154,7 @@ static bool all_rows_agree(const pvid_trust_f32 *self, const pvid_estimator_f32 
     return candidate->misfit <= (self->config.misfit_max * (1.0f + (3.0f * chance)));
 }
 
-float pvid_trust_largest_error_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
+PVID_COLD float pvid_trust_largest_error_f32(const pvid_estimator_f32 *estimator, const pvid_estimate_f32 *candidate)
 {
     float largest_error = 0.0f;
     for (size_t a = 0; a < estimator->model->n_p; a++) {
@@ -173,14 +168,14 @@ float pvid_trust_largest_error_f32(const pvid_estimator_f32 *estimator, const pv
 
 /* ---- renewal ---- */
 
-void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+PVID_COLD void pvid_trust_renew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
     self->groups_to_fade = FADE_GROUPS;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
     restart_alarm(self);
 }
 
-void pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
+PVID_COLD void pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator)
 {
     self->anew = true;
     self->groups = 0;
@@ -218,7 +213,8 @@ static bool has_moved(const pvid_trust_f32 *self, const pvid_estimator_f32 *esti
 
 /* For a settled p: renews the sums if they are stale. If the rows agree with p, p becomes the anchor. If the standard
  * errors are large, p has not converged. */
-static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool errors_small, bool agrees)
+PVID_COLD static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool errors_small,
+                                     bool agrees)
 {
     const bool stale = errors_small && !agrees && has_moved(self, estimator);
     if (stale || pvid_estimator_is_rounded_f32(estimator)) {
@@ -232,8 +228,8 @@ static void renew_if_stale(pvid_trust_f32 *self, const pvid_estimator_f32 *estim
 
 /* Sets the alarm and renews the sums if they are stale. `settled`: the last step was small; error: the largest relative
  * standard error. */
-static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled, float variance_ratio,
-                        float error, const pvid_estimate_f32 *candidate)
+PVID_COLD static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, bool settled,
+                                  float variance_ratio, float error, const pvid_estimate_f32 *candidate)
 {
     const bool agrees = all_rows_agree(self, estimator, candidate);
     const bool errors_small = error <= SMALL_ERROR;
@@ -253,8 +249,8 @@ static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32 *estimato
     }
 }
 
-static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason reason, float size, bool above_noise, float error,
-                              const pvid_estimate_f32 *candidate)
+PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason reason, float size, bool above_noise,
+                                        float error, const pvid_estimate_f32 *candidate)
 {
     if (reason != PVID_UPDATED) {
         return reason;
@@ -293,9 +289,9 @@ PVID_COLD static void add_neglected(const pvid_trust_f32 *self, const pvid_estim
     }
 }
 
-pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator, pvid_reason reason,
-                                  float size, bool above_noise, float variance_ratio,
-                                  const pvid_estimate_f32 *candidate)
+PVID_COLD pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32 *estimator,
+                                            pvid_reason reason, float size, bool above_noise, float variance_ratio,
+                                            const pvid_estimate_f32 *candidate)
 {
     pvid_count_up_16(&self->groups);
     if (reason == PVID_ACCUMULATED) { /* no solve was due */
@@ -308,13 +304,13 @@ pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32
     return verdict_on(self, reason, size, above_noise, error, candidate);
 }
 
-pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
-                                   pvid_reason reason, pvid_estimate_f32 *candidate)
+PVID_COLD pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
+                                             pvid_reason reason, pvid_estimate_f32 *candidate)
 {
     if (verdict == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);
-        if (self->config.neglected > 0.0f) {
+        if ((PVID_NEGLECTED != 0) && (self->config.neglected > 0.0f)) {
             add_neglected(self, estimator, candidate);
         }
         pvid_publication_write(&self->mark, &self->estimate, &self->copy, candidate, sizeof *candidate, number);

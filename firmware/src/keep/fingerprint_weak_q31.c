@@ -134,9 +134,8 @@ static uint32_t filters_of(uint32_t hash, const pvid_weak_filter_q31 filter[], s
     for (size_t i = 0; i < n; i++) {
         const pvid_weak_filter_q31 *one = &filter[i];
         running = pvid_fnv_word(running, one->half);
-        running = pvid_fnv_word(running, one->bits);
-        running = rescale_of(running, &one->rescale);
-        running = pvid_fingerprint_table(running, one->weights, one->half);
+        running = pvid_fnv_word(running, one->down);
+        running = pvid_fingerprint_table(running, one->weights, (one->weights != NULL) ? ((size_t)one->half + 1u) : 0u);
     }
     return running;
 }
@@ -145,12 +144,12 @@ static uint32_t formats_of(uint32_t hash, const pvid_weak_design_q31 *design)
 {
     uint32_t running = hash;
     for (size_t i = 0; i < design->model->integrands; i++) {
-        const uint8_t fields[] = {design->integral[i].once, design->integral[i].twice};
+        const uint8_t fields[] = {design->integral[i].down, design->integral[i].twice};
         running = pvid_fingerprint_bytes(running, fields, sizeof fields);
     }
     for (size_t i = 0; i < design->model->channels; i++) {
         const pvid_weak_format_q31 *one = &design->format[i];
-        const uint8_t fields[] = {one->value, one->own, one->plain, one->ramp};
+        const uint8_t fields[] = {one->value, one->lift, one->own, one->plain, one->ramp};
         running = pvid_fingerprint_bytes(running, fields, sizeof fields);
     }
     return running;
@@ -181,7 +180,10 @@ uint32_t pvid_fingerprint_weak_design_q31(const pvid_weak_design_q31 *design)
     }
     hash = pvid_fingerprint_words(hash, design->sign_width, model->signs);
     hash = formats_of(hash, design);
-    hash = pvid_fingerprint_table(hash, design->circle, 2u * (size_t)design->hop);
+    const size_t highest = ((size_t)design->functions / 2u) + (design->power / 2u);
+    const size_t entries = ((7u * (size_t)design->hop) / 2u) + (3u * highest);
+    hash = pvid_fingerprint_table(hash, design->circle, entries);
+    hash = pvid_fnv_word(hash, design->fine ? 1u : 0u);
     hash = scaled_of(hash, design->factor, terms_end(model));
     hash = pvid_fnv_word(hash, design->n_noise);
     hash = noise_of(hash, design->noise, design->n_noise);

@@ -24,7 +24,7 @@ static const uint32_t layout[] = {
     PLACE(front),
     PLACE(front.ring),
     PLACE(work),
-    PLACE(work.sum),
+    PLACE(work.sums),
     PLACE(solve),
     PLACE(mark),
     PLACE(estimate),

@@ -19,8 +19,7 @@ static const uint32_t layout[] = {
     PLACE(misfit),
     PLACE(misfit.block),
     PLACE(estimator),
-    PLACE(estimator.row_variance),
-    PLACE(estimator.divider),
+    PLACE(estimator.phase),
     PLACE(estimator.mixes),
     PLACE(estimator.counters),
     PLACE(estimator.block),
@@ -29,7 +28,7 @@ static const uint32_t layout[] = {
     PVID_MAX_WINDOW,
 };
 
-static const pvid_snapshot_pointer pointers[] = {{PLACE(window.bank.weights), PVID_SNAPSHOT_OF_INIT}};
+static const pvid_snapshot_pointer pointers[] = {{PLACE(estimator.config), PVID_SNAPSHOT_OF_INIT}};
 static const pvid_snapshot_shape shape = {sizeof(pvid_strong_f32), pointers, sizeof pointers / sizeof pointers[0]};
 
 static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)
@@ -46,7 +45,7 @@ static pvid_snapshot_identity identity_of(const pvid_strong_config_f32 *config)
 /* Whether init has accepted a configuration. */
 static bool is_ready(const pvid_strong_f32 *self, const pvid_strong_config_f32 *config, const uint8_t image[])
 {
-    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->window.length != 0u);
+    const bool ready = (self != NULL) && (config != NULL) && (image != NULL) && (self->estimator.config != NULL);
     PVID_ASSERT(ready);
     return ready;
 }

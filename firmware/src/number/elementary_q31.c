@@ -35,6 +35,17 @@ static int32_t sine_of_half_turns(int64_t h, uint32_t bits)
     return (is_odd != is_negative) ? -held : held;
 }
 
+#if defined(__ARM_ARCH_6M__)
+int32_t pvid_fixed_product_q31(int32_t a, int32_t b, uint32_t s)
+{
+    const int64_t product = pvid_product_in_halves_q31(a, b);
+    if (s == 30u) { /* of most */
+        return (int32_t)pvid_round_shift_q31(product, 30);
+    }
+    return (int32_t)pvid_round_shift_q31(product, s);
+}
+#endif
+
 int32_t pvid_sin_q31(int32_t x, uint32_t bits)
 {
     return sine_of_half_turns(x * HALF_TURNS, bits + HALF_TURNS_BITS);

@@ -28,10 +28,7 @@ static inline bool pvid_finite_f32(float x)
     return (pvid_bits_f32(x) & 0x7F800000u) != 0x7F800000u;
 }
 
-/* finite and low <= x <= high */
-static inline bool pvid_within_f32(float x, float low, float high)
-{
-    return pvid_finite_f32(x) && (x >= low) && (x <= high);
-}
+/* Finite and low <= x <= high: the check of a setting. */
+bool pvid_within_f32(float x, float low, float high);
 
 #endif

@@ -111,12 +111,35 @@ uint32_t pvid_square_root_q31(uint64_t x)
     return root >> up;
 }
 
-pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x)
+/* (x 2^16 + next) / y rounded down, y of 32 bits and x < y; *rest: what is left. The quotient by the upper half of y is
+ * too large by two at most. */
+static uint32_t digit_of(uint32_t x, uint32_t y, uint32_t next, uint32_t *rest)
 {
-    const uint32_t k = 31u - pvid_bit_length_q31(x);
-    const uint64_t quotient = ((uint64_t)1 << 61) / ((uint64_t)x << k);
-    const pvid_reciprocal_q31 result = {(int32_t)((quotient > INT32_MAX) ? (uint64_t)INT32_MAX : quotient), (uint8_t)k};
-    return result;
+    const uint32_t upper = y >> 16;
+    const uint32_t lower = y & 0xFFFFu;
+    uint32_t digit = x / upper;
+    uint32_t left = x - (digit * upper);
+    for (uint32_t i = 0; i < 2u; i++) {
+        if ((left < 0x10000u) && ((digit > 0xFFFFu) || ((digit * lower) > ((left << 16) | next)))) {
+            digit--;
+            left += upper;
+        }
+    }
+    *rest = ((x << 16) | next) - (digit * y);
+    return digit;
+}
+
+/* D. E. Knuth, The Art of Computer Programming 2, algorithm D, with two digits of 16 bits. */
+uint32_t pvid_quotient_in_halves_q31(uint64_t x, uint32_t y)
+{
+    const uint32_t up = 32u - pvid_bit_length_q31(y);
+    const uint32_t divisor = y << up;
+    const uint64_t dividend = x << up;
+    const uint32_t low = (uint32_t)(dividend & 0xFFFFFFFFu);
+    uint32_t rest;
+    const uint32_t upper = digit_of((uint32_t)(dividend >> 32), divisor, low >> 16, &rest);
+    const uint32_t lower = digit_of(rest, divisor, low & 0xFFFFu, &rest);
+    return (upper << 16) + lower;
 }
 
 pvid_root_q31 pvid_root_of_q31(int64_t m, int32_t exponent)

@@ -7,6 +7,7 @@
 #define PVID_INTEGER_Q31_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "pvid/detail/shift_q31.h"
@@ -27,6 +28,23 @@ static inline int64_t pvid_product_q31(int32_t a, int32_t b)
     return pvid_product_in_halves_q31(a, b);
 #else
     return (int64_t)a * b;
+#endif
+}
+
+/* a b 2^-32 rounded down. */
+static inline int32_t pvid_upper_product_q31(int32_t a, int32_t b)
+{
+#if defined(__ARM_ARCH_6M__)
+    /* as pvid_product_in_halves_q31, without the lower register */
+    const uint32_t a_low = (uint32_t)a & 0xFFFFu;
+    const uint32_t b_low = (uint32_t)b & 0xFFFFu;
+    const int32_t a_high = pvid_floor_shift_32_q31(a, 16);
+    const int32_t b_high = pvid_floor_shift_32_q31(b, 16);
+    const int32_t first = (a_high * (int32_t)b_low) + (int32_t)((a_low * b_low) >> 16);
+    const int32_t second = ((int32_t)a_low * b_high) + (int32_t)((uint32_t)first & 0xFFFFu);
+    return (a_high * b_high) + pvid_floor_shift_32_q31(first, 16) + pvid_floor_shift_32_q31(second, 16);
+#else
+    return (int32_t)pvid_floor_shift_q31((int64_t)a * b, 32);
 #endif
 }
 
@@ -141,11 +159,29 @@ static inline uint32_t pvid_bit_length_q31(uint64_t x) /* one instruction counts
 uint32_t pvid_bit_length_q31(uint64_t x);
 #endif
 
+/* Number of bits of x < 256, as of a harmonic: without a call. */
+static inline uint32_t pvid_byte_length_q31(size_t x)
+{
+    static const uint8_t length_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
+    return (x > 15u) ? (4u + length_of[x >> 4]) : length_of[x];
+}
+
+/* x / y rounded down, x < y 2^32: by two divisions of 32 by 16 bits, where there is none of 64 bits. */
+uint32_t pvid_quotient_in_halves_q31(uint64_t x, uint32_t y);
+
+/* x / y rounded down, y > 0. */
+static inline uint64_t pvid_quotient_q31(uint64_t x, uint32_t y)
+{
+#if defined(__arm__)
+    if ((x >> 32) < y) {
+        return pvid_quotient_in_halves_q31(x, y);
+    }
+#endif
+    return x / y;
+}
+
 /* Greatest r with r^2 <= x, x <= 2^62. */
 uint32_t pvid_square_root_q31(uint64_t x);
-
-/* The reciprocal of 1 <= x < 2^31; m is short of the quotient by less than 2. */
-pvid_reciprocal_q31 pvid_reciprocal_of_q31(uint32_t x);
 
 /* r 2^e = sqrt(m 2^exponent), r below 2^31 and of 30 bits at least unless m is 0; 0 <= m <= PVID_WIDE. The greatest
  * such r where m < 2^60; beyond that m may lose its last bit. */

@@ -22,6 +22,9 @@ static inline bool pvid_scaled_exceeds_q31(pvid_scaled_q31 a, pvid_scaled_q31 b)
     return ((uint32_t)a.m << twice_a) > ((uint32_t)b.m << twice_b);
 }
 
+/* 1 / sqrt(x) within 2^-25 of it, x.m of 30 digits and positive; its m is 2^29 to 2^30 - 1. */
+pvid_scaled_q31 pvid_inverse_root_q31(pvid_scaled_q31 x);
+
 /* a 2^exponent. */
 static inline pvid_scaled_q31 pvid_scaled_shifted_q31(pvid_scaled_q31 a, int32_t exponent)
 {

@@ -2,18 +2,18 @@
 #ifndef PVID_UNROLL_H
 #define PVID_UNROLL_H
 
-#include "pvid/config.h"
-
 /* Before a loop of constant length: writes it out, where the loop's own bookkeeping costs more than the two
  * operations inside. */
 #if defined(__GNUC__) && (__GNUC__ >= 8) && !defined(__clang__)
 #define PVID_UNROLL _Pragma("GCC unroll 16")
 #define PVID_UNROLL_BY_TWO _Pragma("GCC unroll 2")
 #define PVID_UNROLL_BY_FOUR _Pragma("GCC unroll 4")
+#define PVID_ROLLED _Pragma("GCC unroll 1") /* stays a loop: its turns are long */
 #else
 #define PVID_UNROLL
 #define PVID_UNROLL_BY_TWO
 #define PVID_UNROLL_BY_FOUR
+#define PVID_ROLLED
 #endif
 
 /* Instead of `static inline`, for a function that is called with constants for which it becomes short, but looks long
@@ -22,19 +22,6 @@
 #define PVID_ALWAYS_INLINE static inline __attribute__((always_inline))
 #else
 #define PVID_ALWAYS_INLINE static inline
-#endif
-
-/* Before a loop whose turns are long, and instead of `static inline` of a function with several callers: written out
- * at every place, but with PVID_SMALL once. */
-#if PVID_SMALL == 0
-#define PVID_UNROLL_IF_FAST PVID_UNROLL
-#define PVID_INLINE_IF_FAST PVID_ALWAYS_INLINE
-#elif defined(__GNUC__) && (__GNUC__ >= 8) && !defined(__clang__)
-#define PVID_UNROLL_IF_FAST _Pragma("GCC unroll 1")
-#define PVID_INLINE_IF_FAST static __attribute__((noinline, unused))
-#else
-#define PVID_UNROLL_IF_FAST
-#define PVID_INLINE_IF_FAST static inline
 #endif
 
 /* Before a function whose results go through memory on purpose: inlined, gcc keeps 32-bit numbers as 64 and multiplies

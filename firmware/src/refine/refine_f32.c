@@ -20,7 +20,7 @@
 #define N PVID_REFINE_PARAMETERS
 
 /* What the next tick does. */
-enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
+enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START };
 
 /* Mean square of the rows' noise over its density at low frequencies: the trapezoids of neighbouring rows share a
  * sample. */
@@ -56,9 +56,17 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT };
  * to no weight then, but still shows the clash. */
 #define KEPT (1.0f / 16.0f)
 
-/* Jobs of a pass for each of its big steps, at most, and beside them; entries that such a block keeps free. */
-#define JOBS 6u
-#define OTHER_JOBS 40u
+/* Steps between the three readings that a block's start is measured by. */
+#define APART 4u
+
+/* In the track a first pass whose step of the logarithms is this much below the limit is the block's last. */
+#define SHORT 0.25f
+
+/* Jobs of a pass for each of its big steps, at most, and for its beginning; ticks of a solution; entries that such a
+ * block keeps free. */
+#define JOBS 9u
+#define FIRST_JOBS 16u
+#define SOLVE_TICKS 45u
 #define SPARE 16u
 
 static inline bool is_ready(const pvid_refine_f32 *self)
@@ -97,7 +105,7 @@ static void begin_pass(pvid_refine_f32 *self)
     self->waiting = false;
 }
 
-static void begin_block(pvid_refine_f32 *self)
+PVID_COLD static void begin_block(pvid_refine_f32 *self)
 {
     if (!is_there(self)) {
         self->begin = pvid_refine_front_end_f32(&self->front); /* overwritten, or will be */
@@ -107,7 +115,48 @@ static void begin_block(pvid_refine_f32 *self)
     memcpy(self->start, self->expected, sizeof self->start);
     self->pass = 0;
     begin_pass(self);
+#if PVID_REFINE_HAS_MEASURED
+    self->phase = self->restarted ? (uint8_t)START : (uint8_t)PASS;
+#endif
 }
+
+#if PVID_REFINE_HAS_MEASURED
+/* The start of a block that follows no other: what the sensors read, rates by a parabola through three readings. From 0
+ * a large motion is too far away. */
+static void start_job(pvid_refine_f32 *self)
+{
+    const uint32_t behind = self->begin + ((2u * APART) + 1u);
+    if ((int32_t)(pvid_refine_front_end_f32(&self->front) - behind) < 0) {
+        self->waiting = true;
+        self->due = behind;
+        return;
+    }
+    pvid_refine_signals_f32 at[3];
+    for (uint32_t k = 0; k < 3u; k++) {
+        pvid_refine_front_read_f32(&self->front, self->begin + (k * APART), &at[k]);
+    }
+    const float scale = 1.0f / ((2.0f * (float)APART) * self->h);
+    for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+        const size_t code = pvid_refine_measured[i];
+        if (code > 0u) {
+            const size_t output = (code - 1u) / 2u;
+            const float z = at[0].z[output];
+            const float rate = (((4.0f * at[1].z[output]) - at[2].z[output]) - (3.0f * z)) * scale;
+            const float x = ((code & 1u) != 0u) ? z : rate;
+            self->start[i] = pvid_refine_within_f32(x, self->config.state_limit[i]) ? x : 0.0f;
+        }
+    }
+    begin_pass(self);
+}
+
+/* Whether the first pass of a block of the track left out too much: its start, which follows from the block before, is
+ * too far away. */
+static bool is_off(const pvid_refine_f32 *self)
+{
+    return !self->restarted && (self->taken > 0u) && (self->pass == 0u) &&
+           ((uint32_t)self->work.used * 10u < (uint32_t)self->length * 6u * PVID_REFINE_OUTPUTS);
+}
+#endif
 
 /* The triangle and r are those of the weak form. */
 static void begin_search(pvid_refine_f32 *self)
@@ -119,7 +168,7 @@ static void begin_search(pvid_refine_f32 *self)
 }
 
 /* Takes a new estimate of the weak form if it is in the region; until a block has been taken it is the prior's mean. */
-PVID_SELDOM static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
+PVID_COLD static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *weak)
 {
     float r[N];
     pvid_refine_from_p(weak->p, r);
@@ -145,8 +194,9 @@ static void begin_anew(pvid_refine_f32 *self)
 static uint32_t oldest(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    const uint32_t jobs = config->passes * ((JOBS * (uint32_t)self->length) + OTHER_JOBS);
-    const uint32_t taken = (jobs / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + SPARE; /* in the meantime */
+    const uint32_t jobs = (JOBS * (uint32_t)self->length) + FIRST_JOBS;
+    const uint32_t ticks = config->passes * ((jobs / config->jobs) + SOLVE_TICKS);
+    const uint32_t taken = (ticks / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + SPARE; /* in the meantime */
     const uint32_t room = pvid_refine_front_room_f32(&self->front);
     const uint32_t end = pvid_refine_front_end_f32(&self->front);
     const uint32_t back = (room > taken) ? (room - taken) : 0u;
@@ -306,32 +356,28 @@ static void end_block(pvid_refine_f32 *self)
 
 /* ---- jobs ---- */
 
-static void pass_job(pvid_refine_f32 *self)
+/* Some jobs of a pass, as far as their signals are there. */
+static inline void pass_jobs(pvid_refine_f32 *self)
 {
-    pvid_refine_signals_f32 signals;
-    uint32_t first = 0;
-    const uint32_t steps = pvid_refine_pass_needs_f32(&self->work, &first);
-    if (steps > 0u) {
-        const uint32_t entry = self->begin + first;
-        const uint32_t behind = entry + (steps + PVID_REFINE_REACH);
-        if ((int32_t)(pvid_refine_front_end_f32(&self->front) - behind) < 0) {
-            self->waiting = true;
-            self->due = behind;
-            return;
-        }
-        pvid_refine_front_read_f32(&self->front, entry, steps, &signals);
-    }
-    pvid_refine_pass_job_f32(&self->work, self->linear, self->weight, &signals);
-    if (pvid_refine_pass_ends_f32(&self->work, self->length)) {
+    const pvid_refine_block_f32 block = {self->linear, self->weight, self->begin, self->length};
+    const pvid_refine_progress progress =
+        pvid_refine_pass_run_f32(&self->work, &self->front, &block, self->config.jobs);
+    if (progress == PVID_REFINE_PASS_WAITS) {
+        uint32_t step = 0;
+        self->waiting = pvid_refine_pass_needs_f32(&self->work, &step);
+        self->due = self->begin + step + 1u;
+    } else if (progress == PVID_REFINE_PASS_DONE) {
         pvid_refine_solve_begin_f32(&self->solve);
         self->phase = SOLVE;
+    } else {
+        /* at the next tick */
     }
 }
 
 static void solve_job(pvid_refine_f32 *self)
 {
     const pvid_refine_solution solution =
-        pvid_refine_solve_job_f32(&self->solve, &self->work, self->triangle, self->r, self->linear,
+        pvid_refine_solve_job_f32(&self->solve, self->work.sums.sum, self->triangle, self->r, self->linear,
                                   self->config.prior_sd, self->config.step_limit);
     if (solution != PVID_REFINE_SOLVING) {
         self->solved = solution == PVID_REFINE_SOLVED;
@@ -339,13 +385,14 @@ static void solve_job(pvid_refine_f32 *self)
     }
 }
 
-/* Whether the block has had enough passes: until the steps are small, in the track `passes` of them usually do; or the
- * ring has lost it. */
+/* Whether the block has had enough passes: until the steps are small, in the track mostly one pass; or the ring has
+ * lost it. */
 static bool is_enough(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    const bool small = self->solve.size < config->step_max;
-    return (self->pass >= config->most_passes) || (small && (self->pass >= config->passes)) || !is_there(self);
+    const bool tracks = (self->taken > 0u) && (self->solve.bend < (SHORT * config->step_max));
+    const bool small = (tracks || (self->pass >= config->passes)) && (self->solve.size < config->step_max);
+    return small || (self->pass >= config->most_passes) || !is_there(self);
 }
 
 /* Whether a block of a search goes on twice as long. */
@@ -359,6 +406,13 @@ static bool grows(const pvid_refine_f32 *self)
 /* The point of linearisation and the start move by the steps. */
 static void move(pvid_refine_f32 *self)
 {
+#if PVID_REFINE_HAS_MEASURED
+    if (is_off(self)) {
+        forget_state(self);
+        begin_block(self);
+        return;
+    }
+#endif
     float moved[N];
     pvid_refine_move_f32(self->linear, self->solve.step, moved);
     memcpy(self->linear, moved, sizeof self->linear);
@@ -373,8 +427,10 @@ static void move(pvid_refine_f32 *self)
     } else if (is_enough(self)) {
         self->phase = END;
     } else if ((self->taken == 0u) && self->renewed && !(self->solve.size < ASTRAY)) {
-        begin_anew_in_the_past(self);
-        begin_block(self);
+        self->lost = 1;
+        self->length = self->config.first_block;
+        self->verdict = PVID_HELD_SEARCHING;
+        self->phase = NEXT;
     } else {
         begin_pass(self);
     }
@@ -393,9 +449,9 @@ static float variance_of_row(const pvid_refine_f32 *self)
 static void assess(pvid_refine_f32 *self)
 {
     if (self->pass == 0u) {
-        pvid_refine_assess_begin_f32(&self->candidate, &self->config);
+        pvid_refine_assess_begin_f32(&self->work.sums.candidate, &self->config);
     }
-    pvid_refine_assess_column_f32(&self->candidate, self->solve.triangle, self->pass, variance_of_row(self));
+    pvid_refine_assess_column_f32(&self->work.sums.candidate, self->solve.triangle, self->pass, variance_of_row(self));
     self->pass++;
     self->phase = (self->pass < N) ? ASSESS : JUDGE;
 }
@@ -403,10 +459,18 @@ static void assess(pvid_refine_f32 *self)
 static void publish(pvid_refine_f32 *self)
 {
     if (self->verdict == PVID_UPDATED) {
-        uint32_t number = self->mark.number[0];
-        pvid_count_up(&number);
-        pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->candidate, sizeof self->candidate,
-                               number);
+        pvid_count_up(&self->published);
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->work.sums.candidate,
+                               sizeof self->work.sums.candidate, self->published);
+    }
+}
+
+/* Withdraws the published estimate if the last block refutes it: one that was not taken in the track does not yet. */
+static void withdraw(pvid_refine_f32 *self)
+{
+    const bool stands = (self->verdict == PVID_UPDATED) || ((self->verdict == PVID_HELD_BLOCK) && (self->taken > 0u));
+    if (!stands && (self->mark.number[0] > 0u)) {
+        pvid_publication_write(&self->mark, &self->estimate, &self->copy, &self->estimate, 0, 0);
     }
 }
 
@@ -433,13 +497,16 @@ static void next_block(pvid_refine_f32 *self)
     begin_block(self);
 }
 
-PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
+/* The jobs that are not a pass's. */
+PVID_COLD static pvid_reason seldom(pvid_refine_f32 *self)
 {
     pvid_reason reason = PVID_ACCUMULATED;
     switch (self->phase) {
-    case PASS:
-        pass_job(self);
+#if PVID_REFINE_HAS_MEASURED
+    case START:
+        start_job(self);
         break;
+#endif
     case SOLVE:
         solve_job(self);
         break;
@@ -459,8 +526,8 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
         assess(self);
         break;
     case JUDGE:
-        pvid_refine_assess_end_f32(&self->candidate, self->r, self->level, self->clash);
-        self->verdict = pvid_refine_verdict_f32(&self->candidate, &self->config, self->weak, self->weak_se);
+        pvid_refine_assess_end_f32(&self->work.sums.candidate, self->r, self->level, self->clash);
+        self->verdict = pvid_refine_verdict_f32(&self->work.sums.candidate, &self->config, self->weak, self->weak_se);
         self->phase = PUBLISH;
         break;
     case PUBLISH:
@@ -470,6 +537,7 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
     case NEXT:
         reason = self->verdict;
         self->told = reason;
+        withdraw(self);
         next_block(self);
         break;
     default:
@@ -486,9 +554,18 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
     return reason;
 }
 
+PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
+{
+    if (self->phase != (uint8_t)PASS) {
+        return seldom(self);
+    }
+    pass_jobs(self);
+    return PVID_ACCUMULATED;
+}
+
 /* ---- API ---- */
 
-pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config)
+PVID_COLD pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config)
 {
     pvid_status status = pvid_init_is_given(self, config) ? pvid_refine_valid_f32(config) : PVID_BAD_POINTER;
     if (status == PVID_OK) {
@@ -512,9 +589,10 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
 }
 
 /* Restarts the block with what the ring will contain. */
-static void restart(pvid_refine_f32 *self)
+PVID_COLD static void restart(pvid_refine_f32 *self)
 {
     pvid_refine_front_reset_f32(&self->front, &self->config);
+    self->plain = false;
     self->begin = pvid_refine_front_first_f32(&self->front);
     self->origin = self->begin;
     self->again = false;
@@ -535,20 +613,34 @@ void pvid_refine_freeze_f32(pvid_refine_f32 *self, bool frozen)
 {
     if (is_ready(self)) {
         self->frozen = frozen;
+        self->plain = false;
     }
 }
 
-pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak)
+static pvid_reason idle(const pvid_refine_f32 *self)
 {
-    if (!is_ready(self) || (sample == NULL)) {
-        return PVID_NOT_READY;
+    return (self->phase == (uint8_t)WAIT) ? PVID_WARMING_UP : PVID_ACCUMULATED;
+}
+
+/* The jobs of a tick: not while the weak form is busy, but not too often. */
+static inline pvid_reason work_unless(pvid_refine_f32 *self, bool busy)
+{
+    if (self->waiting) {
+        return PVID_ACCUMULATED;
     }
-    const bool rests = (weak != NULL) && !self->beside; /* the weak form's tick is long */
-    self->beside = weak != NULL;
-    if (self->beside) {
-        take_weak(self, weak);
+    self->busy = busy;
+    if (busy && (self->rested < self->config.rests)) {
+        self->rested++;
+        return idle(self);
     }
-    const pvid_refine_entry entry = pvid_refine_front_step_f32(&self->front, &self->config, sample);
+    self->rested = 0;
+    return work(self);
+}
+
+/* The last tick of a step: of its own it has no jobs. */
+PVID_SELDOM static pvid_reason end_step(pvid_refine_f32 *self, const float sample[], bool busy)
+{
+    const pvid_refine_entry entry = pvid_refine_front_end_block_f32(&self->front, &self->config, sample);
     if (entry == PVID_REFINE_BROKEN) {
         restart(self);
         return PVID_REJECTED_NOT_FINITE;
@@ -556,15 +648,50 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
     if (self->frozen) {
         return PVID_HELD_FROZEN;
     }
-    if (entry == PVID_REFINE_ENTERED) {
-        self->waiting = self->waiting && (pvid_refine_front_end_f32(&self->front) < self->due);
-    }
-    const bool works = (entry == PVID_REFINE_NOTHING) || (self->config.ratio == 1u);
-    if (works && !rests && !self->waiting) {
-        return work(self);
-    }
-    return (self->phase == (uint8_t)WAIT) ? PVID_WARMING_UP : PVID_ACCUMULATED;
+    self->waiting = self->waiting && (pvid_refine_front_end_f32(&self->front) < self->due);
+    return (self->config.ratio == 1u) ? work_unless(self, busy) : idle(self);
 }
+
+/* A tick with a new estimate of the weak form, the first one, one while it is frozen. */
+PVID_COLD static pvid_reason odd_step(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak,
+                                      bool busy)
+{
+    if (weak != NULL) {
+        take_weak(self, weak);
+    }
+    if (!self->front.referred) {
+        pvid_refine_front_refer_f32(&self->front, &self->config, sample);
+    }
+    self->plain = !self->frozen;
+    if (pvid_refine_front_add_f32(&self->front, sample)) {
+        return end_step(self, sample, busy);
+    }
+    return self->frozen ? PVID_HELD_FROZEN : work_unless(self, busy);
+}
+
+/* A tick of the weak form's second stage, whose pointers are given. */
+static pvid_reason step_of_stage(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy)
+{
+    if ((weak != NULL) || !self->plain) {
+        return odd_step(self, sample, weak, busy);
+    }
+    if (pvid_refine_front_add_f32(&self->front, sample)) {
+        return end_step(self, sample, busy);
+    }
+    return work_unless(self, busy);
+}
+
+pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy)
+{
+    return (is_ready(self) && (sample != NULL)) ? step_of_stage(self, sample, weak, busy) : PVID_NOT_READY;
+}
+
+const pvid_weak_stage_f32 pvid_refine_stage_f32 = {
+    .init = pvid_refine_init_f32,
+    .step = step_of_stage,
+    .gap = pvid_refine_gap_f32,
+    .freeze = pvid_refine_freeze_f32,
+};
 
 const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self)
 {

@@ -17,14 +17,15 @@
 #define FULL_SCALE 32767.0f
 #define MASK ((uint32_t)PVID_REFINE_RING - 1u)
 
-void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+PVID_COLD void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
 {
     const float ratio = (float)config->ratio;
     self->share = 1.0f / ratio;
-    self->droop = (1.0f - (1.0f / (ratio * ratio))) / 24.0f;
     self->behind = 0;
     for (size_t i = 0; i < SIGNALS; i++) {
         const pvid_refine_signal_f32 *signal = &config->signal[i];
+        const float steps = 1.0f / (ratio * ratio); /* the droop of a held input's own steps stays */
+        self->droop[i] = ((signal->source == (uint8_t)PVID_SIGNAL_HELD) ? (1.0f + steps) : (1.0f - steps)) / 24.0f;
         self->sample[i] = signal->sample;
         self->to_counts[i] = signal->scale * (FULL_SCALE / signal->range);
         self->from_counts[i] = signal->range / FULL_SCALE;
@@ -33,7 +34,7 @@ void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvid_refine_c
     pvid_refine_front_reset_f32(self, config);
 }
 
-void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+PVID_COLD void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
 {
     self->wait = config->ratio;
     self->means = 0;
@@ -46,12 +47,7 @@ void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pvid_refine_
 
 uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self)
 {
-    return (uint32_t)self->behind + PVID_REFINE_REACH;
-}
-
-uint32_t pvid_refine_front_end_f32(const pvid_refine_front_f32 *self)
-{
-    return (self->next > self->behind) ? (self->next - self->behind) : 0u;
+    return self->behind;
 }
 
 uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)
@@ -128,7 +124,7 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
         const float x = self->sum[i] * self->share;
         const float middle = self->mean[0][i];
         if (known) {
-            enter(self, config, i, middle - (self->droop * ((self->mean[1][i] - (2.0f * middle)) + x)));
+            enter(self, config, i, middle - (self->droop[i] * ((self->mean[1][i] - (2.0f * middle)) + x)));
         }
         self->mean[1][i] = middle;
         self->mean[0][i] = x;
@@ -144,8 +140,8 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
     return PVID_REFINE_ENTERED;
 }
 
-void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
-                                 const float sample[])
+PVID_COLD void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
+                                           const float sample[])
 {
     for (size_t i = 0; i < INPUTS; i++) {
         const float x = sample[config->signal[i].sample];

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 #include "refine/refine_solve_f32.h"
 #include "refine_model_f32.h"
 
@@ -25,7 +26,7 @@ bool pvid_refine_within_f32(float x, float limit)
     return (x > -limit) && (x < limit);
 }
 
-void pvid_refine_assess_begin_f32(pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config)
+PVID_COLD void pvid_refine_assess_begin_f32(pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config)
 {
     for (size_t i = 0; i < N; i++) {
         for (size_t j = 0; j < N; j++) {
@@ -34,8 +35,8 @@ void pvid_refine_assess_begin_f32(pvid_refine_estimate_f32 *estimate, const pvid
     }
 }
 
-void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const float triangle[], size_t column,
-                                   float variance)
+PVID_COLD void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const float triangle[], size_t column,
+                                             float variance)
 {
     float x[N];
     const size_t end = column + 1u;
@@ -48,7 +49,7 @@ void pvid_refine_assess_column_f32(pvid_refine_estimate_f32 *estimate, const flo
     }
 }
 
-void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level, float clash)
+PVID_COLD void pvid_refine_assess_end_f32(pvid_refine_estimate_f32 *estimate, const float r[], float level, float clash)
 {
     estimate->level = level;
     estimate->clash = clash;
@@ -70,8 +71,9 @@ static bool agrees(const pvid_refine_estimate_f32 *estimate, size_t place, float
     return (difference >= -allowed) && (difference <= allowed);
 }
 
-pvid_reason pvid_refine_verdict_f32(const pvid_refine_estimate_f32 *estimate, const pvid_refine_config_f32 *config,
-                                    const float weak[], const float weak_se[])
+PVID_COLD pvid_reason pvid_refine_verdict_f32(const pvid_refine_estimate_f32 *estimate,
+                                              const pvid_refine_config_f32 *config, const float weak[],
+                                              const float weak_se[])
 {
     bool certain = true;
     for (size_t i = 0; i < N; i++) {

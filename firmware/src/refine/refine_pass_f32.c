@@ -1,81 +1,61 @@
 #include "number/uncontracted.h"
 
-/* Motion: Adams-Bashforth-Nystroem of order 7 predicts, one evaluation a step; its seventh difference corrects
- * prediction to Adams-Moulton's of order 8. The first six steps of a block are three double
- * steps of Runge-Kutta (order 4), their middles quintic Hermite polynomials.
+/* Motion: Adams-Bashforth-Nystroem of order 7 predicts from backward differences, one evaluation a step; the seventh
+ * difference corrects prediction to Adams-Moulton's of order 8. The first six steps of a block are three double steps
+ * of Runge-Kutta (order 4), their middles quintic Hermite polynomials.
  * Derivatives of the motion: leapfrog over four steps (drift, kick, drift) with one Jacobian at the middle; K replaced
  * by K + H^2/12 K^2, which gives the modes their frequencies. Their errors cost efficiency, not bias. Rows: the
- * residuals' mean over those steps by trapezoids, the columns at their middle. */
+ * residuals' mean over those steps by trapezoids, the columns at their middle. Outputs are those of the motion `skew`
+ * seconds later, by its derivatives. */
 #include "refine/refine_pass_f32.h"
 
 #include <stddef.h>
 #include <string.h>
 
 #include "number/unroll.h"
+#include "refine/refine_front_f32.h"
 #include "refine_model_f32.h"
 
 #define N_Q PVID_REFINE_COORDINATES
 #define V (PVID_REFINE_STATES - N_Q) /* place of the rates in the state; without rates any place */
 #define AB PVID_REFINE_AB
+#define MIDDLE (PVID_REFINE_SUB / 2)
 
-/* Jobs of a pass, in their order; the first two of a pair of steps are those of Runge-Kutta alone, then one for each
- * step. */
-enum { CLEAR, FIRST_A, FIRST_B, FIRST, MIDDLE, SECOND_A, SECOND_B, SECOND, END, COLUMNS, ROWS };
+/* Jobs of a pass. START once; MEAN to END are Runge-Kutta's over two steps. */
+enum { CLEAR, START, MEAN, MEAN_AGAIN, FULL, END, STEP, KICK, COLUMNS, MORE_COLUMNS, ROWS, MORE_ROWS };
 
 #define STARTS 3u /* double steps */
 
-/* Weights of the last accelerations, latest first, on the position (h^2) and on the velocity (h); twice, so that a
- * circular buffer is read without wrapping. */
-#define POSITION                                                                                                       \
-    139849.0f / 120960.0f, -4511.0f / 2240.0f, 123133.0f / 40320.0f, -88547.0f / 30240.0f, 1537.0f / 896.0f,           \
-        -11351.0f / 20160.0f, 275.0f / 3456.0f
-#define VELOCITY                                                                                                       \
-    198721.0f / 60480.0f, -18637.0f / 2520.0f, 235183.0f / 20160.0f, -10754.0f / 945.0f, 135713.0f / 20160.0f,         \
-        -5603.0f / 2520.0f, 19087.0f / 60480.0f
+/* Columns of the first of two jobs, and rows of the sums. */
+#define HALF_OF_COLUMNS ((PVID_REFINE_COLUMNS + 1) / 2)
+#define PART_OF_SUMS (PVID_REFINE_WIDTH / 3)
+#define SUMS_BEFORE ((PART_OF_SUMS * ((2 * PVID_REFINE_WIDTH) + 1 - PART_OF_SUMS)) / 2)
+
+/* Weights of the backward differences in the change of the position (h^2) and of the velocity (h); the last one's is
+ * that of the corrector. */
 #if PVID_REFINE_ORDER == 2
-static const float position_weights[2 * AB] = {POSITION, POSITION};
+static const float of_position[AB + 1] = {1.0f / 2.0f,  1.0f / 6.0f,       1.0f / 8.0f,      19.0f / 180.0f,
+                                          3.0f / 32.0f, 863.0f / 10080.0f, 275.0f / 3456.0f, 33953.0f / 453600.0f};
 #endif
-static const float velocity_weights[2 * AB] = {VELOCITY, VELOCITY};
+static const float of_velocity[AB + 1] = {
+    1.0f,           1.0f / 2.0f,         5.0f / 12.0f,      3.0f / 8.0f, 251.0f / 720.0f,
+    95.0f / 288.0f, 19087.0f / 60480.0f, 5257.0f / 17280.0f};
 
-/* Weights of the last accelerations, latest first, in the seventh difference of the newest one; twice. Its weights in
- * the corrected position (h^2) and velocity (h). */
-#define DIFFERENCE -7.0f, 21.0f, -35.0f, 35.0f, -21.0f, 7.0f, -1.0f
-static const float difference_weights[2 * AB] = {DIFFERENCE, DIFFERENCE};
-#define CORRECTED_POSITION (33953.0f / 453600.0f)
-#define CORRECTED_VELOCITY (5257.0f / 17280.0f)
-
-#if PVID_REFINE_SKEW
-/* Weights of five steps that give a signal `skew` seconds after the middle one, and its derivative there: the
- * polynomial of degree 4 through them. */
-static void delay(pvid_refine_pass_f32 *self, float skew)
-{
-    const float s = skew / self->h;
-    const float z = s * s;
-    const float scale = 1.0f / self->h;
-    self->late[0] = ((s * (z - 1.0f)) * (s - 2.0f)) / 24.0f;
-    self->late[1] = ((s * (s - 1.0f)) * (4.0f - z)) / 6.0f;
-    self->late[2] = ((1.0f - z) * (4.0f - z)) * 0.25f;
-    self->late[3] = ((s * (s + 1.0f)) * (4.0f - z)) / 6.0f;
-    self->late[4] = ((s * (z - 1.0f)) * (s + 2.0f)) / 24.0f;
-    self->slope[0] = (scale / 12.0f) * ((s * ((2.0f * z) - (3.0f * s))) - (s - 1.0f));
-    self->slope[1] = (scale / 6.0f) * ((s * ((3.0f * s) - (4.0f * z))) + ((8.0f * s) - 4.0f));
-    self->slope[2] = (scale * s) * ((2.0f * z) - 5.0f) * 0.5f;
-    self->slope[3] = (scale / 6.0f) * ((4.0f + (8.0f * s)) - (s * ((3.0f * s) + (4.0f * z))));
-    self->slope[4] = (scale / 12.0f) * ((s * ((2.0f * z) + (3.0f * s))) - (s + 1.0f));
-}
-#endif
-
-void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[], float h, float gate)
+PVID_COLD void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[], float h,
+                                          float gate)
 {
     self->h = h;
     self->gate = gate;
 #if PVID_REFINE_SKEW
-    delay(self, r[PVID_REFINE_MOVING - 1]);
+    const float skew = r[PVID_REFINE_MOVING];
+    self->skew[0] = skew;
+    self->skew[1] = (0.5f * skew) * skew;
+    self->skew[2] = (self->skew[1] * skew) / (3.0f * h);
 #endif
     pvid_refine_constants(r, self->constants);
     memcpy(self->state, start, sizeof self->state);
     self->job = CLEAR;
-    self->head = 0;
+    self->at = 0;
     self->rows = 0;
     self->starts = STARTS;
     self->step = 0;
@@ -84,8 +64,9 @@ void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], con
 
 static void clear(pvid_refine_pass_f32 *self)
 {
+    memset(self->difference, 0, sizeof self->difference);
     memset(self->column, 0, sizeof self->column);
-    memset(self->sum, 0, sizeof self->sum);
+    memset(self->sums.sum, 0, sizeof self->sums.sum);
     for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
         self->column[i][i] = 1.0f;
     }
@@ -96,60 +77,51 @@ static void clear(pvid_refine_pass_f32 *self)
 
 /* ---- the motion ---- */
 
-PVID_SELDOM static void adams_bashforth(pvid_refine_pass_f32 *self)
+PVID_SELDOM static void predict(pvid_refine_pass_f32 *self)
 {
-    const float *of_velocity = &velocity_weights[AB - self->head];
-    const float h = self->h;
-    float velocity[N_Q] = {0.0f};
-#if PVID_REFINE_ORDER == 2
-    const float *of_position = &position_weights[AB - self->head];
-    float position[N_Q] = {0.0f};
-#endif
-    PVID_UNROLL for (size_t j = 0; j < AB; j++)
-    {
-        PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
-        {
-#if PVID_REFINE_ORDER == 2
-            position[i] += of_position[j] * self->rate[i][j];
-#endif
-            velocity[i] += of_velocity[j] * self->rate[i][j];
-        }
-    }
-    PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
-    {
-#if PVID_REFINE_ORDER == 2
-        self->state[i] += h * (self->state[V + i] + (h * position[i]));
-#endif
-        self->state[V + i] += h * velocity[i];
-    }
-}
-
-/* The accelerations `a` at the predicted state correct it. */
-PVID_ALWAYS_INLINE void correct(pvid_refine_pass_f32 *self, const float a[])
-{
-    const float *weights = &difference_weights[AB - self->head];
     const float h = self->h;
     PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
     {
-        float difference = a[i];
-        PVID_UNROLL for (size_t j = 0; j < AB; j++)
-        {
-            difference += weights[j] * self->rate[i][j];
-        }
-        const float kick = h * difference;
+        const float *difference = self->difference[i];
+        float velocity = of_velocity[AB - 1] * difference[AB - 1];
 #if PVID_REFINE_ORDER == 2
-        self->state[i] += (h * CORRECTED_POSITION) * kick;
+        float position = of_position[AB - 1] * difference[AB - 1];
 #endif
-        self->state[V + i] += CORRECTED_VELOCITY * kick;
+        PVID_UNROLL for (size_t k = AB - 1; k > 0u; k--)
+        {
+            velocity += of_velocity[k - 1u] * difference[k - 1u];
+#if PVID_REFINE_ORDER == 2
+            position += of_position[k - 1u] * difference[k - 1u];
+#endif
+        }
+#if PVID_REFINE_ORDER == 2
+        self->state[i] += h * (self->state[V + i] + (h * position));
+#endif
+        self->state[V + i] += h * velocity;
     }
 }
 
-PVID_ALWAYS_INLINE void push(pvid_refine_pass_f32 *self, const float a[])
+/* New accelerations `a`: the differences, and at a predicted state its correction. */
+PVID_ALWAYS_INLINE void renew(pvid_refine_pass_f32 *self, const float a[], bool corrects)
 {
-    self->head = (uint8_t)((self->head == 0u) ? (AB - 1u) : (self->head - 1u));
+    const float h = self->h;
     PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
     {
-        self->rate[i][self->head] = a[i];
+        float *difference = self->difference[i];
+        float newest = a[i];
+        PVID_UNROLL for (size_t k = 0; k < AB; k++)
+        {
+            const float before = difference[k];
+            difference[k] = newest;
+            newest -= before;
+        }
+        if (corrects) {
+            const float kick = h * newest;
+#if PVID_REFINE_ORDER == 2
+            self->state[i] += (h * of_position[AB]) * kick;
+#endif
+            self->state[V + i] += of_velocity[AB] * kick;
+        }
     }
 }
 
@@ -157,26 +129,6 @@ PVID_ALWAYS_INLINE void push(pvid_refine_pass_f32 *self, const float a[])
 PVID_SELDOM static void accelerations(const float m[], const float state[], const float u[], float a[])
 {
     pvid_refine_motion(m, state, &state[V], u, a);
-}
-
-/* u at the time of the outputs; `at`: of the three steps. */
-PVID_ALWAYS_INLINE void input(const pvid_refine_pass_f32 *self, const pvid_refine_signals_f32 *signals, size_t at,
-                              float u[])
-{
-    PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_INPUTS; i++)
-    {
-#if PVID_REFINE_SKEW
-        float sum = self->late[0] * signals->u[at][i];
-        PVID_UNROLL for (size_t k = 1; k < PVID_REFINE_POINTS; k++)
-        {
-            sum += self->late[k] * signals->u[at + k][i];
-        }
-        u[i] = sum;
-#else
-        u[i] = signals->u[at][i];
-        (void)self;
-#endif
-    }
 }
 
 /* A state with the rate k, h after x. */
@@ -192,71 +144,59 @@ static void advanced(const float x[], const float rates[], const float k[], floa
     }
 }
 
-/* Runge-Kutta over 2 h: its first half. scratch: k1, k2. */
-static void first_half(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
+/* Runge-Kutta over 2 h: the first two slopes at its middle. scratch: k1, k2. */
+static void mean_slope(pvid_refine_pass_f32 *self, const float u[])
 {
     const float h = self->h; /* half of the double step */
+    const bool again = self->job == (uint8_t)MEAN_AGAIN;
     const float *x = self->state;
-    float u[PVID_REFINE_INPUTS];
     float at[PVID_REFINE_STATES];
     float rates[N_Q];
     float k0[N_Q];
-    float *k1 = self->scratch[0];
-    float *k2 = self->scratch[1];
-    input(self, signals, 0, u);
-    if (self->starts == STARTS) {
-        float z[PVID_REFINE_OUTPUTS];
-        accelerations(self->constants, x, u, k0);
-        push(self, k0);
-        pvid_refine_output(self->constants, r, x, &x[V], u, z);
-        for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++) {
-            self->last[i] = signals->z[0][i] - z[i];
-        }
-    }
-    input(self, signals, 1, u);
     for (size_t i = 0; i < N_Q; i++) {
-        k0[i] = self->rate[i][self->head];
-        rates[i] = x[V + i] + (h * k0[i]);
+        k0[i] = self->difference[i][0];
+        rates[i] = again ? (x[V + i] + (h * k0[i])) : x[V + i];
     }
-    advanced(x, &x[V], k0, h, at);
-    accelerations(self->constants, at, u, k1);
-    advanced(x, rates, k1, h, at);
-    accelerations(self->constants, at, u, k2);
+    advanced(x, rates, again ? self->scratch[0] : k0, h, at);
+    accelerations(self->constants, at, u, self->scratch[again ? 1 : 0]);
 }
 
-/* Its second half. scratch: the state at the end, the state at the middle. */
-static void second_half(pvid_refine_pass_f32 *self, const pvid_refine_signals_f32 *signals)
+/* The slope k3 at its end, behind k1. */
+static void full_slope(pvid_refine_pass_f32 *self, const float u[])
 {
     const float h = self->h;
-    const float h2 = 2.0f * h;
     const float *x = self->state;
-    float u[PVID_REFINE_INPUTS];
     float at[PVID_REFINE_STATES];
-    float end[PVID_REFINE_STATES];
-    float middle[PVID_REFINE_STATES];
     float rates[N_Q];
-    float mean[N_Q];
-    float k3[N_Q];
-    float a[N_Q];
-    input(self, signals, 2, u);
     for (size_t i = 0; i < N_Q; i++) {
         rates[i] = x[V + i] + (h * self->scratch[0][i]);
-        mean[i] = self->scratch[0][i] + self->scratch[1][i];
     }
-    advanced(x, rates, self->scratch[1], h2, at);
-    accelerations(self->constants, at, u, k3);
+    advanced(x, rates, self->scratch[1], 2.0f * h, at);
+    accelerations(self->constants, at, u, self->slope);
+}
+
+/* Its end. scratch: the state at the end, the state at the middle. */
+static void end_double(pvid_refine_pass_f32 *self, const float u[])
+{
+    const float h2 = 2.0f * self->h;
+    const float *x = self->state;
+    float at[PVID_REFINE_STATES];
+    float end[PVID_REFINE_STATES];
+    float a[N_Q];
+    float *middle = self->scratch[1];
     for (size_t i = 0; i < N_Q; i++) {
-        const float k0 = self->rate[i][self->head];
+        const float k0 = self->difference[i][0];
+        const float mean = self->scratch[0][i] + self->scratch[1][i];
 #if PVID_REFINE_ORDER == 2
-        at[i] = h2 * (x[V + i] + ((h2 / 6.0f) * (k0 + mean[i])));
+        at[i] = h2 * (x[V + i] + ((h2 / 6.0f) * (k0 + mean)));
         end[i] = x[i] + at[i];
 #endif
-        at[V + i] = (h2 / 6.0f) * ((k0 + (2.0f * mean[i])) + k3[i]);
+        at[V + i] = (h2 / 6.0f) * ((k0 + (2.0f * mean)) + self->slope[i]);
         end[V + i] = x[V + i] + at[V + i];
     }
     accelerations(self->constants, end, u, a);
     for (size_t i = 0; i < N_Q; i++) {
-        const float k0 = self->rate[i][self->head];
+        const float k0 = self->difference[i][0];
 #if PVID_REFINE_ORDER == 2
         middle[i] = ((x[i] + (0.5f * at[i])) - ((h2 * 0.15625f) * at[V + i])) + (((h2 * h2) * 0.015625f) * (k0 + a[i]));
         middle[V + i] =
@@ -266,20 +206,30 @@ static void second_half(pvid_refine_pass_f32 *self, const pvid_refine_signals_f3
 #endif
     }
     memcpy(self->scratch[0], end, sizeof end);
-    memcpy(self->scratch[1], middle, sizeof middle);
 }
 
-/* Residuals at a step, into the mean. */
-PVID_ALWAYS_INLINE void residuals(pvid_refine_pass_f32 *self, const float r[], const float state[], const float u[],
-                                  const float measured[])
+/* Residuals of a state whose accelerations are the newest ones. */
+PVID_ALWAYS_INLINE void residuals(pvid_refine_pass_f32 *self, const float r[], const float state[],
+                                  const pvid_refine_signals_f32 *signals, float e[])
 {
     float z[PVID_REFINE_OUTPUTS];
-    pvid_refine_output(self->constants, r, state, &state[V], u, z);
+#if PVID_REFINE_SKEW
+    float late[PVID_REFINE_STATES];
+    const float *skew = self->skew;
+    PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
+    {
+        const float a = self->difference[i][0];
+        const float jerk = self->difference[i][1];
+        late[V + i] = state[V + i] + (skew[0] * a);
+        late[i] = state[i] + ((skew[0] * state[V + i]) + ((skew[1] * a) + (skew[2] * jerk)));
+    }
+#else
+    const float *late = state;
+#endif
+    pvid_refine_output(self->constants, r, late, &late[V], signals->u, z);
     PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++)
     {
-        const float e = measured[i] - z[i];
-        self->mean[i] += 0.5f * (self->last[i] + e);
-        self->last[i] = e;
+        e[i] = signals->z[i] - z[i];
     }
 }
 
@@ -297,12 +247,19 @@ PVID_ALWAYS_INLINE float damped(const float D[], float half, const float x[], si
 }
 
 /* H (I + H/2 D) times K + H^2/12 K^2, D and B: the kick's mean velocity is that of the middle. */
-PVID_ALWAYS_INLINE void store_kick(pvid_refine_pass_f32 *self, const float K[], const float D[], const float B[])
+static void make_kick(pvid_refine_pass_f32 *self)
 {
     const float big = (float)PVID_REFINE_SUB * self->h;
     const float half = 0.5f * big;
     const float g = (big * big) * (1.0f / 12.0f);
     float *kick = self->kick;
+    float K[N_Q * N_Q];
+    float D[N_Q * N_Q];
+    PVID_UNROLL for (size_t i = 0; i < (size_t)(N_Q * N_Q); i++)
+    {
+        K[i] = kick[i];
+        D[i] = kick[(N_Q * N_Q) + i];
+    }
     PVID_UNROLL for (size_t j = 0; j < N_Q; j++)
     {
         float of_q[N_Q];
@@ -328,7 +285,7 @@ PVID_ALWAYS_INLINE void store_kick(pvid_refine_pass_f32 *self, const float K[], 
         float of_r[N_Q];
         PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
         {
-            of_r[i] = big * B[(j * N_Q) + i];
+            of_r[i] = big * kick[(2 * N_Q * N_Q) + (j * N_Q) + i];
         }
         PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
         {
@@ -340,12 +297,13 @@ PVID_ALWAYS_INLINE void store_kick(pvid_refine_pass_f32 *self, const float K[], 
 #else
 
 /* F = H (1 + HK/2 (1 + HK/3 (1 + HK/4))), then F K and F B: the columns' change over a big step with a constant K. */
-PVID_ALWAYS_INLINE void store_kick(pvid_refine_pass_f32 *self, const float K[], const float D[], const float B[])
+static void make_kick(pvid_refine_pass_f32 *self)
 {
     const float big = (float)PVID_REFINE_SUB * self->h;
     float factor[N_Q][N_Q] = {{0.0f}};
     float next[N_Q][N_Q];
-    (void)D;
+    float K[N_Q * N_Q];
+    memcpy(K, self->kick, sizeof K);
     for (size_t i = 0; i < N_Q; i++) {
         factor[i][i] = 1.0f;
     }
@@ -370,12 +328,17 @@ PVID_ALWAYS_INLINE void store_kick(pvid_refine_pass_f32 *self, const float K[], 
             }
             self->kick[(i * N_Q) + j] = big * sum;
         }
-        for (size_t j = 0; j < PVID_REFINE_MOVING; j++) {
-            float sum = factor[i][0] * B[j * N_Q];
+    }
+    for (size_t j = 0; j < PVID_REFINE_MOVING; j++) {
+        float *of_r = &self->kick[(N_Q * N_Q) + (j * N_Q)];
+        float B[N_Q];
+        memcpy(B, of_r, sizeof B);
+        for (size_t i = 0; i < N_Q; i++) {
+            float sum = factor[i][0] * B[0];
             for (size_t k = 1; k < N_Q; k++) {
-                sum += factor[i][k] * B[(j * N_Q) + k];
+                sum += factor[i][k] * B[k];
             }
-            self->kick[(N_Q * N_Q) + (j * N_Q) + i] = big * sum;
+            of_r[i] = big * sum;
         }
     }
 }
@@ -391,35 +354,11 @@ PVID_ALWAYS_INLINE void output_derivatives(const pvid_refine_pass_f32 *self, con
 }
 
 /* What the columns need, at the middle of the big step; `a`: the accelerations there. */
-PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[],
-                                      const pvid_refine_signals_f32 *signals, const float u[], float a[])
+PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[], const float u[], float a[])
 {
-    float K[N_Q * N_Q];
-    float D[N_Q * N_Q];
-    float U[N_Q * PVID_REFINE_INPUTS];
-    float B[N_Q * PVID_REFINE_MOVING];
     const float *x = self->state;
-    pvid_refine_jacobian(self->constants, x, &x[V], u, a, K, D, U, B);
-#if PVID_REFINE_SKEW
-    PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
-    {
-        float sum = 0.0f;
-        PVID_UNROLL for (size_t j = 0; j < PVID_REFINE_INPUTS; j++)
-        {
-            float rate = self->slope[0] * signals->u[0][j];
-            PVID_UNROLL for (size_t k = 1; k < PVID_REFINE_POINTS; k++)
-            {
-                rate += self->slope[k] * signals->u[k][j];
-            }
-            sum += U[(i * PVID_REFINE_INPUTS) + j] * rate;
-        }
-        B[((PVID_REFINE_MOVING - 1) * N_Q) + i] = sum;
-    }
-#else
-    (void)U;
-    (void)signals;
-#endif
-    store_kick(self, K, D, B);
+    pvid_refine_jacobian(self->constants, x, &x[V], u, a, self->kick, &self->kick[N_Q * V],
+                         &self->kick[N_Q * PVID_REFINE_STATES]);
 #if !PVID_REFINE_OUTPUT_LINEAR
     output_derivatives(self, r, x, u, self->output_column);
 #else
@@ -427,39 +366,95 @@ PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[
 #endif
 }
 
-/* A step: of Adams-Bashforth, or the first or second one behind Runge-Kutta; `signals` are those of its end. The first
- * two steps of a big step end at its middle, where the derivatives are needed: there the work is longest, and the state
- * has been moved there by the job before. */
+#if PVID_REFINE_SKEW
+/* Derivative of output i by the skew, from those by the coordinates and their rates. */
+PVID_ALWAYS_INLINE float slip_of(const pvid_refine_pass_f32 *self, const float derivatives[], size_t i)
+{
+    float sum = 0.0f;
+    PVID_UNROLL for (size_t k = 0; k < N_Q; k++)
+    {
+        const float a = self->difference[k][0];
+#if PVID_REFINE_ORDER == 2
+        sum += derivatives[(i * N_Q) + k] * (self->state[V + k] + (self->skew[0] * a));
+#else
+        sum += derivatives[(i * N_Q) + k] * a;
+#endif
+#if PVID_REFINE_OUTPUT_RATES
+        sum += derivatives[((PVID_REFINE_OUTPUTS + i) * N_Q) + k] * a;
+#endif
+    }
+    return sum;
+}
+
+/* Derivatives of the outputs by the skew, at the middle of the big step. */
+PVID_ALWAYS_INLINE void slip(pvid_refine_pass_f32 *self, const float r[], const float u[])
+{
+#if PVID_REFINE_OUTPUT_LINEAR
+    float derivatives[PVID_REFINE_OUTPUTS * (PVID_REFINE_STATES + PVID_REFINE_STILL)];
+    output_derivatives(self, r, self->state, u, derivatives); /* constants */
+#else
+    const float *derivatives = self->output_column;
+    (void)r;
+    (void)u;
+#endif
+    PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++)
+    {
+        self->slip[i] = slip_of(self, derivatives, i);
+    }
+}
+#endif
+
+/* The first accelerations of a block, and the residuals there. */
+static void start(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
+{
+    float a[N_Q];
+    accelerations(self->constants, self->state, signals->u, a);
+    for (size_t i = 0; i < N_Q; i++) {
+        self->difference[i][0] = a[i];
+    }
+    residuals(self, r, self->state, signals, self->last);
+}
+
+/* A step: of Adams-Bashforth, or the first or second one behind Runge-Kutta; `signals` are those of its end. At the
+ * middle of a big step the derivatives are needed: there the work is longest, and the state has been moved there by the
+ * job before. */
 PVID_SELDOM static void step(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {
-    const bool middle = self->job == (uint8_t)MIDDLE;
+    const bool middle = self->at == (uint8_t)(MIDDLE - 1);
     const bool started = self->starts == 0u;
     const float *x = self->state;
     float a[N_Q];
-    float u[PVID_REFINE_INPUTS];
-    input(self, signals, 0, u);
+    float e[PVID_REFINE_OUTPUTS];
     if (started) {
         if (!middle) {
-            adams_bashforth(self);
+            predict(self);
         }
-    } else if (middle || (self->job == (uint8_t)END)) {
+    } else if ((self->at & 1u) != 0u) {
         memcpy(self->state, self->scratch[0], sizeof self->state);
         self->starts--;
     } else {
         x = self->scratch[1];
     }
-    residuals(self, r, x, u, signals->z[0]);
     if (middle) {
-        differentiate(self, r, signals, u, a);
+        differentiate(self, r, signals->u, a);
     } else {
-        accelerations(self->constants, x, u, a);
+        accelerations(self->constants, x, signals->u, a);
     }
-    if (started) {
-        correct(self, a);
+    renew(self, a, started);
+    residuals(self, r, x, signals, e);
+    PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++)
+    {
+        self->mean[i] += 0.5f * (self->last[i] + e[i]);
+        self->last[i] = e[i];
     }
-    push(self, a);
-    if (started && (self->job == (uint8_t)FIRST)) {
-        adams_bashforth(self);
+#if PVID_REFINE_SKEW
+    if (middle) {
+        slip(self, r, signals->u);
+    }
+#endif
+    self->at++;
+    if (started && (self->at == (uint8_t)(MIDDLE - 1))) {
+        predict(self);
     }
 }
 
@@ -490,16 +485,20 @@ PVID_ALWAYS_INLINE void entries(float row[][PVID_REFINE_WIDTH], size_t column, c
 
 /* The columns over a big step, and their entries in the rows. */
 #if PVID_REFINE_ORDER == 2
-PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, const float derivatives[], const float weight[])
+PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, size_t first, size_t end, const float derivatives[],
+                                const float weight[])
 {
     float (*row)[PVID_REFINE_WIDTH] = &self->row[self->rows];
     const float half = (0.5f * (float)PVID_REFINE_SUB) * self->h;
+#if PVID_REFINE_SKEW
+    const float late = half + self->skew[0];
+#endif
     float kick[2 * N_Q * N_Q];
     PVID_UNROLL for (size_t i = 0; i < (size_t)(2 * N_Q * N_Q); i++)
     {
         kick[i] = self->kick[i];
     }
-    PVID_UNROLL for (size_t j = 0; j < PVID_REFINE_COLUMNS; j++)
+    PVID_UNROLL for (size_t j = first; j < end; j++)
     {
         float *s = self->column[j];
         float x[PVID_REFINE_STATES];
@@ -526,18 +525,24 @@ PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, const float derivati
         }
         PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
         {
-            x[N_Q + i] = 0.5f * (s[N_Q + i] + next[i]);
-            s[i] = x[i] + (half * next[i]);
+            const float rate = s[N_Q + i];
+            const float twice = rate + next[i];
+            x[N_Q + i] = 0.5f * twice;
+#if PVID_REFINE_SKEW
+            x[i] = s[i] + (late * rate); /* the kick between the middle and the skew is left out */
+#endif
+            s[i] += half * twice;
             s[N_Q + i] = next[i];
         }
         entries(row, j, x, derivatives, weight);
     }
 }
 #else
-PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, const float derivatives[], const float weight[])
+PVID_ALWAYS_INLINE void columns(pvid_refine_pass_f32 *self, size_t first, size_t end, const float derivatives[],
+                                const float weight[])
 {
     float (*row)[PVID_REFINE_WIDTH] = &self->row[self->rows];
-    for (size_t j = 0; j < PVID_REFINE_COLUMNS; j++) {
+    for (size_t j = first; j < end; j++) {
         float *s = self->column[j];
         float x[PVID_REFINE_STATES];
         float change[N_Q];
@@ -563,12 +568,18 @@ PVID_ALWAYS_INLINE void end_rows(pvid_refine_pass_f32 *self, const float derivat
 {
     for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++) {
         float *row = self->row[self->rows + i];
-        for (size_t j = PVID_REFINE_MOVING; j < PVID_REFINE_PARAMETERS; j++) {
-            const float entry =
-                derivatives[(PVID_REFINE_OUTPUTS * PVID_REFINE_STATES) +
-                            (i * (PVID_REFINE_PARAMETERS - PVID_REFINE_MOVING)) + (j - PVID_REFINE_MOVING)];
-            row[PVID_REFINE_STATES + j] = (i == 0u) ? entry : (weight[i] * entry);
+#if PVID_REFINE_SKEW
+        row[PVID_REFINE_COLUMNS] = (i == 0u) ? self->slip[0] : (weight[i] * self->slip[i]);
+#endif
+#if PVID_REFINE_STILL
+        float *still = &row[PVID_REFINE_COLUMNS + PVID_REFINE_SKEW];
+        for (size_t j = 0; j < PVID_REFINE_STILL; j++) {
+            const float entry = derivatives[(PVID_REFINE_OUTPUTS * PVID_REFINE_STATES) + (i * PVID_REFINE_STILL) + j];
+            still[j] = (i == 0u) ? entry : (weight[i] * entry);
         }
+#else
+        (void)derivatives;
+#endif
         const float mean = self->mean[i] * (1.0f / (float)PVID_REFINE_SUB);
         const float e = (i == 0u) ? mean : (weight[i] * mean);
         self->mean[i] = 0.0f;
@@ -582,26 +593,31 @@ PVID_ALWAYS_INLINE void end_rows(pvid_refine_pass_f32 *self, const float derivat
     self->rows = (uint8_t)(self->rows + PVID_REFINE_OUTPUTS);
 }
 
-/* The end of a big step: columns and rows. */
+/* The end of a big step: the first columns, or the others and what completes the rows. */
 PVID_SELDOM static void end_big_step(pvid_refine_pass_f32 *self, const float r[], const float weight[])
 {
 #if PVID_REFINE_OUTPUT_LINEAR
-    float derivatives[PVID_REFINE_OUTPUTS * PVID_REFINE_UNKNOWNS];
+    float derivatives[PVID_REFINE_OUTPUTS * (PVID_REFINE_STATES + PVID_REFINE_STILL)];
     output_derivatives(self, r, self->state, self->state, derivatives); /* constants */
 #else
     const float *derivatives = self->output_column;
     (void)r;
 #endif
-    columns(self, derivatives, weight);
+    if (self->job == (uint8_t)COLUMNS) {
+        columns(self, 0, HALF_OF_COLUMNS, derivatives, weight);
+        return;
+    }
+    columns(self, HALF_OF_COLUMNS, PVID_REFINE_COLUMNS, derivatives, weight);
     end_rows(self, derivatives, weight);
+    self->at = 0;
     self->step++;
 }
 
-/* The rows into the sums. */
-static void add_rows(pvid_refine_pass_f32 *self)
+/* The rows into rows `first` to `end` - 1 of the sums. */
+PVID_ALWAYS_INLINE void add_rows(pvid_refine_pass_f32 *self, float sum[], size_t first, size_t end)
 {
-    float *sum = self->sum;
-    PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_WIDTH; i++)
+    float *next = sum;
+    PVID_UNROLL for (size_t i = first; i < end; i++)
     {
         float left[PVID_REFINE_ROWS];
         PVID_UNROLL for (size_t k = 0; k < PVID_REFINE_ROWS; k++)
@@ -615,72 +631,142 @@ static void add_rows(pvid_refine_pass_f32 *self)
             {
                 products += left[k] * self->row[k][j];
             }
-            *sum += products;
-            sum++;
+            *next += products;
+            next++;
         }
     }
+}
+
+PVID_SELDOM static void add_first_rows(pvid_refine_pass_f32 *self)
+{
+    add_rows(self, self->sums.sum, 0, PART_OF_SUMS);
+}
+
+PVID_SELDOM static void add_other_rows(pvid_refine_pass_f32 *self)
+{
+    add_rows(self, &self->sums.sum[SUMS_BEFORE], PART_OF_SUMS, PVID_REFINE_WIDTH);
     self->rows = 0;
 }
 
 /* ---- jobs ---- */
 
-uint32_t pvid_refine_pass_needs_f32(const pvid_refine_pass_f32 *self, uint32_t *first)
+/* Whether the next job needs signals. */
+static inline bool needs(const pvid_refine_pass_f32 *self)
 {
-    static const uint8_t steps[] = {0, 3, 3, 1, 1, 3, 3, 1, 1, 0, 0};  /* by job */
-    static const uint8_t begins[] = {0, 0, 0, 1, 2, 2, 2, 3, 4, 0, 0}; /* in the big step */
-    *first = ((uint32_t)self->step * PVID_REFINE_SUB) + begins[self->job];
-    return steps[self->job];
+    return (self->job <= (uint8_t)STEP) && (self->job != (uint8_t)CLEAR);
 }
 
-bool pvid_refine_pass_ends_f32(const pvid_refine_pass_f32 *self, uint32_t length)
+/* Of which step. */
+static inline uint32_t awaited(const pvid_refine_pass_f32 *self)
 {
-    return (self->step >= length) && (self->job != (uint8_t)ROWS);
+    static const uint8_t ahead[] = {0, 0, 1, 1, 2, 2, 1}; /* by job */
+    return ((uint32_t)self->step * PVID_REFINE_SUB) + self->at + ahead[self->job];
 }
 
-/* First job of a pair. */
-static uint8_t job_of_pair(const pvid_refine_pass_f32 *self, uint8_t with_start, uint8_t without)
+static inline bool ends(const pvid_refine_pass_f32 *self, uint32_t length)
 {
-    return (self->starts > 0u) ? with_start : without;
+    return (self->step >= length) && (self->job <= (uint8_t)STEP);
+}
+
+/* The next step's first job. */
+static uint8_t job_of_step(const pvid_refine_pass_f32 *self)
+{
+    return ((self->starts > 0u) && ((self->at & 1u) == 0u)) ? (uint8_t)MEAN : (uint8_t)STEP;
+}
+
+static uint8_t job_behind_step(const pvid_refine_pass_f32 *self)
+{
+    if (self->at == (uint8_t)MIDDLE) {
+        return KICK;
+    }
+    return (self->at == (uint8_t)PVID_REFINE_SUB) ? (uint8_t)COLUMNS : job_of_step(self);
+}
+
+/* The jobs of a block's beginning. */
+PVID_COLD static void first_jobs(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
+{
+    switch (self->job) {
+    case CLEAR:
+        clear(self);
+        break;
+    case START:
+        start(self, r, signals);
+        break;
+    case FULL:
+        full_slope(self, signals->u);
+        break;
+    case END:
+        end_double(self, signals->u);
+        break;
+    default:
+        mean_slope(self, signals->u);
+        break;
+    }
+    self->job++;
 }
 
 void pvid_refine_pass_job_f32(pvid_refine_pass_f32 *self, const float r[], const float weight[],
                               const pvid_refine_signals_f32 *signals)
 {
     switch (self->job) {
-    case CLEAR:
-        clear(self);
-        self->job = FIRST_A;
-        break;
-    case FIRST_A:
-    case SECOND_A:
-        first_half(self, r, signals);
-        self->job++;
-        break;
-    case FIRST_B:
-    case SECOND_B:
-        second_half(self, signals);
-        self->job++;
-        break;
-    case FIRST:
-    case SECOND:
+    case STEP:
         step(self, r, signals);
-        self->job++;
+        self->job = job_behind_step(self);
         break;
-    case MIDDLE:
-        step(self, r, signals);
-        self->job = job_of_pair(self, SECOND_A, SECOND);
-        break;
-    case END:
-        step(self, r, signals);
-        self->job = COLUMNS;
+    case KICK:
+        make_kick(self);
+        self->job = job_of_step(self);
         break;
     case COLUMNS:
         end_big_step(self, r, weight);
-        self->job = (self->rows == (uint8_t)PVID_REFINE_ROWS) ? (uint8_t)ROWS : job_of_pair(self, FIRST_A, FIRST);
+        self->job = MORE_COLUMNS;
+        break;
+    case MORE_COLUMNS:
+        end_big_step(self, r, weight);
+        self->job = (self->rows == (uint8_t)PVID_REFINE_ROWS) ? (uint8_t)ROWS : job_of_step(self);
+        break;
+    case ROWS:
+        add_first_rows(self);
+        self->job = MORE_ROWS;
+        break;
+    case MORE_ROWS:
+        add_other_rows(self);
+        self->job = job_of_step(self);
         break;
     default:
-        add_rows(self);
-        self->job = job_of_pair(self, FIRST_A, FIRST);
+        first_jobs(self, r, signals);
         break;
     }
+}
+
+pvid_refine_progress pvid_refine_pass_run_f32(pvid_refine_pass_f32 *self, const pvid_refine_front_f32 *front,
+                                              const pvid_refine_block_f32 *block, uint32_t jobs)
+{
+    pvid_refine_signals_f32 signals;
+    const int32_t end = (int32_t)(pvid_refine_front_end_f32(front) - block->begin);
+    for (uint32_t left = jobs; left > 0u; left--) {
+        if (needs(self)) {
+            const uint32_t entry = awaited(self);
+            if ((int32_t)entry >= end) {
+                return PVID_REFINE_PASS_WAITS;
+            }
+            pvid_refine_front_read_f32(front, block->begin + entry, &signals);
+        }
+        pvid_refine_pass_job_f32(self, block->r, block->weight, &signals);
+        if (ends(self, block->length)) {
+            return PVID_REFINE_PASS_DONE;
+        }
+    }
+    return PVID_REFINE_PASS_ON;
+}
+
+bool pvid_refine_pass_needs_f32(const pvid_refine_pass_f32 *self, uint32_t *step)
+{
+    *step = needs(self) ? awaited(self) : 0u;
+    return needs(self);
+}
+
+bool pvid_refine_pass_ends_f32(const pvid_refine_pass_f32 *self, uint32_t length)
+{
+    return ends(self, length);
 }

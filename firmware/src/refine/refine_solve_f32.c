@@ -23,13 +23,16 @@
 /* Halvings of a step that leaves the physical region. */
 #define MOST_HALVINGS 12u
 
-/* Jobs in their order. */
+/* Rotations of a job. */
+#define ROTATIONS 4u
+
+/* Jobs in their order; a row joins in one or two. */
 #define COPY 0u
 #define SIDES 1u
 #define CORNER 2u
 #define ELIMINATE 3u
 #define JOIN (ELIMINATE + WIDTH)
-#define SOLVE (JOIN + N)
+#define SOLVE (JOIN + 1u)
 #define LIMIT (SOLVE + 1u)
 #define SHIFT (LIMIT + 1u)
 
@@ -50,7 +53,7 @@ float pvid_refine_difference_f32(size_t parameter, float to, float from)
     return pvid_refine_is_logarithmic_f32(parameter) ? ((2.0f * difference) / (to + from)) : difference;
 }
 
-void pvid_refine_move_f32(const float r[], const float step[], float moved[])
+PVID_COLD void pvid_refine_move_f32(const float r[], const float step[], float moved[])
 {
     for (size_t i = 0; i < N; i++) {
         const float half = 0.5f * step[i];
@@ -58,7 +61,7 @@ void pvid_refine_move_f32(const float r[], const float step[], float moved[])
     }
 }
 
-void pvid_refine_prior_f32(const float prior_sd[], float sd, float triangle[])
+PVID_COLD void pvid_refine_prior_f32(const float prior_sd[], float sd, float triangle[])
 {
     memset(triangle, 0, PVID_REFINE_TRIANGLE * sizeof triangle[0]);
     for (size_t i = 0; i < N; i++) {
@@ -69,14 +72,14 @@ void pvid_refine_prior_f32(const float prior_sd[], float sd, float triangle[])
 void pvid_refine_solve_begin_f32(pvid_refine_solve_f32 *self)
 {
     self->job = 0;
+    self->row = 0;
+    self->rotation = 0;
     self->halvings = 0;
 }
 
 /* Right side of the past, as seen from the point of linearisation: triangle (past - linear). */
-static void copy(pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass, const float triangle[],
-                 const float past[], const float linear[])
+static void copy(pvid_refine_solve_f32 *self, const float triangle[], const float past[], const float linear[])
 {
-    memcpy(self->sum, pass->sum, sizeof self->sum);
     memcpy(self->triangle, triangle, sizeof self->triangle);
     self->clash = 0.0f;
     float from[N];
@@ -148,20 +151,20 @@ static void chart_corner(float sum[], const float linear[])
 #endif
 }
 
-static void to_steps(pvid_refine_solve_f32 *self, const float linear[])
+static void to_steps(pvid_refine_solve_f32 *self, float sum[], const float linear[])
 {
-    chart_corner(self->sum, linear);
+    chart_corner(sum, linear);
     for (size_t i = 0; i < PVID_REFINE_UNKNOWNS; i++) {
-        self->whole[i] = self->sum[at(WIDTH, i, i)];
+        self->whole[i] = sum[at(WIDTH, i, i)];
     }
 }
 
 /* One column of Cholesky's: its row is complete and is taken off the rest. Without information of its own it is
  * skipped. */
-static void eliminate(pvid_refine_solve_f32 *self, size_t column)
+static void eliminate(pvid_refine_solve_f32 *self, float sum[], size_t column)
 {
     const size_t length = WIDTH - column;
-    float *row = &self->sum[at(WIDTH, column, column)];
+    float *row = &sum[at(WIDTH, column, column)];
     const float square = row[0];
     if (column == LAST) {
         self->residual = (square > 0.0f) ? square : 0.0f;
@@ -185,20 +188,19 @@ static void eliminate(pvid_refine_solve_f32 *self, size_t column)
     }
 }
 
-/* A row of the block's information joins the triangle. */
-static void join(pvid_refine_solve_f32 *self, size_t row)
+/* A row of the block's information joins the triangle, by some rotations. Returns whether all have. */
+static bool join(pvid_refine_solve_f32 *self, float sum[])
 {
-    float left[N];
-    const float *own = &self->sum[at(WIDTH, STATES + row, STATES + row)];
-    for (size_t j = row; j < N; j++) {
-        left[j] = own[j - row];
-    }
-    float rest = own[N - row];
-    for (size_t i = row; i < N; i++) {
+    const size_t row = self->row;
+    float *left = &sum[at(WIDTH, STATES + row, STATES + row)];
+    float *rest = &left[N - row];
+    for (uint32_t count = 0; (count < ROTATIONS) && (self->rotation < N); count++) {
+        const size_t i = self->rotation;
         float *entry = &self->triangle[at(N, i, i)];
         const float a = entry[0];
-        const float b = left[i];
+        const float b = left[i - row];
         const float square = (a * a) + (b * b);
+        self->rotation++;
         if (!(square > 0.0f)) {
             continue;
         }
@@ -207,15 +209,20 @@ static void join(pvid_refine_solve_f32 *self, size_t row)
         const float sine = b * scale;
         for (size_t j = i; j < N; j++) {
             const float x = entry[j - i];
-            const float y = left[j];
+            const float y = left[j - row];
             entry[j - i] = (cosine * x) + (sine * y);
-            left[j] = (cosine * y) - (sine * x);
+            left[j - row] = (cosine * y) - (sine * x);
         }
         const float x = self->right[i];
-        self->right[i] = (cosine * x) + (sine * rest);
-        rest = (cosine * rest) - (sine * x);
+        self->right[i] = (cosine * x) + (sine * *rest);
+        *rest = (cosine * *rest) - (sine * x);
     }
-    self->clash += rest * rest;
+    if (self->rotation == N) {
+        self->clash += *rest * *rest;
+        self->row++;
+        self->rotation = self->row;
+    }
+    return self->row == N;
 }
 
 /* The step of r, shortened to the limit. Returns whether there is one. */
@@ -223,6 +230,7 @@ static bool solve(pvid_refine_solve_f32 *self, const float prior_sd[], float ste
 {
     float *step = self->step;
     float largest = 0.0f;
+    float bend = 0.0f;
     for (size_t i = N; i > 0u; i--) {
         const size_t k = i - 1u;
         const float *entry = &self->triangle[at(N, k, k)];
@@ -236,8 +244,10 @@ static bool solve(pvid_refine_solve_f32 *self, const float prior_sd[], float ste
         step[k] = sum / entry[0];
         const float size = ((step[k] < 0.0f) ? -step[k] : step[k]) / prior_sd[k];
         largest = (size <= largest) ? largest : size;
+        bend = ((size <= bend) || !pvid_refine_is_logarithmic_f32(k)) ? bend : size;
     }
     self->size = largest;
+    self->bend = bend;
     if (!(largest < 1.0e6f)) {
         return false;
     }
@@ -266,11 +276,11 @@ static bool limit(pvid_refine_solve_f32 *self, const float linear[])
 }
 
 /* The step of the block's start. */
-static void shift(pvid_refine_solve_f32 *self)
+static void shift(pvid_refine_solve_f32 *self, const float sums[])
 {
     for (size_t i = STATES; i > 0u; i--) {
         const size_t k = i - 1u;
-        const float *entry = &self->sum[at(WIDTH, k, k)];
+        const float *entry = &sums[at(WIDTH, k, k)];
         float sum = entry[LAST - k];
         for (size_t j = 0; j < N; j++) {
             sum -= entry[(STATES - k) + j] * self->step[j];
@@ -282,35 +292,35 @@ static void shift(pvid_refine_solve_f32 *self)
     }
 }
 
-pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass,
-                                               const float triangle[], const float past[], const float linear[],
-                                               const float prior_sd[], float step_limit)
+PVID_COLD pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, float sum[],
+                                                         const float triangle[], const float past[],
+                                                         const float linear[], const float prior_sd[], float step_limit)
 {
     const uint8_t job = self->job;
     self->job++;
     if (job == COPY) {
-        copy(self, pass, triangle, past, linear);
+        copy(self, triangle, past, linear);
     } else if (job == SIDES) {
-        chart_sides(self->sum, linear);
+        chart_sides(sum, linear);
     } else if (job == CORNER) {
-        to_steps(self, linear);
+        to_steps(self, sum, linear);
     } else if (job < JOIN) {
-        eliminate(self, (size_t)job - ELIMINATE);
-    } else if (job < SOLVE) {
-        join(self, (size_t)job - JOIN);
+        eliminate(self, sum, (size_t)job - ELIMINATE);
+    } else if (job == JOIN) {
+        self->job = join(self, sum) ? SOLVE : JOIN;
     } else if (job == SOLVE) {
         return solve(self, prior_sd, step_limit) ? PVID_REFINE_SOLVING : PVID_REFINE_UNSOLVED;
     } else if (job == LIMIT) {
         self->job = limit(self, linear) ? SHIFT : LIMIT;
     } else {
-        shift(self);
+        shift(self, sum);
         return PVID_REFINE_SOLVED;
     }
     return PVID_REFINE_SOLVING;
 }
 
-void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass,
-                               const float linear[], float state[])
+PVID_COLD void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass,
+                                         const float linear[], float state[])
 {
     for (size_t i = 0; i < STATES; i++) {
         float by_r[PVID_REFINE_MOVING];
@@ -334,7 +344,7 @@ void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_ref
 #endif
 }
 
-void pvid_refine_inverse_column_f32(const float triangle[], size_t column, float out[])
+PVID_COLD void pvid_refine_inverse_column_f32(const float triangle[], size_t column, float out[])
 {
     for (size_t i = 0; i < N; i++) {
         out[i] = 0.0f;

@@ -5,8 +5,9 @@
 #include <stddef.h>
 
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 
-static bool all_within(const float values[], size_t n, float low, float high)
+PVID_COLD static bool all_within(const float values[], size_t n, float low, float high)
 {
     bool within = true;
     for (size_t i = 0; i < n; i++) {
@@ -44,8 +45,8 @@ static pvid_status blocks_are_valid(const pvid_refine_config_f32 *config)
         (((uint32_t)config->block * 6u) > PVID_REFINE_RING)) {
         return PVID_BAD_WINDOW;
     }
-    const bool passes =
-        (config->passes >= 1u) && (config->passes <= config->most_passes) && (config->most_passes <= 16u);
+    const bool passes = (config->passes >= 1u) && (config->passes <= config->most_passes) &&
+                        (config->most_passes <= 16u) && (config->jobs >= 1u) && (config->jobs <= 16u);
     return passes ? PVID_OK : PVID_BAD_ITERATIONS;
 }
 
@@ -84,7 +85,7 @@ static pvid_status limits_are_valid(const pvid_refine_config_f32 *config)
     return pvid_within_f32(config->distance, 0.0f, 1.0e9f) ? PVID_OK : PVID_BAD_START_SD;
 }
 
-pvid_status pvid_refine_valid_f32(const pvid_refine_config_f32 *config)
+PVID_COLD pvid_status pvid_refine_valid_f32(const pvid_refine_config_f32 *config)
 {
     if (!pvid_within_f32(config->sample_rate_hz, 1.0e-3f, 1.0e6f)) {
         return PVID_BAD_SAMPLE_RATE;

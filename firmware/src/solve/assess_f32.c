@@ -13,7 +13,7 @@ static float freedom_of(const pvid_system_f32 *system, const pvid_solve_settings
     return system->weight - (float)settings->n_p;
 }
 
-float pvid_assess_variance_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings)
+PVID_COLD float pvid_assess_variance_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings)
 {
     const float freedom = freedom_of(system, settings);
     if (!(freedom >= 1.0f)) {
@@ -24,7 +24,7 @@ float pvid_assess_variance_f32(const pvid_system_f32 *system, const pvid_solve_s
     return ((residual > system->floor) ? residual : system->floor) / freedom;
 }
 
-float pvid_assess_misfit_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings)
+PVID_COLD float pvid_assess_misfit_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings)
 {
     const bool free = freedom_of(system, settings) >= 1.0f;
     if (!free || !(system->floor > 0.0f) || !(system->rss > 0.0f)) {
@@ -41,9 +41,7 @@ bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve
     const size_t count = PVID_COUNT(PVID_MAX_P, n);
     const float much = (settings->noise_margin * variance) * system->weight;
     float excess[PVID_MAX_P][PVID_MAX_P];
-    PVID_UNROLL_EXACT
     for (size_t a = 0; a < count; a++) {
-        PVID_UNROLL_EXACT
         for (size_t b = a; b < count; b++) {
             excess[a][b] = system->s[a][b] - (much * noise[a][b]);
         }
@@ -52,8 +50,8 @@ bool pvid_assess_above_noise_f32(const pvid_system_f32 *system, const pvid_solve
     return pvid_cholesky_factor_f32(&factor, n, (const float (*)[PVID_MAX_P])excess);
 }
 
-void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
-                           pvid_estimate_f32 *estimate)
+PVID_COLD void pvid_assess_kappa_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
+                                     pvid_estimate_f32 *estimate)
 {
     const uint8_t n = settings->n_p;
     pvid_cholesky_f32 factor;
@@ -91,7 +89,8 @@ static void assess_as_start(const pvid_solve_settings_f32 *settings, pvid_estima
     }
 }
 
-void pvid_assess_scale_f32(const pvid_solve_settings_f32 *settings, float wide, bool known, pvid_estimate_f32 *estimate)
+PVID_COLD void pvid_assess_scale_f32(const pvid_solve_settings_f32 *settings, float wide, bool known,
+                                     pvid_estimate_f32 *estimate)
 {
     const size_t n_p = settings->n_p;
     for (size_t a = 0; known && (a < n_p); a++) {

@@ -94,7 +94,8 @@ void pvid_assess_invert_q31(const pvid_cholesky_q31 *factor, size_t a, pvid_inve
 /* x / (a b), |x| <= a b: Q30, rounded towards 0. */
 static int32_t part_of(int64_t x, int32_t a, int32_t b)
 {
-    const uint64_t part = ((pvid_magnitude_q31(x) / (uint64_t)a) << 30) / (uint64_t)b;
+    const uint64_t over_a = pvid_quotient_q31(pvid_magnitude_q31(x), (uint32_t)a);
+    const uint64_t part = pvid_quotient_q31(over_a << 30, (uint32_t)b);
     const int64_t clamped = (part > (uint64_t)PVID_ONE_Q30) ? PVID_ONE_Q30 : (int64_t)part;
     return (int32_t)((x < 0) ? -clamped : clamped);
 }

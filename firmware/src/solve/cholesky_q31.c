@@ -2,6 +2,8 @@
 
 #include <stddef.h>
 
+#include "number/scaled_q31.h"
+
 int32_t pvid_half_exponent_q31(int64_t diagonal)
 {
     const int32_t length = (int32_t)pvid_bit_length_q31(pvid_magnitude_q31(diagonal));
@@ -15,8 +17,8 @@ bool pvid_pivot_is_significant_q31(int64_t pivot, int32_t diagonal)
 
 int32_t pvid_divide_q31(int64_t total, pvid_reciprocal_q31 inverse, int32_t limit)
 {
-    const int64_t part = pvid_clamp_q31(pvid_round_shift_q31(total, 30), INT32_MAX);
-    return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(part * inverse.m, 31u - inverse.k), limit);
+    const int32_t part = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(total, 30), INT32_MAX);
+    return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(pvid_product_q31(part, inverse.m), 31u - inverse.k), limit);
 }
 
 void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n)
@@ -29,7 +31,7 @@ void pvid_cholesky_begin_q31(pvid_cholesky_q31 *self, uint8_t n)
 /* A pivot over its diagonal entry. */
 static int32_t part_of(int64_t pivot, int32_t diagonal)
 {
-    return (int32_t)pvid_clamp_q31(pivot / diagonal, PVID_ONE_Q30);
+    return (int32_t)pvid_clamp_q31((int64_t)pvid_quotient_q31((uint64_t)pivot, (uint32_t)diagonal), PVID_ONE_Q30);
 }
 
 void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID_MAX_P], size_t j)
@@ -49,7 +51,9 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     }
     self->pivot[j] = pivot;
     self->first_pivot = (j == 0u) ? part_of(pivot, diagonal) : 0;
-    self->inverse[j] = pvid_reciprocal_of_q31(pvid_square_root_q31((uint64_t)pivot));
+    const pvid_scaled_q31 root = pvid_inverse_root_q31(pvid_scaled_of_q31(pivot, 0));
+    self->inverse[j].m = 2 * root.m;
+    self->inverse[j].k = (uint8_t)((uint32_t)(root.e + 60) & 31u); /* of a pivot that is significant 0 to 11 */
     for (size_t i = 0; i < j; i++) {
         int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
         for (size_t k = j + 1u; k < n; k++) {

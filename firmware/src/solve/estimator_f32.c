@@ -32,6 +32,9 @@ const pvid_estimator_config_f32 pvid_estimator_defaults_f32 = {
 
 static bool model_is_valid(const pvid_model_f32 *model)
 {
+    if ((PVID_CHECK_TABLES == 0) && (model != NULL)) {
+        return true;
+    }
     return (model != NULL) && (model->theta != NULL) && (model->jacobian != NULL) && (model->c_row != NULL) &&
            (model->c_column != NULL) && (model->n_theta >= 1u) && (model->n_theta <= PVID_MAX_THETA) &&
            (model->n_p >= 1u) && (model->n_p <= PVID_MAX_P) && ((PVID_EXACT == 0) || (model->n_p == PVID_MAX_P)) &&
@@ -53,7 +56,7 @@ static pvid_status config_is_valid(const pvid_estimator_config_f32 *config)
     return pvid_within_f32(config->row_weight, 1.0e-6f, 1.0f) ? PVID_OK : PVID_BAD_ROW_WEIGHT;
 }
 
-static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+PVID_COLD static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
 {
     const pvid_status status = config_is_valid(config);
     if (status != PVID_OK) {
@@ -128,7 +131,7 @@ pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, 
     return pvid_staged_add_f32(self, kind, n, y);
 }
 
-pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[])
+PVID_COLD pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[])
 {
     if (!pvid_estimator_is_ready_f32(self)) {
         return PVID_NOT_READY;
@@ -148,7 +151,7 @@ pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[
     for (size_t i = 0; i < model->n_theta; i++) {
         b[i] += g[i];
     }
-    if (self->settings.gain < 1.0f) {
+    if (pvid_feeds_back_f32(self)) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         float gradient[PVID_MAX_P];
         const pvid_block whole = {0, model->n_theta, 0};

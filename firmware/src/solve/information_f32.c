@@ -11,7 +11,8 @@
  * terms and that forgetting is smooth (a sixteenth of its time constant). */
 #define BLOCK_MAX 64u
 
-void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model, float forgetting_groups)
+PVID_COLD void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 *model,
+                                         float forgetting_groups)
 {
     self->n_moments = model->n_moments;
     self->n_theta = model->n_theta;
@@ -29,16 +30,6 @@ void pvid_information_init_f32(pvid_information_f32 *self, const pvid_model_f32 
     for (size_t i = 0; i < PVID_MAX_SUMS; i++) {
         self->high[i] = 0.0f;
         self->low[i] = 0.0f;
-    }
-}
-
-void pvid_information_block_f32(const pvid_model_f32 *model, size_t i, pvid_block *block)
-{
-    block->first = 0;
-    block->n = model->n_theta;
-    block->moment = 0;
-    if (model->n_kinds > 1u) {
-        pvid_block_among_kinds(model->n_kinds, model->kind_end, i, block);
     }
 }
 
@@ -68,35 +59,10 @@ static inline void accumulate_block(const pvid_model_f32 *model, const pvid_bloc
     low[1] += row_weight;
 }
 
-#define EIGHT 8u
-
-/* The same for the 8 entries of the pendulum's weak form: the compiler unrolls loops of constant length. */
-static inline void accumulate_eight(const float *restrict n, float y, float row_weight, float *restrict low)
-{
-    PVID_UNROLL
-    for (size_t i = 0; i < EIGHT; i++) {
-        PVID_UNROLL
-        for (size_t j = i; j < EIGHT; j++) {
-            *low += n[i] * n[j];
-            low++;
-        }
-    }
-    PVID_UNROLL
-    for (size_t i = 0; i < EIGHT; i++) {
-        low[i] += y * n[i];
-    }
-    low[EIGHT] += y * y;
-    low[EIGHT + 1u] += row_weight;
-}
-
 void pvid_information_add_block_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const pvid_block *block,
                                     const float n[], float y)
 {
-    if ((block->n == EIGHT) && (model->n_theta == EIGHT)) {
-        accumulate_eight(n, y, self->row_weight, self->low);
-    } else {
-        accumulate_block(model, block, n, y, self->row_weight, self->low);
-    }
+    accumulate_block(model, block, n, y, self->row_weight, self->low);
 }
 
 void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *model, const float n[], float y,
@@ -109,9 +75,6 @@ void pvid_information_add_f32(pvid_information_f32 *self, const pvid_model_f32 *
         pvid_information_read_f32(self, sums);
     }
 }
-
-/* Number of sums processed together, for registers of four floats. */
-#define LANES 4u
 
 /* Knuth's two-sum after forgetting: new high + new low = retention (high + low), but for the two products. */
 static inline void fold(float *restrict high, float *restrict low, float retention)
@@ -133,14 +96,7 @@ void pvid_information_end_group_f32(pvid_information_f32 *self)
     self->age = 0;
     const size_t sums = number_of_sums(self);
     const float retention = self->retention;
-    const size_t in_lanes = sums - (sums % LANES);
-    for (size_t i = 0; i < in_lanes; i += LANES) {
-        PVID_UNROLL
-        for (size_t j = i; j < i + LANES; j++) {
-            fold(&self->high[j], &self->low[j], retention);
-        }
-    }
-    for (size_t i = in_lanes; i < sums; i++) {
+    for (size_t i = 0; i < sums; i++) {
         fold(&self->high[i], &self->low[i], retention);
     }
     self->rounding *= retention;
@@ -159,7 +115,6 @@ void pvid_information_fade_f32(pvid_information_f32 *self, float factor)
 void pvid_information_read_f32(const pvid_information_f32 *self, float sums[PVID_MAX_SUMS])
 {
     const size_t n = number_of_sums(self);
-    PVID_UNROLL_BY_FOUR
     for (size_t i = 0; i < n; i++) {
         sums[i] = self->high[i] + self->low[i];
     }

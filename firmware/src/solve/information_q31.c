@@ -71,14 +71,14 @@ void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *bloc
     int64_t *sum = &self->sums[block->moment];
     for (size_t i = 0; i < n_own; i++) {
         for (size_t j = i; j < n_own; j++) {
-            *sum += pvid_product_q31(row[i], row[j]);
+            *sum += pvid_short_product_q31(row[i], row[j]);
             sum++;
         }
     }
     int64_t *tail = &self->sums[self->n_sums - 2u]; /* rr, weight */
     sum = &tail[(ptrdiff_t)block->first - (ptrdiff_t)self->n_theta];
     for (size_t i = 0; i < n_own; i++) {
-        const int64_t product = pvid_product_q31(row[i], error);
+        const int64_t product = pvid_short_product_q31(row[i], error);
         sum[i] += product;
         if (fresh != NULL) {
             fresh[block->first + i] += product;

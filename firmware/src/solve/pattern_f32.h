@@ -12,15 +12,11 @@
 void pvid_pattern_transpose_times_f32(const pvid_model_f32 *model, const float c[], const pvid_block *block,
                                       const float x[], float out[]);
 
-/* The first non-zero of column a of C. */
-size_t pvid_pattern_start_f32(const pvid_model_f32 *model, size_t a);
-
 /* One past the last non-zero of the column that starts at `start`. */
 size_t pvid_pattern_end_f32(const pvid_model_f32 *model, size_t start);
 
-/* t[n_theta] += M times the non-zeros first..last-1 of a column c_a of C; t = M c_a when all of them are added. */
-void pvid_pattern_add_columns_f32(const pvid_model_f32 *model, const float c[], size_t first, size_t last,
-                                  const float m[], float t[]);
+/* t[n_theta] += a times column j of M. */
+void pvid_pattern_add_column_f32(const pvid_model_f32 *model, size_t j, float a, const float m[], float t[]);
 
 /* Row a of S = C^T M C from the diagonal on, s[b] = c_b^T t for a <= b < n_p, given t = M c_a. */
 void pvid_pattern_project_row_f32(const pvid_model_f32 *model, const float c[], size_t start, const float t[],
@@ -31,8 +27,5 @@ static inline size_t pvid_pattern_diagonal_f32(size_t n, size_t i)
 {
     return (i * ((2u * n) + 1u - i)) / 2u;
 }
-
-/* Entry i of M x for a packed block M of order n, x[n]. */
-float pvid_pattern_times_f32(size_t n, const float m[], size_t i, const float x[]);
 
 #endif

@@ -8,6 +8,8 @@
 #include "number/exact.h"
 #include "number/finite_f32.h"
 #include "solve/pattern_f32.h"
+#include "solve/row_f32.h"
+#include "solve/state_f32.h"
 
 float pvid_product_f32(const float x[], const float y[], size_t n)
 {
@@ -20,7 +22,7 @@ float pvid_product_f32(const float x[], const float y[], size_t n)
     return sum;
 }
 
-pvid_reason pvid_products_accept_f32(pvid_estimator_f32 *self, size_t n, const float squares[], float rss)
+PVID_COLD pvid_reason pvid_products_accept_f32(pvid_estimator_f32 *self, size_t n, const float squares[], float rss)
 {
     const float limit = PVID_ROW_LIMIT * PVID_ROW_LIMIT;
     bool fits = rss <= limit; /* NaN fails the comparison */
@@ -36,8 +38,8 @@ pvid_reason pvid_products_accept_f32(pvid_estimator_f32 *self, size_t n, const f
     return finite ? PVID_REJECTED_SATURATED : PVID_REJECTED_NOT_FINITE;
 }
 
-void pvid_products_end_f32(pvid_estimator_f32 *self, const pvid_block *block, const float gradient[], float rss,
-                           uint32_t rows)
+PVID_COLD void pvid_products_end_f32(pvid_estimator_f32 *self, const pvid_block *block, const float gradient[],
+                                     float rss, uint32_t rows)
 {
     const pvid_model_f32 *model = self->model;
     const float weight = self->information.row_weight * (float)rows;
@@ -48,13 +50,11 @@ void pvid_products_end_f32(pvid_estimator_f32 *self, const pvid_block *block, co
     self->group_weight += weight;
     const uint32_t room = UINT32_MAX - self->counters.rows;
     self->counters.rows += (rows < room) ? rows : room;
-    if (self->settings.gain < 1.0f) {
+    if (pvid_feeds_back_f32(self)) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         float innovation[PVID_MAX_P];
         model->jacobian(self->p, c);
         pvid_pattern_transpose_times_f32(model, c, block, gradient, innovation);
-        for (size_t a = 0; a < model->n_p; a++) {
-            self->innovation[a] += innovation[a];
-        }
+        pvid_row_accumulate_innovation_f32(self, model->n_p, innovation, 1.0f);
     }
 }

@@ -36,9 +36,16 @@ static inline pvid_reason pvid_row_accept_f32(pvid_estimator_f32 *self, size_t n
 static inline void pvid_row_accumulate_innovation_f32(pvid_estimator_f32 *self, size_t n_p, const float gradient[],
                                                       float e)
 {
+#if PVID_FEEDBACK
     for (size_t a = 0; a < n_p; a++) {
         self->innovation[a] += gradient[a] * e;
     }
+#else
+    (void)self;
+    (void)n_p;
+    (void)gradient;
+    (void)e;
+#endif
 }
 
 #endif

@@ -10,13 +10,6 @@
 
 #define GROUPS_MIN 4.0f
 
-/* What a setting may be. */
-typedef struct {
-    float least;
-    float most;
-    pvid_status status;
-} range;
-
 static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config, size_t n_p, uint32_t positive)
 {
     for (size_t i = 0; i < n_p; i++) {
@@ -36,6 +29,18 @@ static pvid_status parameters_are_valid(const pvid_estimator_config_f32 *config,
     return PVID_OK;
 }
 
+PVID_COLD pvid_status pvid_settings_within_f32(const float values[], const pvid_range_f32 ranges[], size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const pvid_range_f32 *range = &ranges[i];
+        const bool off = range->or_zero && pvid_within_f32(values[i], 0.0f, 0.0f);
+        if (!off && !pvid_within_f32(values[i], range->least, range->most)) {
+            return range->status;
+        }
+    }
+    return PVID_OK;
+}
+
 PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f32 *config, size_t n_p,
                                                   uint32_t positive, float update_rate_hz)
 {
@@ -44,24 +49,28 @@ PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f3
         return parameters;
     }
     /* in the order of `values` */
-    static const range ranges[] = {
-        {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD},  {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE},
-        {0.0f, 1.0e12f, PVID_BAD_FORGETTING},  {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING},
-        {0.0f, 1.0e12f, PVID_BAD_FEEDBACK},    {1.0f, 1.0e6f, PVID_BAD_CORRELATION},
-        {1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT},  {0.0f, 0.999f, PVID_BAD_KAPPA_MIN},
-        {0.0f, 1.0e6f, PVID_BAD_NOISE_MARGIN}, {0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f, PVID_BAD_DEAD_ZONE},
+    static const pvid_range_f32 ranges[] = {
+        {1.0e-12f, 1.0e12f, PVID_BAD_ROW_SD, false},
+        {1.0e-6f, 1.0e6f, PVID_BAD_UPDATE_RATE, false},
+        {0.0f, 1.0e12f, PVID_BAD_FORGETTING, false},
+        {GROUPS_MIN, 1.0e18f, PVID_BAD_FORGETTING, false},
+        {0.0f, (PVID_FEEDBACK != 0) ? 1.0e12f : 0.0f, PVID_BAD_FEEDBACK, false},
+        {1.0f, 1.0e6f, PVID_BAD_CORRELATION, false},
+        {1.0e-6f, 0.9f, PVID_BAD_STEP_LIMIT, false},
+        {0.0f, 0.999f, PVID_BAD_KAPPA_MIN, false},
+        {0.0f, 1.0e6f, PVID_BAD_NOISE_MARGIN, false},
+        {0.0f, (PVID_DEAD_ZONE != 0) ? 100.0f : 0.0f, PVID_BAD_DEAD_ZONE, false},
     };
     /* fewer than four groups in the time constant of forgetting are none */
     const float groups = (config->forgetting_s > 0.0f) ? (config->forgetting_s * update_rate_hz) : GROUPS_MIN;
     const float values[] = {config->row_sd,       update_rate_hz,      config->forgetting_s, groups,
                             config->feedback_hz,  config->correlation, config->step_limit,   config->kappa_min,
                             config->noise_margin, config->dead_zone};
-    for (size_t i = 0; i < (sizeof values / sizeof values[0]); i++) {
-        if (!pvid_within_f32(values[i], ranges[i].least, ranges[i].most)) {
-            return ranges[i].status;
-        }
+    const pvid_status status = pvid_settings_within_f32(values, ranges, sizeof values / sizeof values[0]);
+    if (status != PVID_OK) {
+        return status;
     }
-    if ((config->law != PVID_LAW_STATIONARY) && (config->law != PVID_LAW_PSEUDOVELOCITY)) {
+    if ((config->law != PVID_LAW_STATIONARY) && ((PVID_FEEDBACK == 0) || (config->law != PVID_LAW_PSEUDOVELOCITY))) {
         return PVID_BAD_LAW;
     }
     return (config->divider >= 1u) ? PVID_OK : PVID_BAD_DIVIDER;
@@ -69,6 +78,9 @@ PVID_COLD pvid_status pvid_settings_are_valid_f32(const pvid_estimator_config_f3
 
 PVID_COLD float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float update_rate_hz, float interval)
 {
+    if (PVID_FEEDBACK == 0) {
+        return 1.0f;
+    }
     if (config->law == PVID_LAW_PSEUDOVELOCITY) {
         return 0.0f;
     }

@@ -2,10 +2,22 @@
 #ifndef PVID_SOLVE_SETTINGS_F32_H
 #define PVID_SOLVE_SETTINGS_F32_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include "pvid/estimator.h"
+
+/* What a setting may be. */
+typedef struct {
+    float least;
+    float most;
+    pvid_status status; /* if it is not */
+    bool or_zero;       /* or 0 */
+} pvid_range_f32;
+
+/* PVID_OK, or the status of the first value that is out of its range. */
+pvid_status pvid_settings_within_f32(const float values[], const pvid_range_f32 ranges[], size_t count);
 
 /* Checks every field of a configuration but model and row_weight, for n_p parameters, those of the bits of `positive`
  * being positive. The status names the refused field. */

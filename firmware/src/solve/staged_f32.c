@@ -15,17 +15,19 @@
 #include "solve/information_f32.h"
 #include "solve/pattern_f32.h"
 #include "solve/row_f32.h"
+#include "solve/state_f32.h"
 #include "solve/step_f32.h"
+#include "number/unroll.h"
 
 enum {
-    STAGE_READ,        /* the sums and C */
+    STAGE_READ,        /* the sums */
     STAGE_PROJECT,     /* for each column c_a of C: M c_a, a few non-zeros at a time, then row a of S */
     STAGE_FORCE,       /* F */
     STAGE_ABOVE_NOISE, /* whether S contains more information than noise alone */
     STAGE_FACTOR,      /* Cholesky factor of S + H0; whether p[0] is excited */
     STAGE_STEP,        /* dp, and p after the step */
     STAGE_THETA,       /* theta after the step */
-    STAGE_MOVE_B,      /* a few rows of M dtheta at a time */
+    STAGE_MOVE_B,      /* M dtheta, a few columns of M at a time */
     STAGE_COMMIT,      /* writes p, theta, b and rr */
     STAGE_FOLD,        /* ends the group: information.h */
     STAGE_DONE,
@@ -38,7 +40,8 @@ enum {
 /* Rounding error of rr per step, relative to the sum of M_ii dtheta_i^2: four ulp of M, whose terms cancel. */
 #define ROUNDING 2.4e-7f
 
-#define ROWS_PER_STAGE 2u
+/* Columns of M that a stage adds. */
+#define ROWS_PER_STAGE 3u
 #define COLUMNS_PER_STAGE 2u
 
 /* ---- rows ---- */
@@ -48,7 +51,7 @@ static inline float innovate(const pvid_estimator_f32 *self, const pvid_block *b
                              float gradient[])
 {
     const pvid_model_f32 *model = self->model;
-    if (self->settings.gain < 1.0f) {
+    if (pvid_feeds_back_f32(self)) {
         float c[PVID_MAX_THETA * PVID_MAX_P];
         model->jacobian(self->p, c);
         pvid_pattern_transpose_times_f32(model, c, block, n, gradient);
@@ -76,7 +79,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const fl
         pvid_count_up(&self->counters.rejected_saturated);
         return PVID_REJECTED_SATURATED;
     }
-    if (self->settings.gain < 1.0f) {
+    if (pvid_feeds_back_f32(self)) {
         pvid_row_accumulate_innovation_f32(self, model->n_p, gradient, e);
     }
     self->group_rss += e * e;
@@ -86,7 +89,7 @@ pvid_reason pvid_staged_add_f32(pvid_estimator_f32 *self, uint8_t kind, const fl
     return PVID_ACCUMULATED;
 }
 
-void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance)
+PVID_COLD void pvid_estimator_set_expected_f32(pvid_estimator_f32 *self, float variance)
 {
     float tail[2];
     pvid_information_tail_f32(&self->information, tail);
@@ -109,7 +112,6 @@ bool pvid_estimator_is_rounded_f32(const pvid_estimator_f32 *self)
 static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     pvid_information_read_f32(&self->information, solve->sums);
-    self->model->jacobian(self->p, solve->work.c);
     const float *tail = &solve->sums[self->model->n_moments + self->model->n_theta]; /* rr, weight */
     solve->system.rss = tail[0];
     solve->system.rounding = self->information.rounding;
@@ -117,8 +119,7 @@ static void read_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 
     solve->system.weight = tail[1];
 }
 
-/* Adds a part of M c_a; when M c_a is complete, computes row a of S. Returns whether the stage is to be repeated.
- */
+/* Adds a part of M c_a; when it is complete, computes row a of S. Returns whether the stage is to be repeated. */
 static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const pvid_model_f32 *model = self->model;
@@ -132,7 +133,9 @@ static bool project_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f
     }
     if (next < end) {
         const size_t last = ((end - next) > COLUMNS_PER_STAGE) ? (next + COLUMNS_PER_STAGE) : end;
-        pvid_pattern_add_columns_f32(model, solve->work.c, next, last, solve->sums, solve->product);
+        for (size_t k = next; k < last; k++) {
+            pvid_pattern_add_column_f32(model, model->c_row[k], solve->work.c[k], solve->sums, solve->product);
+        }
         solve->next = (uint8_t)last;
         return true;
     }
@@ -194,15 +197,16 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
 
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    const pvid_model_f32 *model = self->model;
-    float rhs[PVID_MAX_P];
-    for (size_t a = 0; a < model->n_p; a++) {
-        rhs[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
+    const float *rhs = solve->system.force;
+#if PVID_FEEDBACK
+    float damped[PVID_MAX_P];
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        damped[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
         self->innovation[a] = 0.0f;
     }
-    for (size_t a = 0; a < model->n_p; a++) {
-        solve->p[a] = self->p[a];
-    }
+    rhs = damped;
+#endif
+    memcpy(solve->p, self->p, sizeof solve->p);
     if (solve->reason == PVID_UPDATED) {
         take_step(self, solve, rhs);
     }
@@ -216,29 +220,38 @@ static void theta_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32
     self->model->theta(solve->p, solve->work.theta.after);
     for (size_t i = 0; i < self->model->n_theta; i++) {
         solve->work.theta.step[i] = solve->work.theta.after[i] - self->theta[i];
+        solve->product[i] = 0.0f;
     }
-    solve->fall = 0.0f;
-    solve->scale = 0.0f;
 }
 
-/* A few rows of M dtheta, and their part of the decrease of rr, dtheta^T (b_old + b_new). Returns the next row. */
-static size_t move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, size_t first)
+/* A few columns of M times their dtheta. Returns whether the stage is to be repeated. */
+static bool move_b_stage(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const size_t n = self->model->n_theta;
-    const float *b = &solve->sums[self->model->n_moments];
+    const size_t first = solve->index;
     const size_t last = ((n - first) > ROWS_PER_STAGE) ? (first + ROWS_PER_STAGE) : n;
-    for (size_t i = first; i < last; i++) {
-        pvid_block block;
-        pvid_information_block_f32(self->model, i, &block);
-        const float *m = &solve->sums[block.moment];
-        const size_t row = i - block.first;
-        const float moved = pvid_pattern_times_f32(block.n, m, row, &solve->work.theta.step[block.first]);
-        solve->product[i] = moved;
-        solve->fall += solve->work.theta.step[i] * (b[i] + (b[i] - moved));
-        solve->scale +=
-            m[pvid_pattern_diagonal_f32(block.n, row)] * (solve->work.theta.step[i] * solve->work.theta.step[i]);
+    for (size_t j = first; j < last; j++) {
+        pvid_pattern_add_column_f32(self->model, j, solve->work.theta.step[j], solve->sums, solve->product);
     }
-    return last;
+    solve->index = (uint8_t)last;
+    return last < n;
+}
+
+/* The decrease of rr, dtheta^T (b_old + b_new), and the size of its terms. */
+static void find_fall(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+{
+    const float *b = &solve->sums[self->model->n_moments];
+    float fall = 0.0f;
+    float scale = 0.0f;
+    pvid_block block = {0, 0, 0};
+    for (size_t i = 0; i < self->model->n_theta; i++) {
+        const float step = solve->work.theta.step[i];
+        pvid_information_block_f32(self->model, i, &block);
+        fall += step * (b[i] + (b[i] - solve->product[i]));
+        scale += solve->sums[block.moment + pvid_pattern_diagonal_f32(block.n, i - block.first)] * (step * step);
+    }
+    solve->fall = fall;
+    solve->scale = scale;
 }
 
 /* Writes p, theta, b -= M dtheta and rr -= fall together. If a sum would overflow, `fall` is not finite, and p is held.
@@ -249,6 +262,7 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     if (solve->in_dead_zone || (!steps && (solve->fallback == NULL))) {
         return;
     }
+    find_fall(self, solve);
     const size_t n = self->model->n_theta;
     float *low = &self->information.low[self->model->n_moments];
     if (!pvid_finite_f32(solve->fall) || !pvid_finite_f32(low[n] - solve->fall)) {
@@ -291,6 +305,7 @@ static uint8_t next_stage(const pvid_estimator_solve_f32 *solve)
 
 static void reset_solve(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
+    self->model->jacobian(self->p, solve->work.c);
     solve->end = (uint8_t)pvid_pattern_end_f32(self->model, 0);
     solve->reason = PVID_ACCUMULATED;
     solve->index = 0;
@@ -307,7 +322,7 @@ static void reset_solve(const pvid_estimator_f32 *self, pvid_estimator_solve_f32
     solve->estimate = NULL;
 }
 
-void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
+PVID_COLD void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve, bool ends_group)
 {
     reset_solve(self, solve);
     solve->ends_group = ends_group;
@@ -317,7 +332,7 @@ void pvid_estimator_begin_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32
         self->group_weight = 0.0f;
         solve->gain = self->settings.gain;
         solve->stage = (uint8_t)(pvid_solve_is_due(&self->phase, self->divider) ? STAGE_READ : STAGE_FOLD);
-    } else if (self->settings.gain < 1.0f) {
+    } else if (pvid_feeds_back_f32(self)) {
         solve->stage = STAGE_DONE; /* with g < 1 there is one step per group */
     }
 }
@@ -382,7 +397,6 @@ static bool finish_stage(pvid_estimator_solve_f32 *solve, bool repeat)
 
 bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
-    const pvid_model_f32 *model = self->model;
     bool repeat = false;
     switch (solve->stage) {
     case STAGE_READ:
@@ -407,8 +421,7 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
         theta_stage(self, solve);
         break;
     case STAGE_MOVE_B:
-        solve->index = (uint8_t)move_b_stage(self, solve, solve->index);
-        repeat = solve->index < model->n_theta;
+        repeat = move_b_stage(self, solve);
         break;
     case STAGE_COMMIT:
         commit_stage(self, solve);
@@ -422,7 +435,7 @@ bool pvid_estimator_advance_f32(pvid_estimator_f32 *self, pvid_estimator_solve_f
     return finish_stage(solve, repeat);
 }
 
-bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
+PVID_COLD bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
     const float wide = solve->variance * self->settings.correlation;
     bool repeat = false;
@@ -460,13 +473,12 @@ bool pvid_estimator_assess_advance_f32(const pvid_estimator_f32 *self, pvid_esti
 /* Number of stages of READ, PROJECT and FORCE. */
 static size_t projection_stages(const pvid_model_f32 *model)
 {
-    size_t stages = 2u;
-    size_t place = 0; /* in a column of C */
-    for (size_t k = 0; k < model->n_c; k++) {
-        const bool first = (k == 0u) || (model->c_column[k] != model->c_column[k - 1u]);
-        place = first ? 0u : (place + 1u);
-        stages += first ? 1u : 0u;
-        stages += ((place % COLUMNS_PER_STAGE) == 0u) ? 1u : 0u;
+    size_t stages = 2u + model->n_p;
+    size_t start = 0;
+    for (size_t a = 0; a < model->n_p; a++) {
+        const size_t end = pvid_pattern_end_f32(model, start);
+        stages += ((end - start) + (COLUMNS_PER_STAGE - 1u)) / COLUMNS_PER_STAGE;
+        start = end;
     }
     return stages;
 }

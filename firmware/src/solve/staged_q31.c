@@ -36,6 +36,9 @@ enum {
 /* Returns the next row. */
 static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, size_t row)
 {
+    if (solve->keeps_matrix) {
+        return pvid_system_rows_end_q31(self->model, row);
+    }
     if (row == 0u) {
         pvid_system_exponents_q31(&self->information, self->model, solve->h);
     }
@@ -59,13 +62,13 @@ static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solv
         force[i] = pvid_scale_q31(driving, solve->h[i]);
         self->fresh[i] = 0;
     }
-    solve->force_exponent = pvid_to_block_q31((uint32_t)n, force, 30, solve->force);
+    solve->part.early.force_exponent = pvid_to_block_q31((uint32_t)n, force, 30, solve->part.early.force);
 }
 
 static void project_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    int64_t *row = solve->system.s[solve->index];
-    solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->c, solve->start, row);
+    int64_t *row = solve->now.system.s[solve->index];
+    solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->part.early.c, solve->start, row);
 }
 
 /* Parts of a stage that factors: one prepares the matrix, then the parameters are eliminated, from the last, a few at a
@@ -90,20 +93,20 @@ static void above_noise_stage(const pvid_estimator_q31 *self, pvid_estimator_sol
     if (part == 0u) {
         int64_t rest[PVID_MAX_P][PVID_MAX_P];
         pvid_system_without_noise_q31(self, solve, rest);
-        pvid_system_begin_factor_q31(&solve->system, n_p, (const int64_t (*)[PVID_MAX_P])rest);
+        pvid_system_begin_factor_q31(&solve->now.system, n_p, (const int64_t (*)[PVID_MAX_P])rest);
         return;
     }
-    pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
-    solve->above_noise = solve->system.factor.positive;
+    pvid_system_eliminate_q31(&solve->now.system, n_p, part - 1u);
+    solve->above_noise = solve->now.system.factor.positive;
 }
 
 static void add_prior(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     for (size_t a = 0; a < self->model->n_p; a++) {
         const int32_t exponent = (int32_t)self->settings.prior_exponent[a] + (2 * (int32_t)self->information.exponent);
-        const int64_t prior = pvid_system_prior_q31(self->settings.prior[a], exponent, solve->system.f[a]);
-        solve->system.s[a][a] += prior;
-        solve->system.first_prior = (a == 0u) ? prior : solve->system.first_prior;
+        const int64_t prior = pvid_system_prior_q31(self->settings.prior[a], exponent, solve->now.system.f[a]);
+        solve->now.system.s[a][a] += prior;
+        solve->now.system.first_prior = (a == 0u) ? prior : solve->now.system.first_prior;
     }
 }
 
@@ -112,17 +115,17 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
         add_prior(self, solve);
-        pvid_system_begin_factor_q31(&solve->system, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
+        pvid_system_begin_factor_q31(&solve->now.system, n_p, (const int64_t (*)[PVID_MAX_P])solve->now.system.s);
         return;
     }
-    pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
+    pvid_system_eliminate_q31(&solve->now.system, n_p, part - 1u);
     if ((part + 1u) < factor_parts(n_p)) {
         return;
     }
     solve->reason = PVID_UPDATED;
-    if (!solve->system.factor.positive) {
+    if (!solve->now.system.factor.positive) {
         solve->reason = pvid_count_held(&self->counters, PVID_HELD_PIVOT);
-    } else if (!solve->above_noise || !pvid_step_is_excited_q31(&solve->system, &self->settings)) {
+    } else if (!solve->above_noise || !pvid_step_is_excited_q31(&solve->now.system, &self->settings)) {
         solve->reason = pvid_count_held(&self->counters, PVID_HELD_NOT_EXCITED);
     } else {
         /* a step is allowed */
@@ -135,12 +138,12 @@ static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve
 {
     memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
     for (size_t k = 0; k < model->n_c; k++) {
-        rhs[model->c_column[k]] += pvid_product_q31(solve->c[k], force[model->c_row[k]]);
+        rhs[model->c_column[k]] += pvid_product_q31(solve->part.early.c[k], force[model->c_row[k]]);
     }
     for (size_t a = 0; a < model->n_p; a++) {
-        rhs[a] = pvid_scale_q31(rhs[a], solve->system.g[a]);
+        rhs[a] = pvid_scale_q31(rhs[a], solve->now.system.g[a]);
     }
-    return pvid_cholesky_solve_q31(&solve->system.factor, rhs, x);
+    return pvid_cholesky_solve_q31(&solve->now.system.factor, rhs, x);
 }
 
 /* F^T (S + H0)^-1 F, F of all data, in the unit of the sums of squares. */
@@ -186,9 +189,10 @@ PVID_ALWAYS_INLINE void solve_stage(const pvid_estimator_q31 *self, pvid_estimat
     solve->in_dead_zone = solve_in_dead_zone(self, solve);
     int64_t rhs[PVID_MAX_P];
     int32_t x[PVID_MAX_P];
-    const int32_t exponent = solve_for(model, solve, solve->force, rhs, x) + solve->force_exponent;
+    const int32_t exponent =
+        solve_for(model, solve, solve->part.early.force, rhs, x) + solve->part.early.force_exponent;
     for (size_t a = 0; a < model->n_p; a++) {
-        const int32_t shift = ((solve->system.f[a] + solve->system.g[a]) - exponent) + PVID_S_BITS + 30;
+        const int32_t shift = ((solve->now.system.f[a] + solve->now.system.g[a]) - exponent) + PVID_S_BITS + 30;
         solve->dp[a] = pvid_clamp_q31(pvid_scale_q31(x[a], shift), STEP_MAX);
     }
 }
@@ -196,7 +200,7 @@ PVID_ALWAYS_INLINE void solve_stage(const pvid_estimator_q31 *self, pvid_estimat
 /* The step of an allowed solve, as a part of `solve`. */
 static void take_step(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    pvid_solution_q31 solution = {.p = solve->p};
+    pvid_solution_q31 solution = {.p = solve->now.step.p};
     pvid_step_take_q31(&self->settings, self->p, solve->dp, &solution);
     pvid_count_step(&self->counters, solution.limited, solution.bounded);
     solve->size = solution.size;
@@ -209,28 +213,28 @@ static void scale_theta_step(const pvid_estimator_q31 *self, pvid_estimator_solv
     int64_t step[PVID_MAX_THETA_Q31];
     int32_t largest = INT32_MIN;
     for (size_t j = 0; j < n; j++) {
-        step[j] = solve->theta[j] - self->theta[j];
+        step[j] = solve->now.step.theta[j] - self->theta[j];
         const int32_t length = (pvid_length_q31(step[j]) - self->align[j]) + solve->h[j];
         largest = (length > largest) ? length : largest;
     }
-    solve->step_exponent = largest - (29 - pvid_system_guard_bits_q31(n));
+    solve->now.step.step_exponent = largest - (29 - pvid_system_guard_bits_q31(n));
     for (size_t j = 0; j < n; j++) {
-        const int64_t scaled = pvid_scale_q31(step[j], (solve->step_exponent + self->align[j]) - solve->h[j]);
-        solve->theta_step[j] = (int32_t)pvid_clamp_q31(scaled, PVID_ONE_Q30 / 2);
+        const int64_t scaled = pvid_scale_q31(step[j], (solve->now.step.step_exponent + self->align[j]) - solve->h[j]);
+        solve->now.step.theta_step[j] = (int32_t)pvid_clamp_q31(scaled, PVID_ONE_Q30 / 2);
     }
 }
 
 static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    memcpy(solve->p, self->p, sizeof solve->p);
+    memcpy(solve->now.step.p, self->p, sizeof solve->now.step.p);
     if (solve->in_dead_zone) {
         pvid_count_up(&self->counters.at_rest);
     } else if (solve->reason == PVID_UPDATED) {
         take_step(self, solve);
     } else if (solve->has_fallback) {
-        memcpy(solve->p, solve->fallback, sizeof solve->p);
+        memcpy(solve->now.step.p, solve->fallback, sizeof solve->now.step.p);
     }
-    pvid_estimator_theta_q31(self, solve->p, solve->theta);
+    pvid_estimator_theta_q31(self, solve->now.step.p, solve->now.step.theta);
     scale_theta_step(self, solve);
 }
 
@@ -240,11 +244,11 @@ static inline int64_t row_times(size_t n, const int32_t m[], size_t i, const int
     size_t at = i;
     int64_t sum = 0;
     for (size_t j = 0; j < i; j++) {
-        sum += pvid_product_q31(m[at], x[j]);
+        sum += pvid_short_product_q31(m[at], x[j]);
         at += (n - 1u) - j;
     }
     for (size_t j = i; j < n; j++) {
-        sum += pvid_product_q31(m[at], x[j]);
+        sum += pvid_short_product_q31(m[at], x[j]);
         at++;
     }
     return sum;
@@ -261,8 +265,9 @@ static size_t move_b_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
             pvid_information_block_q31(self->model, i, &block);
         }
         const int64_t sum =
-            row_times(block.n, &solve->m[block.moment], i - block.first, &solve->theta_step[block.first]);
-        solve->moved[i] = pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->step_exponent)), PVID_CLAMP_LIMIT);
+            row_times(block.n, &solve->m[block.moment], i - block.first, &solve->now.step.theta_step[block.first]);
+        solve->now.step.moved[i] =
+            pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->now.step.step_exponent)), PVID_CLAMP_LIMIT);
     }
     return last;
 }
@@ -275,14 +280,14 @@ static int64_t fall_of(const pvid_estimator_q31 *self, const pvid_estimator_solv
     int32_t mantissa[PVID_MAX_THETA_Q31];
     const int64_t *b = pvid_b_of_q31(&self->information);
     for (size_t j = 0; j < n; j++) {
-        both[j] = pvid_scale_q31((2 * pvid_clamp_q31(b[j], PVID_CLAMP_LIMIT)) - solve->moved[j], solve->h[j]);
+        both[j] = pvid_scale_q31((2 * pvid_clamp_q31(b[j], PVID_CLAMP_LIMIT)) - solve->now.step.moved[j], solve->h[j]);
     }
     const int32_t exponent = pvid_to_block_q31((uint32_t)n, both, 30, mantissa);
     int64_t fall = 0;
     for (size_t j = 0; j < n; j++) {
-        fall += pvid_product_q31(solve->theta_step[j], mantissa[j]);
+        fall += pvid_product_q31(solve->now.step.theta_step[j], mantissa[j]);
     }
-    return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->step_exponent + exponent)), PVID_CLAMP_LIMIT);
+    return pvid_clamp_q31(pvid_scale_q31(fall, -(solve->now.step.step_exponent + exponent)), PVID_CLAMP_LIMIT);
 }
 
 /* Moves p, theta, b and rr together: b -= M dtheta. */
@@ -299,7 +304,7 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     bool fits = true;
     for (size_t i = 0; i < n; i++) {
         b[i] = pvid_clamp_q31(sums[i], PVID_CLAMP_LIMIT);
-        fits = fits && (pvid_magnitude_q31(b[i] - solve->moved[i]) <= (uint64_t)PVID_CLAMP_LIMIT);
+        fits = fits && (pvid_magnitude_q31(b[i] - solve->now.step.moved[i]) <= (uint64_t)PVID_CLAMP_LIMIT);
     }
     const int64_t residual = sums[n] - fall_of(self, solve);
     if (!fits || (residual > PVID_CLAMP_LIMIT)) {
@@ -309,11 +314,11 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
         return;
     }
     for (size_t i = 0; i < n; i++) {
-        sums[i] = b[i] - solve->moved[i];
+        sums[i] = b[i] - solve->now.step.moved[i];
     }
     sums[n] = (residual > 0) ? residual : 0;
-    pvid_estimator_set_theta_q31(self, solve->theta);
-    memcpy(self->p, solve->p, sizeof self->p);
+    pvid_estimator_set_theta_q31(self, solve->now.step.theta);
+    memcpy(self->p, solve->now.step.p, sizeof self->p);
     if (steps) {
         pvid_count_up(&self->counters.updates);
     }
@@ -330,6 +335,7 @@ static void reset_solve(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
     solve->above_noise = true;
     solve->has_fallback = false;
     solve->in_dead_zone = false;
+    solve->keeps_matrix = false;
     solve->gain = PVID_ONE_Q30;
     solve->size = 0;
     solve->variance =
@@ -404,7 +410,7 @@ static bool advance_shared(const pvid_estimator_q31 *self, pvid_estimator_solve_
         all = self->model->n_theta;
         break;
     case STAGE_JACOBIAN:
-        pvid_system_jacobian_q31(self, solve->h, solve->c, solve->system.f);
+        pvid_system_jacobian_q31(self, solve->h, solve->part.early.c, solve->now.system.f);
         break;
     case STAGE_PROJECT:
         project_stage(self, solve);
@@ -459,22 +465,23 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
 static void residual_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_estimate_q31 *estimate)
 {
     const pvid_residual_q31 residual = pvid_residual_of_q31(&self->information);
-    pvid_assess_residual_q31(&residual, &self->settings, self->expected, &solve->variance, &solve->inverse.wide,
+    pvid_assess_residual_q31(&residual, &self->settings, self->expected, &solve->variance, &solve->part.inverse.wide,
                              estimate);
 }
 
 static void kappa_stage(pvid_estimator_solve_q31 *solve, size_t n_p, size_t part, pvid_estimate_q31 *estimate)
 {
     if (part == 0u) {
-        pvid_system_begin_factor_q31(&solve->system, (uint8_t)n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
+        pvid_system_begin_factor_q31(&solve->now.system, (uint8_t)n_p,
+                                     (const int64_t (*)[PVID_MAX_P])solve->now.system.s);
         return;
     }
     if (part < factor_parts(n_p)) {
-        pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
-    } else if (solve->system.factor.positive) {
-        estimate->kappa = solve->system.factor.first_pivot;
-        estimate->least_pivot =
-            pvid_cholesky_least_pivot_q31(&solve->system.factor, (const int32_t (*)[PVID_MAX_P])solve->system.q);
+        pvid_system_eliminate_q31(&solve->now.system, n_p, part - 1u);
+    } else if (solve->now.system.factor.positive) {
+        estimate->kappa = solve->now.system.factor.first_pivot;
+        estimate->least_pivot = pvid_cholesky_least_pivot_q31(&solve->now.system.factor,
+                                                              (const int32_t (*)[PVID_MAX_P])solve->now.system.q);
     }
 }
 
@@ -482,10 +489,10 @@ static void widen_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31
 {
     const uint8_t n_p = self->model->n_p;
     if (part == 0u) {
-        pvid_assess_widen_q31(&solve->system, &self->settings, solve->inverse.wide);
-        pvid_system_begin_factor_q31(&solve->system, n_p, (const int64_t (*)[PVID_MAX_P])solve->system.s);
+        pvid_assess_widen_q31(&solve->now.system, &self->settings, solve->part.inverse.wide);
+        pvid_system_begin_factor_q31(&solve->now.system, n_p, (const int64_t (*)[PVID_MAX_P])solve->now.system.s);
     } else {
-        pvid_system_eliminate_q31(&solve->system, n_p, part - 1u);
+        pvid_system_eliminate_q31(&solve->now.system, n_p, part - 1u);
     }
 }
 
@@ -509,10 +516,10 @@ bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_esti
         all = factor_parts(n_p);
         break;
     case STAGE_INVERT:
-        pvid_assess_invert_q31(&solve->system.factor, index, &solve->inverse);
+        pvid_assess_invert_q31(&solve->now.system.factor, index, &solve->part.inverse);
         break;
     case STAGE_ERRORS:
-        pvid_assess_errors_q31(&solve->system, &self->settings, &solve->inverse, index, estimate);
+        pvid_assess_errors_q31(&solve->now.system, &self->settings, &solve->part.inverse, index, estimate);
         break;
     case STAGE_DONE:
         return true;

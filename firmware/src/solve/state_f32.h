@@ -13,6 +13,12 @@ static inline bool pvid_is_positive_f32(const pvid_model_f32 *model, size_t i)
     return ((model->positive >> i) & 1u) != 0u;
 }
 
+/* Returns whether a step takes sum C^T N e of its rows beside the sums: g < 1. */
+static inline bool pvid_feeds_back_f32(const pvid_estimator_f32 *self)
+{
+    return (PVID_FEEDBACK != 0) && (self->settings.gain < 1.0f);
+}
+
 /* Returns whether init has accepted a configuration. */
 static inline bool pvid_estimator_is_ready_f32(const pvid_estimator_f32 *self)
 {

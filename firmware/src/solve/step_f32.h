@@ -42,7 +42,6 @@ static inline float pvid_step_size_f32(const pvid_solve_settings_f32 *settings, 
 {
     uint32_t largest = 0;
     const size_t n_p = PVID_COUNT(PVID_MAX_P, settings->n_p);
-    PVID_UNROLL_EXACT
     for (size_t a = 0; a < n_p; a++) {
         const uint32_t relative_step = pvid_step_relative_f32(settings, p, a, dp[a]);
         largest = (relative_step > largest) ? relative_step : largest;
@@ -139,7 +138,6 @@ static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_
     solution->size = size;
     const float part = pvid_step_shortening_f32(settings, size, &solution->limited);
     const size_t n_p = PVID_COUNT(PVID_MAX_P, settings->n_p);
-    PVID_UNROLL_EXACT
     for (size_t a = 0; a < n_p; a++) {
         solution->p[a] = pvid_step_bounded_f32(settings, p, a, part * dp[a], &solution->bounded);
     }

@@ -49,7 +49,8 @@ static inline int64_t pvid_step_size_q31(const pvid_solve_settings_q31 *settings
     for (size_t a = 0; a < settings->n_p; a++) {
         const bool positive = (((uint32_t)settings->positive >> a) & 1u) != 0u;
         const int32_t reference = positive ? p[a] : settings->start_sd[a];
-        const int64_t own = (int64_t)(pvid_magnitude_q31(dp[a]) << PVID_SIZE_BITS) / reference;
+        const uint64_t part = pvid_magnitude_q31(dp[a]) << PVID_SIZE_BITS;
+        const int64_t own = (int64_t)pvid_quotient_q31(part, (uint32_t)reference);
         size = (own > size) ? own : size;
     }
     return size;

@@ -37,6 +37,13 @@ static size_t rows_end(const pvid_block *block, size_t row)
     return end;
 }
 
+size_t pvid_system_rows_end_q31(const pvid_model_q31 *model, size_t row)
+{
+    pvid_block block;
+    pvid_information_block_q31(model, row, &block);
+    return rows_end(&block, row);
+}
+
 size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const pvid_model_q31 *model,
                                   const int16_t h[], size_t row, int32_t m[])
 {
@@ -105,16 +112,16 @@ void pvid_system_jacobian_q31(const pvid_estimator_q31 *self, const int16_t h[],
     }
 }
 
-/* t += m e_j a for the symmetric m, packed upper triangle by rows. */
-static inline void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int64_t t[])
+/* t += 2^-32 m e_j a for the symmetric m, packed upper triangle by rows; each product rounded down. */
+static inline void add_column(size_t n, const int32_t m[], size_t j, int32_t a, int32_t t[])
 {
     size_t at = j;
     for (size_t i = 0; i < j; i++) {
-        t[i] += pvid_product_q31(m[at], a);
+        t[i] += pvid_upper_product_q31(m[at], a);
         at += (n - 1u) - i;
     }
     for (size_t i = j; i < n; i++) {
-        t[i] += pvid_product_q31(m[at], a);
+        t[i] += pvid_upper_product_q31(m[at], a);
         at++;
     }
 }
@@ -123,7 +130,7 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
                                int64_t s[])
 {
     const size_t end = pvid_column_end_q31(model, start);
-    int64_t t[PVID_MAX_THETA_Q31] = {0}; /* m c_a */
+    int32_t t[PVID_MAX_THETA_Q31] = {0}; /* 2^-PVID_S_BITS m c_a */
     pvid_block block = {0, 0, 0};
     for (size_t k = start; k < end; k++) {
         const size_t row = model->c_row[k];
@@ -132,14 +139,11 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
         }
         add_column(block.n, &m[block.moment], row - block.first, c[k], &t[block.first]);
     }
-    for (size_t i = 0; i < model->n_theta; i++) {
-        t[i] = pvid_round_shift_q31(t[i], PVID_S_BITS);
-    }
     for (size_t b = model->c_column[start]; b < model->n_p; b++) {
         s[b] = 0;
     }
     for (size_t k = start; k < model->n_c; k++) {
-        s[model->c_column[k]] += pvid_product_q31(c[k], (int32_t)t[model->c_row[k]]);
+        s[model->c_column[k]] += pvid_short_product_q31(c[k], t[model->c_row[k]]);
     }
     return end;
 }
@@ -202,8 +206,8 @@ void pvid_system_without_noise_q31(const pvid_estimator_q31 *self, const pvid_es
     for (size_t a = 0; a < self->model->n_p; a++) {
         for (size_t b = a; b < self->model->n_p; b++) {
             const pvid_scaled_q31 noise = pvid_scaled_times_q31(much, pvid_scaled_unpacked_q31(self->noise_table[at]));
-            const int32_t unit = (int32_t)solve->system.f[a] + solve->system.f[b] + PVID_S_BITS;
-            rest[a][b] = pvid_clamp_q31(solve->system.s[a][b] - pvid_scaled_fixed_q31(noise, -unit), PVID_WIDE);
+            const int32_t unit = (int32_t)solve->now.system.f[a] + solve->now.system.f[b] + PVID_S_BITS;
+            rest[a][b] = pvid_clamp_q31(solve->now.system.s[a][b] - pvid_scaled_fixed_q31(noise, -unit), PVID_WIDE);
             at++;
         }
     }

@@ -18,6 +18,9 @@ void pvid_system_exponents_q31(const pvid_information_q31 *information, const pv
 size_t pvid_system_scale_rows_q31(const pvid_information_q31 *information, const pvid_model_q31 *model,
                                   const int16_t h[], size_t row, int32_t m[]);
 
+/* The row that it returns. */
+size_t pvid_system_rows_end_q31(const pvid_model_q31 *model, size_t row);
+
 /* Bits that entries of C and steps of theta have less than 29, so that sums over theta do not overflow. */
 int32_t pvid_system_guard_bits_q31(size_t n_theta);
 

@@ -18,20 +18,11 @@ const float pvid_five_points_f32[PVID_ORDERS * 2] = {
     -4.0f,         1.0f,          /* order 4 */
 };
 
-PVID_COLD uint32_t pvid_fir_places_f32(const pvid_fir_bank_f32 *bank)
-{
-    const uint32_t points = (2u * (uint32_t)bank->half * bank->stride) + 1u;
-    return (bank->block > 1u) ? (points + bank->block + PVID_BLOCK_SUMS) : points;
-}
-
 PVID_COLD pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, float sample_rate_hz)
 {
     const pvid_status window = pvid_fir_window(bank->half, bank->stride);
     if (window != PVID_OK) {
         return window;
-    }
-    if (pvid_fir_places_f32(bank) > PVID_MAX_WINDOW) {
-        return PVID_BAD_STRIDE;
     }
     if (bank->weights == NULL) {
         return PVID_BAD_BANK;
@@ -49,7 +40,7 @@ PVID_COLD void pvid_fir_take_bank_f32(pvid_fir_bank_f32 *own, const pvid_fir_ban
     /* One by one: the padding of a copied struct would be that of the caller's, and end in snapshots. */
     own->half = bank->half;
     own->stride = bank->stride;
-    own->block = (bank->block > 1u) ? bank->block : 1u;
+    own->block = (uint16_t)pvid_fir_block_f32(bank);
     own->weights = bank->weights;
 }
 
@@ -60,8 +51,8 @@ static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f3
         return status;
     }
     pvid_fir_take_bank_f32(&self->bank, bank);
-    self->length = (uint16_t)((2u * bank->half * bank->stride) + 1u);
-    const float rate = sample_rate_hz / (float)bank->stride;
+    self->length = pvid_fir_length_f32(bank);
+    const float rate = sample_rate_hz / (float)(pvid_fir_block_f32(bank) * bank->stride);
     float power = 1.0f / (float)self->bank.block;
     for (size_t i = 0; i < PVID_ORDERS; i++) {
         self->scale[i] = power;
@@ -80,11 +71,10 @@ PVID_COLD pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self
 
 PVID_COLD void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self)
 {
-    const size_t places = (size_t)pvid_fir_places_f32(&self->bank);
     self->head = 0;
     self->at = 0;
-    self->missing = (uint16_t)(self->length + self->bank.block - 1u);
-    for (size_t i = 0; i < places; i++) {
+    self->missing = self->length;
+    for (size_t i = 0; i < self->length; i++) {
         self->history[i] = 0.0f;
     }
 }

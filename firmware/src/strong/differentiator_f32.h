@@ -10,50 +10,35 @@
 
 #include "pvid/differentiator.h"
 
-/* ---- sums of blocks: tail[0 .. block - 1] holds the last samples, then the sum in use and the one begun anew; `step`
- * floats from one to the next ---- */
-
-#define PVID_BLOCK_SUMS 2u /* places after the samples of a block */
-
-/* Takes a sample in the place `at` of the oldest and returns the sum of the last `block` samples. */
-static inline float pvid_block_sum_f32(float tail[], size_t step, size_t block, size_t at, float sample)
-{
-    float *sums = &tail[block * step];
-    const float updated = sums[0] + (sample - tail[at * step]);
-    const float anew = sums[step] + sample;
-    const bool complete = (at + 1u) == block;
-    const float sum = complete ? anew : updated;
-    tail[at * step] = sample;
-    sums[0] = sum;
-    sums[step] = complete ? 0.0f : anew;
-    return sum;
-}
-
-/* The place after `at`. */
-static inline uint16_t pvid_block_next_f32(size_t block, size_t at)
-{
-    return (uint16_t)(((at + 1u) == block) ? 0u : (at + 1u));
-}
-
-/* ---- the window ---- */
-
-/* Places that a bank needs in a channel's memory: its ring, and its block with its sums. */
-uint32_t pvid_fir_places_f32(const pvid_fir_bank_f32 *bank);
-
 /* Checks a bank and a rate as pvid_differentiator_init_f32 does. */
 pvid_status pvid_fir_bank_is_valid_f32(const pvid_fir_bank_f32 *bank, float sample_rate_hz);
 
 /* Copies a bank whose block is at least 1. */
 void pvid_fir_take_bank_f32(pvid_fir_bank_f32 *own, const pvid_fir_bank_f32 *bank);
 
-/* Stores a sample. Returns whether the window is full. */
+/* Points of a bank's window. */
+static inline uint16_t pvid_fir_length_f32(const pvid_fir_bank_f32 *bank)
+{
+    return (uint16_t)((2u * (uint32_t)bank->half * bank->stride) + 1u);
+}
+
+/* Samples of a point. */
+static inline uint32_t pvid_fir_block_f32(const pvid_fir_bank_f32 *bank)
+{
+    return (bank->block > 1u) ? bank->block : 1u;
+}
+
+/* Adds a sample to its block. Returns whether the block is complete and the window full. */
 static inline bool pvid_fir_push_f32(pvid_differentiator_f32 *self, float sample)
 {
     const size_t head = self->head;
-    const size_t block = self->bank.block;
-    self->history[head] =
-        (block > 1u) ? pvid_block_sum_f32(&self->history[self->length], 1, block, self->at, sample) : sample;
-    self->at = (block > 1u) ? pvid_block_next_f32(block, self->at) : 0u;
+    const uint32_t at = self->at;
+    self->history[head] = (at == 0u) ? sample : (self->history[head] + sample);
+    const bool complete = (at + 1u) >= self->bank.block;
+    self->at = (uint16_t)(complete ? 0u : (at + 1u));
+    if (!complete) {
+        return false;
+    }
     self->head = (uint16_t)((head + 1u == self->length) ? 0u : (head + 1u));
     if (self->missing > 0u) {
         self->missing--;

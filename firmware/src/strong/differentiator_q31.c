@@ -84,21 +84,11 @@ static pvid_status channel_is_valid(const pvid_fir_bank_q31 *bank, size_t lowest
     return PVID_OK;
 }
 
-/* Places that a bank needs: its ring, and the samples of a block with their sum. */
-static uint32_t places_of(const pvid_fir_bank_q31 *bank)
-{
-    const uint32_t points = (2u * (uint32_t)bank->half * bank->stride) + 1u;
-    return (bank->block > 1u) ? (points + bank->block + 1u) : points;
-}
-
 static pvid_status bank_is_valid(const pvid_fir_bank_q31 *bank)
 {
     const pvid_status window = pvid_fir_window(bank->half, bank->stride);
     if (window != PVID_OK) {
         return window;
-    }
-    if (places_of(bank) > PVID_MAX_WINDOW) {
-        return PVID_BAD_STRIDE;
     }
     if (bank->weights == NULL) {
         return PVID_BAD_BANK;
@@ -165,38 +155,36 @@ PVID_COLD pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self
 
 PVID_COLD void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self)
 {
-    const size_t places = (size_t)places_of(&self->bank);
     self->head = 0;
     self->at = 0;
-    self->missing = (uint16_t)((self->length + (uint32_t)block_of(&self->bank)) - 1u);
-    for (size_t i = 0; i < places; i++) {
+    self->missing = self->length;
+    for (size_t i = 0; i < self->length; i++) {
         self->history[i][PHI] = 0;
         self->history[i][Y] = 0;
     }
 }
 
-/* Replaces the oldest sample of a block by this one and writes the sums of the block; they are exact. */
-static void sum_block(pvid_differentiator_q31 *self, int32_t phi, int32_t y, int32_t point[2])
+/* Adds a sample of each channel to the sums of a block, which are exact. Returns whether it is complete. */
+static PVID_SELDOM bool add_to_block(pvid_differentiator_q31 *self, int32_t phi, int32_t y)
 {
-    const size_t block = self->bank.block;
-    int32_t *oldest = self->history[self->length + self->at];
-    int32_t *sum = self->history[self->length + block];
-    sum[PHI] += phi - oldest[PHI];
-    sum[Y] += y - oldest[Y];
-    oldest[PHI] = phi;
-    oldest[Y] = y;
-    self->at = (uint16_t)(((self->at + 1u) == block) ? 0u : (self->at + 1u));
-    point[PHI] = sum[PHI];
-    point[Y] = sum[Y];
+    const uint32_t samples = (uint32_t)self->at + 1u;
+    int32_t *point = self->history[self->head];
+    point[PHI] = (samples == 1u) ? phi : (point[PHI] + phi);
+    point[Y] = (samples == 1u) ? y : (point[Y] + y);
+    const bool complete = samples == self->bank.block;
+    self->at = (uint16_t)(complete ? 0u : samples);
+    return complete;
 }
 
-/* Stores a sample. Returns whether the window is full. */
+/* Takes a sample of each channel. Returns whether it completes a point, and the window is full. */
 static bool push(pvid_differentiator_q31 *self, int32_t phi, int32_t y)
 {
-    int32_t *point = self->history[self->head];
     if (self->bank.block > 1u) {
-        sum_block(self, phi, y, point);
+        if (!add_to_block(self, phi, y)) {
+            return false;
+        }
     } else {
+        int32_t *point = self->history[self->head];
         point[PHI] = phi;
         point[Y] = y;
     }

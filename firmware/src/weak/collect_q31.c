@@ -32,6 +32,14 @@ uint32_t pvid_weak_free_ticks_q31(const pvid_weak_design_q31 *design)
     return ((design->hop / (uint32_t)PVID_WEAK_BLOCK_Q31) - 1u) * (other_ticks(design) - adding);
 }
 
+uint32_t pvid_weak_ticks_behind_join_q31(const pvid_weak_design_q31 *design)
+{
+    const uint32_t each = items(design);
+    const uint32_t joining = ((2u * (uint32_t)pvid_weak_harmonics_q31(design)) + (each - 1u)) / each;
+    const uint32_t all = other_ticks(design);
+    return (all > joining) ? (all - joining) : 0u;
+}
+
 void pvid_weak_collect_init_q31(pvid_weak_collect_q31 *self, const pvid_weak_design_q31 *design, const int32_t offset[])
 {
     self->design = design;

@@ -8,8 +8,8 @@
 
 #include <stdbool.h>
 
-#include "weak/weak_front_q31.h"
 #include "pvid/weak_q31.h"
+#include "weak/weak_front_q31.h"
 
 typedef enum {
     PVID_WEAK_BUSY,    /* the tick did a part of its block's work */
@@ -20,6 +20,9 @@ typedef enum {
 
 /* Fewest ticks that are free for a window's work before the next one is joined. */
 uint32_t pvid_weak_free_ticks_q31(const pvid_weak_design_q31 *design);
+
+/* Those of them before the next half's first block is added. */
+uint32_t pvid_weak_ticks_behind_join_q31(const pvid_weak_design_q31 *design);
 
 /* Returns whether PVID_MAX_BLOCKS are enough: one is where the ticks of a step add and join all harmonics. */
 bool pvid_weak_blocks_fit_q31(const pvid_weak_design_q31 *design);

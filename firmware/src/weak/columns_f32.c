@@ -13,6 +13,7 @@
 #include "number/exact.h"
 #include "number/finite_f32.h"
 #include "solve/products_f32.h"
+#include "weak/white_f32.h"
 
 #define SKIP 1.0e-6f
 
@@ -21,11 +22,11 @@
 
 void pvid_weak_columns_add_f32(const pvid_weak_design_f32 *design, const pvid_weak_term_f32 *term,
                                const pvid_weak_white_f32 *white, const float window[][PVID_MAX_CHANNELS][2],
-                               float part[])
+                               float part[2][PVID_MAX_HARMONICS])
 {
     if (design->model->channel[term->channel].gain == PVID_WEAK_NONE) {
         /* the sums of 1: 2 hop at h = 0, where only order 0 counts */
-        part[0] += (term->order == 0u) ? (white->scale[0] * (term->factor * (2.0f * (float)design->hop))) : 0.0f;
+        part[0][0] += (term->order == 0u) ? (white->scale[0] * (term->factor * (2.0f * (float)design->hop))) : 0.0f;
         return;
     }
     /* (-i omega)^m: 1, -i omega, -omega^2, i omega^3, omega^4, ... */
@@ -37,23 +38,17 @@ void pvid_weak_columns_add_f32(const pvid_weak_design_f32 *design, const pvid_we
     const float of_re = turned ? -sign : sign;
     const float unit = white->omega;
     const size_t order = term->order;
-    const size_t cosines = PVID_COUNT(PVID_MAX_HARMONICS, white->cosines);
-    float *imaginary = &part[cosines - 1u];
-    const size_t sines = PVID_COUNT(PVID_MAX_FUNCTIONS + PVID_MAX_POWER, white->parts) - cosines;
-    float number = 0.0f;
-    if (order == 0u) {
-        part[0] += (of_re * white->scale[0]) * re[0];
-    }
-    for (size_t h = 1; h < cosines; h++) {
-        number += 1.0f;
-        const float rate = number * unit;
+    const size_t harmonics = pvid_weak_harmonics(design);
+    const size_t sines = pvid_weak_sines(design);
+    for (size_t h = 0; h < harmonics; h++) {
+        const float rate = (float)h * unit;
         float weight = white->scale[h];
         for (size_t i = order; i > 0u; i--) {
             weight *= rate;
         }
-        part[h] += (of_re * weight) * re[h * BETWEEN];
+        part[0][h] += (of_re * weight) * re[h * BETWEEN];
         if (h <= sines) {
-            imaginary[h] += (sign * weight) * im[h * BETWEEN];
+            part[1][h] += (sign * weight) * im[h * BETWEEN];
         }
     }
 }
@@ -70,7 +65,6 @@ void pvid_weak_columns_project_f32(size_t rows, const float nuisance[], float in
 {
     const float along = pvid_product_f32(nuisance, column, rows) * inverse;
     const size_t count = PVID_COUNT(PVID_MAX_FUNCTIONS, rows);
-    PVID_UNROLL_EXACT
     for (size_t k = 0; k < count; k++) {
         column[k] -= along * nuisance[k];
     }

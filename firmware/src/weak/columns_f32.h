@@ -10,7 +10,7 @@
 /* part += factor (-1)^order (i omega_h)^order S_h of a term over the standard deviation, real and imaginary parts. */
 void pvid_weak_columns_add_f32(const pvid_weak_design_f32 *design, const pvid_weak_term_f32 *term,
                                const pvid_weak_white_f32 *white, const float window[][PVID_MAX_CHANNELS][2],
-                               float part[]);
+                               float part[2][PVID_MAX_HARMONICS]);
 
 /* A nuisance after those before it have been taken off: keeps 1 / its square, or 0 if less than 1e-6 of `whole`, its
  * square before that, remains. Returns whether it is kept. */

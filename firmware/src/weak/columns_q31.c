@@ -9,9 +9,10 @@
 
 #include <string.h>
 
+#include "number/integer_q31.h"
+#include "number/unroll.h"
 #include "weak/mirror_q31.h"
 #include "weak/white_q31.h"
-#include "number/integer_q31.h"
 
 #define SUM_BITS 30
 #define PRODUCT_DOWN 33u
@@ -30,25 +31,39 @@ static bool is_constant(const pvid_weak_design_q31 *design, size_t channel)
     return design->model->channel[channel].gain == PVID_WEAK_NONE;
 }
 
-static uint32_t length_of(const pvid_weak_design_q31 *design, const pvid_weak_window_q31 *window, size_t channel,
-                          size_t h)
+static uint32_t length_of(const pvid_weak_design_q31 *design, const uint8_t length[], size_t channel, size_t h)
 {
     if (is_constant(design, channel)) {
         return (h == 0u) ? pvid_bit_length_q31(2u * (uint64_t)design->hop) : 0u;
     }
-    return window->length[channel][h];
+    return length[channel];
 }
 
-/* Whether a term contains harmonic h at all; *exponent: of its part there. */
-static bool exponent_of(const pvid_weak_design_q31 *design, size_t t, const pvid_weak_white_q31 *white,
-                        const pvid_weak_window_q31 *window, size_t h, int32_t *exponent)
+/* A harmonic of the sums in the columns. */
+typedef struct {
+    size_t h;
+    int32_t exponent; /* of 1 / sqrt(D_h) */
+    int32_t bits;     /* of h */
+} harmonic;
+
+static harmonic harmonic_of(const pvid_weak_white_q31 *white, size_t h)
 {
-    const pvid_weak_term_q31 term = design->model->term[t];
-    const uint32_t length = length_of(design, window, term.channel, h);
-    if ((length == 0u) || ((h == 0u) && (term.order > 0u)) || (design->factor[t].m == 0)) {
+    const harmonic own = {h, white->scale[h].e, (int32_t)pvid_byte_length_q31(h)};
+    return own;
+}
+
+/* Whether a term contains a harmonic at all; *exponent: of its part there, *lift: of its sums. */
+PVID_ALWAYS_INLINE bool exponent_of(const pvid_weak_design_q31 *design, size_t t, const harmonic *own,
+                                    const uint8_t lengths[], int32_t *exponent, uint32_t *lift)
+{
+    const pvid_weak_term_q31 *term = &design->model->term[t];
+    const pvid_scaled_q31 *factor = &design->factor[t];
+    const uint32_t length = length_of(design, lengths, term->channel, own->h);
+    if ((length == 0u) || ((own->h == 0u) && (term->order > 0u)) || (factor->m == 0)) {
         return false;
     }
-    *exponent = (design->factor[t].e - (int32_t)lift_of(length)) + pvid_weak_white_exponent_q31(white, h, term.order);
+    *lift = lift_of(length);
+    *exponent = (factor->e - (int32_t)*lift) + own->exponent + ((int32_t)term->order * own->bits);
     return true;
 }
 
@@ -66,13 +81,15 @@ void pvid_weak_columns_begin_q31(pvid_weak_columns_q31 *self, const pvid_weak_de
 }
 
 void pvid_weak_columns_scan_q31(pvid_weak_columns_q31 *self, const pvid_weak_design_q31 *design, size_t kind,
-                                const pvid_weak_white_q31 *white, const pvid_weak_window_q31 *window, size_t h)
+                                const pvid_weak_white_q31 *white, const uint8_t length[], size_t h)
 {
     const pvid_weak_kind *own = &design->model->kind[kind];
+    const harmonic at = harmonic_of(white, h);
     for (size_t t = own->first; t < own->end; t++) {
         int32_t exponent = 0;
+        uint32_t lift = 0;
         int32_t *top = &self->exponent[design->model->term[t].column];
-        if (exponent_of(design, t, white, window, h, &exponent) && (exponent > *top)) {
+        if (exponent_of(design, t, &at, length, &exponent, &lift) && (exponent > *top)) {
             *top = exponent;
         }
     }
@@ -81,7 +98,8 @@ void pvid_weak_columns_scan_q31(pvid_weak_columns_q31 *self, const pvid_weak_des
 /* (-i omega)^m is 1, -i omega, -omega^2, i omega^3, ...: from the imaginary part of S_h to the real part of a column
  * and from the real one to the imaginary one if m is odd. */
 void pvid_weak_columns_take_q31(pvid_weak_columns_q31 *self, const pvid_weak_design_q31 *design, size_t kind,
-                                const pvid_weak_white_q31 *white, const pvid_weak_window_q31 *window, size_t h)
+                                const pvid_weak_white_q31 *white, const uint8_t length[], const int32_t sums[][2],
+                                size_t h)
 {
     const pvid_weak_kind *own = &design->model->kind[kind];
     const size_t harmonics = white->cosines;
@@ -91,29 +109,31 @@ void pvid_weak_columns_take_q31(pvid_weak_columns_q31 *self, const pvid_weak_des
     for (size_t m = 1; m < design->power; m++) {
         weight[m] = pvid_weak_white_times_q31(weight[m - 1u], h);
     }
+    const harmonic at = harmonic_of(white, h);
     for (size_t t = own->first; t < own->end; t++) {
         const pvid_weak_term_q31 term = design->model->term[t];
         int32_t exponent = 0;
-        if (!exponent_of(design, t, white, window, h, &exponent)) {
+        uint32_t lift = 0;
+        if (!exponent_of(design, t, &at, length, &exponent, &lift)) {
             continue;
         }
         const int32_t below = self->exponent[term.column] - exponent;
         if (below < SUM_BITS) { /* else nothing is left of it */
             const int32_t constant[2] = {2 * (int32_t)design->hop, 0};
-            const int32_t *s = is_constant(design, term.channel) ? constant : window->s[term.channel][h];
+            const int32_t *s = is_constant(design, term.channel) ? constant : sums[term.channel];
             const int32_t whole =
                 (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[term.order], design->factor[t].m), 30);
             const int32_t w = pvid_floor_shift_32_q31(whole, (uint32_t)below);
-            const int32_t up = (int32_t)((uint32_t)1 << lift_of(length_of(design, window, term.channel, h)));
+            const int32_t up = (int32_t)((uint32_t)1 << lift);
             const bool turned = (term.order % 2u) != 0u;
             const int32_t re = (turned ? s[1] : s[0]) * up;
             const int32_t im = (turned ? s[0] : s[1]) * up;
             const int32_t of_re = ((term.order % 4u) >= 2u) ? -w : w;
             const int32_t of_im = (((term.order + 1u) % 4u) >= 2u) ? -w : w;
             int32_t *x = &self->x[term.column][h];
-            x[0] += (int32_t)pvid_floor_shift_q31(pvid_product_q31(re, of_re), PRODUCT_DOWN);
+            x[0] += pvid_floor_shift_32_q31(pvid_upper_product_q31(re, of_re), PRODUCT_DOWN - 32u);
             if (has_sine) {
-                x[harmonics - 1u] += (int32_t)pvid_floor_shift_q31(pvid_product_q31(im, of_im), PRODUCT_DOWN);
+                x[harmonics - 1u] += pvid_floor_shift_32_q31(pvid_upper_product_q31(im, of_im), PRODUCT_DOWN - 32u);
             }
         }
     }

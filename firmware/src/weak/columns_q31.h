@@ -10,13 +10,14 @@
 /* Begins the columns of a kind: all entries 0. */
 void pvid_weak_columns_begin_q31(pvid_weak_columns_q31 *self, const pvid_weak_design_q31 *design, size_t kind);
 
-/* The unit of each column: all harmonics, each in turn. */
+/* The unit of each column: all harmonics, each in turn; length[channels] of the window's sums there. */
 void pvid_weak_columns_scan_q31(pvid_weak_columns_q31 *self, const pvid_weak_design_q31 *design, size_t kind,
-                                const pvid_weak_white_q31 *white, const pvid_weak_window_q31 *window, size_t h);
+                                const pvid_weak_white_q31 *white, const uint8_t length[], size_t h);
 
-/* Adds harmonic h of the window's sums, over its standard deviation, to the K + n parts of all columns. */
+/* Adds harmonic h of the window's sums [channels], over its standard deviation, to the K + n parts of all columns. */
 void pvid_weak_columns_take_q31(pvid_weak_columns_q31 *self, const pvid_weak_design_q31 *design, size_t kind,
-                                const pvid_weak_white_q31 *white, const pvid_weak_window_q31 *window, size_t h);
+                                const pvid_weak_white_q31 *white, const uint8_t length[], const int32_t sums[][2],
+                                size_t h);
 
 /* Behind all harmonics: the K white rows of a column. */
 void pvid_weak_columns_end_q31(pvid_weak_columns_q31 *self, const pvid_weak_design_q31 *design,

@@ -6,11 +6,11 @@
  * reflected by its own reflection and then by those before it, from the last to the first. */
 #include "weak/noise_q31.h"
 
+#include "number/integer_q31.h"
+#include "number/scaled_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/sums_q31.h"
 #include "weak/white_q31.h"
-#include "number/integer_q31.h"
-#include "number/scaled_q31.h"
 
 void pvid_weak_noise_leverage_q31(const pvid_weak_white_q31 *white, const pvid_weak_design_q31 *design, size_t place,
                                   int32_t u[], int32_t leverage[])
@@ -113,12 +113,15 @@ void pvid_weak_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_weak_des
     }
 }
 
-pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_white_q31 *white, const pvid_weak_design_q31 *design,
+/* All of the variance is sum c_j Q_j / K, and the share of the equation's own error. */
+pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_design_q31 *design, size_t kind,
                                             const pvid_scaled_q31 share[])
 {
-    pvid_scaled_q31 sum = {0, 0};
-    for (size_t j = 0; j < white->powers; j++) {
-        sum = pvid_scaled_plus_q31(sum, pvid_scaled_times_q31(white->weight[j], share[j]));
+    if (design->n_noise == 0u) {
+        const pvid_scaled_q31 none = {0, 0};
+        return none;
     }
-    return pvid_scaled_over_q31(sum, pvid_scaled_of_q31((int64_t)design->functions, 0));
+    const pvid_scaled_q31 error = pvid_scaled_times_q31(design->error_variance[kind], share[design->error_order[kind]]);
+    const pvid_scaled_q31 functions = pvid_scaled_of_q31((int64_t)design->functions, 0);
+    return pvid_scaled_minus_q31(pvid_scaled_of_q31(1, 0), pvid_scaled_over_q31(error, functions));
 }

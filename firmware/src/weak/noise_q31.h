@@ -26,7 +26,7 @@ void pvid_weak_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_weak_des
                               pvid_scaled_q31 pull[]);
 
 /* The part of the rows' variance, 1, that the sensors' noise explains. */
-pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_white_q31 *white, const pvid_weak_design_q31 *design,
+pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_design_q31 *design, size_t kind,
                                             const pvid_scaled_q31 share[]);
 
 #endif

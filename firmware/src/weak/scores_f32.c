@@ -15,6 +15,7 @@
 #include <string.h>
 
 #include "number/count.h"
+#include "number/unroll.h"
 
 /* Far below: this part of the mean. By chance the mean square of 9 residuals is below it once in 10^6 windows. */
 #define FAR_BELOW 0.05f
@@ -30,7 +31,8 @@ void pvid_weak_scores_skip_f32(pvid_weak_scores_f32 *self)
     self->known = false;
 }
 
-void pvid_weak_scores_take_f32(pvid_weak_scores_f32 *self, const pvid_estimator_f32 *estimator, const float sum[])
+PVID_COLD void pvid_weak_scores_take_f32(pvid_weak_scores_f32 *self, const pvid_estimator_f32 *estimator,
+                                         const float sum[])
 {
     const pvid_model_f32 *model = estimator->model;
     float c[PVID_MAX_THETA * PVID_MAX_P];
@@ -41,7 +43,7 @@ void pvid_weak_scores_take_f32(pvid_weak_scores_f32 *self, const pvid_estimator_
     }
 }
 
-void pvid_weak_scores_add_f32(pvid_weak_scores_f32 *self, size_t n_p, float residual)
+PVID_COLD void pvid_weak_scores_add_f32(pvid_weak_scores_f32 *self, size_t n_p, float residual)
 {
     if (residual < (FAR_BELOW * self->residual)) {
         self->windows = 0;

@@ -8,10 +8,11 @@
  *   e^(i a c) (P + i Q),   P = x_c + sum_j s_j cos(a j) + x_(c-4) cos(4 a),   Q = sum_j d_j sin(a j) - x_(c-4) sin(4
  * a),
  *
- * j = 1..3: half as many products as from the steps one by one. A block is added while the next one fills, one harmonic
- * after the other. The circle has all the factors: sin(pi j / hop) at j = h k mod 2 hop, the cosine a quarter turn
- * behind. Behind the last block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel with an integral
- * I = E_1 + I' (E_1 + E_2 of the first half at its end) gets what I' from the second half's own start lacks:
+ * j = 1..3: half as many products as from the steps one by one, none for h = 0. A block is added while the next one
+ * fills, one harmonic after the other. The circle has all the factors: sin(pi j / hop) at j = h k mod 2 hop, the cosine
+ * a quarter turn behind. Behind the last block of a window follow its S_h = A_h + (-1)^h B_h, where B_h of a channel
+ * with an integral I = E_1 + I' (E_1 + E_2 of the first half at its end) gets what I' from the second half's own start
+ * lacks:
  *
  *   fold 1:  B + E_1 B[plain]        fold 2:  (B + E_2 B[plain]) + E_1 B[ramp]
  *
@@ -83,9 +84,51 @@ void pvid_weak_sums_join_f32(pvid_weak_sums_f32 *self, float edge[2][PVID_MAX_IN
 /* What the sums of a half begin with. */
 static const float nothing[PVID_MAX_CHANNELS][2];
 
-void pvid_weak_sums_add_f32(pvid_weak_sums_f32 *self, const pvid_weak_design_f32 *design, size_t channels)
+/* The block's sum of harmonic 0: the steps themselves. */
+static void add_plain(size_t channels, const float x[], const float last[][2], float sum[][2])
 {
+    for (size_t c = 0; c < channels; c++) {
+        float even = x[CENTRE * PVID_MAX_CHANNELS];
+        PVID_UNROLL
+        for (size_t j = 1; j < CENTRE; j++) {
+            even += x[(CENTRE + j) * PVID_MAX_CHANNELS];
+        }
+        sum[c][0] = last[c][0] + (even + x[0]);
+        sum[c][1] = 0.0f;
+        x = &x[1];
+    }
+}
+
+/* The block's sum of another harmonic, of a channel. */
+static inline void add_channel(const float x[], const float cosine[], const float sine[], const float last[2],
+                               float sum[2])
+{
+    float even = x[CENTRE * PVID_MAX_CHANNELS];
+    float odd = 0.0f;
+    PVID_UNROLL
+    for (size_t j = 1; j < CENTRE; j++) {
+        const float part = sine[j] * x[(CENTRE - j) * PVID_MAX_CHANNELS];
+        even += cosine[j] * x[(CENTRE + j) * PVID_MAX_CHANNELS];
+        odd = (j == 1u) ? part : (odd + part);
+    }
+    even += cosine[CENTRE] * x[0];
+    odd -= sine[CENTRE] * x[0];
+    sum[0] = (last[0] + (cosine[0] * even)) - (sine[0] * odd);
+    sum[1] = (last[1] + (sine[0] * even)) + (cosine[0] * odd);
+}
+
+void pvid_weak_sums_add_f32(pvid_weak_sums_f32 *self, const pvid_weak_design_f32 *design, size_t number)
+{
+    const size_t channels = PVID_COUNT(PVID_EXACT_CHANNELS, number);
     const uint32_t h = self->harmonic;
+    float (*sum)[2] = self->sum[self->target][h];
+    const float (*last)[2] = (self->start == 0u) ? nothing : (const float (*)[2])sum;
+    const float *x = self->block[PVID_MAX_BLOCKS - 1u - self->filling][0];
+    self->harmonic++;
+    if (h == 0u) {
+        add_plain(channels, x, last, sum);
+        return;
+    }
     const uint32_t turn = 2u * (uint32_t)design->hop;
     const float *of_sine = design->circle;
     const float *of_cosine = &of_sine[design->hop / 2u];
@@ -101,26 +144,12 @@ void pvid_weak_sums_add_f32(pvid_weak_sums_f32 *self, const pvid_weak_design_f32
         cosine[j] = of_cosine[at];
         sine[j] = of_sine[at];
     }
-    float (*sum)[2] = self->sum[self->target][h];
-    const float (*last)[2] = (self->start == 0u) ? nothing : (const float (*)[2])sum;
-    const float *x = self->block[PVID_MAX_BLOCKS - 1u - self->filling][0];
-    PVID_UNROLL_BY_TWO
-    for (size_t c = 0; c < channels; c++) {
-        float even = x[CENTRE * PVID_MAX_CHANNELS];
-        float odd = 0.0f;
-        PVID_UNROLL
-        for (size_t j = 1; j < CENTRE; j++) {
-            const float part = sine[j] * x[(CENTRE - j) * PVID_MAX_CHANNELS];
-            even += cosine[j] * x[(CENTRE + j) * PVID_MAX_CHANNELS];
-            odd = (j == 1u) ? part : (odd + part);
+    for (size_t c = 0; c < channels; c += 2u) { /* two of them: gcc does not unroll a loop of constant length in part */
+        add_channel(&x[c], cosine, sine, last[c], sum[c]);
+        if ((c + 1u) < channels) {
+            add_channel(&x[c + 1u], cosine, sine, last[c + 1u], sum[c + 1u]);
         }
-        even += cosine[CENTRE] * x[0];
-        odd -= sine[CENTRE] * x[0];
-        sum[c][0] = (last[c][0] + (cosine[0] * even)) - (sine[0] * odd);
-        sum[c][1] = (last[c][1] + (sine[0] * even)) + (cosine[0] * odd);
-        x = &x[1];
     }
-    self->harmonic++;
 }
 
 /* I^1 or I^2 of an integrand at the end of the window's first half. */

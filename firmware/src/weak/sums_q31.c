@@ -1,11 +1,14 @@
 #include "weak/sums_q31.h"
 
-#include "weak/values_q31.h"
+#include <string.h>
+
+#include "number/exact.h"
 #include "number/integer_q31.h"
-#include "number/unroll.h"
+#include "weak/values_q31.h"
 
 #define BLOCK ((size_t)PVID_WEAK_BLOCK_Q31)
-#define DOWN 22u
+#define DOWN 14u
+#define FINE_DOWN 22u
 
 enum { RE = 0, IM = 1 };
 
@@ -35,12 +38,35 @@ void pvid_weak_sums_next_q31(pvid_weak_sums_q31 *self, const pvid_weak_design_q3
     }
 }
 
-/* A sum of four products of 24 by 29 bits, 2^-22 of it rounded down, which fits 32 bits. */
-#if defined(__ARM_ARCH_6M__)
-/* Without a long multiplication: a factor is high 2^12 + low, x is high 2^14 + low; four products of each fit 32 bits.
- */
+/* A sum of four products of 16 by 29 bits, 2^-14 of it rounded down, which fits 32 bits. */
 static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
 {
+#if defined(__ARM_ARCH_6M__)
+    /* without a long multiplication: x is high 2^14 + low; four products of each fit 32 bits */
+    int32_t high = 0;
+    int32_t low = 0;
+    PVID_UNROLL
+    for (size_t j = 0; j < BLOCK; j++) {
+        const int32_t one = x[j * PVID_MAX_CHANNELS];
+        high += factor[j] * pvid_floor_shift_32_q31(one, DOWN);
+        low += factor[j] * (int32_t)((uint32_t)one & 0x3FFFu);
+    }
+    return high + pvid_floor_shift_32_q31(low, DOWN);
+#else
+    int64_t sum = 0;
+    PVID_UNROLL
+    for (size_t j = 0; j < BLOCK; j++) {
+        sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
+    }
+    return (int32_t)pvid_floor_shift_q31(sum, DOWN);
+#endif
+}
+
+/* The same of 24 by 29 bits and 2^-22. */
+static inline int32_t fine_products(const int32_t factor[BLOCK], const int32_t *x)
+{
+#if defined(__ARM_ARCH_6M__)
+    /* a factor is high 2^12 + low, x is high 2^14 + low; four products of each fit 32 bits */
     int32_t high = 0;
     int32_t first = 0;
     int32_t second = 0;
@@ -59,53 +85,60 @@ static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
     }
     const int32_t below = (4 * first) + second + pvid_floor_shift_32_q31(low, 12);
     return (16 * high) + pvid_floor_shift_32_q31(below, 10);
-}
 #else
-static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
-{
     int64_t sum = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
         sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
     }
-    return (int32_t)pvid_floor_shift_q31(sum, DOWN);
-}
+    return (int32_t)pvid_floor_shift_q31(sum, FINE_DOWN);
 #endif
+}
 
-/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded half up, or
- * begins these with them. */
-static void add_products(const int32_t factor[BLOCK], const int32_t *x, size_t channels, uint32_t shift, bool begins,
-                         int32_t *sum)
+/* x 2^-s rounded half up, s >= 1. */
+static inline int32_t rounded(int32_t x, uint32_t s)
 {
-    const int32_t c[BLOCK] = {factor[0], factor[1], factor[2], factor[3]};
-    for (size_t left = channels; left > 0u; left--) {
-        const int32_t half = pvid_floor_shift_32_q31(products(c, x), shift - 1u);
-        *sum = (begins ? 0 : *sum) + pvid_floor_shift_32_q31(half + 1, 1);
+    return pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(x, s - 1u) + 1, 1);
+}
+
+/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded half up: what
+ * is lost must not have a mean. */
+static void add_products(const PVID_TABLE int32_t *factor, size_t h, const int32_t *x, size_t channels,
+                         const pvid_weak_design_q31 *design, int32_t *sum)
+{
+    const int32_t c[BLOCK] = {factor[0], factor[h], factor[2u * h], factor[3u * h]};
+    const int32_t *end = &x[channels];
+    const uint32_t shift = design->sum_shift;
+    if (design->fine) {
+        while (x != end) {
+            *sum += rounded(fine_products(c, x), shift);
+            sum += 2;
+            x++;
+        }
+        return;
+    }
+    while (x != end) {
+        *sum += rounded(products(c, x), shift);
         sum += 2;
         x++;
     }
 }
 
-/* The block to the sums of harmonic h, whose first step is at `angle` of the circle. */
+/* The block to the sums of harmonic h, whose first step is at `angle` of the circle. The table goes on far enough
+ * behind the circle for three quarters of it and a block. */
 static void add_block(pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *design, size_t h)
 {
-    const size_t summed = pvid_weak_summed_q31(design->model);
+    const size_t summed = PVID_COUNT(PVID_EXACT_CHANNELS, pvid_weak_summed_q31(design->model));
     const size_t turn = 2u * (size_t)design->hop;
-    const size_t three_quarters = turn - ((size_t)design->hop / 2u);
     const int32_t *x = &self->block[PVID_MAX_BLOCKS - 1u - self->filling][0][0];
-    int32_t *sum = &self->sum[self->target][h][0][0];
-    int32_t cosine[BLOCK];
-    int32_t sine[BLOCK];
-    size_t place = self->angle;
-    for (size_t j = 0; j < BLOCK; j++) {
-        const size_t quarter = place + three_quarters;
-        cosine[j] = design->circle[place];
-        sine[j] = design->circle[(quarter >= turn) ? (quarter - turn) : quarter];
-        place = (place + h >= turn) ? ((place + h) - turn) : (place + h);
+    int32_t (*sum)[2] = self->sum[self->target][h];
+    const PVID_TABLE int32_t *cosine = &design->circle[self->angle];
+    if (self->start == 0u) {
+        memset(sum, 0, summed * sizeof sum[0]);
     }
-    add_products(cosine, x, summed, design->sum_shift, self->start == 0u, &sum[RE]);
+    add_products(cosine, h, x, summed, design, &sum[0][RE]);
     if (h > 0u) {
-        add_products(sine, x, summed, design->sum_shift, self->start == 0u, &sum[IM]);
+        add_products(&cosine[turn - (turn / 4u)], h, x, summed, design, &sum[0][IM]);
     }
     const size_t next = (size_t)self->angle + self->start;
     self->angle = (uint16_t)((next >= turn) ? (next - turn) : next);
@@ -113,51 +146,61 @@ static void add_block(pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *desi
 
 /* The end of the first half's integrals of a channel: I^n, n = 1 or 2, that of 1 in the unit of the channel. */
 static int32_t edge_of(const pvid_weak_values_q31 *values, const pvid_weak_channel *channel, size_t first, size_t n,
-                       int32_t hop)
+                       int32_t hop, uint32_t lift)
 {
     if (channel->integrand == PVID_WEAK_NONE) {
-        if (n == 2u) {
-            return 24 * hop * hop;
-        }
-        return (channel->fold == 1u) ? (2 * hop) : (24 * hop);
+        const int32_t once = (channel->fold == 1u) ? (2 * hop) : (24 * hop);
+        return (int32_t)((uint32_t)((n == 2u) ? (once * hop) : once) << lift);
     }
     return values->edge[first][n - 1u][channel->integrand];
 }
 
-/* I^n at the end of the first half times B_h. */
-static inline int64_t shifted(int32_t end, int32_t b, uint32_t shift)
+/* I^n at the end of the first half times B_h, 2^-shift of it; of a shift below 32 the last bits are 0. */
+static inline int32_t shifted(int32_t end, int32_t b, uint32_t shift)
 {
-    return pvid_floor_shift_q31(pvid_product_q31(end, b), shift);
+    const int32_t upper = pvid_upper_product_q31(end, b);
+    return (shift >= 32u) ? pvid_floor_shift_32_q31(upper, shift - 32u)
+                          : (upper * (int32_t)((uint32_t)1 << (32u - shift)));
 }
 
-/* S_h = A_h + (-1)^h B_h; the integrals of B are shifted to the start of A: by I^fold, and by I^1 t where fold is 2. */
+/* S_h = A_h + (-1)^h B_h, which may take the place of A_h; the integrals of B are shifted to the start of A: by I^fold,
+ * and by I^1 t where fold is 2. */
 static void join(const pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *design, const pvid_weak_values_q31 *values,
-                 size_t h, pvid_weak_window_q31 *window)
+                 size_t h, uint8_t length[], int32_t s[][2])
 {
     const pvid_weak_model_q31 *model = design->model;
     const size_t first = (size_t)self->target ^ 1u;
     const int32_t (*a)[2] = self->sum[first][h];
     const int32_t (*b)[2] = self->sum[self->target][h];
-    const size_t summed = pvid_weak_summed_q31(model);
+    const size_t summed = PVID_COUNT(PVID_EXACT_CHANNELS, pvid_weak_summed_q31(model));
     const bool even = (h % 2u) == 0u;
     for (size_t k = 0; k < summed; k++) {
         const pvid_weak_channel *channel = &model->channel[k];
-        const pvid_weak_format_q31 format = design->format[k];
-        const bool folds = channel->fold > 0u;
-        const bool ramps = channel->fold > 1u;
-        const int32_t end = folds ? edge_of(values, channel, first, channel->fold, design->hop) : 0;
-        const int32_t once = ramps ? edge_of(values, channel, first, 1, design->hop) : 0;
-        uint32_t bits = 0;
-        for (size_t part = 0; part < 2u; part++) {
-            const int32_t other = b[k][part];
-            int64_t shift = folds ? shifted(end, b[channel->plain][part], format.plain) : 0;
-            shift += ramps ? shifted(once, b[channel->ramp][part], format.ramp) : 0;
-            const int32_t own = pvid_floor_shift_32_q31(a[k][part] + (even ? other : -other), format.own);
-            const int32_t total = (int32_t)pvid_clamp_q31(own + (even ? shift : -shift), PVID_ONE_Q30);
-            window->s[k][h][part] = total;
-            bits |= (uint32_t)((total < 0) ? -total : total);
+        const pvid_weak_format_q31 *format = &design->format[k];
+        int32_t re = b[k][RE];
+        int32_t im = b[k][IM];
+        int32_t shift_re = 0;
+        int32_t shift_im = 0;
+        if (channel->fold > 0u) {
+            const int32_t end = edge_of(values, channel, first, channel->fold, design->hop, format->lift);
+            shift_re = shifted(end, b[channel->plain][RE], format->plain);
+            shift_im = shifted(end, b[channel->plain][IM], format->plain);
         }
-        window->length[k][h] = (uint8_t)pvid_bit_length_q31(bits);
+        if (channel->fold > 1u) {
+            const int32_t once = edge_of(values, channel, first, 1, design->hop, format->lift);
+            shift_re += shifted(once, b[channel->ramp][RE], format->ramp);
+            shift_im += shifted(once, b[channel->ramp][IM], format->ramp);
+        }
+        if (even) {
+            re = pvid_floor_shift_32_q31(a[k][RE] + re, format->own) + shift_re;
+            im = pvid_floor_shift_32_q31(a[k][IM] + im, format->own) + shift_im;
+        } else {
+            re = pvid_floor_shift_32_q31(a[k][RE] - re, format->own) - shift_re;
+            im = pvid_floor_shift_32_q31(a[k][IM] - im, format->own) - shift_im;
+        }
+        s[k][RE] = re;
+        s[k][IM] = im;
+        length[k] = (uint8_t)pvid_bit_length_q31((uint32_t)((re < 0) ? -re : re) | (uint32_t)((im < 0) ? -im : im));
     }
 }
 
@@ -168,7 +211,9 @@ void pvid_weak_sums_item_q31(pvid_weak_sums_q31 *self, const pvid_weak_design_q3
     if (self->item < harmonics) {
         add_block(self, design, self->item);
     } else {
-        join(self, design, values, (size_t)self->item - harmonics, window);
+        const size_t h = (size_t)self->item - harmonics;
+        window->half = (uint8_t)(self->target ^ 1u);
+        join(self, design, values, h, window->length[h], pvid_weak_window_sums_q31(self, window)[h]);
     }
     self->item++;
     self->left--;

@@ -13,6 +13,17 @@ static inline uint8_t pvid_weak_harmonics_q31(const pvid_weak_design_q31 *design
     return (uint8_t)((design->functions / 2u) + (design->power / 2u) + 1u);
 }
 
+/* S_h of a window [harmonics]: of its own, or in the place of the older half's sums. */
+static inline int32_t (*pvid_weak_window_sums_q31(pvid_weak_sums_q31 *sums, pvid_weak_window_q31 *window))
+    [PVID_MAX_CHANNELS][2] {
+#if PVID_MAX_WINDOWS > 0
+        (void)sums;
+        return window->s;
+#else
+        return sums->sum[window->half];
+#endif
+    }
+
 /* No block, no half. */
 void pvid_weak_sums_reset_q31(pvid_weak_sums_q31 *self);
 

@@ -5,9 +5,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "number/finite_f32.h"
+#include "number/unroll.h"
 #include "weak/weak_front_f32.h"
 #include "weak/weak_signals.h"
-#include "number/finite_f32.h"
 
 static bool all_within(const float values[], size_t n, float low)
 {
@@ -159,10 +160,12 @@ static bool is_exact(const pvid_weak_design_f32 *design)
     const pvid_weak_model_f32 *model = design->model;
     const uint32_t harmonics = ((uint32_t)design->functions / 2u) + ((uint32_t)design->power / 2u) + 1u;
     return (design->functions == PVID_MAX_FUNCTIONS) && (design->power == PVID_MAX_POWER) &&
-           (harmonics == PVID_MAX_HARMONICS) && (model->samples == PVID_MAX_SAMPLES) &&
+           (harmonics == PVID_MAX_HARMONICS) && (design->decimation == PVID_MAX_DECIMATION) &&
+           (pvid_weak_front_length_f32(design) <= PVID_MAX_RING) && (model->samples == PVID_MAX_SAMPLES) &&
            (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
            (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
-           (model->integrands == PVID_EXACT_INTEGRANDS) && (model->model->n_p == PVID_MAX_P);
+           (model->gains == PVID_EXACT_GAINS) && (model->integrands == PVID_EXACT_INTEGRANDS) &&
+           (model->model->n_p == PVID_MAX_P);
 }
 
 static pvid_status sizes_are_valid(const pvid_weak_design_f32 *design)
@@ -200,10 +203,13 @@ static pvid_status tables_are_valid(const pvid_weak_design_f32 *design)
     return noise_is_valid(design) ? PVID_OK : PVID_BAD_DESIGN;
 }
 
-pvid_status pvid_weak_valid_f32(const pvid_weak_design_f32 *design)
+PVID_COLD pvid_status pvid_weak_valid_f32(const pvid_weak_design_f32 *design)
 {
     if (design == NULL) {
         return PVID_BAD_DESIGN;
+    }
+    if ((PVID_EXACT != 0) && (PVID_CHECK_TABLES == 0)) {
+        return (design->model == NULL) ? PVID_BAD_MODEL : (is_exact(design) ? PVID_OK : PVID_BAD_DESIGN);
     }
     pvid_status status = model_is_valid(design->model);
     if (status != PVID_OK) {

@@ -3,11 +3,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "weak/weak_front_q31.h"
-#include "weak/weak_signals.h"
+#include "number/integer_q31.h"
 #include "weak/sums_q31.h"
 #include "weak/values_q31.h"
-#include "number/integer_q31.h"
+#include "weak/weak_front_q31.h"
+#include "weak/weak_signals.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define LEAST_FUNCTIONS 4u
@@ -15,7 +15,9 @@
 #define MOST_TERMS 15u    /* of a column */
 #define WORD 62u          /* largest shift of an int64 */
 #define EXPONENT_MAX 8192 /* of a factor */
-#define PLACES 32u        /* of the leading x, and of shifts of an int32 */
+#define PLACES 32u        /* of shifts of an int32 */
+#define MOST_UP 30u
+#define LEAST_SHIFT 2u /* of an integral's end */
 
 static bool counts_fit(const pvid_weak_model_q31 *model)
 {
@@ -155,12 +157,15 @@ static bool filters_are_valid(const pvid_weak_design_q31 *design)
         const pvid_weak_filter_q31 *filter = &design->filter[i];
         const pvid_weak_jet jet = design->model->jet[i];
         uint64_t whole = 0;
-        if ((filter->half > PVID_MAX_RING) || (filter->bits >= (PLACES - 1u)) || !rescale_is_valid(&filter->rescale) ||
-            ((filter->half > 0u) ? (filter->weights == NULL) : (jet.order != 0u))) {
+        if ((filter->half > PVID_MAX_RING) || (filter->down > WORD) || (filter->weights == NULL)) {
             return false;
         }
-        for (size_t k = 0; k < filter->half; k++) {
-            whole += pvid_magnitude_q31(filter->weights[k]);
+        for (size_t k = 0; k <= filter->half; k++) {
+            const uint64_t one = pvid_magnitude_q31(filter->weights[k]);
+            if (one > (uint64_t)PVID_ONE_Q30) {
+                return false;
+            }
+            whole += one;
         }
         if (whole > ((uint64_t)PVID_WIDE / (4u * (uint64_t)most_of(design, jet.signal)))) {
             return false;
@@ -172,19 +177,23 @@ static bool filters_are_valid(const pvid_weak_design_q31 *design)
 static bool shifts_are_valid(const pvid_weak_design_q31 *design)
 {
     const pvid_weak_model_q31 *model = design->model;
-    /* hop terms of 29 bits and one for rounding fit 30 bits */
-    const int64_t sums = (int64_t)design->hop * (((int64_t)1 << 29) + 2);
-    bool valid = (design->sum_shift >= 1u) && (design->sum_shift <= 30u) &&
-                 (pvid_floor_shift_q31(sums, design->sum_shift) < PVID_ONE_Q30);
+    /* products of hop steps of 29 bits, and one off for each block, fit 30 bits */
+    const int64_t sums = (int64_t)design->hop * ((int64_t)1 << 29);
+    bool valid = (design->sum_shift >= 1u) && (design->sum_shift <= MOST_UP) &&
+                 ((pvid_floor_shift_q31(sums, design->sum_shift) + design->hop) < PVID_ONE_Q30);
     for (size_t i = 0; i < model->channels; i++) {
         const pvid_weak_format_q31 *one = &design->format[i];
-        valid = valid && (one->value >= 1u) && (one->value <= WORD) && (one->own < PLACES) && (one->plain <= WORD) &&
-                (one->ramp <= WORD) &&
-                ((model->channel[i].gain == PVID_WEAK_NONE) || (model->channel[i].fold > 0u) || (one->value < PLACES));
+        const int64_t hop = design->hop;
+        const int64_t most = (model->channel[i].fold == 1u) ? (2 * hop) : (24 * hop * hop);
+        valid = valid && ((one->value >= 1u) || (model->channel[i].gain == PVID_WEAK_NONE)) &&
+                (one->value <= MOST_UP) && (one->own < PLACES) && (one->plain <= WORD) && (one->ramp <= WORD) &&
+                ((model->channel[i].fold < 1u) || (one->plain >= LEAST_SHIFT)) &&
+                ((model->channel[i].fold < 2u) || (one->ramp >= LEAST_SHIFT)) && (one->lift <= MOST_UP) &&
+                ((one->lift == 0u) || (most <= pvid_floor_shift_q31(INT32_MAX, one->lift)));
     }
     for (size_t i = 0; i < model->integrands; i++) {
         const pvid_weak_integral_q31 *one = &design->integral[i];
-        valid = valid && (one->once >= 1u) && (one->once <= WORD) && (one->twice >= 1u) && (one->twice <= WORD);
+        valid = valid && (one->down <= MOST_UP) && (one->twice >= 1u) && (one->twice <= MOST_UP);
     }
     for (size_t i = 0; i < model->runs; i++) {
         valid = valid && rescale_is_valid(&design->run[i]);
@@ -245,6 +254,17 @@ static pvid_status sizes_are_valid(const pvid_weak_design_q31 *design)
     return fits ? PVID_OK : PVID_BAD_WINDOW;
 }
 
+/* In a build for one design: the counts that are constants there (number/exact.h). */
+static bool is_exact(const pvid_weak_design_q31 *design)
+{
+    const pvid_weak_model_q31 *model = design->model;
+    return (design->functions == PVID_MAX_FUNCTIONS) && (design->power == PVID_MAX_POWER) &&
+           (pvid_weak_harmonics_q31(design) == PVID_MAX_HARMONICS) && (model->samples == PVID_MAX_SAMPLES) &&
+           (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
+           (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
+           (model->integrands == PVID_EXACT_INTEGRANDS) && (pvid_weak_summed_q31(model) == PVID_EXACT_CHANNELS);
+}
+
 /* Every number of the tables. */
 static pvid_status tables_are_valid(const pvid_weak_design_q31 *design)
 {
@@ -276,6 +296,9 @@ pvid_status pvid_weak_valid_q31(const pvid_weak_design_q31 *design)
         return status;
     }
     if (!design_is_given(design)) {
+        return PVID_BAD_DESIGN;
+    }
+    if ((PVID_EXACT != 0) && !is_exact(design)) {
         return PVID_BAD_DESIGN;
     }
     status = (PVID_CHECK_TABLES != 0) ? tables_are_valid(design) : PVID_OK;

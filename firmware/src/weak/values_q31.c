@@ -3,16 +3,18 @@
  *
  *   sgn_(k-1)  from the arguments v at k - 2, k - 1, k: the mean of sgn over the step, v linear there
  *   I^1        I_j = I_(j-1) + (-f_(j-2) + 13 f_(j-1) + 13 f_j - f_(j+1)) dt/24, the integral of a cubic
- *   I^2        its trapezoids with end correction: += dt/2 (I_j + I_(j-1)) - dt^2/12 (f_j - f_(j-1))
+ *   I^2        += dt/2 (I_j + I_(j-1)) + dt^2/60 (f_(j+1) - f_(j-2) - 8 (f_j - f_(j-1)))
  *
- * In dt/24 and dt^2/48 both are exact integers. Before the first step v and f go on in a straight line. */
+ * In dt/120 and dt^2/240 both are integers; the shift of what a step adds to the second one is rounded. Before the
+ * first step v and f go on in a straight line. */
 #include "weak/values_q31.h"
 
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/rescale_q31.h"
+#include "number/exact.h"
 #include "pvid/elementary_q31.h"
+#include "weak/rescale_q31.h"
 
 void pvid_weak_values_init_q31(pvid_weak_values_q31 *self, uint16_t lead)
 {
@@ -25,6 +27,7 @@ void pvid_weak_values_reset_q31(pvid_weak_values_q31 *self)
     self->known = 0;
     self->index = 0;
     self->half = 0;
+    memset(self->owed, 0, sizeof self->owed);
 }
 
 /* Mean of sgn over a step: v 2/|g| within +-1, with the slope g = (after - before)/2; 0 for 0. Q30. */
@@ -43,12 +46,12 @@ static int32_t mean_sign(int64_t before, int32_t v, int32_t after)
 static void complete_inputs(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t newest[])
 {
     const pvid_weak_model_q31 *model = design->model;
-    int32_t *run = &self->now[model->jets];
-    int32_t *sign = &run[model->runs];
-    for (size_t i = 0; i < model->runs; i++) {
+    int32_t *run = &self->now[PVID_COUNT(PVID_EXACT_JETS, model->jets)];
+    int32_t *sign = &run[PVID_COUNT(PVID_EXACT_RUNS, model->runs)];
+    for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_RUNS, model->runs); i++) {
         run[i] = pvid_weak_rescaled_q31(self->run[i], &design->run[i]);
     }
-    for (size_t i = 0; i < model->signs; i++) {
+    for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_SIGNS, model->signs); i++) {
         const int32_t v = self->v[0][i];
         const int32_t width = design->sign_width[i];
         const int32_t next = newest[model->runs + i];
@@ -61,7 +64,7 @@ static void take_newest(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *
                         const int32_t newest[])
 {
     const pvid_weak_model_q31 *model = design->model;
-    for (size_t i = 0; i < model->runs; i++) {
+    for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_RUNS, model->runs); i++) {
         int64_t rise = 0; /* over a gap */
         if (self->known > 0u) {
             rise = (int64_t)self->rate[i] + newest[i];
@@ -73,52 +76,48 @@ static void take_newest(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *
         self->run[i] = pvid_clamp_q31(self->run[i] + rise, PVID_WIDE);
         self->rate[i] = newest[i];
     }
-    for (size_t i = 0; i < model->signs; i++) {
+    for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_SIGNS, model->signs); i++) {
         self->v[1][i] = self->v[0][i];
         self->v[0][i] = newest[model->runs + i];
     }
-    for (size_t i = 0; i < model->jets; i++) {
+    for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_JETS, model->jets); i++) {
         self->now[i] = jet[i];
     }
     self->ran = true;
 }
 
-/* x 2^-s rounded half up, s >= 1, within 2^30, beyond which the tables of the design tool let nothing. */
-static inline int32_t rounded(int64_t x, uint32_t s)
+/* x and what is owed, 2^-s of it rounded down; the rest stays owed: 0 to 2^s - 1. */
+static inline int32_t shifted_with(int32_t *owed, int32_t x, uint32_t s)
 {
-    const int64_t twice = pvid_clamp_q31(pvid_floor_shift_q31(x, s - 1u), INT32_MAX - 1);
-    return pvid_floor_shift_32_q31((int32_t)twice + 1, 1);
-}
-
-/* The same of a product whose factors are within 2^30; its upper part is enough where the shift is long. */
-static inline int32_t rounded_product(int32_t a, int32_t b, uint32_t s)
-{
-    const int64_t product = pvid_product_q31(a, b);
-    if (s < 32u) {
-        return rounded(product, s);
-    }
-    const int32_t upper = (int32_t)pvid_floor_shift_q31(product, 31);
-    return (s < 63u) ? pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(upper, s - 32u) + 1, 1) : 0;
+    const int32_t whole = x + *owed;
+    const int32_t down = pvid_floor_shift_32_q31(whole, s);
+    *owed = (int32_t)((uint32_t)whole & (((uint32_t)1 << s) - 1u));
+    return down;
 }
 
 /* Integrals at the step before that of the integrands f; at the first step of a half they begin anew. */
-static void integrate(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t f[])
+static void integrate(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t f[], bool begins)
 {
     const size_t ended = (size_t)self->half ^ 1u;
-    for (size_t i = 0; i < design->model->integrands; i++) {
-        const pvid_weak_integral_q31 shift = design->integral[i];
-        const int64_t now = self->f[0][i];
-        const int64_t last = self->f[1][i];
-        const int64_t before = (self->known > 3u) ? self->f[2][i] : ((2 * last) - now);
-        int64_t once = 0;
-        int64_t twice = 0;
+    for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_INTEGRANDS, design->model->integrands); i++) {
+        const int32_t next = shifted_with(&self->owed[i], f[i], design->integral[i].down);
+        const int32_t now = self->f[0][i];
+        const int32_t last = self->f[1][i];
+        const int32_t before = (self->known > 3u) ? self->f[2][i] : ((2 * last) - now);
+        int32_t once = 0;
+        int32_t twice = 0;
+        self->f[0][i] = next;
+        self->f[1][i] = now;
+        self->f[2][i] = last;
         if (self->known > 2u) {
-            once = self->once[i] + ((13 * (last + now)) - (before + f[i]));
-            twice = self->twice[i] + ((self->once[i] + once) - (4 * (now - last)));
+            once = self->once[i] + (5 * ((13 * (last + now)) - (before + next)));
+            const int32_t rise = (self->once[i] + once) + (4 * ((next - before) - (8 * (now - last))));
+            const int32_t half = pvid_floor_shift_32_q31(rise, (uint32_t)design->integral[i].twice - 1u);
+            twice = self->twice[i] + pvid_floor_shift_32_q31(half + 1, 1);
         }
-        if (self->index == 0u) {
-            self->edge[ended][0][i] = rounded(once, shift.once);
-            self->edge[ended][1][i] = rounded(twice, shift.twice);
+        if (begins) {
+            self->edge[ended][0][i] = once;
+            self->edge[ended][1][i] = twice;
             once = 0;
             twice = 0;
         }
@@ -127,33 +126,29 @@ static void integrate(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *de
     }
 }
 
-/* I^fold of a channel at the present step, rounded; that of 1 in dt/2, dt^2/48. */
-static int32_t integral_of(const pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design,
-                           const pvid_weak_channel *channel)
+/* I^fold of a channel at the present step; that of 1 in dt/2, dt^2/48. */
+static inline int32_t integral_of(const pvid_weak_values_q31 *self, const pvid_weak_channel *channel, uint32_t lift)
 {
     const int32_t steps = (int32_t)self->index;
     const bool first = channel->fold == 1u;
     const size_t i = channel->integrand;
     if (i == PVID_WEAK_NONE) {
-        return first ? (2 * steps) : (24 * steps * steps);
+        return (int32_t)((uint32_t)(first ? (2 * steps) : (24 * steps * steps)) << lift);
     }
-    return first ? rounded(self->once[i], design->integral[i].once)
-                 : rounded(self->twice[i], design->integral[i].twice);
+    return first ? self->once[i] : self->twice[i];
 }
 
 static void write_channels(const pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, int32_t channel[])
 {
-    const size_t summed = pvid_weak_summed_q31(design->model);
+    const size_t summed = PVID_COUNT(PVID_EXACT_CHANNELS, pvid_weak_summed_q31(design->model));
     for (size_t k = 0; k < summed; k++) {
         const pvid_weak_channel *one = &design->model->channel[k];
-        const int32_t gain = self->gain[one->gain];
-        const uint32_t shift = design->format[k].value;
-        int32_t value = 0;
-        if (one->fold == 0u) {
-            value = rounded(gain, shift);
-        } else {
-            value = rounded_product(gain, integral_of(self, design, one), shift);
+        const pvid_weak_format_q31 *format = &design->format[k];
+        int32_t value = self->gain[one->gain];
+        if (one->fold > 0u) {
+            value = pvid_upper_product_q31(value, integral_of(self, one, format->lift));
         }
+        value = pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(value, (uint32_t)format->value - 1u) + 1, 1);
         channel[k] = (value > PVID_WEAK_LIMIT_Q31) ? PVID_WEAK_LIMIT_Q31
                                                    : ((value < -PVID_WEAK_LIMIT_Q31) ? -PVID_WEAK_LIMIT_Q31 : value);
     }
@@ -174,20 +169,12 @@ pvid_weak_outcome pvid_weak_values_step_q31(pvid_weak_values_q31 *self, const pv
         if (!model->values(self->now, out)) {
             return PVID_WEAK_BEYOND;
         }
-        const int32_t *f = &out[model->gains];
+        integrate(self, design, &out[model->gains], complete && (self->index == 0u));
         if (complete) {
-            integrate(self, design, f);
             write_channels(self, design, channel);
-            for (size_t i = 0; i < model->integrands; i++) {
-                self->f[2][i] = self->f[1][i];
-                self->f[1][i] = self->f[0][i];
-            }
         }
         for (size_t i = 0; i < model->gains; i++) {
             self->gain[i] = out[i];
-        }
-        for (size_t i = 0; i < model->integrands; i++) {
-            self->f[0][i] = f[i];
         }
     }
     take_newest(self, design, jet, newest);

@@ -15,6 +15,9 @@ void pvid_weak_watch_init_f32(pvid_weak_watch_f32 *self, const pvid_weak_config_
     self->range = config->range;
     self->drive_min = config->drive_min;
     self->delay = delay;
+    for (size_t i = 0; (config->drive_min != NULL) && (i < config->design->model->samples); i++) {
+        self->moves |= (config->drive_min[i] > 0.0f) ? ((uint32_t)1u << i) : 0u;
+    }
     pvid_weak_watch_reset_f32(self);
 }
 
@@ -30,9 +33,9 @@ void pvid_weak_watch_step_f32(pvid_weak_watch_f32 *self, size_t samples, const f
     self->out[half] = (!first && self->out[half]) || (self->beyond > 0u);
     self->beyond = (uint16_t)((self->beyond > 0u) ? (self->beyond - 1u) : 0u);
     const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, samples);
-    if (self->drive_min != NULL) {
-        PVID_UNROLL_EXACT
-        for (size_t i = 0; i < count; i++) {
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        if (((self->moves >> i) & 1u) != 0u) {
             pvid_weak_spread_f32 *spread = &self->spread[half][i];
             if (first) {
                 spread->reference = sample[i];
@@ -51,11 +54,14 @@ bool pvid_weak_watch_beyond_f32(const pvid_weak_watch_f32 *self)
     return self->out[0] || self->out[1];
 }
 
-void pvid_weak_watch_half_f32(pvid_weak_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
+PVID_COLD void pvid_weak_watch_half_f32(pvid_weak_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
 {
     bool still = false;
     const float n = (float)hop;
-    for (size_t i = 0; (self->drive_min != NULL) && (i < samples); i++) {
+    for (size_t i = 0; i < samples; i++) {
+        if (((self->moves >> i) & 1u) == 0u) {
+            continue;
+        }
         const pvid_weak_spread_f32 *a = &self->spread[later ^ 1u][i];
         const pvid_weak_spread_f32 *b = &self->spread[later][i];
         const float d = b->reference - a->reference;

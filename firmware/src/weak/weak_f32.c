@@ -5,19 +5,19 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/weak_finish_f32.h"
-#include "weak/weak_front_f32.h"
-#include "weak/weak_step_f32.h"
-#include "weak/sums_f32.h"
-#include "weak/ticks_f32.h"
-#include "weak/valid_f32.h"
-#include "weak/watch_f32.h"
-#include "weak/white_f32.h"
 #include "judge/publication.h"
 #include "number/count.h"
 #include "number/finite_f32.h"
 #include "number/init.h"
 #include "number/unroll.h"
+#include "weak/sums_f32.h"
+#include "weak/ticks_f32.h"
+#include "weak/valid_f32.h"
+#include "weak/watch_f32.h"
+#include "weak/weak_finish_f32.h"
+#include "weak/weak_front_f32.h"
+#include "weak/weak_step_f32.h"
+#include "weak/white_f32.h"
 
 /* The largest finite number. */
 #define LARGEST 3.40282347e38f
@@ -37,7 +37,7 @@ static inline bool all_finite(const float values[], size_t n)
     return finite;
 }
 
-static pvid_status limits_are_valid(const pvid_weak_config_f32 *config)
+PVID_COLD static pvid_status limits_are_valid(const pvid_weak_config_f32 *config)
 {
     for (size_t i = 0; i < config->design->model->samples; i++) {
         if ((config->range != NULL) && !pvid_within_f32(config->range[i], 1.0e-30f, 3.4e38f)) {
@@ -50,7 +50,7 @@ static pvid_status limits_are_valid(const pvid_weak_config_f32 *config)
     return PVID_OK;
 }
 
-static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+PVID_COLD static pvid_status init_estimator(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
 {
     const pvid_weak_design_f32 *design = config->design;
     const pvid_weak_model_f32 *model = design->model;
@@ -92,6 +92,18 @@ static inline bool is_ready(const pvid_weak_f32 *self)
     return ready;
 }
 
+/* This tick has more to do than to take its samples. */
+static inline void mark_busy(pvid_weak_f32 *self)
+{
+    self->busy = (PVID_REFINEMENT != 0) || self->busy;
+}
+
+/* Returns whether a tick only adds its samples. */
+static inline bool is_plain(const pvid_weak_f32 *self)
+{
+    return (PVID_EXACT != 0) ? (PVID_EXACT_PLAIN != 0) : self->front.plain;
+}
+
 /* Returns whether there is a second stage. */
 static inline bool refines(const pvid_weak_f32 *self)
 {
@@ -104,17 +116,23 @@ static inline pvid_reason idle(const pvid_weak_f32 *self)
     return self->warm ? PVID_ACCUMULATED : PVID_WARMING_UP;
 }
 
-/* What a tick without a step does from now on. */
-static void rest(pvid_weak_f32 *self)
+/* H + 1. */
+static inline uint8_t harmonics_of(const pvid_weak_f32 *self)
 {
-    if (pvid_weak_sums_is_busy_f32(&self->sums, self->harmonics)) {
+    return (PVID_EXACT != 0) ? (uint8_t)PVID_MAX_HARMONICS : self->harmonics;
+}
+
+/* What a tick without a step does from now on. */
+PVID_SELDOM static void rest(pvid_weak_f32 *self)
+{
+    if (pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self))) {
         self->rest = ADD;
     } else {
         self->rest = pvid_weak_finish_is_busy_f32(&self->finish) ? PROCESS : (uint8_t)idle(self);
     }
 }
 
-static void restart(pvid_weak_f32 *self)
+PVID_COLD static void restart(pvid_weak_f32 *self)
 {
     pvid_weak_front_reset_f32(&self->front);
     pvid_weak_step_reset_f32(&self->history);
@@ -150,7 +168,7 @@ static bool window_has_place(const pvid_weak_f32 *self, uint32_t free_ticks)
 #endif
 }
 
-static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+PVID_COLD static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
 {
     const pvid_weak_design_f32 *design = config->design;
     if (!pvid_within_f32(config->sample_rate_hz, 1.0e-3f, 1.0e6f)) {
@@ -184,19 +202,20 @@ static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config_f32 *conf
     self->design = design;
     self->harmonics = (uint8_t)((design->functions / 2u) + (design->power / 2u) + 1u);
     self->channels = summed_channels(design->model);
-    if ((PVID_EXACT != 0) && (self->channels != PVID_EXACT_CHANNELS)) {
-        return PVID_BAD_DESIGN;
-    }
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_weak_front_init_f32(&self->front, design, config->sample_rate_hz);
     pvid_weak_step_init_f32(&self->history, (float)pvid_weak_front_lead_f32(&self->front) / config->sample_rate_hz);
     pvid_weak_watch_init_f32(&self->watch, config, delay_of(design));
-    self->watches = (config->range != NULL) || (config->drive_min != NULL);
-    self->plain = self->front.plain ? design->model->samples : 0u;
+    self->watches = (config->range != NULL) || (self->watch.moves != 0u);
+    self->samples = design->model->samples;
+    if ((PVID_EXACT != 0) &&
+        ((self->channels != PVID_EXACT_CHANNELS) || (self->front.plain != (PVID_EXACT_PLAIN != 0)))) {
+        return PVID_BAD_DESIGN;
+    }
     for (size_t i = 0; i < design->model->samples; i++) {
         self->front.limit[i] = pvid_weak_front_limit_f32((config->range != NULL) ? config->range[i] : LARGEST);
     }
-    const uint32_t free_ticks = pvid_weak_free_ticks_f32(design->decimation);
+    const uint32_t free_ticks = pvid_weak_free_ticks_f32(pvid_weak_decimation(design->decimation));
     if (pvid_weak_blocks_f32(free_ticks, self->harmonics) > (uint32_t)PVID_MAX_BLOCKS) {
         return PVID_BAD_DESIGN;
     }
@@ -240,7 +259,7 @@ void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen)
 }
 
 /* The reason why a complete window is dropped; PVID_ACCUMULATED if it is used. */
-static pvid_reason drop_reason(pvid_weak_f32 *self)
+PVID_COLD static pvid_reason drop_reason(pvid_weak_f32 *self)
 {
     if (self->frozen) {
         return PVID_HELD_FROZEN;
@@ -276,6 +295,7 @@ PVID_SELDOM static pvid_reason end_half(pvid_weak_f32 *self)
 /* The channels of a step to the present block. */
 PVID_SELDOM static pvid_reason form(pvid_weak_f32 *self)
 {
+    mark_busy(self);
     const pvid_weak_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
     pvid_reason dropped = PVID_ACCUMULATED;
@@ -284,35 +304,43 @@ PVID_SELDOM static pvid_reason form(pvid_weak_f32 *self)
             dropped = end_half(self);
         }
     }
-    rest(self);
+    self->rest = pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self)) ? (uint8_t)ADD : self->resume;
     return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
 }
 
 /* A sample that is not finite. */
-PVID_SELDOM static pvid_reason reject(pvid_weak_f32 *self)
+PVID_COLD static pvid_reason reject(pvid_weak_f32 *self)
 {
     restart(self);
     pvid_count_up(&self->estimator.counters.rejected_not_finite);
     return PVID_REJECTED_NOT_FINITE;
 }
 
+/* Harmonics that a tick adds or joins. */
+static inline uint32_t items_of(const pvid_weak_f32 *self)
+{
+    return (PVID_EXACT != 0)
+               ? pvid_weak_items_f32(pvid_weak_free_ticks_f32(PVID_MAX_DECIMATION), (uint32_t)PVID_MAX_HARMONICS)
+               : self->items_per_tick;
+}
+
 /* Some harmonics of the last block are added, or of the last window joined. */
 static pvid_reason add(pvid_weak_f32 *self)
 {
+    mark_busy(self);
     pvid_weak_sums_f32 *sums = &self->sums;
-    for (uint32_t left = self->items_per_tick; (left > 0u) && (self->rest == ADD); left--) {
-        if (pvid_weak_sums_joins_f32(sums)) {
-            pvid_weak_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_weak_window_f32(self));
-            if (sums->joined == self->harmonics) {
-                pvid_weak_finish_begin_f32(&self->finish);
-                rest(self);
-            }
-        } else {
+    for (uint32_t left = items_of(self); (left > 0u) && pvid_weak_sums_is_busy_f32(sums, harmonics_of(self)); left--) {
+        if (!pvid_weak_sums_joins_f32(sums)) {
             pvid_weak_sums_add_f32(sums, self->design, self->channels);
-            if (!pvid_weak_sums_is_busy_f32(sums, self->harmonics)) {
-                rest(self);
-            }
+            continue;
         }
+        pvid_weak_sums_join_one_f32(sums, self->design, self->channels, self->dt, pvid_weak_window_f32(self));
+        if (sums->joined == harmonics_of(self)) {
+            pvid_weak_finish_begin_f32(&self->finish);
+        }
+    }
+    if (!pvid_weak_sums_is_busy_f32(sums, harmonics_of(self))) {
+        rest(self);
     }
     return idle(self);
 }
@@ -320,16 +348,17 @@ static pvid_reason add(pvid_weak_f32 *self)
 /* Some stages of the last whole window. */
 static pvid_reason process(pvid_weak_f32 *self)
 {
-    pvid_reason reason = idle(self);
+    mark_busy(self);
     uint32_t left = self->stages_per_tick;
+    self->finish.report = (uint8_t)idle(self);
     do {
-        pvid_weak_finish_step_f32(self, &reason);
+        pvid_weak_finish_step_f32(self);
         left--;
     } while (left > 0u);
     if (!pvid_weak_finish_is_busy_f32(&self->finish)) {
         rest(self);
     }
-    return reason;
+    return (pvid_reason)self->finish.report;
 }
 
 /* The samples of the tick of a step, whose channels follow. */
@@ -347,8 +376,9 @@ static void watch(pvid_weak_f32 *self, const float sample[])
 /* The last tick of a block. */
 PVID_SELDOM static pvid_reason end_block(pvid_weak_f32 *self, const float sample[])
 {
-    const uint8_t decimation = self->front.decimation;
+    const uint8_t decimation = pvid_weak_decimation(self->front.decimation);
     const bool steps = pvid_weak_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
+    self->resume = self->rest;
     if (steps && self->watches && (self->history.known > 1u)) {
         watch(self, sample);
     }
@@ -385,7 +415,7 @@ static inline pvid_reason follow(pvid_weak_f32 *self, const float sample[])
 }
 
 /* Of samples with one that is not finite or beyond its range: returns whether all are finite. */
-PVID_SELDOM static bool are_finite(pvid_weak_f32 *self, const float sample[])
+static bool are_finite(pvid_weak_f32 *self, const float sample[])
 {
     const bool finite = all_finite(sample, self->design->model->samples);
     if (finite) {
@@ -394,50 +424,54 @@ PVID_SELDOM static bool are_finite(pvid_weak_f32 *self, const float sample[])
     return finite;
 }
 
-/* A tick whose signals are not the samples. */
-PVID_SELDOM static pvid_reason other_tick(pvid_weak_f32 *self, const float sample[])
+/* Adds finite samples to the block. */
+static inline void take(pvid_weak_f32 *self, const float sample[])
 {
-    if (!is_ready(self) || (sample == NULL)) {
-        return PVID_NOT_READY;
+#if !PVID_EXACT_PLAIN
+    if (!is_plain(self)) {
+        pvid_weak_front_derive_f32(&self->front, self->design->model, sample);
+        return;
     }
-    const pvid_weak_model_f32 *model = self->design->model;
-    if (!pvid_weak_front_fits_f32(&self->front, model->samples, sample) && !are_finite(self, sample)) {
-        return reject(self);
-    }
-    pvid_weak_front_derive_f32(&self->front, model, sample);
-    return follow(self, sample);
+#endif
+    pvid_weak_front_add_f32(&self->front, self->samples, sample);
 }
 
 /* A tick with a sample that is not finite or beyond its range. */
-PVID_SELDOM static pvid_reason odd_tick(pvid_weak_f32 *self, const float sample[])
+PVID_COLD static pvid_reason odd_tick(pvid_weak_f32 *self, const float sample[])
 {
+    if (!is_ready(self)) {
+        return PVID_NOT_READY;
+    }
     if (!are_finite(self, sample)) {
         return reject(self);
     }
-    pvid_weak_front_add_f32(&self->front, self->plain, sample);
+    take(self, sample);
     return follow(self, sample);
 }
 
 /* A tick of the weak form. */
 static inline pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
 {
-    if ((self == NULL) || (sample == NULL) || (self->plain == 0u)) {
-        return other_tick(self, sample);
+    if ((self == NULL) || (sample == NULL)) {
+        PVID_ASSERT(false);
+        return PVID_NOT_READY;
     }
-    if (!pvid_weak_front_fits_f32(&self->front, self->plain, sample)) {
+    if (!pvid_weak_front_fits_f32(&self->front, self->samples, sample)) {
         return odd_tick(self, sample);
     }
-    pvid_weak_front_add_f32(&self->front, self->plain, sample);
+    take(self, sample);
     return follow(self, sample);
 }
 
-/* A tick of both stages. */
+/* A tick of both stages: the second one knows at which the first one has more to do than to take a sample. */
 PVID_SELDOM static pvid_reason both_ticks(pvid_weak_f32 *self, const float sample[])
 {
+    self->busy = false;
     const pvid_reason reason = weak_tick(self, sample);
     const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
     if (sample != NULL) {
-        self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL);
+        (void)self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL,
+                                        self->busy);
     }
     return reason;
 }

@@ -27,10 +27,11 @@ static inline bool pvid_weak_finish_is_busy_f32(const pvid_weak_finish_f32 *self
     return self->stage != (uint8_t)PVID_WEAK_IDLE;
 }
 
-/* Runs one stage. Sets *reason if a row is rejected, if the gate rejects the rows of a kind, or at the last stage. */
-void pvid_weak_finish_step_f32(pvid_weak_f32 *self, pvid_reason *reason);
+/* Runs one stage. Sets finish.report if a row is rejected, if the gate rejects the rows of a kind, or at the last
+ * stage. */
+void pvid_weak_finish_step_f32(pvid_weak_f32 *self);
 
-/* Number of stages of a window. */
+/* Number of stages of a window, at most. */
 uint32_t pvid_weak_finish_stages_f32(const pvid_weak_f32 *self);
 
 /* Number of stages until all columns of a window are formed, at most. */

@@ -3,28 +3,25 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/columns_q31.h"
-#include "weak/mirror_q31.h"
-#include "weak/noise_q31.h"
-#include "weak/steps.h"
-#include "weak/sums_q31.h"
-#include "weak/white_q31.h"
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
+#include "weak/columns_q31.h"
+#include "weak/mirror_q31.h"
+#include "weak/noise_q31.h"
+#include "weak/steps.h"
+#include "weak/sums_q31.h"
+#include "weak/white_q31.h"
 
 enum {
-    /* for each kind of rows */
+    /* for each kind of rows; the first four only where the noise is computed anew */
     STAGE_WEIGH,    /* c_j from a few entries of the noise table */
     STAGE_SPECTRUM, /* D_h, a few harmonics at a time */
     STAGE_INVERT,   /* 1 / sqrt(D_h), a harmonic at a time */
     STAGE_MIRROR,   /* n reflections that leave the white rows */
-    STAGE_LEVERAGE, /* n parts; this and the next two only where the noise is computed anew */
-    STAGE_SHARE,    /* Q_j, a few harmonics */
-    STAGE_NOISE,    /* C, then bias and information by each entry of the noise table */
     STAGE_UNIT,     /* of the columns: a few harmonics */
     STAGE_COLUMN,   /* columns: each harmonic of all; the white rows of each */
     STAGE_PROJECT,  /* for each nuisance: what remains of it, then a column without it */
@@ -32,6 +29,9 @@ enum {
     STAGE_RESIDUAL, /* a few rows of e, in place of Y; at the end the gate accepts or rejects the kind */
     STAGE_FADE,     /* before the first rows of the window: the factor of a renewal on the sums, in parts */
     STAGE_ADD,      /* K times, less the nuisances: a row to the estimator */
+    STAGE_LEVERAGE, /* n parts; this and the next two likewise, where anything needs the noise itself */
+    STAGE_SHARE,    /* Q_j, a few harmonics */
+    STAGE_NOISE,    /* C, then bias and information by each entry of the noise table */
     STAGE_PULL,     /* what the noise takes from b */
     /* for the window */
     STAGE_SOLVE,  /* `iterations` solves, several stages each */
@@ -47,7 +47,8 @@ enum {
 #define SHARES_PER_STAGE 1u
 #define RESIDUALS_PER_STAGE 2u
 
-/* Windows after which the noise is computed anew, and relative step of p behind which it is at once: 2^-7, Q22. */
+/* Windows after which the noise and what whitens it are computed anew, and relative step of p behind which they are at
+ * once: 2^-7, Q22. */
 #define NOISE_WINDOWS 16u
 #define SMALL_STEP ((int64_t)1 << 15)
 
@@ -89,49 +90,60 @@ pvid_status pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self, const pvid_wea
         self->known.used = self->known.used || (design->error_variance[i].m > 0);
     }
     self->known.age = NOISE_WINDOWS;
+    for (size_t i = 0; i < design->model->kinds; i++) {
+        pvid_weak_white_init_q31(&self->white[i], design);
+    }
     self->stage = STAGE_IDLE;
     return PVID_OK;
 }
 
-static void begin_kind(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
+static void begin_kind(pvid_weak_finish_q31 *self)
 {
-    pvid_weak_white_init_q31(&self->work.rows.white, design);
     self->index = 0;
     self->part = 0;
     self->live = 0;
     self->rss = 0;
     self->saturated = false;
-    self->stage = STAGE_WEIGH;
+    self->rejected = false;
+    self->stage = self->known.renewed ? STAGE_WEIGH : STAGE_UNIT;
 }
 
-void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design)
+void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self)
 {
     pvid_weak_known_q31 *known = &self->known;
-    known->renewed = known->used && ((known->age >= NOISE_WINDOWS) || (self->size > SMALL_STEP));
-    known->age = (uint8_t)(known->renewed ? 1u : (known->age + (known->used ? 1u : 0u)));
+    known->renewed = (known->age >= NOISE_WINDOWS) || (self->size > SMALL_STEP);
+    known->age = (uint8_t)(known->renewed ? 1u : (known->age + 1u));
     self->kind = 0;
     self->theta = 0;
     self->used = 0;
     self->iteration = 0;
     self->free = 0;
-    begin_kind(self, design);
+    begin_kind(self);
 }
 
 /* ---- rows of a kind; each returns whether there is more of the stage ---- */
 
+/* theta of the kind at the present p. */
+static void take_theta(pvid_weak_q31 *self)
+{
+    const pvid_estimator_q31 *estimator = &self->estimator;
+    const size_t first = self->finish.theta;
+    for (size_t j = 0; j < kind_of(self)->thetas; j++) {
+        const int32_t bits = estimator->theta_bits[first + j];
+        self->finish.work.rows.parts.noise.of_theta[j] = pvid_scaled_of_q31(estimator->theta[first + j], -bits);
+    }
+}
+
 static bool weigh_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    const pvid_estimator_q31 *estimator = &self->estimator;
     const size_t end = lesser((size_t)finish->index + ENTRIES_PER_STAGE, self->design->n_noise);
     if (finish->index == 0u) {
-        for (size_t j = 0; j < kind_of(self)->thetas; j++) {
-            const size_t i = finish->theta + j;
-            finish->work.rows.of_theta[j] = pvid_scaled_of_q31(estimator->theta[i], -(int32_t)estimator->theta_bits[i]);
-        }
+        take_theta(self);
     }
-    pvid_weak_white_weigh_q31(&finish->work.rows.white, self->design, finish->kind, finish->work.rows.of_theta,
-                              finish->index, end);
+    pvid_weak_noise_work_q31 *work = &finish->work.rows.parts.noise;
+    pvid_weak_white_weigh_q31(&finish->white[finish->kind], self->design, finish->kind, work->of_theta, finish->index,
+                              end, work->weight);
     finish->index = (uint16_t)end;
     return end < self->design->n_noise;
 }
@@ -139,12 +151,13 @@ static bool weigh_stage(pvid_weak_q31 *self)
 static bool spectrum_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    const size_t harmonics = finish->work.rows.white.cosines;
+    const size_t harmonics = finish->white[finish->kind].cosines;
     const size_t end = lesser((size_t)finish->index + HARMONICS_PER_STAGE, harmonics);
-    pvid_weak_white_spectrum_q31(&finish->work.rows.white, self->design, finish->kind, finish->index, end);
+    pvid_weak_white_spectrum_q31(&finish->white[finish->kind], self->design, finish->kind,
+                                 finish->work.rows.parts.noise.weight, finish->index, end);
     finish->index = (uint16_t)end;
     if (end == harmonics) {
-        finish->work.rows.least = pvid_weak_white_floor_q31(&finish->work.rows.white, self->design);
+        finish->work.rows.least = pvid_weak_white_floor_q31(&finish->white[finish->kind], self->design);
     }
     return end < harmonics;
 }
@@ -152,9 +165,9 @@ static bool spectrum_stage(pvid_weak_q31 *self)
 static bool invert_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    const size_t harmonics = finish->work.rows.white.cosines;
+    const size_t harmonics = finish->white[finish->kind].cosines;
     const size_t end = lesser((size_t)finish->index + ROOTS_PER_STAGE, harmonics);
-    pvid_weak_white_invert_q31(&finish->work.rows.white, finish->work.rows.least, finish->index, end);
+    pvid_weak_white_invert_q31(&finish->white[finish->kind], finish->work.rows.least, finish->index, end);
     finish->index = (uint16_t)end;
     return end < harmonics;
 }
@@ -162,7 +175,7 @@ static bool invert_stage(pvid_weak_q31 *self)
 static bool mirror_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    pvid_weak_white_mirror_q31(&finish->work.rows.white, self->design, finish->index);
+    pvid_weak_white_mirror_q31(&finish->white[finish->kind], self->design, finish->index);
     finish->index++;
     return finish->index < pvid_weak_mirrors_q31(self->design);
 }
@@ -171,7 +184,7 @@ static bool leverage_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
     pvid_weak_rows_q31 *rows = &finish->work.rows;
-    pvid_weak_noise_leverage_q31(&rows->white, self->design, finish->index, rows->parts.noise.u,
+    pvid_weak_noise_leverage_q31(&finish->white[finish->kind], self->design, finish->index, rows->parts.noise.u,
                                  rows->parts.noise.leverage);
     finish->index++;
     return finish->index < pvid_weak_mirrors_q31(self->design);
@@ -181,10 +194,11 @@ static bool share_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
     pvid_weak_rows_q31 *rows = &finish->work.rows;
-    const size_t harmonics = rows->white.cosines;
+    const size_t harmonics = finish->white[finish->kind].cosines;
     const size_t end = lesser((size_t)finish->index + SHARES_PER_STAGE, harmonics);
     for (size_t h = finish->index; h < end; h++) {
-        pvid_weak_noise_share_q31(&rows->white, self->design, rows->parts.noise.leverage, h, rows->parts.noise.share);
+        pvid_weak_noise_share_q31(&finish->white[finish->kind], self->design, rows->parts.noise.leverage, h,
+                                  rows->parts.noise.share);
     }
     finish->index = (uint16_t)end;
     return end < harmonics;
@@ -218,11 +232,12 @@ static bool noise_stage(pvid_weak_q31 *self)
             begin_noise(self);
         }
         pvid_system_jacobian_q31(&self->estimator, h, work->c, work->f);
+        take_theta(self);
     } else if (finish->index == 1u) {
         finish->known.sensors =
-            pvid_scaled_plus_q31(finish->known.sensors, pvid_weak_noise_sensors_q31(&rows->white, design, work->share));
+            pvid_scaled_plus_q31(finish->known.sensors, pvid_weak_noise_sensors_q31(design, finish->kind, work->share));
     } else if (design->noise[finish->index - 2u].kind == finish->kind) {
-        pvid_weak_noise_take_q31(&self->estimator, design, &design->noise[finish->index - 2u], work, rows->of_theta,
+        pvid_weak_noise_take_q31(&self->estimator, design, &design->noise[finish->index - 2u], work, work->of_theta,
                                  finish->theta, finish->n_bits, finish->y_bits, &finish->known.pull[finish->theta]);
     } else {
         /* an entry of another kind */
@@ -235,14 +250,14 @@ static bool unit_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
     pvid_weak_rows_q31 *rows = &finish->work.rows;
-    const size_t harmonics = rows->white.cosines;
+    const size_t harmonics = finish->white[finish->kind].cosines;
     const size_t end = lesser((size_t)finish->index + UNITS_PER_STAGE, harmonics);
     if (finish->index == 0u) {
         pvid_weak_columns_begin_q31(&rows->parts.columns, self->design, finish->kind);
     }
     for (size_t h = finish->index; h < end; h++) {
-        pvid_weak_columns_scan_q31(&rows->parts.columns, self->design, finish->kind, &rows->white,
-                                   &self->collect.window, h);
+        pvid_weak_columns_scan_q31(&rows->parts.columns, self->design, finish->kind, &finish->white[finish->kind],
+                                   self->collect.window.length[h], h);
     }
     finish->index = (uint16_t)end;
     return end < harmonics;
@@ -253,13 +268,16 @@ static bool column_stage(pvid_weak_q31 *self)
     pvid_weak_finish_q31 *finish = &self->finish;
     const pvid_weak_design_q31 *design = self->design;
     const pvid_weak_kind *kind = kind_of(self);
-    const size_t harmonics = finish->work.rows.white.cosines;
+    const size_t harmonics = finish->white[finish->kind].cosines;
     if (finish->index < harmonics) {
-        pvid_weak_columns_take_q31(&finish->work.rows.parts.columns, design, finish->kind, &finish->work.rows.white,
-                                   &self->collect.window, finish->index);
+        const int32_t (*sums)[PVID_MAX_CHANNELS][2] =
+            (const int32_t (*)[PVID_MAX_CHANNELS][2])pvid_weak_window_sums_q31(&self->collect.sums,
+                                                                               &self->collect.window);
+        pvid_weak_columns_take_q31(&finish->work.rows.parts.columns, design, finish->kind, &finish->white[finish->kind],
+                                   self->collect.window.length[finish->index], sums[finish->index], finish->index);
     } else {
         const size_t place = finish->index - harmonics;
-        pvid_weak_columns_end_q31(&finish->work.rows.parts.columns, design, &finish->work.rows.white, place);
+        pvid_weak_columns_end_q31(&finish->work.rows.parts.columns, design, &finish->white[finish->kind], place);
         if (place > kind->thetas) {
             finish->work.rows.whole[place - kind->thetas - 1u] =
                 pvid_weak_columns_square_q31(design->functions, finish->work.rows.parts.columns.x[place]);
@@ -442,10 +460,19 @@ static void begin_solves(pvid_weak_q31 *self)
     pvid_estimator_set_expected_q31(&self->estimator, expected_of(self));
     pvid_estimator_begin_q31(&self->estimator, &finish->work.solve, true);
     finish->rss = finish->work.solve.group_rss;
+    finish->exponent = self->estimator.information.exponent;
     if (fallback != NULL) {
         finish->work.solve.has_fallback = true;
         memcpy(finish->work.solve.fallback, fallback, sizeof finish->work.solve.fallback);
     }
+}
+
+/* Whether a solve that has been done leaves M as it was. */
+static bool keeps_matrix(const pvid_weak_q31 *self)
+{
+    const pvid_information_q31 *information = &self->estimator.information;
+    return (self->finish.reason != PVID_ACCUMULATED) && (information->retention == INT32_MAX) &&
+           (information->exponent == self->finish.exponent);
 }
 
 static bool solve_stage(pvid_weak_q31 *self)
@@ -463,6 +490,7 @@ static bool solve_stage(pvid_weak_q31 *self)
         return false;
     }
     pvid_estimator_begin_q31(&self->estimator, &finish->work.solve, false);
+    finish->work.solve.keeps_matrix = keeps_matrix(self);
     return true;
 }
 
@@ -484,7 +512,7 @@ static void end_kind(pvid_weak_q31 *self)
     finish->theta = (uint8_t)(finish->theta + kind_of(self)->thetas);
     finish->kind++;
     if (finish->kind < self->design->model->kinds) {
-        begin_kind(finish, self->design);
+        begin_kind(finish);
     } else if (finish->used > 0u) {
         finish->stage = STAGE_SOLVE;
         begin_solves(self);
@@ -554,17 +582,23 @@ static void step_kind(pvid_weak_q31 *self, pvid_reason *reason)
     if (advance_kind(self, reason)) {
         return;
     }
+    const bool noise = finish->known.renewed && finish->known.used;
     if ((finish->stage == (uint8_t)STAGE_RESIDUAL) && !passes(self)) {
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         *reason = PVID_REJECTED_OUTLIER;
-        end_kind(self);
-    } else if (finish->stage == (uint8_t)STAGE_PULL) {
+        finish->rejected = true;
+    }
+    if (finish->stage == (uint8_t)STAGE_PULL) {
         finish->used++;
         finish->free = (uint16_t)(finish->free + (uint16_t)freedom_of(self));
         end_kind(self);
+    } else if (finish->rejected && (!noise || (finish->stage == (uint8_t)STAGE_NOISE))) {
+        end_kind(self);
     } else {
-        const bool skips = (finish->stage == (uint8_t)STAGE_MIRROR) && !finish->known.renewed;
-        finish->stage = (uint8_t)(skips ? (uint8_t)STAGE_UNIT : (finish->stage + 1u));
+        const bool to_noise = finish->rejected && (finish->stage == (uint8_t)STAGE_RESIDUAL);
+        const bool to_pull = !noise && (finish->stage == (uint8_t)STAGE_ADD);
+        const uint8_t next = (uint8_t)(to_pull ? (uint8_t)STAGE_PULL : (finish->stage + 1u));
+        finish->stage = (uint8_t)(to_noise ? (uint8_t)STAGE_LEVERAGE : next);
         finish->index = 0;
         finish->part = 0;
     }
@@ -578,6 +612,7 @@ void pvid_weak_finish_step_q31(pvid_weak_q31 *self, pvid_reason *reason)
         if (!solve_stage(self)) {
             finish->stage = STAGE_ASSESS;
             pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve, &finish->candidate);
+            finish->work.solve.keeps_matrix = keeps_matrix(self);
         }
         break;
     case STAGE_ASSESS:
@@ -602,6 +637,15 @@ static uint32_t stages_of(size_t all, size_t few)
     return (uint32_t)((all > 0u) ? ((all + (few - 1u)) / few) : 1u);
 }
 
+/* Up to the last that reads the window's sums. */
+static uint32_t stages_of_columns(const pvid_weak_design_q31 *design)
+{
+    const size_t harmonics = pvid_weak_harmonics_q31(design);
+    return stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
+           stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_weak_mirrors_q31(design) +
+           stages_of(harmonics, UNITS_PER_STAGE) + (uint32_t)harmonics;
+}
+
 static uint32_t stages_of_kind(const pvid_weak_q31 *self, const pvid_weak_kind *kind)
 {
     const pvid_weak_design_q31 *design = self->design;
@@ -615,10 +659,18 @@ static uint32_t stages_of_kind(const pvid_weak_q31 *self, const pvid_weak_kind *
         self->finish.known.used
             ? ((uint32_t)pvid_weak_mirrors_q31(design) + stages_of(harmonics, SHARES_PER_STAGE) + 2u + design->n_noise)
             : 0u;
-    return noise + stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
-           stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_weak_mirrors_q31(design) +
-           stages_of(harmonics, UNITS_PER_STAGE) + (uint32_t)(harmonics + columns_of(kind)) + (uint32_t)project +
-           kind->thetas + 1u + stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
+    return noise + stages_of_columns(design) + (uint32_t)columns_of(kind) + (uint32_t)project + kind->thetas + 1u +
+           stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
+}
+
+uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self)
+{
+    const pvid_weak_model_q31 *model = self->design->model;
+    uint32_t stages = stages_of_columns(self->design);
+    for (size_t i = 0; (i + 1u) < model->kinds; i++) {
+        stages += stages_of_kind(self, &model->kind[i]);
+    }
+    return stages;
 }
 
 uint32_t pvid_weak_finish_stages_q31(const pvid_weak_q31 *self)

@@ -12,7 +12,7 @@
 pvid_status pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self, const pvid_weak_config_q31 *config);
 
 /* Begins a window at the estimator's present p. */
-void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self, const pvid_weak_design_q31 *design);
+void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self);
 
 /* The stage behind the last one. */
 #define PVID_WEAK_IDLE_Q31 18u
@@ -25,6 +25,9 @@ static inline bool pvid_weak_finish_is_busy_q31(const pvid_weak_finish_q31 *self
 
 /* Runs one stage. Sets *reason if a row is rejected, if the gate rejects the rows of a kind, or at the last stage. */
 void pvid_weak_finish_step_q31(pvid_weak_q31 *self, pvid_reason *reason);
+
+/* Number of stages of a window up to the last that reads its sums. */
+uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self);
 
 /* Number of stages of a window. */
 uint32_t pvid_weak_finish_stages_q31(const pvid_weak_q31 *self);

@@ -15,8 +15,8 @@
 
 #include <string.h>
 
-#include "weak/weak_signals.h"
 #include "number/exact.h"
+#include "weak/weak_signals.h"
 
 #define HELD_SCALE (1.0f / 24.0f)
 
@@ -29,13 +29,14 @@ uint16_t pvid_weak_front_half_f32(const pvid_weak_design_f32 *design)
     return half;
 }
 
-uint32_t pvid_weak_front_length_f32(const pvid_weak_design_f32 *design)
+PVID_COLD uint32_t pvid_weak_front_length_f32(const pvid_weak_design_f32 *design)
 {
     const uint32_t steps = (2u * (uint32_t)pvid_weak_front_half_f32(design)) + 1u;
     return (uint32_t)design->model->signals * (3u + (2u * steps));
 }
 
-void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design, float sample_rate_hz)
+PVID_COLD void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design,
+                                        float sample_rate_hz)
 {
     const pvid_weak_model_f32 *model = design->model;
     const float ticks = (float)design->decimation;
@@ -54,7 +55,7 @@ void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_
  * from the second tick on. */
 static uint16_t lost(const pvid_weak_front_f32 *self)
 {
-    if (self->decimation > 1u) {
+    if (pvid_weak_decimation(self->decimation) > 1u) {
         return 1;
     }
     return (uint16_t)(((self->needs != PVID_WEAK_NEEDS_NOTHING) && (self->half < 2u)) ? (2u - self->half) : 0u);
@@ -73,6 +74,8 @@ void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self)
     self->wait = self->decimation;
     memset(self->line, 0, 3u * (size_t)self->signals * sizeof self->line[0]);
 }
+
+#if !PVID_EXACT_PLAIN
 
 /* The samples before: all equal to the first one since a restart. */
 static void begin(pvid_weak_front_f32 *self, size_t samples, const float sample[])
@@ -96,29 +99,17 @@ static void remember(pvid_weak_front_f32 *self, size_t count, const float sample
     }
 }
 
-/* A signal of the tick before, whose sample is x, from the next sample and the two before it. */
-static inline float held_signal(const pvid_weak_front_f32 *self, const pvid_weak_signal *signal, float next)
+/* A held signal of the tick `now`, between the samples `next` and `last` with one more before it. */
+static inline float held_signal(float before, float last, float now, float next)
 {
-    const size_t i = signal->sample;
-    const float x = self->before[0][i];
-    if (signal->source == (uint8_t)PVID_SIGNAL_HELD) {
-        return (((-self->before[2][i] + (13.0f * self->before[1][i])) + (13.0f * x)) - next) * HELD_SCALE;
-    }
-    return (signal->source == (uint8_t)PVID_SIGNAL_JUMP) ? (self->jump_scale * (x - self->before[1][i])) : x;
-}
-
-/* A signal of this tick. */
-static inline float plain_signal(const pvid_weak_front_f32 *self, const pvid_weak_signal *signal, float x)
-{
-    return (signal->source == (uint8_t)PVID_SIGNAL_JUMP) ? (self->jump_scale * (x - self->before[0][signal->sample]))
-                                                         : x;
+    return (((-before + (13.0f * last)) + (13.0f * now)) - next) * HELD_SCALE;
 }
 
 PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvid_weak_model_f32 *model,
                                             const float sample[])
 {
     const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, model->signals);
-    const bool next = self->needs == PVID_WEAK_NEEDS_NEXT;
+    const bool next = self->needs == PVID_WEAK_NEEDS_NEXT; /* then the signals are those of the tick before */
     if (!self->seen) {
         begin(self, model->samples, sample);
         if (next) {
@@ -126,18 +117,29 @@ PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvi
             return;
         }
     }
-    for (size_t i = 0; i < signals; i++) {
-        const pvid_weak_signal *signal = &model->signal[i];
-        const float x = sample[signal->sample];
-        float *sums = &self->line[2u * i];
-        const float once = sums[0] + (next ? held_signal(self, signal, x) : plain_signal(self, signal, x));
+    const float *now = next ? self->before[0] : sample;
+    const float *last = next ? self->before[1] : self->before[0];
+    const pvid_weak_signal *signal = model->signal;
+    float *sums = self->line;
+    for (size_t left = signals; left > 0u; left--) {
+        const size_t i = signal->sample;
+        float x = now[i];
+        if (signal->source != (uint8_t)PVID_SIGNAL_SAMPLED) {
+            x = (signal->source == (uint8_t)PVID_SIGNAL_HELD) ? held_signal(self->before[2][i], last[i], x, sample[i])
+                                                              : (self->jump_scale * (x - last[i]));
+        }
+        const float once = sums[0] + x;
         sums[0] = once;
         sums[1] += once;
+        sums = &sums[2];
+        signal++;
     }
     if (self->needs != PVID_WEAK_NEEDS_NOTHING) {
         remember(self, model->samples, sample);
     }
 }
+
+#endif
 
 /* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
 static inline float jet_of(const pvid_weak_filter_f32 *filter, uint8_t order, const float *x, size_t stride)

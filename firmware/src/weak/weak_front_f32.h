@@ -9,6 +9,12 @@
 #include "number/finite_f32.h"
 #include "pvid/weak.h"
 
+/* D. */
+static inline uint8_t pvid_weak_decimation(uint8_t decimation)
+{
+    return (PVID_EXACT != 0) ? (uint8_t)PVID_MAX_DECIMATION : decimation;
+}
+
 /* Half of the longest compensator [steps]. */
 uint16_t pvid_weak_front_half_f32(const pvid_weak_design_f32 *design);
 
@@ -35,20 +41,20 @@ bool pvid_weak_front_step_f32(pvid_weak_front_f32 *self, const pvid_weak_design_
 /* What the bits of a sample without its sign, shifted left by one, are compared with. */
 static inline uint32_t pvid_weak_front_limit_f32(float largest)
 {
-    return pvid_bits_f32(largest) << 1u;
+    return (pvid_bits_f32(largest) << 1u) + 1u;
 }
 
-/* Returns whether none of this number of samples, at least 1, is beyond its limit. */
+/* Returns whether none of this number of samples is beyond its limit: never before init, with no samples or limits. */
 static inline bool pvid_weak_front_fits_f32(const pvid_weak_front_f32 *self, uint32_t number, const float sample[])
 {
     const size_t count = PVID_COUNT(PVID_MAX_SAMPLES, number);
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < count; i++) {
-        if ((pvid_bits_f32(sample[i]) << 1u) > self->limit[i]) {
+        if ((pvid_bits_f32(sample[i]) << 1u) >= self->limit[i]) {
             return false;
         }
     }
-    return true;
+    return count > 0u;
 }
 
 /* Adds this number of finite samples of a tick to the block. */

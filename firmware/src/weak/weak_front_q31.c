@@ -6,16 +6,16 @@
  * first tick: with  a += x,  b += a  from 0 in every block, b + D a' - b', a' and b' those of the block before. It is
  * exact: D^2 |x| fits an int32. It is then shifted to 28 bits.
  *
- * A jet is the rescaled sum  x 2^bits + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without the leading x
- * above order 0) or  sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half; x are outputs. They stand twice in the
- * line, one length apart: so the last ones are always contiguous. */
+ * A jet is the sum  w_0 x + sum_i w_i ((x_(+i) - x) + (x_(-i) - x)) of even order (without w_0 above order 0) or
+ * sum_i w_i (x_(+i) - x_(-i)) of odd order, i = 1..half, shifted; x are outputs. They stand twice in the line, one
+ * length apart: so the last ones are always contiguous. */
 #include "weak/weak_front_q31.h"
 
 #include <string.h>
 
-#include "weak/weak_signals.h"
-#include "weak/rescale_q31.h"
+#include "number/integer_q31.h"
 #include "number/unroll.h"
+#include "weak/weak_signals.h"
 
 uint16_t pvid_weak_front_half_q31(const pvid_weak_design_q31 *design)
 {
@@ -122,41 +122,46 @@ PVID_SELDOM bool pvid_weak_front_derive_q31(pvid_weak_front_q31 *self, const pvi
     return true;
 }
 
-/* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. */
+/* A jet at a step; x: the signal there, its neighbours `stride` numbers apart. Beyond an int32 it saturates, which is
+ * beyond its reach. */
 static int32_t jet_of(const pvid_weak_filter_q31 *filter, uint8_t order, const int32_t *x, size_t stride)
 {
     const PVID_TABLE int32_t *weight = filter->weights;
     const int32_t *after = x;
     const int32_t *before = x;
     const int32_t centre = *x;
-    int64_t sum = (order == 0u) ? (centre * ((int64_t)1 << filter->bits)) : 0;
     const bool odd = (order % 2u) != 0u;
+    int64_t sum = 0;
+    if (order == 0u) {
+        sum = pvid_short_product_q31(*weight, centre);
+    }
     for (size_t left = filter->half; left > 0u; left--) {
+        weight++;
         after += stride;
         before -= stride;
-        sum += pvid_product_q31(*weight, odd ? (*after - *before) : ((*after + *before) - (2 * centre)));
-        weight++;
+        sum += pvid_short_product_q31(*weight, odd ? (*after - *before) : ((*after + *before) - (2 * centre)));
     }
-    return pvid_weak_rescaled_q31(sum, &filter->rescale);
+    return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(sum, filter->down), INT32_MAX);
 }
 
 bool pvid_weak_front_step_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design, int32_t jet[])
 {
     const pvid_weak_model_q31 *model = design->model;
-    const size_t signals = self->signals;
+    const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, self->signals);
+    const size_t jets = PVID_COUNT(PVID_EXACT_JETS, model->jets);
     const size_t length = (2u * (size_t)self->half) + 1u;
     int32_t *sums = self->line;
     int32_t *carry = &sums[2u * signals];
     int32_t *outputs = &carry[signals];
     int32_t *place = &outputs[self->head * signals];
+    PVID_UNROLL_EXACT
     for (size_t i = 0; i < signals; i++) {
-        const int32_t once = sums[0];
-        const int32_t twice = sums[1];
+        const int32_t once = sums[2u * i];
+        const int32_t twice = sums[(2u * i) + 1u];
         const int32_t output = pvid_floor_shift_32_q31(twice + carry[i], design->down[i]);
         carry[i] = ((int32_t)self->decimation * once) - twice;
-        sums[0] = 0;
-        sums[1] = 0;
-        sums += 2;
+        sums[2u * i] = 0;
+        sums[(2u * i) + 1u] = 0;
         place[i] = output;
         place[(length * signals) + i] = output;
     }
@@ -167,7 +172,7 @@ bool pvid_weak_front_step_q31(pvid_weak_front_q31 *self, const pvid_weak_design_
         return false;
     }
     const int32_t *centre = &outputs[((size_t)self->head + self->half) * signals];
-    for (size_t i = 0; i < model->jets; i++) {
+    for (size_t i = 0; i < jets; i++) {
         const pvid_weak_jet one = model->jet[i];
         jet[i] = jet_of(&design->filter[i], one.order, &centre[one.signal], signals);
     }

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "number/exact.h"
 #include "pvid/weak_q31.h"
 
 /* Half of the longest compensator of the jets [steps]. */
@@ -49,18 +50,16 @@ static inline bool pvid_weak_front_plain_q31(pvid_weak_front_q31 *self, const pv
     int32_t *sums = self->line;
     const int32_t *full_scale = design->full_scale;
     const int32_t *offset = self->offset;
-    for (uint32_t left = signals; left > 0u; left--) {
-        const int32_t x = pvid_weak_count_q31(*reading, *offset);
-        if (!pvid_weak_is_within_q31(x, *full_scale)) {
+    const size_t count = PVID_COUNT(PVID_EXACT_SIGNALS, signals);
+    PVID_UNROLL_EXACT
+    for (size_t i = 0; i < count; i++) {
+        const int32_t x = pvid_weak_count_q31(reading[i], offset[i]);
+        if (!pvid_weak_is_within_q31(x, full_scale[i])) {
             return false;
         }
-        const int32_t once = sums[0] + x;
-        sums[0] = once;
-        sums[1] += once;
-        reading++;
-        offset++;
-        full_scale++;
-        sums += 2;
+        const int32_t once = sums[2u * i] + x;
+        sums[2u * i] = once;
+        sums[(2u * i) + 1u] += once;
     }
     return true;
 }

@@ -3,15 +3,15 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "weak/collect_q31.h"
-#include "weak/weak_finish_q31.h"
-#include "weak/weak_front_q31.h"
-#include "weak/valid_q31.h"
 #include "judge/publication.h"
 #include "number/count.h"
 #include "number/init.h"
 #include "number/integer_q31.h"
 #include "number/unroll.h"
+#include "weak/collect_q31.h"
+#include "weak/valid_q31.h"
+#include "weak/weak_finish_q31.h"
+#include "weak/weak_front_q31.h"
 
 #define COUNTS_LIMIT INT32_C(0x01000000) /* 2^24 */
 #define OFFSET_LIMIT ((int32_t)1 << 30)
@@ -37,7 +37,7 @@ static pvid_reason idle_reason(const pvid_weak_q31 *self)
 static void rest(pvid_weak_q31 *self)
 {
     const bool busy = (self->collect.sums.left > 0u) || pvid_weak_finish_is_busy_q31(&self->finish);
-    self->rest = busy ? BUSY : (uint8_t)idle_reason(self);
+    self->rest = busy ? BUSY : (uint32_t)idle_reason(self);
 }
 
 static void restart(pvid_weak_q31 *self)
@@ -45,6 +45,13 @@ static void restart(pvid_weak_q31 *self)
     pvid_weak_collect_reset_q31(&self->collect);
     self->warm = false;
     rest(self);
+}
+
+/* Whether the sums of a window are read before others take their place. */
+static bool window_fits(const pvid_weak_q31 *self)
+{
+    const uint32_t ticks = pvid_weak_ticks_behind_join_q31(self->design);
+    return (PVID_MAX_WINDOWS > 0) || (pvid_weak_finish_columns_q31(self) <= (self->stages_per_tick * ticks));
 }
 
 static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
@@ -95,7 +102,7 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     const uint32_t stages = pvid_weak_finish_stages_q31(self);
     const uint32_t each = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
     self->stages_per_tick = (uint8_t)((each <= STAGES_MAX) ? each : 0u);
-    if (self->stages_per_tick == 0u) {
+    if ((self->stages_per_tick == 0u) || !window_fits(self)) {
         return PVID_BAD_ITERATIONS;
     }
     self->plain = self->collect.front.plain ? design->model->samples : 0u;
@@ -130,6 +137,9 @@ static bool is_driven(const pvid_weak_q31 *self)
     const int64_t n = 2 * (int64_t)self->design->hop;
     bool driven = true;
     for (size_t i = 0; (self->drive_min != NULL) && (i < self->design->model->samples); i++) {
+        if (self->drive_min[i] == 0) {
+            continue;
+        }
         const int64_t sum = self->drive.sum[0][i] + self->drive.sum[1][i];
         const int64_t square = self->drive.square[0][i] + self->drive.square[1][i];
         const int64_t mean = sum / n;
@@ -151,7 +161,7 @@ static pvid_reason hand_over(pvid_weak_q31 *self)
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
-    pvid_weak_finish_begin_q31(&self->finish, self->design);
+    pvid_weak_finish_begin_q31(&self->finish);
     return PVID_ACCUMULATED;
 }
 
@@ -160,15 +170,6 @@ PVID_SELDOM static pvid_reason reject(pvid_weak_q31 *self)
     restart(self);
     pvid_count_up(&self->estimator.counters.rejected_saturated);
     return PVID_REJECTED_SATURATED;
-}
-
-PVID_SELDOM static pvid_reason advance_finish(pvid_weak_q31 *self)
-{
-    pvid_reason reason = idle_reason(self);
-    for (uint8_t i = 0; (i < self->stages_per_tick) && pvid_weak_finish_is_busy_q31(&self->finish); i++) {
-        pvid_weak_finish_step_q31(self, &reason);
-    }
-    return reason;
 }
 
 /* The last tick of a step. */
@@ -186,7 +187,21 @@ PVID_SELDOM static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t re
     return tick;
 }
 
-/* Behind the work of a tick. */
+/* Stages of a whole window, in a tick that adds no harmonics. */
+static inline pvid_reason advance_finish(pvid_weak_q31 *self)
+{
+    pvid_reason reason = idle_reason(self);
+    for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
+        pvid_weak_finish_step_q31(self, &reason);
+        if (!pvid_weak_finish_is_busy_q31(&self->finish)) {
+            rest(self);
+            return reason;
+        }
+    }
+    return reason;
+}
+
+/* Behind the last tick of a step or the last harmonics of a window. */
 static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
 {
     pvid_reason reason = idle_reason(self);
@@ -206,8 +221,11 @@ static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
 /* A tick that ends no step, with work. */
 PVID_SELDOM static pvid_reason work(pvid_weak_q31 *self)
 {
-    pvid_weak_collect_q31 *collect = &self->collect;
-    return after(self, (collect->sums.left > 0u) ? pvid_weak_collect_work_q31(collect) : PVID_WEAK_FREE);
+    if (self->collect.sums.left == 0u) {
+        return advance_finish(self);
+    }
+    const pvid_weak_tick tick = pvid_weak_collect_work_q31(&self->collect);
+    return (self->collect.sums.left == 0u) ? after(self, tick) : idle_reason(self);
 }
 
 /* Behind the readings of a tick. */

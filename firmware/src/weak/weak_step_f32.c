@@ -10,9 +10,10 @@
  *   run         + dt/2 (r_(k-1) + r_k), r its derivative, with what rounding takes off kept (Kahan); from the first
  *               sample to the first step r stays that of the first step
  *   I^1_k       I^1_(k-1) + dt/24 (-f_(k-2) + 13 f_(k-1) + 13 f_k - f_(k+1))
- *   I^2_k       I^2_(k-1) + dt/2 (I^1_(k-1) + I^1_k) - dt^2/12 (f_k - f_(k-1))
+ *   I^2_k       I^2_(k-1) + dt/2 (I^1_(k-1) + I^1_k) + dt^2/60 (f_(k+1) - f_(k-2) - 8 (f_k - f_(k-1)))
  *   of 1:       t and t^2/2
  *
+ * The last term of I^2 removes the error of the trapezoids and that of I^1: I^2 is exact to order 6, I^1 to order 4.
  * Both integrals are 0 at the first step of a half window; their values there without that are the `edge`. */
 #include "weak/weak_step_f32.h"
 
@@ -79,22 +80,27 @@ static void integrate(pvid_weak_history_f32 *self, size_t integrands, float dt, 
 {
     const float part = dt / 24.0f;
     const float half = 0.5f * dt;
-    const float end = (dt * dt) / 12.0f;
-    const bool starts = self->known <= 2u;
-    const bool second = self->known == 3u;
+    const float bend = (dt * dt) / 60.0f;
+    for (size_t i = 0; (self->known == 3u) && (i < integrands); i++) { /* a line before the second step */
+        self->f[1][i] = (2.0f * self->f[0][i]) - now[i];
+    }
     PVID_UNROLL_EXACT
     for (size_t i = 0; i < integrands; i++) {
         const float last = self->f[0][i];
         const float f = now[i];
-        const float before = second ? ((2.0f * last) - f) : self->f[1][i];
+        const float before = self->f[1][i];
         const float rise = part * (((-before + (13.0f * last)) + (13.0f * f)) - next[i]);
         const float from = self->integral[2u * i];
         const float once = from + rise;
-        const float twice = self->integral[(2u * i) + 1u] + ((half * (from + once)) - (end * (f - last)));
-        self->integral[2u * i] = starts ? 0.0f : once;
-        self->integral[(2u * i) + 1u] = starts ? 0.0f : twice;
+        const float outside = (next[i] - before) - (8.0f * (f - last));
+        const float twice = self->integral[(2u * i) + 1u] + ((half * (from + once)) + (bend * outside));
+        self->integral[2u * i] = once;
+        self->integral[(2u * i) + 1u] = twice;
         self->f[1][i] = last;
         self->f[0][i] = f;
+    }
+    for (size_t i = 0; (self->known <= 2u) && (i < (2u * integrands)); i++) { /* at the first step */
+        self->integral[i] = 0.0f;
     }
 }
 
@@ -113,7 +119,7 @@ bool pvid_weak_step_take_f32(pvid_weak_history_f32 *self, const pvid_weak_design
                              float channel[])
 {
     const pvid_weak_model_f32 *model = design->model;
-    float arguments[PVID_MAX_INPUTS] = {0.0f}; /* of the newest step: derivatives of the runs, then arguments of sgn */
+    float arguments[PVID_MAX_INPUTS]; /* of the newest step: derivatives of the runs, then arguments of sgn */
     const size_t runs = PVID_COUNT(PVID_EXACT_RUNS, model->runs);
     const size_t signs = PVID_COUNT(PVID_EXACT_SIGNS, model->signs);
     const size_t jets = PVID_COUNT(PVID_EXACT_JETS, model->jets);
@@ -123,7 +129,7 @@ bool pvid_weak_step_take_f32(pvid_weak_history_f32 *self, const pvid_weak_design
     float *newest = self->inputs[self->newest];
     self->newest ^= 1u;
     float *before = self->inputs[self->newest];
-    if (model->prepare != NULL) {
+    if (((runs + signs) > 0u) && (model->prepare != NULL)) {
         model->prepare(newest, arguments);
     }
     if (self->known > 0u) {

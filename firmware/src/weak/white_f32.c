@@ -21,7 +21,10 @@
  *   y_(k+1) = (h/H)^2 u_k - a_k u_k - |y_k| u_(k-1),   a_k = u_k^T (h/H)^2 u_k,   u_(k+1) = y_(k+1) / |y_(k+1)|
  *
  *   Q_j = tr(R^-1 dR/dc_j) = sum over the parts of W_h omega_h^(2 j) (1 - sum_k u_kh^2) / D_h
- */
+ *
+ * An entry of the noise table is a share of the variance D_h of the rows, and likewise the covariance that noise alone
+ * has in two columns a and b, over theta_a theta_b. In white rows its sum is factor Q_j; half of it is each of (a, b)
+ * and (b, a) if they differ. */
 #include "weak/white_f32.h"
 
 #include <math.h>
@@ -35,27 +38,22 @@
 #define FLOOR 1.0e-10f
 #define SPECTRUM_MIN 1.0e-30f
 
-void pvid_weak_white_init_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, float dt)
+PVID_COLD void pvid_weak_white_init_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, float dt)
 {
-    const size_t half = design->power / 2u;
-    self->cosines = (uint8_t)((design->functions / 2u) + half + 1u);
-    self->parts = (uint8_t)(design->functions + design->power);
-    self->vectors = (uint8_t)half;
     self->omega = TURN / (2.0f * ((float)design->hop * dt));
-    self->powers = 1;
+    uint8_t highest = 0;
     for (size_t i = 0; i < design->n_noise; i++) {
-        const uint8_t powers = (uint8_t)(design->noise[i].power + 1u);
-        self->powers = (powers > self->powers) ? powers : self->powers;
+        highest = (design->noise[i].power > highest) ? design->noise[i].power : highest;
     }
     for (size_t kind = 0; kind < design->model->kinds; kind++) {
-        const uint8_t powers = (uint8_t)(design->error_order[kind] + 1u);
-        self->powers = (powers > self->powers) ? powers : self->powers;
+        highest = (design->error_order[kind] > highest) ? design->error_order[kind] : highest;
     }
+    self->powers = (uint8_t)(highest + 1u);
 }
 
-static float theta_of(const pvid_weak_design_f32 *design, uint8_t kind, const float theta[], uint8_t column)
+static inline bool is_of_kind(const pvid_weak_noise_f32 *one, uint8_t kind)
 {
-    return (column < design->model->kind[kind].thetas) ? theta[column] : -1.0f;
+    return (PVID_MAX_KINDS == 1) || (one->kind == kind);
 }
 
 void pvid_weak_white_weigh_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
@@ -66,10 +64,8 @@ void pvid_weak_white_weigh_f32(pvid_weak_white_f32 *self, const pvid_weak_design
     }
     for (size_t i = first; i < last; i++) {
         const pvid_weak_noise_f32 *one = &design->noise[i];
-        if (one->kind == kind) {
-            const float a = theta_of(design, kind, theta, one->a);
-            const float b = theta_of(design, kind, theta, one->b);
-            self->weight[one->power] += one->factor * (a * b);
+        if (is_of_kind(one, kind)) {
+            self->weight[one->power] += one->factor * (theta[one->a] * theta[one->b]);
         }
     }
 }
@@ -90,14 +86,12 @@ static float polynomial_of(const float c[], size_t powers, float x)
     return sum;
 }
 
-void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
-                                  uint8_t harmonics)
+void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind)
 {
+    const size_t harmonics = pvid_weak_harmonics(design);
     float mean = 0.0f;
     float c[PVID_MAX_POWER]; /* of the sensors and the equation */
-    for (size_t j = 0; j < self->powers; j++) {
-        c[j] = self->weight[j];
-    }
+    memcpy(c, self->weight, sizeof c);
     c[design->error_order[kind]] += design->error_variance[kind];
     for (size_t h = 0; h < harmonics; h++) {
         const float rate = (float)h * self->omega;
@@ -108,176 +102,146 @@ void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_des
     self->floor = (part > SPECTRUM_MIN) ? part : SPECTRUM_MIN;
 }
 
-void pvid_weak_white_scale_f32(pvid_weak_white_f32 *self, uint8_t harmonics)
+PVID_COLD void pvid_weak_white_scale_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design)
 {
+    const size_t harmonics = pvid_weak_harmonics(design);
     for (size_t h = 0; h < harmonics; h++) {
         self->scale[h] = 1.0f / sqrtf((self->scale[h] > self->floor) ? self->scale[h] : self->floor);
     }
 }
 
-static inline size_t cosines_of(const pvid_weak_white_f32 *self)
+void pvid_weak_white_reflect_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, size_t family,
+                                 size_t count, float x[])
 {
-    return PVID_COUNT(PVID_MAX_HARMONICS, self->cosines);
-}
-
-static inline size_t parts_of(const pvid_weak_white_f32 *self)
-{
-    return PVID_COUNT(PVID_MAX_FUNCTIONS + PVID_MAX_POWER, self->parts);
-}
-
-static inline size_t harmonic_of(const pvid_weak_white_f32 *self, size_t part)
-{
-    return (part < self->cosines) ? part : ((part + 1u) - self->cosines);
-}
-
-/* First part of a family, and the place behind its last one. */
-static inline size_t family_first(const pvid_weak_white_f32 *self, size_t family)
-{
-    return (family == 0u) ? 0u : cosines_of(self);
-}
-
-static inline size_t family_end(const pvid_weak_white_f32 *self, size_t family)
-{
-    return (family == 0u) ? cosines_of(self) : parts_of(self);
-}
-
-/* x -= v (v^T x) from `first` to `end` - 1 */
-static inline void reflect(const float *restrict v, size_t first, size_t end, float *restrict x)
-{
-    float along = 0.0f;
-    for (size_t i = first; i < end; i++) {
-        along += v[i] * x[i];
-    }
-    for (size_t i = first; i < end; i++) {
-        x[i] -= along * v[i];
-    }
-}
-
-/* All reflections of a family, one after the other: as `reflect`, written out in a build for one design. */
-static inline void reflect_family(const pvid_weak_white_f32 *self, size_t family, float x[])
-{
-    const size_t vectors = PVID_COUNT(PVID_MAX_POWER / 2, self->vectors);
-    const size_t end = family_end(self, family);
+    const size_t harmonics = pvid_weak_harmonics(design);
+    float y[PVID_MAX_HARMONICS]; /* in registers, where the number is a constant */
     PVID_UNROLL_EXACT
-    for (size_t k = 0; k < vectors; k++) {
-        const float *v = self->reflection[k];
+    for (size_t h = 0; h < harmonics; h++) {
+        y[h] = x[h];
+    }
+    for (size_t k = 0; k < count; k++) {
+        const float *v = self->reflection[k][family];
         float along = 0.0f;
         PVID_UNROLL_EXACT
-        for (size_t i = family_first(self, family) + k; i < end; i++) {
-            along += v[i] * x[i];
+        for (size_t h = 0; h < harmonics; h++) {
+            along += v[h] * y[h];
         }
         PVID_UNROLL_EXACT
-        for (size_t i = family_first(self, family) + k; i < end; i++) {
-            x[i] -= along * v[i];
+        for (size_t h = 0; h < harmonics; h++) {
+            y[h] -= along * v[h];
         }
     }
-}
-
-void pvid_weak_white_reflect_f32(const pvid_weak_white_f32 *self, size_t family, float x[])
-{
-    if (family == 0u) {
-        reflect_family(self, 0, x);
-    } else {
-        reflect_family(self, 1, x);
+    PVID_UNROLL_EXACT
+    for (size_t h = 0; h < harmonics; h++) {
+        x[h] = y[h];
     }
 }
 
-/* Puts in place of x, from `first` on, v with v^T v = 2, such that x - v (v^T x) has nothing behind its first entry. */
-static void form(float *x, size_t first, size_t end)
+/* Place behind the last part of a family; its first part has the number of the family. */
+static size_t family_end(const pvid_weak_design_f32 *design, size_t family)
 {
+    return (family == 0u) ? pvid_weak_harmonics(design) : (pvid_weak_sines(design) + 1u);
+}
+
+/* The reflection of the present direction, behind those of the k directions before it: v with v^T v = 2, such that
+ * x - v (v^T x) has nothing behind its entry k of the family. */
+static void form(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, size_t k, size_t family,
+                 const pvid_weak_basis_f32 *basis)
+{
+    const size_t first = family + k;
+    const size_t end = family_end(design, family);
+    float *v = self->reflection[k][family];
+    for (size_t h = 0; h < pvid_weak_harmonics(design); h++) {
+        v[h] = ((h >= family) && (h < end)) ? basis->direction[family][h] : 0.0f;
+    }
+    pvid_weak_white_reflect_f32(self, design, family, k, v);
+    for (size_t h = family; h < first; h++) {
+        v[h] = 0.0f;
+    }
     float square = 0.0f;
-    for (size_t i = first; i < end; i++) {
-        square += x[i] * x[i];
+    for (size_t h = first; h < end; h++) {
+        square += v[h] * v[h];
     }
     const float size = sqrtf(square);
-    const float head = x[first];
+    const float head = v[first];
     const bool negative = head < 0.0f;
     const float scale = 1.0f / sqrtf(size * (size + (negative ? -head : head)));
-    x[first] = negative ? (head - size) : (head + size);
-    for (size_t i = first; i < end; i++) {
-        x[i] *= scale;
+    v[first] = negative ? (head - size) : (head + size);
+    for (size_t h = first; h < end; h++) {
+        v[h] *= scale;
     }
 }
 
 /* The next orthonormal direction of a family, the first one if k is 0. */
-static void direct(const pvid_weak_white_f32 *self, size_t k, size_t family, pvid_weak_basis_f32 *basis)
+static void direct(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, size_t k, size_t family,
+                   pvid_weak_basis_f32 *basis)
 {
-    const size_t first = family_first(self, family);
-    const size_t end = family_end(self, family);
-    const float unit = 1.0f / (float)(self->cosines - 1u);
-    const float least = (family == 0u) ? 0.0f : 1.0f; /* its first harmonic */
-    const float *scale = &self->scale[family];
+    const size_t end = family_end(design, family);
+    const float unit = 1.0f / (float)(pvid_weak_harmonics(design) - 1u);
     const float norm = basis->norm[family];
     const float slope = basis->slope[family];
-    float *u = basis->direction;
-    float *before = basis->before;
+    float *u = basis->direction[family];
+    float *before = basis->before[family];
+    float *leverage = basis->leverage[family];
     float square = 0.0f;
-    float h = least;
-    for (size_t i = first; i < end; i++) {
-        const float x = h * unit;
-        const float last = u[i];
-        float y = scale[i - first];
+    for (size_t h = family; h < end; h++) {
+        const float x = (float)h * unit;
+        const float last = u[h];
+        float y = self->scale[h];
         if (k > 0u) {
-            y = (((x * x) - slope) * last) - (norm * before[i]);
+            y = (((x * x) - slope) * last) - (norm * before[h]);
         } else if (family > 0u) {
             y *= x;
         } else {
             /* of h^0 */
         }
-        before[i] = (k > 0u) ? last : 0.0f;
-        u[i] = y;
+        before[h] = (k > 0u) ? last : 0.0f;
+        u[h] = y;
         square += y * y;
-        h += 1.0f;
     }
     const float size = sqrtf(square);
     const float inverse = 1.0f / size;
     float moment = 0.0f;
-    h = least;
-    for (size_t i = first; i < end; i++) {
-        const float x = h * unit;
-        const float one = u[i] * inverse;
+    for (size_t h = family; h < end; h++) {
+        const float x = (float)h * unit;
+        const float one = u[h] * inverse;
         const float part = one * one;
-        u[i] = one;
-        basis->leverage[i] = (k > 0u) ? (basis->leverage[i] + part) : part;
+        u[h] = one;
+        leverage[h] = (k > 0u) ? (leverage[h] + part) : part;
         moment += (x * x) * part;
-        h += 1.0f;
     }
     basis->norm[family] = size;
     basis->slope[family] = moment;
 }
 
 /* Direction k takes four stages: for each family it is found, then for each its reflection. */
-void pvid_weak_white_basis_f32(pvid_weak_white_f32 *self, size_t stage, pvid_weak_basis_f32 *basis)
+void pvid_weak_white_basis_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, size_t stage,
+                               pvid_weak_basis_f32 *basis)
 {
     const size_t k = stage / 4u;
     const size_t family = stage % 2u;
     if ((stage % 4u) < 2u) {
-        direct(self, k, family, basis);
-        return;
+        direct(self, design, k, family, basis);
+    } else {
+        form(self, design, k, family, basis);
     }
-    const size_t first = family_first(self, family);
-    const size_t end = family_end(self, family);
-    float *own = self->reflection[k];
-    for (size_t i = first; i < end; i++) {
-        own[i] = basis->direction[i];
-    }
-    for (size_t j = 0; j < k; j++) {
-        reflect(self->reflection[j], first + j, end, own);
-    }
-    form(own, first + k, end);
 }
 
-void pvid_weak_white_share_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, const float leverage[],
-                               size_t first, size_t last)
+void pvid_weak_white_share_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design,
+                               const pvid_weak_basis_f32 *basis, size_t first, size_t last)
 {
+    const size_t sines = pvid_weak_sines(design);
     if (first == 0u) {
         memset(self->share, 0, sizeof self->share);
     }
-    for (size_t i = first; i < last; i++) {
-        const size_t h = harmonic_of(self, i);
+    for (size_t h = first; h < last; h++) {
         const float rate = (float)h * self->omega;
         const float square = rate * rate;
-        float weight = samples_of(design, h) * ((1.0f - leverage[i]) * (self->scale[h] * self->scale[h]));
+        float left = 1.0f - basis->leverage[0][h];
+        if ((h > 0u) && (h <= sines)) {
+            left += 1.0f - basis->leverage[1][h];
+        }
+        float weight = samples_of(design, h) * (left * (self->scale[h] * self->scale[h]));
         for (size_t j = 0; j < self->powers; j++) {
             self->share[j] += weight;
             weight *= square;
@@ -286,24 +250,19 @@ void pvid_weak_white_share_f32(pvid_weak_white_f32 *self, const pvid_weak_design
 }
 
 void pvid_weak_white_pull_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
-                              const float theta[], size_t first, size_t last, float g[])
+                              const float x[], size_t first, size_t last, float out[])
 {
-    const uint8_t thetas = design->model->kind[kind].thetas;
     for (size_t i = first; i < last; i++) {
         const pvid_weak_noise_f32 *one = &design->noise[i];
-        if (one->kind == kind) {
+        if (is_of_kind(one, kind)) {
             const float half = (0.5f * one->factor) * self->share[one->power];
-            if (one->a < thetas) {
-                g[one->a] += half * theta_of(design, kind, theta, one->b);
-            }
-            if (one->b < thetas) {
-                g[one->b] += half * theta_of(design, kind, theta, one->a);
-            }
+            out[one->a] += half * x[one->b];
+            out[one->b] += half * x[one->a];
         }
     }
 }
 
-float pvid_weak_white_sensors_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design)
+PVID_COLD float pvid_weak_white_sensors_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design)
 {
     float sum = 0.0f;
     for (size_t j = 0; j < self->powers; j++) {

@@ -11,10 +11,10 @@
 
 #include <stdbool.h>
 
-#include "weak/mirror_q31.h"
-#include "weak/sums_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
+#include "weak/mirror_q31.h"
+#include "weak/sums_q31.h"
 
 #define FLOOR_BITS 33
 #define LEAST_EXPONENT (-200) /* of D_h, where there is no noise at all */
@@ -35,13 +35,13 @@ void pvid_weak_white_init_q31(pvid_weak_white_q31 *self, const pvid_weak_design_
     }
 }
 
-void pvid_weak_white_weigh_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, uint8_t kind,
-                               const pvid_scaled_q31 theta[], size_t first, size_t last)
+void pvid_weak_white_weigh_q31(const pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, uint8_t kind,
+                               const pvid_scaled_q31 theta[], size_t first, size_t last, pvid_scaled_q31 weight[])
 {
     const pvid_scaled_q31 minus_one = pvid_scaled_of_q31(-1, 0);
     const size_t thetas = design->model->kind[kind].thetas;
     for (size_t j = 0; (first == 0u) && (j < self->powers); j++) {
-        self->weight[j] = none;
+        weight[j] = none;
     }
     for (size_t i = first; i < last; i++) {
         const pvid_weak_noise_q31 *one = &design->noise[i];
@@ -49,7 +49,7 @@ void pvid_weak_white_weigh_q31(pvid_weak_white_q31 *self, const pvid_weak_design
             const pvid_scaled_q31 a = (one->a < thetas) ? theta[one->a] : minus_one;
             const pvid_scaled_q31 b = (one->b < thetas) ? theta[one->b] : minus_one;
             const pvid_scaled_q31 share = pvid_scaled_times_q31(one->factor, pvid_scaled_times_q31(a, b));
-            self->weight[one->power] = pvid_scaled_plus_q31(self->weight[one->power], share);
+            weight[one->power] = pvid_scaled_plus_q31(weight[one->power], share);
         }
     }
 }
@@ -61,7 +61,7 @@ static int64_t samples_of(const pvid_weak_design_q31 *design, size_t harmonic)
 }
 
 void pvid_weak_white_spectrum_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, uint8_t kind,
-                                  size_t first, size_t last)
+                                  const pvid_scaled_q31 weight[], size_t first, size_t last)
 {
     const size_t order = design->error_order[kind];
     const pvid_scaled_q31 error = design->error_variance[kind];
@@ -69,7 +69,7 @@ void pvid_weak_white_spectrum_q31(pvid_weak_white_q31 *self, const pvid_weak_des
         const pvid_scaled_q31 square = pvid_scaled_of_q31((int64_t)(h * h), 0);
         pvid_scaled_q31 sum = none;
         for (size_t j = self->powers; j > 0u; j--) {
-            sum = pvid_scaled_plus_q31(pvid_scaled_times_q31(sum, square), self->weight[j - 1u]);
+            sum = pvid_scaled_plus_q31(pvid_scaled_times_q31(sum, square), weight[j - 1u]);
             if (j - 1u == order) {
                 sum = pvid_scaled_plus_q31(sum, error);
             }

@@ -84,7 +84,7 @@ static void jacobian(const float in[], float out[])
     out[15] = v14;
 }
 
-static void form(const float gain[], const float integral[], float t, float channel[])
+static void form(const float *restrict gain, const float *restrict integral, float t, float *restrict channel)
 {
     const float half_square = 0.5f * (t * t);
     channel[0] = gain[0];

@@ -10,7 +10,7 @@
 
 static bool kapitza_values_q31(const int32_t in[], int32_t out[])
 {
-    static const int32_t limits[2] = {1065426471, 908569067};
+    static const int32_t limits[2] = {1061446779, 906225501};
     if (!pvid_within_limits_q31(in, limits, 2)) {
         return false;
     }

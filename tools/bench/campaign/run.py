@@ -17,9 +17,6 @@ from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.rig.file import Core
 
-_CONNECT_S = 10
-_WORKERS_S = 30  # until a running scheduler must have a worker
-
 
 @dataclass(frozen=True)
 class Campaign:
@@ -67,7 +64,7 @@ def run(
     scheduler
         Address of a running scheduler; by default processes on this machine.
     workers
-        Number of them; by default, one a processor.
+        Number of them; by default, one a processor. One is this process.
     """
     rigs = range(campaign.rigs)
     missing = [rig for rig in rigs if rig not in store.records]

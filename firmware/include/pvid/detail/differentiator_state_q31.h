@@ -8,12 +8,12 @@
 /* Only the functions of differentiator_q31.h write to it. */
 struct pvid_differentiator_q31 {
     pvid_fir_bank_q31 bank;
-    uint16_t length;                     /* places of the ring */
-    uint16_t head;                       /* place of the oldest point */
-    uint16_t at;                         /* place of the oldest sample of a block */
-    uint16_t missing;                    /* samples until the window is full */
-    bool five_points;                    /* the bank is that of pvid_five_points_q31, no shift */
-    int32_t history[PVID_MAX_WINDOW][2]; /* phi, y: the ring; behind it the samples of a block and their sum */
+    uint16_t length;  /* places of the ring */
+    uint16_t head;    /* place of the oldest point, and of the sums of a block until they replace it */
+    uint16_t at;      /* samples in these sums */
+    uint16_t missing; /* points until the window is full */
+    bool five_points; /* the bank is that of pvid_five_points_q31, no shift */
+    int32_t history[PVID_MAX_WINDOW][2]; /* phi, y: the ring of points */
 };
 
 #endif

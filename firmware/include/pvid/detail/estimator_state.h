@@ -38,8 +38,10 @@ struct pvid_estimator_f32 {
     const pvid_model_f32 *model;
     pvid_information_f32 information;
     float p[PVID_MAX_P];
-    float theta[PVID_MAX_THETA];  /* f(p) */
+    float theta[PVID_MAX_THETA]; /* f(p) */
+#if PVID_FEEDBACK
     float innovation[PVID_MAX_P]; /* sum C^T N e since the last solve; only while g < 1 */
+#endif
     pvid_solve_settings_f32 settings;
     float group_rss;    /* sum of e^2 of the rows of the current group, each at the p of its tick */
     float group_weight; /* their weight */

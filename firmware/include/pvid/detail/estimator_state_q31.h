@@ -104,8 +104,37 @@ typedef struct {
     pvid_root_q31 root[PVID_MAX_P];         /* their lengths */
 } pvid_inverse_q31;
 
+/* Of a solve or an assessment up to S, and the right-hand side of a solve. */
+typedef struct {
+    int32_t c[PVID_MAX_C_Q31];         /* C_k = c_k 2^(f_column - h_row), f of the system */
+    int32_t force[PVID_MAX_THETA_Q31]; /* by rows: 2^(force_exponent + h_row) */
+    int32_t force_exponent;
+} pvid_solve_force_q31;
+
+/* Of a solve from its step on. */
+typedef struct {
+    int64_t theta[PVID_MAX_THETA_Q31]; /* after the step, likewise p and b: b -= moved */
+    int32_t p[PVID_MAX_P];
+    int32_t theta_step[PVID_MAX_THETA_Q31]; /* theta_step_j 2^(step_exponent - h_j) in units of Y per N */
+    int32_t step_exponent;
+    int64_t moved[PVID_MAX_THETA_Q31];
+} pvid_solve_step_q31;
+
+/* What a solve or an assessment needs early, and an assessment later.
+ * MISRA deviation: 19.2; what a stage reads, a stage of the same part has written. Likewise the next one. */
+typedef union {
+    pvid_solve_force_q31 early;
+    pvid_inverse_q31 inverse;
+} pvid_solve_parts_q31;
+
+/* What they need of the system, and a solve behind it. */
+typedef union {
+    pvid_system_q31 system;
+    pvid_solve_step_q31 step;
+} pvid_solve_equations_q31;
+
 /* A solve or an assessment in progress; the caller owns it. Read reason, size, group_rss and above_noise when it is
- * complete. The caller may set fallback after begin. */
+ * complete. The caller may set fallback and keeps_matrix after begin. */
 struct pvid_estimator_solve_q31 {
     pvid_reason reason;
     uint8_t stage;
@@ -116,24 +145,17 @@ struct pvid_estimator_solve_q31 {
     bool above_noise; /* S contains more information than noise alone */
     bool has_fallback;
     bool in_dead_zone;            /* within the dead zone: no step is taken */
+    bool keeps_matrix;            /* M is that of the last solve: m and h stay */
     int32_t fallback[PVID_MAX_P]; /* value of p if no step is allowed */
     int64_t size;                 /* largest |dp/p| of the step before step_limit, Q22; 0 if p is held */
     int64_t group_rss;            /* sum of e^2 of the group's rows, each at the p of its tick */
     pvid_scaled_q31 variance;     /* of a row, divided by 4^exponent as the sums are */
-    pvid_inverse_q31 inverse;
     int32_t gain;
     int32_t m[PVID_MAX_MOMENTS_Q31]; /* M_ij = m_ij 2^(h_i + h_j) */
     int16_t h[PVID_MAX_THETA_Q31];
-    int32_t c[PVID_MAX_C_Q31];         /* C_k = c_k 2^(f_column - h_row), f of the system */
-    int32_t force[PVID_MAX_THETA_Q31]; /* right-hand side by rows: 2^(force_exponent + h_row) */
-    int32_t force_exponent;
-    pvid_system_q31 system;
+    pvid_solve_parts_q31 part;
+    pvid_solve_equations_q31 now;
     int64_t dp[PVID_MAX_P];
-    int32_t p[PVID_MAX_P]; /* p after the step; likewise theta and b: b -= moved */
-    int64_t theta[PVID_MAX_THETA_Q31];
-    int32_t theta_step[PVID_MAX_THETA_Q31]; /* theta_step_j 2^(step_exponent - h_j) in units of Y per N */
-    int32_t step_exponent;
-    int64_t moved[PVID_MAX_THETA_Q31];
 };
 
 #endif

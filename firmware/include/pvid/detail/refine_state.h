@@ -9,15 +9,16 @@
 #define PVID_REFINE_SUB 4 /* steps of the motion in a big step: of the columns and of a row of each output */
 #define PVID_REFINE_SIGNALS (PVID_REFINE_INPUTS + PVID_REFINE_OUTPUTS)
 #define PVID_REFINE_STATES (PVID_REFINE_ORDER * PVID_REFINE_COORDINATES)
-#define PVID_REFINE_COLUMNS (PVID_REFINE_STATES + PVID_REFINE_MOVING)      /* that are integrated */
-#define PVID_REFINE_UNKNOWNS (PVID_REFINE_STATES + PVID_REFINE_PARAMETERS) /* of a block */
-#define PVID_REFINE_WIDTH (PVID_REFINE_UNKNOWNS + 1)                       /* and the residual */
+#define PVID_REFINE_COLUMNS (PVID_REFINE_STATES + PVID_REFINE_MOVING)                      /* that are integrated */
+#define PVID_REFINE_STILL (PVID_REFINE_PARAMETERS - PVID_REFINE_MOVING - PVID_REFINE_SKEW) /* of the outputs alone */
+#define PVID_REFINE_UNKNOWNS (PVID_REFINE_STATES + PVID_REFINE_PARAMETERS)                 /* of a block */
+#define PVID_REFINE_WIDTH (PVID_REFINE_UNKNOWNS + 1)                                       /* and the residual */
 #define PVID_REFINE_SUMS ((PVID_REFINE_WIDTH * (PVID_REFINE_WIDTH + 1)) / 2)
 #define PVID_REFINE_TRIANGLE ((PVID_REFINE_PARAMETERS * (PVID_REFINE_PARAMETERS + 1)) / 2)
-#if PVID_REFINE_OUTPUTS == 3
-#define PVID_REFINE_ROWS 3 /* that are added to the sums together */
+#if PVID_REFINE_OUTPUTS < 3
+#define PVID_REFINE_ROWS 2 /* that are added to the sums together */
 #else
-#define PVID_REFINE_ROWS 4
+#define PVID_REFINE_ROWS PVID_REFINE_OUTPUTS
 #endif
 
 /* The front end: means of blocks of samples, their droop undone, second derivatives; then the ring, in units of range /
@@ -31,7 +32,7 @@ typedef struct {
     uint16_t place;                                      /* of the newest entry of `line` */
     uint32_t next;                                       /* entry of the ring that is written next */
     float share;                                         /* 1 / ratio */
-    float droop;                                         /* (1 - 1 / ratio^2) / 24 */
+    float droop[PVID_REFINE_SIGNALS];                    /* (1 - 1 / ratio^2) / 24; held (1 + 1 / ratio^2) / 24 */
     float to_counts[PVID_REFINE_SIGNALS];                /* 32767 / range, with the scale of the signal */
     float from_counts[PVID_REFINE_SIGNALS];              /* range / 32767 */
     float sum[PVID_REFINE_SIGNALS];                      /* of the block */
@@ -43,48 +44,59 @@ typedef struct {
     int16_t ring[PVID_REFINE_RING][PVID_REFINE_SIGNALS]; /* INT16_MIN: missing or beyond its range */
 } pvid_refine_front_f32;
 
+/* Sums of a pass, then of its solution; behind the end of a block its estimate. */
+typedef union {
+    float sum[PVID_REFINE_SUMS]; /* of the products of the rows' entries, upper triangle */
+    pvid_refine_estimate_f32 candidate;
+} pvid_refine_sums_f32;
+
 /* One pass over one block: the motion from a start, the derivatives of the motion, and the sums of the rows. */
 typedef struct {
-    float h; /* a step [s] */
-#if PVID_REFINE_SKEW
-    float late[5];  /* weights of five steps that give an input at the time of the outputs */
-    float slope[5]; /* and its derivative there */
-#endif
+    float h;    /* a step [s] */
     float gate; /* largest |residual| that is used; 0: no gate */
+#if PVID_REFINE_SKEW
+    float skew[3];                   /* of the outputs on the inputs: s, s^2/2, s^3/(6 h) */
+    float slip[PVID_REFINE_OUTPUTS]; /* dz/ds at the middle of the big step */
+#endif
     float constants[PVID_REFINE_CONSTANTS];
-    float state[PVID_REFINE_STATES];                       /* q, then v */
-    float rate[PVID_REFINE_COORDINATES][PVID_REFINE_AB];   /* highest derivatives of the last steps, circular */
-    float column[PVID_REFINE_COLUMNS][PVID_REFINE_STATES]; /* d state / d (start, moving parameters) */
-    float kick[PVID_REFINE_COORDINATES * (PVID_REFINE_STATES + PVID_REFINE_MOVING)]; /* derivatives at the middle of
-                                                                the big step, times the big step */
-    float scratch[2][PVID_REFINE_STATES]; /* between the jobs of a first step */
+    float state[PVID_REFINE_STATES];                           /* q, then v */
+    float difference[PVID_REFINE_COORDINATES][PVID_REFINE_AB]; /* backward ones of the highest derivatives, from 0 */
+    float column[PVID_REFINE_COLUMNS][PVID_REFINE_STATES];     /* d state / d (start, moving parameters) */
+    float kick[PVID_REFINE_COORDINATES *
+               (PVID_REFINE_STATES + PVID_REFINE_MOVING)]; /* K, D, B at the middle of the big step; then the change of
+                                                              the columns by it */
+    float scratch[2][PVID_REFINE_STATES];                  /* between the jobs of a first step */
+    float slope[PVID_REFINE_COORDINATES];                  /* likewise */
 #if !PVID_REFINE_OUTPUT_LINEAR
-    float output_column[PVID_REFINE_OUTPUTS * PVID_REFINE_UNKNOWNS]; /* dz/dq, dz/dv, dz/dr at that middle */
+    float output_column[PVID_REFINE_OUTPUTS *
+                        (PVID_REFINE_STATES + PVID_REFINE_STILL)]; /* dz/dq, dz/dv, dz/dr at that middle */
 #endif
     float last[PVID_REFINE_OUTPUTS]; /* residuals at the last step; NaN: missing */
     float mean[PVID_REFINE_OUTPUTS]; /* their sum over the big step, by trapezoids */
     float row[PVID_REFINE_ROWS][PVID_REFINE_WIDTH];
-    float sum[PVID_REFINE_SUMS]; /* of the products of the rows' entries, upper triangle */
+    pvid_refine_sums_f32 sums;
     uint8_t job;
-    uint8_t head;   /* newest place of `rate` */
+    uint8_t at;     /* steps of the big step that are done */
     uint8_t rows;   /* in `row` */
     uint8_t starts; /* double steps that are still Runge-Kutta's */
     uint16_t step;  /* big steps that are done */
     uint16_t used;  /* rows in the sums but those of the gate */
 } pvid_refine_pass_f32;
 
-/* Between the jobs of a solution. */
+/* Between the jobs of a solution, beside the sums of the pass. */
 typedef struct {
-    float sum[PVID_REFINE_SUMS];
     float triangle[PVID_REFINE_TRIANGLE];
     float right[PVID_REFINE_PARAMETERS];
     float whole[PVID_REFINE_UNKNOWNS];  /* diagonal before the elimination */
     float step[PVID_REFINE_PARAMETERS]; /* of r */
     float shift[PVID_REFINE_STATES];    /* of the block's start */
     float size;                         /* of the step before it is shortened [prior_sd] */
+    float bend;                         /* likewise of its logarithms, on which the motion depends least linearly */
     float residual;                     /* sum of squares of the block after its own fit */
     float clash;                        /* what the block and the past cannot both have, squared */
     uint8_t job;
+    uint8_t row;      /* of the block, that joins the triangle */
+    uint8_t rotation; /* its next one */
     uint8_t halvings;
 } pvid_refine_solve_f32;
 
@@ -98,7 +110,8 @@ struct pvid_refine_f32 {
     bool frozen;
     bool solved;         /* the last solution exists */
     bool restarted;      /* the block's start is not known from the one before */
-    bool beside;         /* the tick before had a new estimate of the weak form */
+    bool busy;           /* the weak form was at the last tick that could have had jobs */
+    bool plain;          /* the next tick has a sample alone */
     bool waiting;        /* the next job needs an entry of the ring that is not there */
     bool sane;           /* the block */
     bool again;          /* the block begins before the end of the last one */
@@ -106,6 +119,7 @@ struct pvid_refine_f32 {
     pvid_reason verdict; /* on the block */
     pvid_reason told;    /* of the last block that ended */
     uint8_t phase;
+    uint8_t rested;                       /* ticks without jobs that the weak form was busy at, in a row */
     uint8_t pass;                         /* of the block */
     uint8_t taken;                        /* blocks in a row, up to 2 */
     uint8_t refused;                      /* in a row */
@@ -127,8 +141,8 @@ struct pvid_refine_f32 {
     pvid_refine_front_f32 front;
     pvid_refine_pass_f32 work;
     pvid_refine_solve_f32 solve;
-    pvid_publication_mark mark;
-    pvid_refine_estimate_f32 candidate;
+    uint32_t published;         /* estimates so far */
+    pvid_publication_mark mark; /* with 0 while there is none */
     pvid_refine_estimate_f32 estimate;
     pvid_refine_estimate_f32 copy;
 };

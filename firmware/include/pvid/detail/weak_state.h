@@ -16,18 +16,41 @@ typedef struct {
                         tick before */
     bool seen;       /* there is a sample since the restart, and `before` contains it */
     uint8_t decimation;
-    uint16_t half;                     /* of the longest compensator [steps] */
-    uint16_t missing;                  /* outputs until the line is full, at least 1 */
-    uint16_t head;                     /* place of the next outputs */
-    float ticks;                       /* D */
-    float scale;                       /* 1 / D^2 */
-    float jump_scale;                  /* dt/12, dt the tick [s] */
-    uint32_t limit[PVID_MAX_SAMPLES];  /* largest absolute value of each sample that needs no attention: its bits,
-                                          shifted left by one */
+    uint16_t half;                    /* of the longest compensator [steps] */
+    uint16_t missing;                 /* outputs until the line is full, at least 1 */
+    uint16_t head;                    /* place of the next outputs */
+    float ticks;                      /* D */
+    float scale;                      /* 1 / D^2 */
+    float jump_scale;                 /* dt/12, dt the tick [s] */
+    uint32_t limit[PVID_MAX_SAMPLES]; /* largest absolute value of each sample that needs no attention: its bits,
+                                         shifted left by one, plus 1 */
+#if !PVID_EXACT_PLAIN
     float before[3][PVID_MAX_SAMPLES]; /* samples of the last three ticks, latest first, if they are needed */
+#endif
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
 } pvid_weak_front_f32;
+
+/* Sizes of the next struct's arrays, at least 1: those of a build for one model, or enough for any. */
+#if PVID_EXACT
+#define PVID_WEAK_VALUES (PVID_EXACT_GAINS + PVID_EXACT_INTEGRANDS)
+#else
+#define PVID_WEAK_VALUES (PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS)
+#endif
+#if !PVID_EXACT
+#define PVID_WEAK_RUNS PVID_MAX_INTEGRANDS
+#elif PVID_EXACT_RUNS > 0
+#define PVID_WEAK_RUNS PVID_EXACT_RUNS
+#else
+#define PVID_WEAK_RUNS 1
+#endif
+#if !PVID_EXACT
+#define PVID_WEAK_SIGNS PVID_MAX_INTEGRANDS
+#elif PVID_EXACT_SIGNS > 0
+#define PVID_WEAK_SIGNS PVID_EXACT_SIGNS
+#else
+#define PVID_WEAK_SIGNS 1
+#endif
 
 /* From the jets of a step to the values of its channels, two steps later. */
 typedef struct {
@@ -37,12 +60,12 @@ typedef struct {
     float lead;     /* from a run's first sample to its first step [s] */
     uint8_t newest; /* place in `inputs` of the newest step; the other is of the last step before it */
     float inputs[2][PVID_MAX_INPUTS]; /* of `values` */
-    float rate[PVID_MAX_INTEGRANDS];  /* derivatives of the runs there */
-    float v[2][PVID_MAX_INTEGRANDS];  /* arguments of sgn at that step and the one before it */
-    float run[PVID_MAX_INTEGRANDS];   /* integrals since the start of the run, and what rounding took off */
-    float run_low[PVID_MAX_INTEGRANDS];
-    float out[2][PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS]; /* results of `values` at the step before that, and place for
-                                                              the next ones */
+    float rate[PVID_WEAK_RUNS];       /* derivatives of the runs there */
+    float v[2][PVID_WEAK_SIGNS];      /* arguments of sgn at that step and the one before it */
+    float run[PVID_WEAK_RUNS];        /* integrals since the start of the run, and what rounding took off */
+    float run_low[PVID_WEAK_RUNS];
+    float out[2][PVID_WEAK_VALUES];          /* results of `values` at the step before that, and place for
+                                                                       the next ones */
     float f[2][PVID_MAX_INTEGRANDS];         /* integrands at the two steps before that one, latest first */
     float integral[2 * PVID_MAX_INTEGRANDS]; /* I^1 and I^2 of each since the start of the half */
     float edge[2][PVID_MAX_INTEGRANDS];      /* I^1 and I^2 of the half before, at its end */
@@ -59,6 +82,7 @@ typedef struct {
 typedef struct {
     const float *range; /* of the configuration; NULL: no check */
     const float *drive_min;
+    uint32_t moves;                                   /* bit i set: sample i has a least deviation */
     uint16_t delay;                                   /* steps from a sample to the last step that it is part of */
     uint16_t beyond;                                  /* steps that may yet contain a sample beyond its range */
     bool out[2];                                      /* of each half: contains such a step */
@@ -82,22 +106,16 @@ typedef struct {
     float sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2];           /* A_h and B_h, real and imaginary part */
 } pvid_weak_sums_f32;
 
-/* Most parts of a window's sums that its rows are made of. */
-#define PVID_WEAK_PARTS (PVID_MAX_FUNCTIONS + PVID_MAX_POWER)
-
 /* The noise of a kind's rows: D_h, the directions that the test functions leave out, and what follows from the inverse.
  */
 typedef struct {
-    uint8_t cosines;                                       /* real parts; the others are imaginary parts */
-    uint8_t parts;                                         /* K + n */
-    uint8_t vectors;                                       /* n/2: reflections of each family */
-    uint8_t powers;                                        /* of omega^2 in use */
-    float omega;                                           /* 2 pi / T [rad/s] */
-    float weight[PVID_MAX_POWER];                          /* c_j of the sensors, variance at the power j of omega^2 */
-    float floor;                                           /* least D_h */
-    float scale[PVID_MAX_HARMONICS];                       /* D_h, then 1 / sqrt(D_h) */
-    float reflection[PVID_MAX_POWER / 2][PVID_WEAK_PARTS]; /* v of I - v v^T, one of each family in a row */
-    float share[PVID_MAX_POWER];                           /* Q_j = tr(R^-1 dR/dc_j) */
+    uint8_t powers;                  /* of omega^2 in use */
+    float omega;                     /* 2 pi / T [rad/s] */
+    float weight[PVID_MAX_POWER];    /* c_j of the sensors, variance at the power j of omega^2 */
+    float floor;                     /* least D_h */
+    float scale[PVID_MAX_HARMONICS]; /* D_h, then 1 / sqrt(D_h) */
+    float reflection[PVID_MAX_POWER / 2][2][PVID_MAX_HARMONICS]; /* v of I - v v^T, of each family */
+    float share[PVID_MAX_POWER];                                 /* Q_j = tr(R^-1 dR/dc_j) */
 } pvid_weak_white_f32;
 
 /* Products of two parameters. */
@@ -115,20 +133,20 @@ typedef struct {
     float neighbour[PVID_WEAK_PAIRS];
 } pvid_weak_scores_f32;
 
-/* Orthonormal directions that the test functions leave out, one of each family in a row. */
+/* Orthonormal directions that the test functions leave out, of each family. */
 typedef struct {
-    float norm[2];                    /* of the present direction of each family, before it was divided by it */
-    float slope[2];                   /* mean of (h/H)^2 over its squares */
-    float direction[PVID_WEAK_PARTS]; /* the present one */
-    float before[PVID_WEAK_PARTS];
-    float leverage[PVID_WEAK_PARTS]; /* sum of the squares of all */
+    float norm[2];                          /* of the present direction, before it was divided by it */
+    float slope[2];                         /* mean of (h/H)^2 over its squares */
+    float direction[2][PVID_MAX_HARMONICS]; /* the present one */
+    float before[2][PVID_MAX_HARMONICS];
+    float leverage[2][PVID_MAX_HARMONICS]; /* sum of the squares of all */
 } pvid_weak_basis_f32;
 
-/* C at p, and the places of the non-zeros of each row of a kind. */
+/* C at p, and of a kind: one of its columns, and the covariance of the noise in N times that; of Y too. */
 typedef struct {
     float c[PVID_MAX_THETA * PVID_MAX_P];
-    uint8_t count[PVID_MAX_THETA];
-    uint8_t place[PVID_MAX_THETA][PVID_MAX_P];
+    float column[PVID_MAX_THETA + 1];
+    float product[PVID_MAX_THETA + 1];
 } pvid_weak_slopes_f32;
 
 /* What the columns of a kind need before they are formed, one after the other, and they themselves. */
@@ -145,12 +163,12 @@ typedef struct {
 #if PVID_MAX_WINDOWS > 0
     float window[PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* S_h: real and imaginary part */
 #endif
-    float own[PVID_MAX_COLUMNS];    /* square of each nuisance before projection, then inverse of what remains; then
-                                       squares of theta's columns */
-    float pull[PVID_MAX_THETA];     /* g: what the sensors' noise takes from B */
-    float score[PVID_MAX_THETA];    /* sum N e + g of the window */
-    float gradient[PVID_MAX_THETA]; /* sum N e of the kind */
-    float part[PVID_WEAK_PARTS];    /* of the present column */
+    float own[PVID_MAX_COLUMNS];       /* square of each nuisance before projection, then inverse of what remains; then
+                                          squares of theta's columns */
+    float pull[PVID_MAX_THETA + 1];    /* g: what the sensors' noise takes from B; and place for Y's */
+    float score[PVID_MAX_THETA];       /* sum N e + g of the window */
+    float theta[PVID_MAX_THETA + 1];   /* of the kind, -1 for Y; then sum N e of the kind */
+    float part[2][PVID_MAX_HARMONICS]; /* of the present column: real parts, imaginary parts */
     pvid_weak_columns_f32 of_kind;
 } pvid_weak_rows_f32;
 
@@ -163,18 +181,18 @@ typedef union {
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
     bool compensation;
-    bool shares; /* R^-1 is needed: for the compensation, or because the equations have errors of their own */
-    bool alone;  /* the next window has no neighbour before it */
+    bool alone; /* the next window has no neighbour before it */
     uint8_t stage;
-    uint8_t phase; /* of a column's stages */
     uint8_t kind;
     uint8_t theta;      /* first one of the kind */
     uint8_t used;       /* kinds whose rows have been added */
     uint8_t live;       /* nuisances of the kind that are projected out */
     uint8_t iteration;  /* solves done for this window */
     uint8_t verdict;    /* of trust.h on the candidate, a pvid_reason */
+    uint8_t report;     /* reason of the tick, if a stage sets one */
     uint8_t other;      /* column of the next product */
     uint16_t index;     /* within the stage */
+    uint16_t phase;     /* of a column's stages */
     uint16_t term;      /* next one of the kind */
     uint16_t moment;    /* next one of the kind */
     pvid_reason reason; /* of the last solve, then of the window */
@@ -194,10 +212,12 @@ typedef struct {
 struct pvid_weak_f32 {
     const pvid_weak_design_f32 *design;
     const pvid_weak_refine_f32 *refine; /* second stage; NULL: none */
-    uint8_t plain;     /* samples that a tick only adds; 0: they need more, or `self` is not initialised */
+    uint8_t samples;                    /* of a tick; 0: `self` is not initialised */
+    uint8_t resume;                     /* `rest` behind the channels of a step */
     uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: weak_f32.c */
     bool warm;         /* a window has been complete since the restart */
     bool frozen;       /* complete windows are dropped */
+    bool busy;         /* the last tick did more than to take its samples; with a second stage alone */
     bool watches;      /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */

@@ -14,7 +14,7 @@ typedef struct {
     uint8_t needs; /* samples beside those of a tick */
     uint8_t signals;
     uint8_t decimation;                  /* D */
-    uint16_t wait;                       /* ticks until the block ends */
+    uint32_t wait;                       /* ticks until the block ends */
     uint16_t half;                       /* of the longest compensator */
     uint16_t missing;                    /* outputs until there is a step, this one included */
     uint16_t head;                       /* place of the next output */
@@ -27,14 +27,15 @@ typedef struct {
 typedef struct {
     uint8_t known;                     /* steps since the restart, 0..4 */
     int32_t now[PVID_MAX_INPUTS];      /* inputs of `values` at the step before the newest; runs and signs last */
-    int32_t rate[PVID_MAX_INTEGRANDS]; /* derivatives of the runs there */
-    int32_t v[2][PVID_MAX_INTEGRANDS]; /* arguments of sgn there and at the step before */
-    int64_t run[PVID_MAX_INTEGRANDS];  /* twice the sum of the derivatives of the runs up to there, by trapezoids */
+    int32_t rate[PVID_MAX_INPUTS];     /* derivatives of the runs there */
+    int32_t v[2][PVID_MAX_INPUTS];     /* arguments of sgn there and at the step before */
+    int64_t run[PVID_MAX_INPUTS];      /* twice the sum of the derivatives of the runs up to there, by trapezoids */
     int32_t gain[PVID_MAX_CHANNELS];   /* at the step before that */
     int32_t f[3][PVID_MAX_INTEGRANDS]; /* integrands there and at the two steps before it, latest first */
-    int64_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
-    int64_t twice[PVID_MAX_INTEGRANDS];
-    int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end, rounded */
+    int32_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
+    int32_t twice[PVID_MAX_INTEGRANDS];
+    int32_t owed[PVID_MAX_INTEGRANDS]; /* what the shifts of the integrands took away and the next step gets back */
+    int32_t edge[2][2][PVID_MAX_INTEGRANDS]; /* of each half: once and twice at its end */
     uint16_t index;                          /* of the step whose channels come next, in its half */
     uint8_t half;                            /* that fills, 0 or 1 */
     uint16_t lead;                           /* ticks from the first sample to the first step */
@@ -57,8 +58,11 @@ typedef struct {
 
 /* S_h of a window, real and imaginary part. */
 typedef struct {
-    uint8_t length[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS]; /* bits of the larger part */
-    int32_t s[PVID_MAX_CHANNELS][PVID_MAX_HARMONICS][2];
+    uint8_t half;                                          /* the older one */
+    uint8_t length[PVID_MAX_HARMONICS][PVID_MAX_CHANNELS]; /* bits of the larger part */
+#if PVID_MAX_WINDOWS > 0
+    int32_t s[PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* else in the place of the older half's sums */
+#endif
 } pvid_weak_window_q31;
 
 /* Most parts of the sums of a window: K + n. */
@@ -68,7 +72,6 @@ typedef struct {
 typedef struct {
     uint8_t cosines;                                        /* real parts; the others are imaginary parts */
     uint8_t powers;                                         /* of h^2 in use */
-    pvid_scaled_q31 weight[PVID_MAX_POWER];                 /* c_j, variance at the power j of h^2 */
     pvid_scaled_q31 scale[PVID_MAX_HARMONICS];              /* D_h, then 1 / sqrt(D_h) */
     int32_t mirror[PVID_MAX_POWER / 2][PVID_WEAK_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
 } pvid_weak_white_q31;
@@ -95,16 +98,18 @@ typedef struct {
     int64_t square[2][PVID_MAX_SAMPLES];
 } pvid_weak_drive_q31;
 
-/* While the noise of a kind's rows is computed anew. */
+/* While the noise of a kind's rows is computed anew, before and behind its columns. */
 typedef struct {
-    int32_t u[PVID_WEAK_ROWS_Q31];         /* a direction that the test functions leave out, Q30 */
-    int32_t leverage[PVID_WEAK_ROWS_Q31];  /* sum of the squares of all of them, Q30 */
-    pvid_scaled_q31 share[PVID_MAX_POWER]; /* Q_j */
-    int32_t c[PVID_MAX_C_Q31];             /* C at p: C_k = c_k 2^f_column */
+    int32_t u[PVID_WEAK_ROWS_Q31];                /* a direction that the test functions leave out, Q30 */
+    int32_t leverage[PVID_WEAK_ROWS_Q31];         /* sum of the squares of all of them, Q30 */
+    pvid_scaled_q31 weight[PVID_MAX_POWER];       /* c_j, variance at the power j of h^2 */
+    pvid_scaled_q31 share[PVID_MAX_POWER];        /* Q_j */
+    pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
+    int32_t c[PVID_MAX_C_Q31];                    /* C at p: C_k = c_k 2^f_column */
     int16_t f[PVID_MAX_P];
 } pvid_weak_noise_work_q31;
 
-/* The columns begin behind that.
+/* Each begins where the other one has ended.
  * MISRA deviation: 19.2; as of pvid_weak_work_q31. */
 typedef union {
     pvid_weak_noise_work_q31 noise;
@@ -113,10 +118,8 @@ typedef union {
 
 /* The rows of a kind while they are made. */
 typedef struct {
-    pvid_weak_white_q31 white;
-    pvid_scaled_q31 least;                        /* D_h */
-    pvid_scaled_q31 of_theta[PVID_MAX_THETA_Q31]; /* theta of the kind */
-    uint64_t whole[PVID_MAX_COLUMNS];             /* square of each nuisance before those before it are off */
+    pvid_scaled_q31 least;            /* D_h */
+    uint64_t whole[PVID_MAX_COLUMNS]; /* square of each nuisance before those before it are off */
     pvid_weak_parts_q31 parts;
 } pvid_weak_rows_q31;
 
@@ -130,8 +133,8 @@ typedef union {
 /* What the sensors' noise does to the rows, at the p of one of the last windows. */
 typedef struct {
     bool used;               /* anything needs it */
-    bool renewed;            /* in the present window */
-    uint8_t age;             /* windows since it was computed */
+    bool renewed;            /* it and the reflections are, in the present window */
+    uint8_t age;             /* windows since they were computed */
     bool compensates;        /* `pull` is added to b */
     pvid_scaled_q31 sensors; /* part of the rows' variance that the sensors explain, summed over kinds */
     pvid_scaled_q31 pull[PVID_MAX_THETA_Q31]; /* what it takes from b in a window, in units of b */
@@ -146,8 +149,10 @@ typedef struct {
     uint8_t live;                      /* nuisances of the kind that are projected out */
     uint8_t iteration;                 /* solves done for this window */
     uint8_t part;                      /* of a column's stages */
+    uint8_t exponent;                  /* of the sums before the solves */
     bool kept;                         /* the present nuisance is */
     bool saturated;                    /* a row of the kind does not fit: none of them is used */
+    bool rejected;                     /* by the gate: no row of the kind is used */
     uint16_t index;                    /* within the stage */
     uint16_t free;                     /* rows less nuisances of the kinds that were added */
     pvid_reason reason;                /* of the last solve, then of the window */
@@ -159,6 +164,7 @@ typedef struct {
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];
     pvid_weak_known_q31 known;
+    pvid_weak_white_q31 white[PVID_MAX_KINDS]; /* at the p of one of the last windows */
     pvid_weak_work_q31 work;
     pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_weak_finish_q31;
@@ -167,8 +173,8 @@ typedef struct {
 struct pvid_weak_q31 {
     const pvid_weak_design_q31 *design;
     const int32_t *drive_min;
+    uint32_t rest; /* reason of a tick that ends no step and has no work; 255: there is work */
     uint8_t plain; /* samples, if each is a signal; else 0 */
-    uint8_t rest;  /* reason of a tick that ends no step and has no work; 255: there is work */
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */
     bool warm;               /* a window has been complete since the restart */

@@ -24,7 +24,7 @@ def each(client: Any, work: Callable[..., Done], items: Sequence[Item], **fixed:
 
     Parameters
     ----------
-    client : of `client`
+    client : of `client`; None: this process does the work
     work : a function that a worker can import
 
     Raises
@@ -32,6 +32,9 @@ def each(client: Any, work: Callable[..., Done], items: Sequence[Item], **fixed:
     PvidError
         That of the work, or where a worker cannot run it.
     """
+    if client is None:
+        yield from (work(item, **fixed) for item in items)
+        return
     futures = client.map(work, items, pure=False, **fixed)
     for future in _distributed().as_completed(futures, loop=client.loop):
         try:
@@ -46,7 +49,8 @@ def each(client: Any, work: Callable[..., Done], items: Sequence[Item], **fixed:
 
 @contextmanager
 def client(scheduler: str | None, workers: int) -> Iterator[Any]:
-    """A client of the scheduler, or of worker processes of its own that nobody else can reach.
+    """A client of the scheduler, or of worker processes of its own that nobody else can reach; None for one worker on
+    this machine, for which another process and a scheduler take longer to start than most recordings to identify.
 
     Parameters
     ----------
@@ -58,6 +62,9 @@ def client(scheduler: str | None, workers: int) -> Iterator[Any]:
     PvidError
         When the scheduler cannot be reached or has no worker, or dask.distributed is not installed.
     """
+    if scheduler is None and workers == 1:
+        yield None
+        return
     distributed = _distributed()
     if scheduler is not None:
         try:

@@ -128,6 +128,7 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
     configure = ["cmake", "-S", str(source), "-B", str(tree), "-G", "Ninja"]
     configure += [f"-DCMAKE_TOOLCHAIN_FILE={ROOT / 'firmware' / 'cmake' / target.toolchain}.cmake"]
     configure += [f"-DPVID_BOARD={target.name}", "-DPVID_DEVELOPER=ON"]
+    configure += ["-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O2 -g1 -DNDEBUG"]  # costs by file need the places of functions alone
     configure += [f"-D{name}={value}" for name, value in options.items()]
     configure += ["-DCMAKE_C_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
     environment = compiled_once()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pvid.board.mechanism_board import MechanismBoard
+from pvid.board.mechanism_board import MechanismBoard, refuse_unrefined
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.target import Verdict, verify
 from pvid.core.native import Native
@@ -25,18 +25,24 @@ def verify_recording(
     core: Core = "f32",
     progress: Callable[[int], None] | None = None,
     ranking: Sequence[Scored] = (),
+    refined: bool = False,
 ) -> Verdict:
     """Plays it on a target, with the settings of `identify`; every hash is compared.
 
     Parameters
     ----------
     ranking : of the analysis of the recording, where there is one: the design is not searched for again
+    refined : with the second stage, in float32
 
     Raises
     ------
     PvidError
         When the target cannot be started or refuses, or the engine does not have what the model needs.
     """
-    board = _BOARDS[core].of_recording(rig, recording, to_identify=True, ranking=ranking)
+    if refined:
+        refuse_unrefined(core)
+        board: Board = MechanismBoard.of_recording(rig, recording, True, ranking, refined=True)
+    else:
+        board = _BOARDS[core].of_recording(rig, recording, to_identify=True, ranking=ranking)
     samples = board.recording.T
     return verify(target, board.without_recording, Native(), *samples, progress=progress)

@@ -34,6 +34,7 @@ from pvid.link.frames import (
     Message,
     Raw,
     RawCount,
+    RefinedEstimate,
     Schema,
     Source,
     Status,
@@ -57,6 +58,7 @@ class FieldRecord:
     raw: dict[int, Samples] = field(default_factory=dict)
     hashes: dict[int, int] = field(default_factory=dict)
     estimates: dict[int, Estimate | EstimateQ31] = field(default_factory=dict)
+    refined: dict[int, RefinedEstimate] = field(default_factory=dict)
     received: Counters = field(default_factory=Counters)
 
     @property
@@ -113,6 +115,8 @@ class FieldRecord:
                 self.hashes[tick] = message.hash
             case Estimate() | EstimateQ31():
                 self.estimates[tick] = message
+            case RefinedEstimate():
+                self.refined[tick] = message
             case _:
                 pass
 

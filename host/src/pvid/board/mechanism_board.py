@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,17 +19,24 @@ from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.simulated_sensors import sensor_macros
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import SLOWEST
-from pvid.codegen import files_design, files_weak
+from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
+from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.native import Native
 from pvid.core.sizes import raised
+from pvid.core.weak_native import RefinedIdentifier
 from pvid.design.c_tables import float_literal
+from pvid.design.refine import refine_config
 from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames
 from pvid.model.compiled import CompiledModel
+from pvid.models.kapitza.refinement import refine_rig
 from pvid.models.mechanisms import names as shipped
+from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.described import rig_of_document
@@ -40,16 +48,24 @@ from pvid.run.engine_design import (
     config_for_simulated_rig,
     config_to_identify,
     engine_config,
+    neglected_part,
     samples_of,
+    with_neglected,
 )
 from pvid.run.mechanism import model_of
 from pvid.run.nominal_run import model_of_rig_file, nominal_run
+from pvid.run.refine_design import refine_design
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
+from pvid.settings.refine import RefineConfig, RefineSignal
+from pvid.settings.weak import Source as SignalSource
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
+from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.sim.simulated_run import RigSimulation
+from pvid.twin.both_stages import BothStagesTwin
+from pvid.twin.refine import RefineTwin
 from pvid.twin.weak import WeakTwin
 
 _COMMAND = "pvid log"
@@ -72,6 +88,7 @@ class MechanismBoard:
     recording
         what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own, or
         simulates those of a pendulum's rig file
+    refine : settings of the second stage; None: without
     """
 
     configure_frame = Configure
@@ -80,10 +97,16 @@ class MechanismBoard:
     compiled: CompiledModel
     config: WeakConfig
     recording: npt.NDArray[np.float32]
+    refine: RefineConfig | None = None
 
     @classmethod
     def of_recording(
-        cls, rig: MechanismRig, recording: Recording, to_identify: bool = False, ranking: Sequence[Scored] = ()
+        cls,
+        rig: MechanismRig,
+        recording: Recording,
+        to_identify: bool = False,
+        ranking: Sequence[Scored] = (),
+        refined: bool = False,
     ) -> MechanismBoard:
         """With the design and the tables that a recording of the rig asks for; the board's sensors read it.
 
@@ -91,36 +114,57 @@ class MechanismBoard:
         ----------
         to_identify : as `identify` does: what is published is judged on this machine
         ranking : as of pvid.run.engine_design.design_for_recording
+        refined : with the second stage
 
         Raises
         ------
         PvidError
-            When the recording is too short, or the engine does not have what the model needs.
+            When the recording is too short, or the engine or its second stage does not have what the model needs.
         """
         compiled = model_of(rig)
         recording.refuse_damaged()
         whole = recording.whole()
         config = (config_to_identify if to_identify else config_for_recording)(compiled, whole, ranking=ranking)
-        return cls(rig, compiled, config, samples_of(config, whole.signals))
+        refine = refine_design(compiled, config, whole.signals) if refined else None
+        return cls(rig, compiled, config, samples_of(config, whole.signals), refine)
 
     @classmethod
-    def of_shipped_rig(cls, name: str) -> MechanismBoard:
+    def of_shipped_rig(cls, name: str, refined: bool = False) -> MechanismBoard:
         """That of a shipped mechanism, whose sensors read a simulation.
+
+        Parameters
+        ----------
+        refined
+            With the second stage; the pendulum's simulation is then one of the full equations.
 
         Raises
         ------
         PvidError
-            Where there is no such mechanism, or the engine does not have what it needs.
+            Where there is no such mechanism, or the engine or its second stage does not have what it needs.
         """
         simulated = simulated_rig(name)
         rig = MechanismRig(name, simulated.sample_rate, known=simulated.knowns)
         compiled = model_of(rig)
         config = config_for_simulated_rig(compiled)
-        return cls(rig, compiled, config, samples_of(config, RigSimulation.of(compiled, simulated).run()))
+        if not refined:
+            return cls(rig, compiled, config, samples_of(config, RigSimulation.of(compiled, simulated).run()))
+        if name == DEFAULT:
+            found = simulate(sensors=standard_sensors(), truth="full", duration=simulated.duration, seed=1).run
+            run = {"phi": found.phi, "y": found.y}
+        else:
+            run = RigSimulation.of(compiled, simulated).run()
+        refine = refine_design(compiled, config, run, [simulated.truth[one] for one in compiled.p_names])
+        return cls(rig, compiled, config, samples_of(config, run), refine)
 
     @classmethod
-    def of_rig_file(cls, rig: RigFile) -> MechanismBoard:
+    def of_rig_file(cls, rig: RigFile, refined: bool = False) -> MechanismBoard:
         """With a design for the guess of a pendulum's rig file; the board simulates the sensors.
+
+        Parameters
+        ----------
+        refined
+            With the second stage; the simulated sensors of an emulated board follow the small-angle equations, which
+            contradict it.
 
         Raises
         ------
@@ -129,22 +173,31 @@ class MechanismBoard:
         """
         made = nominal_run(rig)
         config = engine_config(made.compiled, made.run, made.design, made.p)
+        config = with_neglected(config, neglected_part(made.compiled, made.run))
         # What the rig really reads is not known: a height from the floor is no fault.
         config = replace(config, range=None)
-        return cls(rig, made.compiled, config, _nothing(config))
+        refine = _refine_of_rig_file(rig, made.compiled, config) if refined else None
+        return cls(rig, made.compiled, config, _nothing(config), refine)
 
     def __post_init__(self) -> None:
         if not self.config.sample_rate >= SLOWEST:
             raise PvidError(f"the sample rate is {self.config.sample_rate:g} Hz, and a board streams at 1 Hz and more")
 
+    @cached_property
+    def equations(self) -> RefineFunctions:
+        """Those of the second stage."""
+        return refine_functions(self.compiled)
+
     @property
     def names(self) -> BoardNames:
         """What the board says about itself."""
         units = {one.name: one.unit for one in self.compiled.signals}
+        refined = () if self.refine is None else self.equations.parameters
         return BoardNames(
             self.config.design.model.name,
             tuple((name, units[name]) for name in self.config.design.model.sample_names),
             tuple((one.name, one.unit) for one in self.compiled.unknowns),
+            refined=tuple((one.name, "" if one.unit == "1" else one.unit) for one in refined),
         )
 
     @property
@@ -183,6 +236,12 @@ class MechanismBoard:
                 self._shared, sizes_of_design(design), _COMMAND, self.compiled.title, listed
             ),
         }
+        if self.refine is not None:
+            code |= {
+                "pvid/refine_shape.h": files_refine.shape(self.equations, _COMMAND),
+                "refine_model_f32.h": files_refine.header(self.equations, _COMMAND),
+                "stream_refine.h": _refine_header(self.refine),
+            }
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
         simulated = isinstance(self.rig, RigFile) and not len(self.recording)
         macros = [
@@ -195,6 +254,7 @@ class MechanismBoard:
             *sensor_macros(self.rig, self._lsb, self.sample_rate),
             f"#define STREAM_P_UNIT {{{units}}}",
             f"#define STREAM_NAMES {c_string(self.names.text)}",
+            *([] if self.refine is None else ["#define STREAM_REFINED"]),
         ]
         return StreamImage(
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
@@ -205,6 +265,7 @@ class MechanismBoard:
             identifier="weak_f32",
             sensor="sensor.c" if simulated else "sensor_recording.c",
             sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
+            refined=self.refine is not None,
         )
 
     def configure(
@@ -247,9 +308,12 @@ class MechanismBoard:
         single = {name: getattr(frame, name) for name in _SINGLE}
         return replace(self.config, estimator=replace(own, law=Law(frame.law), **places, **single))
 
-    def twin_of(self, frame: Configuration) -> WeakTwin:
+    def twin_of(self, frame: Configuration) -> WeakTwin | BothStagesTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
-        return WeakTwin(self.configured(frame))
+        weak = WeakTwin(self.configured(frame))
+        if self.refine is None:
+            return weak
+        return BothStagesTwin(weak, RefineTwin(GeneratedRefine(self.equations), self.refine))
 
     @property
     def without_recording(self) -> MechanismBoard:
@@ -266,12 +330,21 @@ class MechanismBoard:
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the engine on this machine [ticks]."""
-        identifier = weak_native(self.compiled, self.config.design).identifier_of(self.config)
-        return identifier.run_samples(self.readings(*signals), sums=False).hash
+        samples = self.readings(*signals)
+        if self.refine is None:
+            identifier = weak_native(self.compiled, self.config.design).identifier_of(self.config)
+            return identifier.run_samples(samples, sums=False).hash
+        return self.both_stages().run_both(samples).hash
+
+    def both_stages(self) -> RefinedIdentifier:
+        """Both stages in C on this machine."""
+        assert self.refine is not None
+        library = weak_native(self.compiled, self.config.design, self.equations)
+        return library.refined_of(self.config, self.refine)
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
-        lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config).items()]
+        lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config, self.refine).items()]
         return "\n".join([self.rig.text(), f"[{_TABLE}]", *lines, ""])
 
     @classmethod
@@ -285,7 +358,27 @@ class MechanismBoard:
         """
         compiled = model_of_rig_file(rig) if isinstance(rig, RigFile) else model_of(rig)
         config = _config(compiled, engine)
-        return cls(rig, compiled, config, _nothing(config))
+        return cls(rig, compiled, config, _nothing(config), _refine(engine))
+
+
+def _refine_of_rig_file(rig: RigFile, compiled: CompiledModel, config: WeakConfig) -> RefineConfig:
+    """Settings of the second stage for the guess of a pendulum's rig file."""
+    guess = [one.guess for one in compiled.unknowns][:3]
+    about = refine_rig(
+        config.sample_rate,
+        rig.l1,
+        guess,
+        compiled.signal("phi").sd,
+        y_gain_sd=rig.sensor.y_gain_sd,
+        samples=("y", "phi"),
+    )
+    return refine_config(about, compiled.following.forgetting_s)
+
+
+def _refine_header(settings: RefineConfig) -> str:
+    """stream_refine.h: `stream_refine_config`."""
+    lines = ['#include "pvid/refine.h"', "", *files_refine_design.tables(settings, "stream_refine_config")]
+    return "\n".join(["#ifndef STREAM_REFINE_H", "#define STREAM_REFINE_H", "", *lines, "", "#endif", ""])
 
 
 def _nothing(config: WeakConfig) -> npt.NDArray[np.float32]:
@@ -293,12 +386,21 @@ def _nothing(config: WeakConfig) -> npt.NDArray[np.float32]:
     return np.zeros((0, config.design.model.samples), np.float32)
 
 
-def board_of_rig_file(rig: RigFile) -> MechanismBoard | MechanismBoardQ31:
+def board_of_rig_file(rig: RigFile, refined: bool = False) -> MechanismBoard | MechanismBoardQ31:
     """In the arithmetic of a pendulum's rig file; raises as MechanismBoard.of_rig_file, and for core f64."""
     made = BOARDS.get(rig.identifier.core)
     if made is None:
         raise PvidError(f"targets hold the cores f32 and q31, not {rig.identifier.core}")
-    return made.of_rig_file(rig)
+    if not refined:
+        return made.of_rig_file(rig)
+    refuse_unrefined(rig.identifier.core)
+    return MechanismBoard.of_rig_file(rig, refined)
+
+
+def refuse_unrefined(core: str) -> None:
+    """PvidError for a core without a second stage."""
+    if core != FLOAT.name:
+        raise PvidError(f"the second stage is in float32 alone: --refine with core {FLOAT.name}, not {core}")
 
 
 _KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismBoard, MechanismBoardQ31)
@@ -349,7 +451,7 @@ def _recording(samples: npt.NDArray[np.float32]) -> str:
 # ---- the text of the settings: numbers as Python writes them, which read back exactly; long tables as their bits
 
 
-def _flat(config: WeakConfig) -> dict[str, Any]:
+def _flat(config: WeakConfig, refine: RefineConfig | None) -> dict[str, Any]:
     """Key -> value; keys of the parts have their names in front."""
     parts: dict[str, Any] = {
         "estimator": config.estimator,
@@ -358,6 +460,8 @@ def _flat(config: WeakConfig) -> dict[str, Any]:
         "design": config.design,
     }
     found = {one.name: getattr(config, one.name) for one in fields(config) if one.name not in parts}
+    if refine is not None:
+        parts["refine"] = refine
     for part, owner in parts.items():
         found |= {f"{part}_{one.name}": getattr(owner, one.name) for one in fields(owner) if one.name != "model"}
     return {name: value for name, value in found.items() if value is not None}
@@ -371,6 +475,8 @@ def _written(value: Any) -> str:
             return str(int(value))
         case WeakFilter():
             return _written(value.weights)
+        case RefineSignal():
+            return _written([value.sample, value.order, value.scale, value.range, int(value.source)])
         case np.ndarray() if value.size > _SHORT:  # the bits
             words = [f"{word:08x}" for word in value.view(np.uint32).tolist()]
             rows = [" ".join(words[k : k + _WORDS]) for k in range(0, len(words), _WORDS)]
@@ -392,9 +498,28 @@ def _array(value: Any, kind: type[np.generic] = np.float32) -> npt.NDArray[Any]:
     return np.array(value, kind)
 
 
+def _part(engine: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The keys of a part without its name."""
+    return {key.removeprefix(f"{name}_"): value for key, value in engine.items() if key.startswith(f"{name}_")}
+
+
+def _refine(engine: Mapping[str, Any]) -> RefineConfig | None:
+    given = _part(engine, "refine")
+    if not given:
+        return None
+    signal = tuple(
+        RefineSignal(sample, order, scale, range_, SignalSource(source))
+        for sample, order, scale, range_, source in given.pop("signal")
+    )
+    arrays: dict[str, Any] = {
+        key: _array(value) if isinstance(value, list | str) else value for key, value in given.items()
+    }
+    return RefineConfig(**{"second": None, **arrays}, signal=signal)
+
+
 def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> WeakConfig:
     def part(name: str) -> dict[str, Any]:
-        return {key.removeprefix(f"{name}_"): value for key, value in engine.items() if key.startswith(f"{name}_")}
+        return _part(engine, name)
 
     def arrays(values: dict[str, Any]) -> dict[str, Any]:
         return {

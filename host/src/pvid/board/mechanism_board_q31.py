@@ -30,6 +30,7 @@ from pvid.oracle.weak.choice import Scored
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
+from pvid.run.engine_design import neglected_part
 from pvid.run.engine_design_q31 import (
     FixedEngine,
     engine_for_recording,
@@ -37,18 +38,12 @@ from pvid.run.engine_design_q31 import (
     engine_of_parts,
     engine_to_identify,
     fixed_engine,
+    with_neglected,
 )
 from pvid.run.mechanism import model_of
 from pvid.run.nominal_run import model_of_rig_file, nominal_run
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
-from pvid.settings.weak_q31 import (
-    Rescale,
-    WeakConfigQ31,
-    WeakDesignQ31,
-    WeakFilterQ31,
-    WeakFormatQ31,
-    WeakNoiseQ31,
-)
+from pvid.settings.weak_q31 import Rescale, WeakConfigQ31, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakNoiseQ31
 from pvid.setup.weak_sizes import sizes_of_q31
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.weak_q31 import WeakTwinQ31
@@ -101,6 +96,7 @@ class MechanismBoardQ31:
         """As MechanismBoard.of_rig_file."""
         made = nominal_run(rig)
         engine = fixed_engine(made.compiled, made.run, made.design, made.p)
+        engine = with_neglected(engine, neglected_part(made.compiled, made.run))
         return cls(rig, engine, _nothing(len(engine.lsb)))
 
     def __post_init__(self) -> None:
@@ -254,7 +250,9 @@ class MechanismBoardQ31:
         design = part("design")
         kinds = {"filter": _filter, "run": _rescale, "format": _format, "noise": _noise}
         design |= {key: tuple(make(one) for one in design[key]) for key, make in kinds.items()}
-        tables = WeakDesignQ31(model=made.model, circle=circle_of(design["hop"]), units=(), margins={}, **design)
+        highest = design["functions"] // 2 + design["power"] // 2
+        circle = circle_of(design["hop"], highest, design["fine"])
+        tables = WeakDesignQ31(model=made.model, circle=circle, units=(), margins={}, **design)
         config = WeakConfigQ31(
             design=tables,
             estimator=EstimatorConfigQ31(**part("estimator")),
@@ -326,8 +324,7 @@ def _written(value: Any) -> str:
         case str():
             return f'"{value}"'
         case WeakFilterQ31():
-            one = value.rescale
-            return _written([value.bits, one.down, one.shift, one.multiplier, *value.weights.tolist()])
+            return _written([value.half, value.down, *value.weights.tolist()])
         case Rescale() | WeakFormatQ31():
             return _written([getattr(value, one.name) for one in fields(value)])
         case WeakNoiseQ31():
@@ -346,8 +343,8 @@ def _tuples(value: Any) -> Any:
 
 
 def _filter(given: tuple[int, ...]) -> WeakFilterQ31:
-    bits, down, shift, multiplier, *weights = given
-    return WeakFilterQ31(np.array(weights, np.int32), bits, Rescale(down, shift, multiplier))
+    half, down, *weights = given
+    return WeakFilterQ31(half, down, np.array(weights, np.int32))
 
 
 def _rescale(given: tuple[int, ...]) -> Rescale:

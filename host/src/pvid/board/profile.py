@@ -12,7 +12,9 @@ from pathlib import Path
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
 from pvid.board.engine_image import engine_image
+from pvid.board.refined_image import build_refined_image
 from pvid.board.replay_image import build_image, parse_report, standard_run
+from pvid.board.sizes import refined_replay
 from pvid.core.sources import ROOT
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Form
@@ -53,7 +55,7 @@ def _symbols(board: Board, image: Path) -> list[_Symbol]:
     command = [f"{board.tool_prefix}nm", "--line-numbers", "--print-size", "--defined-only", str(image)]
     listing = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     entry = re.compile(r"^([0-9a-f]+) ([0-9a-f]+) [tTwW] (\S+)(?:\t(\S+):\d+)?$", re.MULTILINE)
-    sizes = re.compile(r"_window\d+_theta\d+_p\d+_\w+_enum\d+")  # what the linker's names hold of pvid/config.h
+    sizes = re.compile(r"(_model0x\w{8}u)?_window\d+_theta\d+_p\d+_\w+_enum\d+")  # of pvid/sized.h
     return sorted(
         (
             _Symbol(int(start, 16), int(size, 16), sizes.sub("", name), Path(file or "compiler").name)
@@ -92,6 +94,18 @@ def profile(board: Board, form: Form, core: Core = "f32", model: str = DEFAULT) 
         When the board's emulator is not QEMU or takes no plugins, something does not build, or the image fails.
     """
     return _counted(board, *_PLAYED[form](board, core, model))
+
+
+def refined(board: Board) -> Profile:
+    """Of both stages of the pendulum, the ticks behind the first estimate of the second one.
+
+    Raises
+    ------
+    PvidError
+        As `profile`.
+    """
+    run = refined_replay(board)
+    return _counted(board, build_refined_image(board, run)[0], "pvid_weak_step_f32", run.weak.measure_from)
 
 
 def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:

@@ -167,13 +167,13 @@ def _engine(image: Path, tree: Path, name: str) -> _Built:
 
 
 @cache
-def refined_replay() -> RefinedRun:
-    """What the images of the refinement play."""
-    return refined_pendulum(REFINED_TICKS)
+def refined_replay(board: Board) -> RefinedRun:
+    """What the image of the refinement plays on a board."""
+    return refined_pendulum(REFINED_TICKS, board)
 
 
 def _refined(configuration: Configuration) -> _Built:
-    run = refined_replay()
+    run = refined_replay(configuration.board)
     return _engine(*build_refined_image(configuration.board, run), run.weak.name)
 
 

@@ -19,6 +19,7 @@ _TRANSFER = re.compile(
     r"^(b|bl|blx|bx|b[a-z]{2,3}(\.[nw])?|b\.[nw]|cbn?z|j|jr|jal|jalr|e?i?r?call|e?i?r?jmp|br[a-z]{2})$"
 )
 _TARGET = re.compile(r"\b(?:0x)?([0-9a-f]+) <[^+>]+(?:\+0x([0-9a-f]+))?>")
+_CLONE = re.compile(r"\.\d+")  # in a symbol, not in the compiler's record: work.constprop.0
 _RETURN = re.compile(r"^(lr|ra)$")
 _POINTER_CALLS = {"blx", "bx", "jr", "jalr", "icall", "eicall", "ijmp", "eijmp"}
 
@@ -67,8 +68,8 @@ def _pushed(mnemonic: str, operands: str) -> int:
         return int(down.group(1)) if mnemonic in ("sub", "sub.w", "subw") else 0
     if down := re.search(r", \[sp, #-(\d+)\]!", operands):
         return int(down.group(1))
-    if down := re.match(r"^sp,sp,-(\d+)$", operands):
-        return int(down.group(1)) if mnemonic == "addi" else 0
+    if down := re.match(r"^sp,sp,-(\d+)\b", operands):  # an alias of addi for some binutils; a comment may follow
+        return int(down.group(1)) if mnemonic in ("add", "addi") else 0
     return 0
 
 
@@ -185,7 +186,8 @@ def stack_bound(tool_prefix: str, image: Path, tree: Path, entry: str) -> int:
 
     def deepest(at: int, callers: tuple[int, ...]) -> int:
         name = functions[at].name
-        compiled = frames.get(name, frames.get(name.split(".")[0]))  # a part split off has a frame of its own
+        part = _CLONE.sub("", name)  # a part split off, or a copy, has a frame of its own
+        compiled = frames.get(name, frames.get(part, frames.get(name.split(".")[0])))
         if compiled is None:
             return arithmetic(at, set())
         if at in callers:

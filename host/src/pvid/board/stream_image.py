@@ -84,6 +84,7 @@ class StreamImage:
     identifier : firmware/apps/stream/identifier_<identifier>.c
     sensor : a file of firmware/apps/stream
     sizes : PVID_MAX_ macro -> value
+    refined : with the second stage, whose refine_model_f32.h and pvid/refine_shape.h are among the files
     """
 
     number: int
@@ -94,12 +95,18 @@ class StreamImage:
     identifier: str
     sensor: str
     sizes: dict[str, str]
+    refined: bool = False
 
     @property
     def headers(self) -> dict[str, str]:
         """All files, stream_rig.h among them."""
         told = f"#define STREAM_SETTINGS 0x{self.number:08X}u /* CRC-32 of what the bits depend on */"
         return {"stream_rig.h": _guarded("STREAM_RIG_H", [told, *self.macros]), **self.files}
+
+    @property
+    def left_out(self) -> str:
+        """What of the core is not linked."""
+        return left_out(self.form, self.core, *(["refine"] if self.refined else []))
 
 
 class Streamed(Protocol):
@@ -154,14 +161,16 @@ def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
     name = f"stream-{zlib.crc32(repr(sorted(files.items())).encode()):08x}"
     folder = BUILD / "runs" / name
     for file, text in files.items():
-        keep_header(folder, file, text)
+        keep_header((folder / file).parent, Path(file).name, text)
     if board is None:
         tree = BUILD / f"{HOST}-{name}"
         with one_at_a_time(tree):
             return _build_for_host(image, folder, tree)
     options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": image.identifier, **image.sizes}
     options["PVID_STREAM_SENSOR"] = image.sensor
-    options["PVID_LEAVE_OUT"] = left_out(image.form, image.core)
+    options["PVID_LEAVE_OUT"] = image.left_out
+    if image.refined:
+        options["PVID_REFINE_MODEL"] = str(folder)
     tree = build(board, BUILD / f"{board.name}-{name}", options)
     return tree / "apps" / "stream" / "stream.elf"
 
@@ -169,9 +178,9 @@ def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
 def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
     """With the options of the core (firmware/cmake/PvidCompile.cmake); without what it does not link."""
     application = FIRMWARE / "apps" / "stream"
-    needless = re.compile(left_out(made.form, made.core))
+    needless = re.compile(made.left_out)
+    core = [path for path in core_sources() if not needless.search(path.as_posix())]
     sources = [
-        *(path for path in core_sources() if not needless.search(path.as_posix())),
         FIRMWARE / "link" / "link.c",
         FIRMWARE / "ports" / "host" / "port.c",
         FIRMWARE / "ports" / "host" / "receiver.c",
@@ -179,14 +188,17 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
         *(folder / name for name in sorted(made.files) if name.endswith(".c")),
     ]
     image = tree / "stream"
-    inputs = [*sources, *folder.glob("*.h"), *FIRMWARE.glob("**/*.h")]
+    inputs = [*core, *sources, *folder.glob("**/*.h"), *FIRMWARE.glob("**/*.h")]
     if image.exists() and image.stat().st_mtime > max(one.stat().st_mtime for one in inputs):
         return image
-    includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports", folder]
+    includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports"]
     options = ["-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
     options += [f"-D{name}={value}" for name, value in made.sizes.items()] + [f"-I{one}" for one in includes]
     tree.mkdir(parents=True, exist_ok=True)
-    objects = objects_of("gcc", options, sources, tree)
+    own = [f"-I{folder}", *options]
+    # The same of every rig with these sizes, but for the second stage, whose shape stands before the core's header.
+    objects = objects_of("gcc", own if made.refined else options, core, tree)
+    objects += objects_of("gcc", own, sources, tree)
     fresh = tree / "stream.new"
     run_compiler(["gcc", *objects, "-lm", "-o", str(fresh)])
     fresh.replace(image)

@@ -8,7 +8,7 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.compare_on import Outcome
 from pvid.board.mechanism_image import build_with
-from pvid.board.replay_image import REPORT_EVERY, play
+from pvid.board.replay_image import REPORT_EVERY, ReplayReport, play
 from pvid.codegen import files_strong_design
 from pvid.codegen.strong_library import sizes_of_strong, strong_texts
 from pvid.run.strong_compare import StrongComparison
@@ -65,8 +65,8 @@ def header(design: StrongDesign) -> str:
     )
 
 
-def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:
-    """Builds the image of a recording for an emulated board, runs it, and compares every hash that it reports.
+def play_on_board(target: str, run: StrongComparison) -> ReplayReport:
+    """Builds the image of a recording for an emulated board and runs it.
 
     Raises
     ------
@@ -86,11 +86,29 @@ def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:
     }
     sizes = sizes_of_strong(design.strong, design.config)
     image, _ = build_with(board, f"{name}-f32-{ticks}", files, sizes, "f32", "strong")
-    report = play(board, image, _START_S + _SECONDS_A_TICK * ticks)
+    return play(board, image, _START_S + _SECONDS_A_TICK * ticks)
+
+
+def differs_at(report: ReplayReport, run: StrongComparison) -> int | None:
+    """The first tick whose hash is not that of this machine; None: there is none."""
     apart = [at for at, hashed in report.hashes.items() if hashed != int(run.hashes[at - 1])]
-    equal = not apart and report.hash == run.found.core_hash
-    verdict = "equal" if equal else f"DIFFERENT: hash at tick {apart[0] if apart else report.ticks}"
-    return Outcome(target, "f32", "strong", law, report.ticks, report.hash, equal, verdict)
+    if report.hash != run.found.core_hash:
+        apart.append(report.ticks)
+    return apart[0] if apart else None
+
+
+def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:
+    """Runs a recording on an emulated board and compares every hash that it reports.
+
+    Raises
+    ------
+    PvidError
+        As play_on_board.
+    """
+    report = play_on_board(target, run)
+    apart = differs_at(report, run)
+    verdict = "equal" if apart is None else f"DIFFERENT: hash at tick {apart}"
+    return Outcome(target, "f32", "strong", law, report.ticks, report.hash, apart is None, verdict)
 
 
 def _board(target: str) -> Board:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from pvid.settings.engine_cores import ENGINE_CORES, FIXED, FLOAT
 if TYPE_CHECKING:
     from pvid.deploy.deployment import Deployment
     from pvid.settings.enums import Core
+    from pvid.settings.refine import RefineConfig
 
 _DEFAULT = FLOAT.name
 _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "amalgamation")
@@ -81,18 +83,32 @@ def _deployment(
 ) -> Deployment:
     from pvid.deploy.of_rig import deployment_f32, deployment_q31
     from pvid.models.mechanisms import names as names_of_shipped
-    from pvid.run.engine_design import config_for_recording, config_for_simulated_rig, simulated_run_of
-    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
+    from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
+    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_rig_like_the_shipped
+    from pvid.run.refine_design import full_motion_of, refine_design, refine_for_simulated_rig
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     if run_path is not None:
         recording = recorded(compiled, rig, run_path, columns)
         if is_integer:
             return deployment_q31(engine_for_recording(compiled, recording, functions), recording.signals, title)
-        return deployment_f32(compiled, config_for_recording(compiled, recording, functions), recording.signals, title)
+        config = config_for_recording(compiled, recording, functions)
+        refine = _noted(lambda: refine_design(compiled, config, recording.signals))
+        return deployment_f32(compiled, config, recording.signals, title, refine)
     if model not in names_of_shipped():
         raise PvidError(f"{model} has no shipped rig to make a design for: give a recording of yours with --run")
     run = simulated_run_of(compiled)[0]
     if is_integer:
-        return deployment_q31(engine_for_simulated_rig(compiled, functions), run, title)
-    return deployment_f32(compiled, config_for_simulated_rig(compiled, functions), run, title)
+        return deployment_q31(engine_for_rig_like_the_shipped(compiled, functions), run, title)
+    config = config_for_rig_like_the_shipped(compiled, functions)
+    refine = _noted(lambda: refine_for_simulated_rig(compiled, config))
+    return deployment_f32(compiled, config, full_motion_of(compiled), title, refine)
+
+
+def _noted(made: Callable[[], RefineConfig]) -> RefineConfig | None:
+    """Settings of the second stage; None, with a note on the reason, where a board cannot have it."""
+    try:
+        return made()
+    except PvidError as error:
+        write_stderr(f"note: no second stage: {error}")
+        return None

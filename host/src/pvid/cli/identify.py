@@ -16,9 +16,12 @@ from pvid.cli.result import print_result, print_warning, write_figure, write_ref
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
+from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.advised import identified
+from pvid.settings.engine_cores import FLOAT
 
 
 @click.command(name="identify")
@@ -35,8 +38,8 @@ from pvid.run.advised import identified
 @click.option(
     "--refine/--no-refine",
     default=None,
-    help="Fit the full equations to the whole run, from this answer on, in float64: any angle, friction, skew.  "
-    "[default: of the pendulum's weak form]",
+    help="Fit the full equations to the whole run, from this answer on: any angle, friction, skew. In float64, or with "
+    "--core f32 by the second stage in C.  [default: of the pendulum's weak form, in float64]",
 )
 @click.option(
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
@@ -66,16 +69,21 @@ def command(
     With --model, or a rig file with [model], the run is one of another mechanism (host/docs/models.md): its columns are
     t and the signals of the model. It is identified in float64; with --core f32 also by the C core, compiled for it.
 
-    The refinement fits the full equations to the whole run. Its answer replaces that of the weak form where its
-    residuals are those of the sensors' noise; the last line says which it is and why. --figure shows the measured
+    The refinement fits the full equations to the whole run. In float64 its answer replaces that of the weak form where
+    its residuals are those of the sensors' noise; the last line says which it is and why. With --core f32 --refine it
+    is the second stage of the C core, as on a board, and the answer is its last estimate. --figure shows the measured
     signals against the simulated.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
-    reported tick and at the end. It is then the answer of the target's form, without the refinement.
+    reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both
+    stages.
     """
-    if refine and target is not None:
-        raise PvidError("--refine is in float64 on this computer: omit --on")
-    described = mechanism_rig(run_path, rig_path, settings, model)
+    if refine and target is not None and core != FLOAT.name:
+        raise PvidError(f"the refinement on a target is in float32: --on {target} --refine --core {FLOAT.name}")
+    described: MechanismRig | RigFile | None = mechanism_rig(run_path, rig_path, settings, model)
+    if described is None and refine and core == FLOAT.name:
+        own = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
+        described, law = (own, None) if own.identifier.form_traits.publishes else (None, law)
     if described is not None:
         from pvid.cli.mechanism import identify_run  # loads SymPy
 

@@ -58,6 +58,11 @@ if TYPE_CHECKING:
     type=click.Choice(("f32", "q31")),
     help="Arithmetic of a described mechanism's board.  [default: f32]",
 )
+@click.option(
+    "--refine",
+    is_flag=True,
+    help="The board fits the full equations behind the weak form, in float32 (pvid/refine.h).",
+)
 @click.option("--append", is_flag=True, help="Append to an existing log.")
 @click.option("--restart", is_flag=True, help="Restart the board on every (re)connection (needs --rig).")
 @click.option("--paced", is_flag=True, help="Sample as fast as the line allows instead of in real time.")
@@ -93,6 +98,7 @@ def command(
     model: str | None,
     run_path: Path | None,
     core: str | None,
+    refine: bool,
     append: bool,
     restart: bool,
     paced: bool,
@@ -115,13 +121,15 @@ def command(
     On a terminal the estimates are shown as they arrive; otherwise a status line is printed every 10 s.
     """
     emulated = port in (HOST_TARGET, *EMULATORS)
-    described = _described(rig_path, model, run_path, core)
+    described = _described(rig_path, model, run_path, core, refine)
     rig = None if rig_path is None or described is not None else load(rig_path)
     if emulated and rig is None and described is None:
         rig = RigFile.standard()
     if restart and rig is None and described is None:
         raise PvidError("--restart needs --rig: the board is restarted with its settings")
-    board = described or (None if rig is None else _board(rig))
+    if refine and rig is None and described is None:
+        raise PvidError("--refine is for a board that is started here: name its rig file with --rig")
+    board = described or (None if rig is None else _board(rig, refine))
     kept = rig if board is None or isinstance(board, StreamRig) else board
     text = None if kept is None else kept.text()
     if append:
@@ -170,37 +178,45 @@ def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
 
 
 def _described(
-    rig_path: Path | None, model: str | None, run_path: Path | None, core: str | None
+    rig_path: Path | None, model: str | None, run_path: Path | None, core: str | None, refine: bool
 ) -> MechanismBoard | MechanismBoardQ31 | None:
     """The board of a described mechanism; None: it is one of the library's."""
     described = mechanism_rig(run_path, rig_path, (), model)
     if described is None:
         if run_path is not None:
             raise PvidError("--run is for a described mechanism: name it with --model, or in the rig file")
-        if core is None:
+        if core is None and (model is None or not refine):
             return None
-        if model is None or rig_path is not None:
+        if core is not None and (model is None or rig_path is not None):
             raise PvidError("--core is for a mechanism that --model names: a rig file sets that of the pendulum")
-    from pvid.board.mechanism_board import BOARDS  # loads SymPy
+    from pvid.board.mechanism_board import BOARDS, MechanismBoard, refuse_unrefined  # loads SymPy
     from pvid.run.mechanism import model_of
 
     made = BOARDS[core or "f32"]
-    if described is None:
-        return made.of_shipped_rig(model or "")
+    if refine:
+        refuse_unrefined(core or "f32")
     if run_path is None and rig_path is None:
-        return made.of_shipped_rig(described.model)
+        name = model or "" if described is None else described.model
+        return MechanismBoard.of_shipped_rig(name, refined=True) if refine else made.of_shipped_rig(name)
+    if described is None:
+        return None
     if run_path is None:
         raise PvidError(f"{described.model}: name a recording of it with --run, from which the board's design is made")
     columns = parsed(None, channels_of(model_of(described)))
-    return made.of_recording(described, read_recording(run_path, described.sample_rate, columns))
+    recording = read_recording(run_path, described.sample_rate, columns)
+    if refine:
+        return MechanismBoard.of_recording(described, recording, refined=True)
+    return made.of_recording(described, recording)
 
 
-def _board(rig: RigFile) -> StreamRig | MechanismBoard | MechanismBoardQ31:
+def _board(rig: RigFile, refine: bool) -> StreamRig | MechanismBoard | MechanismBoardQ31:
     """Of the weak form by the engine, whose design is made for the guess of the rig file."""
     if rig.identifier.form_traits.publishes:
         from pvid.board.mechanism_board import board_of_rig_file  # loads SymPy
 
-        return board_of_rig_file(rig)
+        return board_of_rig_file(rig, refine)
+    if refine:
+        raise PvidError("--refine is behind the weak form: the rig file has form strong")
     if rig.sample_rate is None:
         raise PvidError("sample_rate is required in the rig file: the board samples on its own clock")
     return stream_rig(rig, rig.sample_rate)

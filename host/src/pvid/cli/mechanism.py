@@ -25,6 +25,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, is_run, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
+from pvid.run.compare import Comparison
 from pvid.run.engine_identify import ALL_ALIKE
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
@@ -110,12 +111,14 @@ def identify_run(
     in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
     if weights != "residuals" and in_c:
         raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
-    if refine and in_c:
-        raise PvidError(f"--refine is in float64; omit --core {in_c.name}")
+    if refine and in_c and in_c is not FLOAT:
+        raise PvidError(f"--refine is in float32 and float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
-    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name):
+    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     answer = identify_mechanism(recording, model, weights)
+    if refine and in_c:
+        return _refined_in_c(answer, as_json=as_json, figure=figure, on=on)
     if refine:
         return _refined(answer, as_json=as_json, figure=figure)
     core: CoreAnswer | None = None
@@ -185,13 +188,13 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
     return core
 
 
-def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core) -> bool:
+def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core, refined: bool) -> bool:
     """Streams a recording to a target and prints the account; whether every hash is that of this machine."""
     from pvid.board.engine_board import verify_recording
 
     own = described(rig) if isinstance(rig, RigFile) else rig
     with progress_bar(f"streaming to {target}", len(recording)) as advance:
-        verdict = verify_recording(target, own, recording, core, advance)
+        verdict = verify_recording(target, own, recording, core, advance, refined=refined)
     write_stderr(f"{target}: {verdict.playback.account}")
     if not verdict.equal:
         write_stderr(f"pvid: {target}: {verdict.text}")
@@ -203,18 +206,41 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
     from pvid.cli.result import write_refined_figure
     from pvid.run.refined_mechanism import refined_answer
 
-    answer, refined, text = refined_answer(answer)
+    weak = answer
+    answer, refined, text = refined_answer(weak)
     if as_json:
         found = None if refined is None else refined.found
         shown = None if found is None else {"chi2": found.chi2, "slow_chi2": found.slow_chi2}
         click.echo(json.dumps({**answer.as_json(), "refinement": {"text": text, **(shown or {})}}))
     else:
-        _print(answer)
+        _print(answer, "weak form" if answer is weak else "refined")
         click.echo(text)
     if figure is not None and refined is not None:
         write_refined_figure(refined, figure)
     if not answer.identified:
         write_stderr("pvid: nothing identified")
+        return NOTHING_IDENTIFIED
+    return DONE
+
+
+def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None, on: str | None) -> int:
+    """Identifies by both stages in C and prints the refined estimate, or that of the first stage."""
+    from pvid.run.refined_core import refined_in_c
+
+    if figure is not None:
+        raise PvidError("--figure is of a refinement in float64; omit --core f32")
+    found = refined_in_c(answer)
+    if as_json:
+        click.echo(json.dumps(found.as_json() | ({} if on is None else {"on": on})))
+    else:
+        if found.identified:
+            stage = "refined" if found.adopted else "weak form"
+            _table(found.values, f"{answer.model.title}: {stage}, C in {FLOAT.words}")
+        click.echo(f"{found.text}; hash of both stages {found.hash:08x}")
+    for one in () if found.adopted else found.weak.verdict.reasons:
+        write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
+    if not found.identified:
+        write_stderr(f"pvid: nothing identified: {found.weak.reason.text}")
         return NOTHING_IDENTIFIED
     return DONE
 
@@ -226,8 +252,8 @@ def compare_recording(
     targets: Sequence[str] = (),
     **given: str | None,
 ) -> list[Outcome]:
-    """The C core against its twin on a recording of a described mechanism, in float32 by default; then targets against
-    the C core.
+    """The C core against its twin on a recording of a described mechanism, in float32 by default, with the second stage
+    where a board has it; then targets against the C core, which stream the first stage alone.
 
     Parameters
     ----------
@@ -236,6 +262,7 @@ def compare_recording(
     """
     from pvid.board.engine_board import verify_recording
     from pvid.run.mechanism_compare import compare_recording as compared
+    from pvid.run.refined_core import compare_both
 
     if given.get("form") == _STRONG:
         return _compared_strong(path, rig, columns, targets, given)
@@ -251,15 +278,26 @@ def compare_recording(
     chosen = given.get("core") or FLOAT.name
     for core in [one.name for one in ENGINE_CORES.values() if chosen in (one.name, "all")]:
         with progress_bar(core, len(recording)) as advance:
-            found = compared(model, recording, core, advance)
-        verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
-        outcomes.append(Outcome("host", core, "weak", "stationary", found.ticks, found.core_hash, found.equal, verdict))
+            if core == FLOAT.name:
+                found, second = compare_both(model, recording, advance)
+            else:
+                found, second = compared(model, recording, core, advance), None
+        outcomes.append(_compared("weak", core, found))
+        if isinstance(second, Comparison):
+            outcomes.append(_compared("refined", core, second))
+        elif second is not None:
+            write_stderr(f"pvid: note: no second stage: {second}")
         for target in targets:
             with progress_bar(f"{core} on {target}", len(recording)) as advance:
                 there = verify_recording(target, own, recording, core, advance)
             ticks, last = there.playback.done, there.playback.hash
             outcomes.append(Outcome(target, core, "weak", "stationary", ticks, last, there.equal, there.text))
     return outcomes
+
+
+def _compared(form: str, core: Core, found: Comparison) -> Outcome:
+    verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
+    return Outcome("host", core, form, "stationary", found.ticks, found.core_hash, found.equal, verdict)
 
 
 def _compared_strong(
@@ -289,10 +327,10 @@ def _compared_strong(
     return outcomes
 
 
-def _print(answer: MechanismAnswer) -> None:
+def _print(answer: MechanismAnswer, stage: str = "weak form") -> None:
     found = answer.found
     if answer.identified:
-        _table(answer.values, f"{answer.model.title}: weak form, float64")
+        _table(answer.values, f"{answer.model.title}: {stage}, float64")
     explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
     click.echo(
         f"status {found.verdict.status}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "

@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.models.simulated_rig import SimulatedRig
     from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
+    from pvid.settings.refine import RefineConfig
     from pvid.settings.weak import WeakConfig
 
 _MODEL = click.argument("model", metavar="MODEL")
@@ -161,7 +162,8 @@ def build(
     In the CMakeLists.txt of your firmware: add_subdirectory(OUT) and target_link_libraries(my_firmware PRIVATE NAME).
 
     NAME_design_f32.h has the tables and settings of the weak form for the rig of --run, or for the shipped rig of a
-    shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point. With --strong,
+    shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point. NAME_refine_design_f32.h has the
+    settings of the second stage, which fits the full equations (host/docs/firmware.md). With --strong,
     NAME_strong_design_f32.h has the differentiators and settings of the strong form.
     """
     from pvid.codegen import build as generated
@@ -185,7 +187,10 @@ def build(
     if design is not None:
         fixed_weak, no_fixed_weak = _fixed_weak(compiled, rig, run_path, columns, functions, soft, title)
     strong_design = _strong_design_of(compiled, rig, model, run_path, columns) if strong else None
-    options = generated.Options(limits, soft, strong, design, fixed_weak, strong_design)
+    refine_design, no_refinement = None, generated.refine_refusal(compiled)
+    if design is not None and no_refinement is None:
+        refine_design, no_refinement = _refine_design_of(compiled, rig, run_path, columns, design, soft)
+    options = generated.Options(limits, soft, strong, design, fixed_weak, strong_design, refine_design)
     if not only_check:
         for path in generated.build(compiled, out, title, options):
             click.echo(path)
@@ -197,6 +202,8 @@ def build(
             write_stderr(f"pvid: no weak form in C: {reason}")
         if no_fixed_weak is not None:
             write_stderr(f"pvid: no weak form in fixed point: {no_fixed_weak}")
+        if no_refinement is not None:
+            write_stderr(f"pvid: no refinement in C: {no_refinement}")
         if reason is None and design is None:
             write_stderr("pvid: no design of a rig: give a recording of it with --run")
         return DONE
@@ -311,6 +318,26 @@ def _strong_design_of(
     return strong_design(compiled, Recording(run["t"], signals, simulation.rig.sample_rate)).config
 
 
+def _refine_design_of(
+    compiled: CompiledModel,
+    rig: MechanismRig | RigFile | None,
+    run_path: Path | None,
+    columns: str | None,
+    design: WeakConfig,
+    soft_signs: dict[str, float],
+) -> tuple[RefineConfig | None, str | None]:
+    """Of the refinement behind the weak form, or why there is none."""
+    from pvid.run.refine_design import refine_design, refine_for_simulated_rig
+
+    try:
+        if run_path is not None:
+            recording = recorded(compiled, rig, run_path, columns)
+            return refine_design(compiled, design, recording.signals, soft_signs=soft_signs), None
+        return refine_for_simulated_rig(compiled, design, soft_signs), None
+    except PvidError as error:
+        return None, str(error)
+
+
 def _design_of(
     compiled: CompiledModel,
     rig: MechanismRig | RigFile | None,
@@ -321,7 +348,7 @@ def _design_of(
 ) -> WeakConfig | None:
     from pvid.codegen.build import weak_refusal
     from pvid.models.mechanisms import names as names_of_shipped
-    from pvid.run.engine_design import config_for_recording, config_for_simulated_rig
+    from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped
 
     if columns is not None and run_path is None:
         raise PvidError("--columns needs --run")
@@ -330,7 +357,7 @@ def _design_of(
     if run_path is not None:
         return config_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions)
     if model in names_of_shipped():
-        return config_for_simulated_rig(compiled, functions)
+        return config_for_rig_like_the_shipped(compiled, functions)
     if functions is not None:
         raise PvidError("--functions needs --run: there is no rig to make a design for")
     return None
@@ -346,12 +373,12 @@ def _fixed_weak(
     title: str,
 ) -> tuple[dict[str, str], str | None]:
     """Files of the fixed-point weak form, or why there are none."""
-    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_simulated_rig
+    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_rig_like_the_shipped
     from pvid.run.engine_files_q31 import config_of, files_of
 
     try:
         if run_path is None:
-            engine = engine_for_simulated_rig(compiled, functions, soft_signs)
+            engine = engine_for_rig_like_the_shipped(compiled, functions, soft_signs)
         else:
             engine = engine_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions, soft_signs)
     except PvidError as error:

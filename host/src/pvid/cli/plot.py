@@ -8,7 +8,7 @@ import click
 
 from pvid.base.console import DONE
 from pvid.cli.input import FigurePath, columns_option, print_notes, rig_options
-from pvid.log.rig import LOG_SUFFIX, mechanism_of_log
+from pvid.log.rig import LOG_SUFFIX, described_document_of_log, mechanism_of_log
 from pvid.log.rig_settings import rig_for
 from pvid.models.registry import MODELS
 from pvid.rig.columns import parsed
@@ -23,12 +23,12 @@ from pvid.rig.run import is_run
 def command(log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: str | None, out: Path | None) -> int:
     """Draws a report of a LOG: convergence, residuals and their autocorrelation, spectra, phase plot.
 
-    A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first. Of a log of
-    another mechanism than kapitza the estimates are drawn under the names that the board gave.
+    A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first. Of the log of a
+    described mechanism the estimates are drawn under the names that the board gave.
     """
     if rig_path is None and not is_run(log) and log.suffix == LOG_SUFFIX:
         mechanism = mechanism_of_log(log)
-        if mechanism.model.name not in MODELS:
+        if mechanism.model.name not in MODELS or described_document_of_log(log) is not None:
             from pvid.show.log_figure import write_log_figure
 
             out = out or log.with_suffix(".png")

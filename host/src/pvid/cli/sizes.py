@@ -53,7 +53,8 @@ def command(
 
         on = boards.board(profiled)
         profiles = {name: profile.profile(on, "weak", core or "f32", name) for name in models} or {
-            form: profile.profile(on, form) for form in FORMS
+            **{form: profile.profile(on, form) for form in FORMS},
+            sizes.REFINED: profile.refined(on),
         }
         put_table(update, "profile", markdown(profile.HEADER, profile.table_rows(profiles)))
         return DONE

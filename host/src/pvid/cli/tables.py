@@ -31,7 +31,7 @@ _FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1, "block": 
 @click.option("--points", type=int, help="fir: points of the Savitzky-Golay window, odd.  [default: 241]")
 @click.option("--degree", type=int, help="fir: degree of its polynomial, 4 to 12.  [default: 12]")
 @click.option("--difference", is_flag=True, default=None, help="fir: five-point central differences instead.")
-@click.option("--stride", type=int, help="fir: samples between points.  [default: 1]")
+@click.option("--stride", type=int, help="fir: points from tap to tap.  [default: 1]")
 @click.option("--block", type=int, help="fir: samples whose mean is a point, odd.  [default: 1]")
 def command(
     form: str,

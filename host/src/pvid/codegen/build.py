@@ -14,6 +14,7 @@ from pvid.codegen import (
     files_f32,
     files_q31,
     files_refine,
+    files_refine_design,
     files_strong,
     files_strong_design,
     files_weak,
@@ -34,6 +35,7 @@ from pvid.codegen.weak_twin import weak_model_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
+from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak import with_soft_signs
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
@@ -73,6 +75,17 @@ if({upper}_WEAK AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_weak_f32.c)
   target_sources({name} PRIVATE {name}_weak_f32.c)
 endif()
 
+# {name}_refine_design_f32.h, the second stage (pvid/refine.h): compiles pvid itself with the equations of {name}.
+option({upper}_REFINE "Compile pvid with the refinement of {name}" OFF)
+if({upper}_REFINE AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/refine_model_f32.h)
+  get_target_property({name}_pvid pvid::pvid ALIASED_TARGET)
+  if(NOT {name}_pvid)
+    message(FATAL_ERROR "{upper}_REFINE needs the sources of pvid: add_subdirectory or FetchContent, not find_package")
+  endif()
+  target_include_directories(${{{name}_pvid}} BEFORE PUBLIC $<BUILD_INTERFACE:${{CMAKE_CURRENT_SOURCE_DIR}}>)
+  target_compile_definitions(${{{name}_pvid}} PUBLIC PVID_REFINEMENT=1)
+endif()
+
 {fixed_weak}# The generated functions against the bits of their twin: ctest.
 option({upper}_TEST "Build the test of {name}" ${{PROJECT_IS_TOP_LEVEL}})
 if({upper}_TEST)
@@ -106,6 +119,7 @@ class Options:
     design : of the weak form for a rig; None: no NAME_design_f32.h
     fixed_weak : files of the fixed-point weak form for a rig, name -> text (pvid.run.engine_files_q31)
     strong_design : settings of the strong form for a rig; None: no NAME_strong_design_f32.h
+    refine_design : settings of the refinement for a rig; None: no NAME_refine_design_f32.h
     """
 
     reaches: Reaches = field(default_factory=Reaches)
@@ -114,6 +128,7 @@ class Options:
     design: WeakConfig | None = None
     fixed_weak: Mapping[str, str] = field(default_factory=dict)
     strong_design: StrongModelConfig | None = None
+    refine_design: RefineConfig | None = None
 
 
 def files_of(compiled: CompiledModel, command: str, options: Options | None = None) -> dict[str, str]:
@@ -153,6 +168,8 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
         files["pvid/refine_shape.h"] = files_refine.shape(refined, command)
         files["refine_model_f32.h"] = files_refine.header(refined, command)
         files[f"{name}_refine_twin.py"] = refine_twin.text(refined, command)
+        if chosen.refine_design is not None:
+            files[f"{name}_refine_design_f32.h"] = files_refine_design.header(refined, chosen.refine_design, command)
     files[f"{name}_twin.py"] = twin_file.text(functions, command, fixed)
     files[f"{name}_test.c"] = self_test.source(functions, command, fixed)
     sources = " ".join(one for one in files if one.endswith(".c") and one not in apart)

@@ -112,6 +112,9 @@ def source(made: WeakFunctions, model: WeakModel, command: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+_FORM = "static void form(const float *restrict gain, const float *restrict integral, float t, float *restrict channel)"
+
+
 def _form(model: WeakModel) -> str:
     """The function that makes the channels of a step."""
     square = "half_square"
@@ -132,7 +135,7 @@ def _form(model: WeakModel) -> str:
     ]
     return "\n".join(
         [
-            "static void form(const float gain[], const float integral[], float t, float channel[])",
+            _FORM,
             "{",
             *unused,
             *first,

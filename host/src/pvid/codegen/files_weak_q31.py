@@ -12,7 +12,7 @@ from pvid.codegen.parameters_q31 import ParametersQ31, c_parameters
 from pvid.codegen.weak_q31 import FixedWeak, c_functions
 from pvid.core.sizes import smallest
 from pvid.settings.weak import NONE
-from pvid.settings.weak_q31 import Rescale, WeakConfigQ31, WeakDesignQ31
+from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
 
 _WIDTH = 12  # numbers a line
 
@@ -172,18 +172,13 @@ def _model(made: FixedWeak, prefix: str) -> list[str]:
     ]
 
 
-def _rescale(one: Rescale) -> str:
-    return f"{{{one.down}, {one.shift}, {one.multiplier}}}"
-
-
 def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
     parts, filters = [], []
     for k, one in enumerate(design.filter):
-        weights = f"{prefix}_weights_{k}" if one.half else "NULL"
-        if one.half:
-            parts.append(_numbers("PVID_TABLE int32_t", weights, one.weights))
-        filters.append((one.half, one.bits, _rescale(one.rescale), weights))
-    formats = [(one.value, one.own, one.plain, one.ramp) for one in design.format]
+        weights = f"{prefix}_weights_{k}"
+        parts.append(_numbers("PVID_TABLE int32_t", weights, one.weights))
+        filters.append((one.half, one.down, weights))
+    formats = [(one.value, one.lift, one.own, one.plain, one.ramp) for one in design.format]
     tables = {
         "full_scale": _numbers("int32_t", f"{prefix}_full_scale", design.full_scale),
         "down": _numbers("uint8_t", f"{prefix}_down", design.down),
@@ -209,6 +204,7 @@ def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
         f"static const pvid_weak_design_q31 {prefix}_design_q31 = {{",
         f"    .model = &{prefix}_weak_q31,",
         *(f"    .{name} = {getattr(design, name)}," for name in sizes),
+        f"    .fine = {'true' if design.fine else 'false'},",
         f"    .n_noise = {len(design.noise)},",
         *(f"    .{name} = {prefix}_{name if text else ''}," for name, text in tables.items() if text),
         "};",

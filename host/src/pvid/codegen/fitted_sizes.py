@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from pvid.codegen.files_f32 import guarded
 from pvid.core.sizes import smallest
-from pvid.settings.weak import NONE, WeakConfig
+from pvid.settings.enums import Law
+from pvid.settings.weak import NONE, WeakChannel, WeakConfig
 from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
+from pvid.twin.q31 import weak_finish
 from pvid.twin.weak import WeakTwin
 
 
@@ -26,20 +28,37 @@ def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]
     fitted = found | {
         "PVID_MAX_WINDOWS": 0 if _shares_place(config) else 1,
         "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
+        "PVID_FEEDBACK": int(config.estimator.law is not Law.STATIONARY or config.estimator.feedback_hz > 0),
+        "PVID_NEGLECTED": int(config.trust.neglected > 0),
         "PVID_REFINEMENT": int(refined),
     }
     if found != needed:
         return fitted
-    counts = ("signals", "jets", "runs", "signs", "integrands")
-    exact = {f"PVID_EXACT_{one.upper()}": int(getattr(model, one)) for one in counts}
-    summed = max(k + 1 for k, one in enumerate(model.channel) if one.gain != NONE)
-    return fitted | {"PVID_CHECK_TABLES": 0, "PVID_EXACT": 1, "PVID_EXACT_CHANNELS": summed} | exact
+    counts = {one: int(getattr(model, one)) for one in ("signals", "jets", "runs", "signs", "gains", "integrands")}
+    exact = _exact(counts, model.channel) | {"PVID_EXACT_PLAIN": int(model.plain)}
+    return fitted | {"PVID_CHECK_TABLES": 0} | exact
+
+
+def _exact(counts: Mapping[str, int], channels: Sequence[WeakChannel]) -> dict[str, int]:
+    """Loops of constant length."""
+    summed = max(k + 1 for k, one in enumerate(channels) if one.gain != NONE)
+    exact = {f"PVID_EXACT_{one.upper()}": count for one, count in counts.items()}
+    return {"PVID_EXACT": 1, "PVID_EXACT_CHANNELS": summed} | exact
 
 
 def fitted_sizes_q31(config: WeakConfigQ31, n_p: int, n_c: int) -> dict[str, int]:
     """The same in fixed point, of a model with n_p parameters and n_c non-zeros of d theta / d p."""
-    parts = {"PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0), "PVID_CHECK_TABLES": 0}
-    return smallest(sizes_of_q31(config.design, n_p, n_c)) | parts
+    model, needed = config.design.model, sizes_of_q31(config.design, n_p, n_c)
+    found = smallest(needed)
+    fitted = found | {
+        "PVID_MAX_WINDOWS": 0 if weak_finish.shares_place(config.design) else 1,
+        "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
+        "PVID_CHECK_TABLES": 0,
+    }
+    if found != needed:
+        return fitted
+    counts = {"signals": len(model.signal), "jets": len(model.jet), "integrands": model.integrands}
+    return fitted | _exact(counts | {"runs": model.runs, "signs": model.signs}, model.channel)
 
 
 def _shares_place(config: WeakConfig) -> bool:

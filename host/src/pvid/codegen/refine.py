@@ -91,6 +91,7 @@ class RefineFunctions:
     constants : what each m is, as text
     settings : further entries of r's array where constants are arguments: widths of signs, knowns
     skew : the last moving entry is that of the sensors
+    measured : of q, and of v of order 2: 1 + 2 output where it is that output, 2 + 2 output: its rate, 0: neither
     functions : by name
     """
 
@@ -106,6 +107,7 @@ class RefineFunctions:
     constants: tuple[str, ...]
     settings: tuple[str, ...]
     skew: bool
+    measured: tuple[int, ...]
     functions: Mapping[str, RefineFunction] = field(repr=False)
 
 
@@ -589,8 +591,14 @@ class _Refine:
             constants=split.texts(r_names),
             settings=tuple(map(str, self.settings)),
             skew=self.skew,
+            measured=self._measured(),
             functions=made,
         )
+
+    def _measured(self) -> tuple[int, ...]:
+        direct = {Jet(name): k for k, name in enumerate(self.outputs) if name not in self.model.refinement.outputs}
+        codes = {jet: 1 + 2 * k for jet, k in direct.items()} | {jet.d(): 2 + 2 * k for jet, k in direct.items()}
+        return tuple(codes.get(one, 0) for one in (*self.q, *self.v))
 
     def _chart(self) -> list[list[sp.Expr]]:
         """d(steps of the motion)/d(steps of r), by entries of r; empty: it is the identity."""

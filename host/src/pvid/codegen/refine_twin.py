@@ -125,19 +125,20 @@ class GeneratedRefine:
     def __init__(self, made: RefineFunctions) -> None:
         self.made = made
         self._twin = loaded(made)
-        self._still = made.moving - made.skew  # derivatives by these do not come from the outputs
+        self._still = made.moving - made.skew  # first entry of r that does not change the motion
         by_p = {one.place: k for k, one in enumerate(made.parameters) if one.place >= 0}
         self.shape = RefineShape(
             order=made.order,
             coordinates=len(made.coordinates),
             inputs=len(made.inputs),
             outputs=len(made.outputs),
-            moving=made.moving,
+            moving=self._still,
             parameters=len(made.parameters),
             skew=made.skew,
             rates=any(is_nonzero(made, "Zv")),
             logarithmic=tuple(one.log for one in made.parameters),
             place_of_p=tuple(by_p[place] for place in sorted(by_p)),
+            measured=made.measured,
         )
 
     def _called(self, name: str, **arrays: Float32) -> dict[str, Float32]:
@@ -160,14 +161,11 @@ class GeneratedRefine:
     def jacobian(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Derivatives:
         """a and its derivatives."""
         found, n = self._called("jacobian", m=m, q=q, v=v, u=u), self.shape.coordinates
-        B = np.zeros((self.shape.moving, n), np.float32)
-        B[: self._still] = found["B"].reshape(self._still, n)
         return Derivatives(
             a=found["a"],
             K=found["K"].reshape(n, n),
             D=found["D"].reshape(n, n) if "D" in found else np.zeros((n, n), np.float32),
-            U=found["U"].reshape(n, self.shape.inputs),
-            B=B,
+            B=found["B"].reshape(self._still, n),
         )
 
     def output(self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32) -> Float32:
@@ -190,9 +188,7 @@ class GeneratedRefine:
         """Derivatives by the motion's steps [moving] to those by the steps of r."""
         if self._twin.chart is None:
             return row
-        out = row.copy()
-        out[: self._still] = self._called("chart", r=r, row=row[: self._still])["row"]
-        return out
+        return self._called("chart", r=r, row=row)["row"]
 
     def from_p(self, p: Float32) -> Float32:
         """r of an estimate of the weak form."""

@@ -43,6 +43,11 @@ def compiled_once() -> Mapping[str, str]:
 def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], folder: Path) -> list[str]:
     """Compiles each source into a folder, side by side; the names of the objects.
 
+    Parameters
+    ----------
+    options : paths in them are from the folder; where they do not name it, ccache finds the objects of another one
+        without reading a header
+
     Raises
     ------
     PvidError
@@ -54,22 +59,24 @@ def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], f
     def made(source: Path) -> str:
         place = str(folder / f"{source.parent.name}-{source.stem}.o")  # a generated source may have the name of another
         command = [*([ccache] if ccache else []), compiler, *options, "-c", str(source), "-o", place]
-        run_compiler(command, environment)
+        run_compiler(command, environment, folder)
         return place
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(made, sources))
 
 
-def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None) -> str:
-    """What it prints.
+def run_compiler(
+    command: Sequence[str], environment: Mapping[str, str] | None = None, folder: Path | None = None
+) -> str:
+    """What it prints; it is started in a folder.
 
     Raises
     ------
     PvidError
         When it fails, with its first error.
     """
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=folder)
     if done.returncode != 0:
         lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
         told = (lines or done.stderr.splitlines() or ["no output"])[0]

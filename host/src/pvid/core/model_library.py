@@ -92,12 +92,15 @@ def _build(
 ) -> None:
     """Whole or not at all: several processes may build the same."""
     with tempfile.TemporaryDirectory(dir=library.parent.parent) as made:
-        folder = Path(made) / "library"
+        # Its name is that of the headers in it, and the options have no other path of here: ccache finds the core's
+        # objects of another mechanism, but for headers that one of these stands before (pvid/refine_shape.h).
+        headers_here = sorted(name for name in texts if name.endswith(".h"))
+        folder = Path(made) / hashlib.sha256("\0".join(headers_here).encode()).hexdigest()[:8]
         folder.mkdir()
         for name, text in texts.items():
             (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")
-        options = [*_FLAGS, *definitions, f"-I{folder}", *INCLUDES, f"-I{NATIVE}"]
+        options = [*_FLAGS, *definitions, f"-I{folder.name}", *INCLUDES, f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
         objects = objects_of(compiler, options, [*code, *_sources(engine, _REFINED in texts)], Path(made))
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
@@ -120,4 +123,6 @@ def _declarations(compiler: str, headers: Sequence[str], options: list[str], fol
     own = [*(f"{name}.h" for name in replays), *(name for name in headers if name != _REFINED)]
     top = folder / "native.h"
     top.write_text("".join(f'#include "{name}"\n' for name in own), encoding="utf-8")
-    return run_compiler([compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)])
+    return run_compiler(
+        [compiler, "-E", "-P", "-nostdinc", "-DPVID_LITTLE_ENDIAN_H", f"-I{empty}", *options, str(top)], folder=folder
+    )

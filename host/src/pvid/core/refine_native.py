@@ -26,7 +26,7 @@ class RefineRecord:
     ----------
     reason : uint8 [ticks]
     hash : running hash, uint32 [ticks]
-    r, se : published parameters and standard errors [ticks, parameters]; 0 before the first publication
+    r, se : published parameters and standard errors [ticks, parameters]; 0 where there is no published estimate
     """
 
     reason: npt.NDArray[np.uint8]
@@ -77,7 +77,7 @@ class RefineNative:
 
     @property
     def estimate(self) -> npt.NDArray[np.void] | None:
-        """The published estimate; None before the first one."""
+        """The published estimate; None: there is none."""
         number = int(self.state.mark.number[0])
         return self.native.headers.viewed(self.state.estimate) if number else None
 

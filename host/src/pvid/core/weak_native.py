@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.core.native import Native, Publisher
+from pvid.settings.enums import Stage
 from pvid.settings.record import Record
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig
@@ -90,12 +91,14 @@ class RefinedRecord:
     Attributes
     ----------
     told : reason of the refinement's last block, uint8 [ticks]
+    busy : whether the weak form was, uint8 [ticks]
     weak_p, weak_se : estimates of the weak form, trusted or not, where they are new [ticks, p]; NaN at all others
-    r, se : published parameters and standard errors of the refinement [ticks, parameters]; 0 before the first one
+    r, se : published parameters and standard errors of the refinement [ticks, parameters]; 0 where there is none
     hash : running hash of both stages, uint32 [ticks]
     """
 
     told: npt.NDArray[np.uint8]
+    busy: npt.NDArray[np.uint8]
     weak_p: Float32
     weak_se: Float32
     r: Float32
@@ -116,9 +119,16 @@ class RefinedIdentifier(WeakIdentifier):
 
     @property
     def refined(self) -> npt.NDArray[np.void] | None:
-        """The published estimate of the refinement; None before the first one."""
+        """The published estimate of the refinement; None: there is none."""
         number = int(self.refinement.mark.number[0])
         return self.native.headers.viewed(self.refinement.estimate) if number else None
+
+    @property
+    def best(self) -> tuple[Stage, npt.NDArray[np.void]]:
+        """Whose estimate is published, and the estimate."""
+        library, estimate = self.native.library, self.native.headers.ffi.new("pvid_estimate_f32 *")
+        stage = library.pvid_refine_best_f32(self.refinement, library.pvid_weak_estimate_f32(self.state), estimate)
+        return Stage(stage), self.native.headers.viewed(estimate[0]).copy()
 
     def run_both(self, samples: npt.ArrayLike) -> RefinedRecord:
         """Steps through samples [ticks, samples]."""
@@ -127,6 +137,7 @@ class RefinedIdentifier(WeakIdentifier):
         p, n = len(self.refinement.weak_se), len(self.refinement.r)
         record = RefinedRecord(
             told=np.zeros(len(given), np.uint8),
+            busy=np.zeros(len(given), np.uint8),
             weak_p=np.full((len(given), p), np.nan, np.float32),
             weak_se=np.full((len(given), p), np.nan, np.float32),
             r=np.zeros((len(given), n), np.float32),
@@ -134,7 +145,7 @@ class RefinedIdentifier(WeakIdentifier):
             hash=np.zeros(len(given), np.uint32),
         )
         arrays = (
-            given, record.told, record.weak_p, record.weak_se, record.r, record.se, self._hash, record.hash
+            given, record.told, record.busy, record.weak_p, record.weak_se, record.r, record.se, self._hash, record.hash
         )  # fmt: skip
         self.native.library.pvid_replay_both_stages_f32(self.state, len(given), *map(headers.pointer, arrays))
         return record

@@ -86,7 +86,7 @@ def _units(files: Mapping[str, str]) -> list[str]:
 
 def _own_names(text: str) -> set[str]:
     """Functions, tables and enumerators that a source without comments keeps to itself."""
-    enumerators = (name for body in _ENUM.findall(text) for name in re.findall(r"^\s*(\w+)", body, re.MULTILINE))
+    enumerators = (name for body in _ENUM.findall(text) for name in re.findall(r"(?:^|,)\s*(\w+)", body))
     return {*_STATIC.findall(text), *enumerators}
 
 

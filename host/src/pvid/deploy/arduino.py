@@ -32,7 +32,7 @@ static uint32_t tick;
 
 void setup() {{
   Serial.begin(115200);
-  const pvid_status status = {name}_begin();
+  const pvid_status status = {begin}();
   if (status != PVID_OK) {{
     Serial.print("the configuration is refused: status ");
     Serial.print((int)status);
@@ -51,7 +51,7 @@ void loop() {{
     {name}_step(sample);
   }} else {{
     char line[{upper}_EXAMPLE_LINE];
-    for (int k = 0; k < {upper}_PARAMETERS; k++) {{
+    for (int k = 0; k < {upper}_EXAMPLE_LINES; k++) {{
       Serial.println({name}_example_line(k, line));
     }}
   }}
@@ -62,7 +62,7 @@ void loop() {{
 
 def sketch(d: Deployment) -> Files:
     """The example's folder."""
-    ino = _SKETCH.format(name=d.name, upper=d.upper, type=d.sample_type)
+    ino = _SKETCH.format(name=d.name, upper=d.upper, begin=d.begin, type=d.sample_type)
     return under(f"examples/{d.name}", {f"{d.name}.ino": ino, **example_files(d)})
 
 

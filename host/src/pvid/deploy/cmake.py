@@ -49,7 +49,7 @@ MAIN = """\
 int main(void)
 {{
     {type} sample[{upper}_SAMPLES];
-    const pvid_status status = {name}_begin();
+    const pvid_status status = {begin}();
     if (status != PVID_OK) {{
         (void)puts(pvid_status_text(status));
         return 1;
@@ -57,7 +57,7 @@ int main(void)
     for (uint32_t tick = 0; {name}_example_sample(tick, sample); tick++) {{
         (void){name}_step(sample);
     }}
-    for (int k = 0; k < {upper}_PARAMETERS; k++) {{
+    for (int k = 0; k < {upper}_EXAMPLE_LINES; k++) {{
         char line[{upper}_EXAMPLE_LINE];
         (void)puts({name}_example_line(k, line));
     }}
@@ -73,7 +73,7 @@ def target(d: Deployment, library: Files) -> str:
 
 def main_of(d: Deployment) -> str:
     """A program with standard output."""
-    return MAIN.format(name=d.name, upper=d.upper, type=d.sample_type)
+    return MAIN.format(name=d.name, upper=d.upper, begin=d.begin, type=d.sample_type)
 
 
 def package(d: Deployment) -> Files:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -12,36 +13,53 @@ from pvid.deploy.arithmetic import Arithmetic
 from pvid.deploy.deployment import Deployment, Files
 
 _ROOMS = ("number", "solve", "judge", "weak", "keep")
+_REFINED = "refine"  # a room that some deployments have
+_OF_MODEL = ("pvid/refine_shape.h", "refine_model_f32.h")  # which come with the mechanism
 _INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 _OWN_CONFIG = "#ifdef PVID_CONFIG_HEADER\n#include PVID_CONFIG_HEADER\n#endif\n"
 SIZES = "pvid/rig_sizes.h"
 
 
 @cache
-def _files(arithmetic: Arithmetic) -> dict[str, Path]:
-    """Name below the include path -> file: sources of the rooms that need no mechanism's own headers, and headers."""
+def _files(arithmetic: Arithmetic, refined: bool) -> dict[str, Path]:
+    """Name below the include path -> file: sources of the rooms whose headers the deployment has, and these headers."""
     found: dict[str, Path] = {}
-    for room in _ROOMS:
+    rooms, given = ((*_ROOMS, _REFINED), _OF_MODEL) if refined else (_ROOMS, ())
+    for room in rooms:
         for path in sorted((SRC / room).glob("*.c")):
-            headers = None if path.stem.endswith(arithmetic.without) else _headers_of(path)
+            headers = None if path.stem.endswith(arithmetic.without) else _headers_of(path, rooms, given)
             if headers is not None:
                 found |= {_name(one): one for one in (path, *headers)}
     return dict(sorted(found.items()))
 
 
-def _headers_of(source: Path) -> set[Path] | None:
-    """All headers that a source includes, directly or not; None: one of them is not of the weak form."""
+def _headers_of(source: Path, rooms: tuple[str, ...], given: tuple[str, ...]) -> set[Path] | None:
+    """All headers of the core that a source includes, directly or not; None: one of them is of no room."""
     found: set[Path] = set()
     rest = [source]
     while rest:
         for name in includes_of(rest.pop().read_text(encoding="utf-8")):
-            path = FIRMWARE / "include" / name if name.startswith("pvid/") else SRC / name
-            if not path.is_file() or path.is_relative_to(SRC) and path.parent.name not in _ROOMS:
+            if name in given:
+                continue
+            path = _path(name)
+            if not path.is_file() or path.is_relative_to(SRC) and path.parent.name not in rooms:
                 return None
             if path not in found:
                 found.add(path)
                 rest.append(path)
     return found
+
+
+def _included(texts: Iterable[str], known: Mapping[str, Path]) -> dict[str, Path]:
+    """Headers of the core that generated files include beside the known ones."""
+    rooms = (*_ROOMS, _REFINED)
+    paths = [_path(name) for text in texts for name in includes_of(text) if name not in known]
+    headers = [{path} | (_headers_of(path, rooms, _OF_MODEL) or set()) for path in paths if path.is_file()]
+    return {_name(path): path for group in headers for path in sorted(group)}
+
+
+def _path(name: str) -> Path:
+    return FIRMWARE / "include" / name if name.startswith("pvid/") else SRC / name
 
 
 def includes_of(text: str) -> list[str]:
@@ -61,7 +79,9 @@ def core_files(deployment: Deployment) -> Files:
     PvidError
         When pvid/config.h has no place for them.
     """
-    files = {name: path.read_text(encoding="utf-8") for name, path in _files(deployment.arithmetic).items()}
+    found = _files(deployment.arithmetic, deployment.second is not None)
+    found |= _included(deployment.generated.values(), found)
+    files = {name: path.read_text(encoding="utf-8") for name, path in found.items()}
     config = files["pvid/config.h"]
     if _OWN_CONFIG not in config:
         raise PvidError("pvid/config.h does not include PVID_CONFIG_HEADER: a rig's sizes have no place in it")

@@ -45,7 +45,7 @@ static volatile uint32_t tick;
 
 int {name}_app_start(void)
 {{
-    const pvid_status status = {name}_begin();
+    const pvid_status status = {begin}();
     if (status != PVID_OK) {{
         (void)puts(pvid_status_text(status));
     }}
@@ -70,7 +70,7 @@ int {name}_app_poll(void)
     const uint32_t number = {name}_read(value, error);
     if (number != shown) {{
         shown = number;
-        for (int k = 0; k < {upper}_PARAMETERS; k++) {{
+        for (int k = 0; k < {upper}_EXAMPLE_LINES; k++) {{
             char line[{upper}_EXAMPLE_LINE];
             (void)puts({name}_example_line(k, line));
         }}
@@ -85,7 +85,7 @@ def package(d: Deployment) -> Files:
     library = library_files(d)
     app = {
         f"{d.name}_app.h": _HEADER.format(name=d.name, upper=d.upper),
-        f"{d.name}_app.c": _SOURCE.format(name=d.name, upper=d.upper, type=d.sample_type),
+        f"{d.name}_app.c": _SOURCE.format(name=d.name, upper=d.upper, begin=d.begin, type=d.sample_type),
     }
     steps = [
         f"Toolchain CMake: in CMakeLists.txt `add_subdirectory({d.library})` and "

@@ -51,6 +51,23 @@ class Playback:
 
 
 @dataclass(frozen=True, eq=False)
+class SecondStage:
+    """The refinement of a mechanism.
+
+    Attributes
+    ----------
+    parameters : r
+    value, error : of the refined estimate at the end of the example's motion [parameters]; None: nothing is refined
+    held : outcome of the last block then
+    """
+
+    parameters: tuple[Quantity, ...]
+    value: npt.NDArray[np.float64] | None
+    error: npt.NDArray[np.float64] | None
+    held: Reason
+
+
+@dataclass(frozen=True, eq=False)
 class Deployment:
     """A mechanism for a rig.
 
@@ -66,6 +83,7 @@ class Deployment:
     generated : name -> text of the model's and the rig's files
     command : that makes it; no date
     first_s : of motion up to the first window that is judged [s]
+    second : the refinement; None: the package has none
     """
 
     name: str
@@ -79,11 +97,17 @@ class Deployment:
     command: str
     first_s: float
     playback: Playback = field(repr=False)
+    second: SecondStage | None = None
 
     @property
     def core(self) -> str:
         """As in the names of functions in C."""
         return self.arithmetic.core
+
+    @property
+    def begin(self) -> str:
+        """The function that starts the example."""
+        return f"{self.name}_begin" if self.second is None else f"{self.name}_begin_refined"
 
     @property
     def upper(self) -> str:

@@ -52,7 +52,7 @@ static void step(void *unused)
 
 void app_main(void)
 {{
-    const pvid_status status = {name}_begin();
+    const pvid_status status = {begin}();
     if (status != PVID_OK) {{
         ESP_LOGE(TAG, "the configuration is refused: %s", pvid_status_text(status));
         return;
@@ -65,7 +65,7 @@ void app_main(void)
         vTaskDelay(pdMS_TO_TICKS(100));
     }}
     ESP_ERROR_CHECK(esp_timer_stop(timer));
-    for (int k = 0; k < {upper}_PARAMETERS; k++) {{
+    for (int k = 0; k < {upper}_EXAMPLE_LINES; k++) {{
         char line[{upper}_EXAMPLE_LINE];
         ESP_LOGI(TAG, "%s", {name}_example_line(k, line));
     }}
@@ -84,7 +84,7 @@ def package(d: Deployment) -> Files:
     library = library_files(d)
     example = f"examples/{d.name}"
     main = {
-        "main.c": _MAIN.format(name=d.name, upper=d.upper, type=d.sample_type),
+        "main.c": _MAIN.format(name=d.name, upper=d.upper, begin=d.begin, type=d.sample_type),
         **example_files(d),
         "CMakeLists.txt": f"idf_component_register(SRCS main.c {d.name}_example.c INCLUDE_DIRS .)\n",
         "idf_component.yml": f'dependencies:\n  {d.library}:\n    version: "*"\n    override_path: "../../.."\n',

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from pvid.deploy.deployment import Deployment, Files
+import numpy as np
+import numpy.typing as npt
+
+from pvid.deploy.deployment import Deployment, Files, Quantity
 from pvid.design.c_tables import float_literal
+from pvid.settings.enums import Reason
+
+Float = npt.NDArray[np.float64]
 
 _ROW = 16  # numbers a line
 
@@ -72,6 +78,42 @@ static char *copied(char *text, const char *from)
 """
 
 
+_ESTIMATE = """\
+static void estimate(char *text, const char *name, float value, float error, const char *unit)
+{
+    text = copied(text, name);
+    text = copied(text, " = ");
+    text = number(text, value);
+    text = copied(text, " +- ");
+    text = number(text, error);
+    text = copied(text, (unit[0] == '\\0') ? "" : " ");
+    *copied(text, unit) = '\\0';
+}
+"""
+_REFINED = "refined "
+
+
+def _refined_line(d: Deployment) -> list[str]:
+    if d.second is None:
+        return []
+    name, upper = d.name, d.upper
+    texts = [f"{name}_refined_{one}[r]" for one in ("parameter", "unit")]
+    return [
+        f"    if (k >= {upper}_PARAMETERS) {{",
+        f"        float refined[{upper}_REFINED];",
+        f"        float refined_error[{upper}_REFINED];",
+        f"        const int r = k - {upper}_PARAMETERS;",
+        f'        char *text = copied(line, "{_REFINED}");',
+        f"        if ({name}_read_refined(refined, refined_error) == 0u) {{",
+        f"            *copied(text, pvid_reason_text({name}_refined_reason())) = '\\0';",
+        "        } else {",
+        f"            estimate(text, {texts[0]}, refined[r], refined_error[r], {texts[1]});",
+        "        }",
+        "        return line;",
+        "    }",
+    ]
+
+
 def example_files(deployment: Deployment) -> Files:
     """Name -> text."""
     return {
@@ -93,6 +135,7 @@ def _header(d: Deployment) -> str:
             f'#include "{d.name}_identifier.h"',
             "",
             f"#define {d.upper}_EXAMPLE_TICKS {len(d.playback.counts)}u",
+            f"#define {d.upper}_EXAMPLE_LINES {_lines(d)} /* {_all_lines(d)} */",
             f"#define {d.upper}_EXAMPLE_LINE {_longest_line(d)} /* characters, with the 0 at the end */",
             "",
             "#ifdef __cplusplus",
@@ -102,7 +145,7 @@ def _header(d: Deployment) -> str:
             "/* The samples of a tick. Returns false behind the last one. */",
             f"bool {d.name}_example_sample(uint32_t tick, {d.sample_type} sample[{d.upper}_SAMPLES]);",
             "",
-            "/* Parameter k as text, as in 'R = 1.2043 +- 0.00420 ohm'; k at most the number of parameters. */",
+            "/* Line k as text, as in 'R = 1.2043 +- 0.00420 ohm'; k less than the number of lines. */",
             f"const char *{d.name}_example_line(int k, char line[{d.upper}_EXAMPLE_LINE]);",
             "",
             "#ifdef __cplusplus",
@@ -115,9 +158,20 @@ def _header(d: Deployment) -> str:
     )
 
 
+def _lines(d: Deployment) -> str:
+    return f"{d.upper}_PARAMETERS" if d.second is None else f"({d.upper}_PARAMETERS + {d.upper}_REFINED)"
+
+
+def _all_lines(d: Deployment) -> str:
+    return "one for each parameter" if d.second is None else "one for each parameter, and for each refined one"
+
+
 def _longest_line(d: Deployment) -> int:
     number = len("-1.2346e-05")
-    return max(len(f"{one.name} =  +-  {one.unit}") for one in d.parameters) + 2 * number + 1
+    refined = () if d.second is None else d.second.parameters
+    texts = [f"{_REFINED}{one.name} =  +-  {one.unit}" for one in (*d.parameters, *refined)]
+    held = max(len(f"{_REFINED}{one.text}") for one in Reason) if refined else 0
+    return max(max(map(len, texts)) + 2 * number, held) + 1
 
 
 def _source(d: Deployment) -> str:
@@ -163,23 +217,17 @@ def _source(d: Deployment) -> str:
             "}",
             "",
             _NUMBER,
+            _ESTIMATE,
             f"const char *{d.name}_example_line(int k, char line[{d.upper}_EXAMPLE_LINE])",
             "{",
+            *_refined_line(d),
             f"    float value[{d.upper}_PARAMETERS];",
             f"    float error[{d.upper}_PARAMETERS];",
-            "    char *text = line;",
             f"    if ({d.name}_read(value, error) == 0u) {{",
-            '        text = copied(text, "no estimate yet");',
+            "        *copied(line, \"no estimate yet\") = '\\0';",
             "    } else {",
-            f"        text = copied(text, {d.name}_parameter[k]);",
-            '        text = copied(text, " = ");',
-            "        text = number(text, value[k]);",
-            '        text = copied(text, " +- ");',
-            "        text = number(text, error[k]);",
-            f'        text = copied(text, ({d.name}_unit[k][0] == \'\\0\') ? "" : " ");',
-            f"        text = copied(text, {d.name}_unit[k]);",
+            f"        estimate(line, {d.name}_parameter[k], value[k], error[k], {d.name}_unit[k]);",
             "    }",
-            "    *text = '\\0';",
             "    return line;",
             "}",
             "",
@@ -189,12 +237,21 @@ def _source(d: Deployment) -> str:
 
 def expected(d: Deployment) -> list[str]:
     """What the example prints at its end: the lines of a README."""
-    playback = d.playback
-    if playback.value is None or playback.error is None:
-        return ["no estimate yet"]
+    playback, second = d.playback, d.second
+    lines = _estimates(d.parameters, playback.value, playback.error) or ["no estimate yet"] * len(d.parameters)
+    if second is not None:
+        refined = _estimates(second.parameters, second.value, second.error)
+        lines += [f"{_REFINED}{one}" for one in refined or [second.held.text] * len(second.parameters)]
+    return lines
+
+
+def _estimates(parameters: Sequence[Quantity], value: Float | None, error: Float | None) -> list[str]:
+    """A line for each; none where there is no estimate."""
+    if value is None or error is None:
+        return []
     return [
-        f"{one.name} = {_five(value)} +- {_five(error)} {one.unit}".rstrip()
-        for one, value, error in zip(d.parameters, playback.value, playback.error, strict=True)
+        f"{one.name} = {_five(x)} +- {_five(se)} {one.unit}".rstrip()
+        for one, x, se in zip(parameters, value, error, strict=True)
     ]
 
 

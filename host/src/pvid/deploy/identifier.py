@@ -5,16 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from pvid.codegen import describe
-from pvid.deploy.deployment import Deployment, Files, Quantity
+from pvid.deploy.deployment import Deployment, Files, Quantity, SecondStage
 from pvid.design.c_tables import float_literal
 
 
 def identifier_files(deployment: Deployment) -> Files:
     """Name -> text."""
-    return {
-        f"{deployment.name}_identifier.h": _header(deployment),
-        f"{deployment.name}_identifier.c": _source(deployment),
-    }
+    name = deployment.name
+    files = {f"{name}_identifier.h": _header(deployment), f"{name}_identifier.c": _source(deployment)}
+    if deployment.second is not None:
+        files |= {
+            f"{name}_refined.h": _private(deployment),
+            f"{name}_refined.c": _refined(deployment, deployment.second),
+        }
+    return files
 
 
 def _header(d: Deployment) -> str:
@@ -60,6 +64,7 @@ def _header(d: Deployment) -> str:
         "/* Starts, or starts again from the guesses. PVID_OK, or the wrong field: pvid_status_text(status). */",
         f"pvid_status {d.name}_begin(void);",
         "",
+        *_refined_declarations(d),
         "/* One tick. PVID_UPDATED or PVID_MISFIT: there is a new estimate; pvid_reason_text(reason) for others. */",
         f"pvid_reason {d.name}_step(const {d.sample_type} sample[{d.upper}_SAMPLES]);",
         "",
@@ -112,6 +117,7 @@ def _source(d: Deployment) -> str:
         f'#include "{d.name}_identifier.h"',
         "",
         f'#include "{d.name}_design_{core}.h"',
+        *([] if d.second is None else [f'#include "{d.name}_refined.h"']),
         f'#include "{d.arithmetic.snapshot_header}"',
         "",
         f"static pvid_weak_{core} identifier;",
@@ -121,10 +127,7 @@ def _source(d: Deployment) -> str:
         "",
         _names(d, "unit", [one.unit for one in d.parameters]),
         "",
-        f"pvid_status {d.name}_begin(void)",
-        "{",
-        f"    return pvid_weak_init_{core}(&identifier, &{d.name}_config_{core});",
-        "}",
+        *_begin(d),
         "",
         f"pvid_reason {d.name}_step(const {d.sample_type} sample[{upper}_SAMPLES])",
         "{",
@@ -175,6 +178,119 @@ def _source(d: Deployment) -> str:
     return "\n".join(lines)
 
 
-def _names(d: Deployment, what: str, names: list[str]) -> str:
+def _begin(d: Deployment) -> list[str]:
+    if d.second is None:
+        return [
+            f"pvid_status {d.name}_begin(void)",
+            "{",
+            f"    return pvid_weak_init_{d.core}(&identifier, &{d.name}_config_{d.core});",
+            "}",
+        ]
+    return [
+        f"pvid_status {d.name}_begin_with(const pvid_weak_refine_f32 *stage)",
+        "{",
+        f"    pvid_weak_config_f32 config = {d.name}_config_f32;",
+        "    config.refine = stage;",
+        "    return pvid_weak_init_f32(&identifier, &config);",
+        "}",
+        "",
+        f"pvid_status {d.name}_begin(void)",
+        "{",
+        f"    return {d.name}_begin_with(NULL);",
+        "}",
+    ]
+
+
+def _refined_declarations(d: Deployment) -> list[str]:
+    if d.second is None:
+        return []
+    table = describe.table([_parameter(k, x) for k, x in enumerate(d.second.parameters)])
+    return [
+        f"/* The same with a second stage, in place of {d.name}_begin: it fits the full equations, to the statistical",
+        " * limit, from the first stage's estimate on (pvid/refine.h). What it refines:",
+        *(f" *   {line}".rstrip() for line in table),
+        " */",
+        f"#define {d.upper}_REFINED {len(d.second.parameters)}",
+        f"extern const char *const {d.name}_refined_parameter[{d.upper}_REFINED];",
+        f"extern const char *const {d.name}_refined_unit[{d.upper}_REFINED];",
+        f"pvid_status {d.name}_begin_refined(void);",
+        "",
+        f"/* As {d.name}_read, of the refined estimate. 0: there is none yet, that of {d.name}_read stands. */",
+        f"uint32_t {d.name}_read_refined(float value[{d.upper}_REFINED], float standard_error[{d.upper}_REFINED]);",
+        "",
+        "/* Outcome of the refinement's last block of samples; a snapshot does not contain the refinement. */",
+        f"pvid_reason {d.name}_refined_reason(void);",
+        "",
+    ]
+
+
+def _private(d: Deployment) -> str:
+    return "\n".join(
+        [
+            f"/* {d.name}_refined.h - between {d.name}_identifier.c and {d.name}_refined.c.",
+            " *",
+            f" * {d.banner} */",
+            f"#ifndef {d.upper}_REFINED_H",
+            f"#define {d.upper}_REFINED_H",
+            "",
+            '#include "pvid/weak.h"',
+            "",
+            "/* With a second stage, or NULL. */",
+            f"pvid_status {d.name}_begin_with(const pvid_weak_refine_f32 *stage);",
+            "",
+            "#endif",
+            "",
+        ]
+    )
+
+
+def _refined(d: Deployment, second: SecondStage) -> str:
+    """Apart, so that a program without it does not link the refinement."""
+    upper, size = d.upper, "REFINED"
+    return "\n".join(
+        [
+            f"/* {d.banner} */",
+            f'#include "{d.name}_identifier.h"',
+            "",
+            f'#include "{d.name}_refine_design_f32.h"',
+            f'#include "{d.name}_refined.h"',
+            "",
+            "static pvid_refine_f32 refinement;",
+            "static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement,",
+            f"                                            &{d.name}_refine_config_f32}};",
+            "",
+            _names(d, "refined_parameter", [one.name for one in second.parameters], size),
+            "",
+            _names(d, "refined_unit", [one.unit for one in second.parameters], size),
+            "",
+            f"pvid_status {d.name}_begin_refined(void)",
+            "{",
+            f"    return {d.name}_begin_with(&second);",
+            "}",
+            "",
+            f"uint32_t {d.name}_read_refined(float value[{upper}_REFINED], float standard_error[{upper}_REFINED])",
+            "{",
+            "    pvid_refine_estimate_f32 estimate;",
+            "    uint32_t number = 0u;",
+            "    if (!pvid_refine_read_f32(&refinement, &estimate, &number)) {",
+            "        return 0u;",
+            "    }",
+            f"    for (int k = 0; k < {upper}_REFINED; k++) {{",
+            "        value[k] = estimate.r[k];",
+            "        standard_error[k] = estimate.se[k];",
+            "    }",
+            "    return number;",
+            "}",
+            "",
+            f"pvid_reason {d.name}_refined_reason(void)",
+            "{",
+            "    return pvid_refine_reason_f32(&refinement);",
+            "}",
+            "",
+        ]
+    )
+
+
+def _names(d: Deployment, what: str, names: list[str], size: str = "PARAMETERS") -> str:
     texts = ", ".join(f'"{one}"' for one in names)
-    return f"const char *const {d.name}_{what}[{d.upper}_PARAMETERS] = {{{texts}}};"
+    return f"const char *const {d.name}_{what}[{d.upper}_{size}] = {{{texts}}};"

@@ -18,13 +18,13 @@ _REST = 1024  # for the stack and Arduino itself
 
 
 @cache
-def state_bytes(d: Deployment) -> int | None:
-    """Size of the identifier [bytes] on this computer, whose pointers are longer than those of a microcontroller; None
+def _bytes(d: Deployment, header: str, state: str) -> int | None:
+    """Size of a state [bytes] on this computer, whose pointers are longer than those of a microcontroller; None
     where there is no compiler."""
-    program = f'#include "{d.arithmetic.header}"\nchar pvid_state[sizeof(pvid_weak_{d.core})];\n'
+    program = f'#include "{header}"\nchar pvid_state[sizeof({state})];\n'
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
-        for name, text in core_files(d).items():
+        for name, text in (core_files(d) | dict(d.generated)).items():
             if name.endswith(".h"):
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (folder / name).write_text(text, encoding="utf-8")
@@ -38,10 +38,19 @@ def state_bytes(d: Deployment) -> int | None:
     return None if done.returncode or found is None else int(found[1])
 
 
+def state_bytes(d: Deployment) -> int | None:
+    """Size of the identifier [bytes], as `_bytes`."""
+    return _bytes(d, d.arithmetic.header, f"pvid_weak_{d.core}")
+
+
 def note(d: Deployment) -> str:
     """One sentence on RAM."""
     size = state_bytes(d)
-    return "" if size is None else f"The identifier takes about {size} bytes of RAM."
+    if size is None:
+        return ""
+    second = None if d.second is None else _bytes(d, "pvid/refine.h", "pvid_refine_f32")
+    more = "" if second is None else f", the second stage {second} more"
+    return f"The identifier takes about {size} bytes of RAM{more}."
 
 
 def avr_note(d: Deployment) -> str:

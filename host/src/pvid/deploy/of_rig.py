@@ -7,19 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen import files_design, files_weak
+from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
+from pvid.codegen.build import refine_functions
 from pvid.codegen.fitted_sizes import fitted_sizes
+from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.core.weak_native import RefinedRecord
 from pvid.deploy.arithmetic import FIXED, FLOAT
-from pvid.deploy.deployment import Deployment, Playback, Quantity
+from pvid.deploy.deployment import Deployment, Playback, Quantity, SecondStage
 from pvid.model.compiled import CompiledModel
 from pvid.run.engine_design import Run, samples_of
 from pvid.run.engine_design_q31 import FixedEngine
 from pvid.run.engine_files_q31 import files_of, fitted_of
 from pvid.settings.enums import Reason
 from pvid.settings.record import Record
+from pvid.settings.refine import BIG_STEP, RefineConfig
 from pvid.settings.weak import Source, WeakConfig
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 
@@ -29,7 +33,9 @@ _LARGEST = 30_000  # count of a signal without a resolution
 _PUBLISHED = (Reason.UPDATED, Reason.MISFIT)
 
 
-def deployment_f32(compiled: CompiledModel, config: WeakConfig, run: Run, command: str) -> Deployment:
+def deployment_f32(
+    compiled: CompiledModel, config: WeakConfig, run: Run, command: str, refine: RefineConfig | None = None
+) -> Deployment:
     """In float32.
 
     Parameters
@@ -37,6 +43,7 @@ def deployment_f32(compiled: CompiledModel, config: WeakConfig, run: Run, comman
     config : settings and tables for the rig
     run : of the rig, for the example: name of each signal -> samples [n]
     command : that makes it, for the banners
+    refine : settings of the refinement; None: the package has none
 
     Raises
     ------
@@ -56,12 +63,27 @@ def deployment_f32(compiled: CompiledModel, config: WeakConfig, run: Run, comman
         np.float32,
     )
     counts = np.rint(samples.astype(np.float64) / lsb).astype(np.int32)[: _most_ticks(model.samples)]
-    record = (
-        weak_native(compiled, design)
-        .identifier_of(config)
-        .run_samples(counts.astype(np.float32) * lsb, sums=False, hashes=False)
-    )
+    values = counts.astype(np.float32) * lsb
+    record = weak_native(compiled, design).identifier_of(config).run_samples(values, sums=False, hashes=False)
     hop = design.hop * design.decimation
+    playback = _playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns)))
+    generated = {
+        f"{name}_weak.h": files_weak.header(made, model, sizes_of_model(model), command),
+        f"{name}_weak_f32.c": files_weak.source(made, model, command),
+        f"{name}_design_f32.h": files_design.header(config, needed, command, compiled.title, titles),
+    }
+    second = None
+    if refine is not None:
+        functions = refine_functions(compiled)
+        generated |= {
+            "pvid/refine_shape.h": files_refine.shape(functions, command),
+            "refine_model_f32.h": files_refine.header(functions, command),
+            f"{name}_refine_design_f32.h": files_refine_design.header(functions, refine, command),
+        }
+        refined = weak_native(compiled, design, functions).refined_of(config, refine).run_both(values)
+        ticks = _ticks_of(refined, refine, len(playback.counts), len(counts))
+        playback = _playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns)), ticks)
+        second = _second(functions, refined, ticks)
     return Deployment(
         name=name,
         title=compiled.title,
@@ -69,15 +91,12 @@ def deployment_f32(compiled: CompiledModel, config: WeakConfig, run: Run, comman
         sample_rate=config.sample_rate,
         samples=tuple(Quantity(one, units[one], note=_note(made, k)) for k, one in enumerate(model.sample_names)),
         parameters=tuple(Quantity(one.name, one.unit) for one in compiled.unknowns),
-        sizes=fitted_sizes(config),
-        generated={
-            f"{name}_weak.h": files_weak.header(made, model, sizes_of_model(model), command),
-            f"{name}_weak_f32.c": files_weak.source(made, model, command),
-            f"{name}_design_f32.h": files_design.header(config, needed, command, compiled.title, titles),
-        },
+        sizes=fitted_sizes(config, refined=refine is not None),
+        generated=generated,
         command=command,
         first_s=config.ticks_needed / config.sample_rate,
-        playback=_playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns))),
+        playback=playback,
+        second=second,
     )
 
 
@@ -122,14 +141,34 @@ def _most_ticks(samples: int) -> int:
     return _MOST_NUMBERS // samples
 
 
+def _ticks_of(refined: RefinedRecord, settings: RefineConfig, least: int, most: int) -> int:
+    """A block longer than up to the first refined estimate; all of it where there is none."""
+    published = np.flatnonzero(refined.told == Reason.UPDATED)
+    block = settings.block * BIG_STEP * settings.ratio
+    return min(max(least, int(published[0]) + 1 + block), most) if len(published) else most
+
+
+def _second(made: RefineFunctions, refined: RefinedRecord, ticks: int) -> SecondStage:
+    """As it is after so many ticks of the example's motion."""
+    is_there = bool(np.any(refined.r[ticks - 1]))  # not withdrawn
+    value, error = (np.asarray(one[ticks - 1], np.float64) if is_there else None for one in (refined.r, refined.se))
+    parameters = tuple(Quantity(one.name, one.unit) for one in made.parameters)
+    return SecondStage(parameters, value, error, Reason(refined.told[ticks - 1]))
+
+
 def _playback(
-    counts: npt.NDArray[np.int32], lsb: Sequence[float], record: Record, hop: int, scale: npt.NDArray[np.float64]
+    counts: npt.NDArray[np.int32],
+    lsb: Sequence[float],
+    record: Record,
+    hop: int,
+    scale: npt.NDArray[np.float64],
+    least: int = 0,
 ) -> Playback:
-    """Some half windows longer than up to the first estimate; all of it where there is none."""
+    """Some half windows longer than up to the first estimate, `least` ticks; all of it where there is none."""
     published = np.flatnonzero(np.isin(record.reason, _PUBLISHED))
     if not len(published):
         judged = record.reason[record.reason != Reason.ACCUMULATED]
         return Playback(counts, tuple(lsb), None, None, Reason(judged[-1]))
-    ticks = min(int(published[0]) + 1 + _LONGER * hop, len(counts))
+    ticks = min(max(int(published[0]) + 1 + _LONGER * hop, least), len(counts))
     value, error = (np.asarray(one[ticks - 1], np.float64) * scale for one in (record.published, record.published_se))
     return Playback(counts[:ticks], tuple(lsb), value, error)

@@ -42,7 +42,7 @@ def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequ
                 "",
                 f"It identifies a recorded motion of {len(d.playback.counts) / d.sample_rate:.3g} s and prints",
                 "",
-                *(f"    {line}" for line in expected(d)),
+                *(f"    {line}" for line in dict.fromkeys(expected(d))),
                 "",
                 "## Your sensors",
                 "",
@@ -51,6 +51,7 @@ def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequ
                 f"`{d.name}_read(value, error)` may be called from any context; `pvid_reason_text(reason)` is why",
                 f"there is no estimate yet; `{d.name}_gap()` is for missing samples.",
                 f"Delete `{d.name}_example.c` and `.h` then.",
+                *_refined(d),
                 "",
                 *(f"- {one}" for one in (memory.note(d), *notes) if one),
                 "",
@@ -58,6 +59,18 @@ def readme(deployment: Deployment, where: str, steps: Sequence[str], notes: Sequ
         ).rstrip()
         + "\n"
     )
+
+
+def _refined(d: Deployment) -> list[str]:
+    """What the second stage is, and how it is left out."""
+    if d.second is None:
+        return []
+    return [
+        "",
+        f"`{d.name}_begin_refined()` in place of `{d.name}_begin()` switches the second stage on, as the example does:",
+        "it fits the full equations, from the first stage's estimate on, to the statistical limit, and",
+        f"`{d.name}_read_refined(value, error)` reads its estimate. Without it neither flash nor RAM is taken.",
+    ]
 
 
 def _named(names: list[str]) -> str:

@@ -45,7 +45,7 @@ K_TIMER_DEFINE(period, NULL, NULL);
 int main(void)
 {{
     {type} sample[{upper}_SAMPLES];
-    const pvid_status status = {name}_begin();
+    const pvid_status status = {begin}();
     if (status != PVID_OK) {{
         printk("the configuration is refused: %s\\n", pvid_status_text(status));
         return 1;
@@ -56,7 +56,7 @@ int main(void)
         (void){name}_step(sample);
     }}
     k_timer_stop(&period);
-    for (int k = 0; k < {upper}_PARAMETERS; k++) {{
+    for (int k = 0; k < {upper}_EXAMPLE_LINES; k++) {{
         char line[{upper}_EXAMPLE_LINE];
         printk("%s\\n", {name}_example_line(k, line));
     }}
@@ -108,5 +108,5 @@ def package(d: Deployment) -> Files:
             d, "for Zephyr", steps, ["A processor without an FPU refuses CONFIG_FPU: delete the line."]
         ),
     }
-    main = {"main.c": _MAIN.format(name=d.name, upper=d.upper, type=d.sample_type), **example_files(d)}
+    main = {"main.c": _MAIN.format(name=d.name, upper=d.upper, begin=d.begin, type=d.sample_type), **example_files(d)}
     return library | licence() | files | under(f"{sample}/src", main)

@@ -5,7 +5,7 @@ and x[c+i], x[c-i] the points i strides away,
 
     q_i = (x[c+i] - x[c]) + (x[c-i] - x[c]),    d_i = x[c+i] - x[c-i],    i = 1..half
     order 0:      x[c] + sum w[0, i-1] q_i
-    orders 2, 4:  rate^k sum w[k, i-1] q_i        rate = sample rate / stride
+    orders 2, 4:  rate^k sum w[k, i-1] q_i        rate = sample rate / (stride block)
     orders 1, 3:  rate^k sum w[k, i-1] d_i
 """
 
@@ -38,10 +38,10 @@ class FirBank(Folded):
     Attributes
     ----------
     weights : folded tables [5, half]; row k is the derivative of order k per point^k, at any sample rate
-    stride : samples from point to point
+    stride : points from tap to tap
     kind : the method of design
     degree : highest degree of the polynomials on which all five orders are exact
-    block : samples whose mean is a point
+    block : samples whose mean is a point; there is a result for each block
     """
 
     weights: Float
@@ -60,13 +60,13 @@ class FirBank(Folded):
 
         Returns
         -------
-        Shape [5, n - 2 delay]; column j belongs to sample j + delay.
+        Shape [5, n // block - 2 half stride]; column j belongs to sample j block + delay.
         """
         samples = np.asarray(x, np.float64)
-        count = samples.size - self.window + 1
+        count = samples.size // self.every - self.memory + 1
         if count <= 0:
             raise PvidError(f"{samples.size} samples do not fill the differentiator's window of {self.window}")
-        points = np.convolve(samples, np.full(self.block, 1 / self.block), "valid") if self.block > 1 else samples
+        points = samples[: samples.size // self.every * self.every].reshape(-1, self.every).mean(axis=1)
         reach = self.half * self.stride
         centre = points[reach : reach + count]
         out = np.zeros((ORDERS, count))
@@ -78,7 +78,7 @@ class FirBank(Folded):
             for order in range(ORDERS):
                 out[order] += self.weights[order, i - 1] * (d if order % 2 else q)
         out[0] += centre
-        rate = sample_rate / self.stride
+        rate = sample_rate / (self.stride * self.every)
         out *= rate ** np.arange(ORDERS)[:, np.newaxis]
         return out
 
@@ -116,7 +116,7 @@ def savitzky_golay(window: int, degree: int, stride: int = 1, block: int = 1) ->
     ----------
     window : points in the window, odd and above `degree`
     degree : of the polynomial, 4..12
-    stride : samples from point to point
+    stride : points from tap to tap
     block : samples of a point, odd
 
     Notes
@@ -134,7 +134,7 @@ def savitzky_golay(window: int, degree: int, stride: int = 1, block: int = 1) ->
         raise PvidError(f"the block of a Savitzky-Golay window must be odd, not {block} samples")
     _require_window(window, stride)
     half = (window - 1) // 2
-    offsets = (np.arange(block) - (block - 1) / 2) / stride  # of a block's samples from its centre [points]
+    offsets = (np.arange(block) - (block - 1) / 2) / (stride * block)  # of a block's samples from its centre [taps]
     weights = np.empty((ORDERS, half))
     for parity in (0, 1):
         degrees = list(range(parity, degree + 1, 2))

@@ -66,9 +66,9 @@ def strong_design_q31(
     PvidError
         Where a range is less than 16 counts, or something cannot be held.
     """
-    point = bank.stride / sample_rate
-    integer = integer_bank(bank, round(phi_range / phi_lsb), round(y_range / y_lsb), rate * point)
-    tau = point * 2.0**integer.tau_bits
+    apart = bank.stride * bank.every / sample_rate  # from tap to tap [s]
+    integer = integer_bank(bank, round(phi_range / phi_lsb), round(y_range / y_lsb), rate * apart)
+    tau = apart * 2.0**integer.tau_bits
     angle_unit = phi_lsb / integer.denominator * 2.0**-integer.phi_bits
     u_range = acceleration_range / l1
     most = min(W_LIKELY / w, W_MOST / w_upper, RATE_MOST / max(u_range, w))

@@ -15,23 +15,19 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.settings.weak import NONE, Source, WeakChannel, WeakDesign32, WeakJet, WeakSignal
-from pvid.settings.weak_q31 import (
-    Rescale,
-    WeakDesignQ31,
-    WeakFilterQ31,
-    WeakFormatQ31,
-    WeakModelQ31,
-    WeakNoiseQ31,
-)
+from pvid.settings.weak_q31 import Rescale, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakModelQ31, WeakNoiseQ31
 
 Float = npt.NDArray[np.float64]
 
 BLOCK = 4  # steps that are added together
-CIRCLE = 2**23 - 1  # 1 in the table of cosines
 CHANNEL_BITS = 28  # of a channel
-DOWN = 22  # of a block's products, to 32 bits
-_WORD = 30  # bits of a rounded sum or integral: one is spare
+CIRCLE, FINE_CIRCLE = 2**15 - 1, 2**23 - 1  # largest cosine in the table
+DOWN, FINE_DOWN = 14, 22  # of a block's products, to 32 bits
+UPPER = 32  # bits that the upper half of a product is short of
+_WORD = 30  # bits of a sum: one is spare
 _BLOCK_BITS = 28  # of a block sum: a pair of differences fits a word
+_FEW_COUNTS = 2.0**12  # of a sample times the root of D, with which a cosine of 16 bits is exact enough
+_AMPLITUDES = 256  # of the cosine, among which there is one whose rounding is good-natured
 
 # Of each source: its largest integer in full scales, and its unit in counts.
 _REACH = {Source.SAMPLED: 1, Source.HELD: 28, Source.JUMP: 2}
@@ -131,14 +127,16 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
     widths = tuple(round(width * 2.0**bits) for width, bits in zip(sizes.sign_width, formats.arguments, strict=True))
     if any(width > 0 and whole < 1 for width, whole in zip(sizes.sign_width, widths, strict=True)):
         raise PvidError("the width of a soft sign is below the resolution of its velocity")
-    integral = []
-    for most in formats.integrand_most:
-        once = 28.0 * sizes.hop * most
-        twice = 28.0 * sizes.hop**2 * most + 8.0 * sizes.hop * most
-        margins.take("a double integral", twice, 62)
-        integral.append((max(1, shift_to(once, _WORD)), max(1, shift_to(twice, _WORD))))
-    sum_shift = max(1, shift_to(sizes.hop * (2.0 ** (CHANNEL_BITS + 23 - DOWN) + 2), _WORD - 1e-6))
-    channels = _Channels(model, sizes.hop, sum_shift, formats, tuple(integral), margins)
+    integral = tuple(_Integral.of(most, sizes.hop, margins) for most in formats.integrand_most)
+    # a second derivative has no large slow part
+    slow = {model.signal[jet.signal].sample for jet in model.jet if jet.order < 2}
+    fine = any(sensing.full_scale[one] * math.sqrt(sizes.decimation) > _FEW_COUNTS for one in slow)
+    circle = circle_of(sizes.hop, sizes.functions // 2 + sizes.power // 2, fine)
+    # products of four steps have 31 bits
+    sum_shift = max(1, shift_to(sizes.hop * (2.0**29 + 2), _WORD - 1e-6))
+    channels = _Channels(
+        model, sizes.hop, sum_shift, formats, integral, (float(circle[0]), FINE_DOWN if fine else DOWN), margins
+    )
     units = tuple(channels.unit(k, dt) for k in range(len(model.channel)))
     omega = math.pi / (sizes.hop * dt)
     terms = zip(sizes.model.term, model.term, strict=True)
@@ -154,9 +152,10 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
         filter=filters,
         run=runs,
         sign_width=widths,
-        integral=tuple(integral),
+        integral=tuple((one.down, one.twice) for one in integral),
         format=tuple(channels.format(k) for k in range(len(model.channel))),
-        circle=circle_of(sizes.hop),
+        fine=fine,
+        circle=circle,
         factor=tuple(
             scaled_number(float(theirs.factor) * units[mine.channel] * omega**mine.order) for theirs, mine in terms
         ),
@@ -174,9 +173,25 @@ def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, for
     )
 
 
-def circle_of(hop: int) -> npt.NDArray[np.int32]:
-    """The table of cosines of a half window [2 hop]."""
-    return np.asarray(np.rint(CIRCLE * np.cos(np.pi * np.arange(2 * hop) / hop)), np.int32)
+def circle_of(hop: int, highest: int, fine: bool) -> npt.NDArray[np.int32]:
+    """The table of cosines of a half window [2 hop + 3 hop/2 + 3 highest], which goes on behind the circle.
+
+    A sum at harmonic h takes every h-th entry, and the errors of these let other frequencies of the signal into it. The
+    amplitude is the largest, or of those of 16 bits the one that lets in least of the slow ones, which the motion has.
+    """
+    turn = 2 * hop
+    place = np.outer(np.arange(1, highest + 1), np.arange(turn)) % turn
+    cosine = np.cos(np.pi * np.arange(turn) / hop)
+    best, chosen = np.inf, cosine
+    largest, tried = (FINE_CIRCLE, 1) if fine else (CIRCLE, _AMPLITUDES)
+    for amplitude in range(largest, largest - tried, -1):
+        whole = np.rint(amplitude * cosine)
+        let_in = np.fft.rfft((whole / amplitude - cosine)[place])[:, : 2 * highest]
+        total = float(np.sum(np.abs(let_in) ** 2))
+        if total < best:
+            best, chosen = total, whole
+    n = turn + 3 * (hop // 2) + 3 * highest
+    return np.asarray(chosen[np.arange(n) % turn], np.int32)
 
 
 def scaled_number(x: float) -> tuple[int, int]:
@@ -221,20 +236,20 @@ class _Block:
 
 def _filter(block: _Block, jet: WeakJet, weights: Float, bits: int, margins: _Margins) -> WeakFilterQ31:
     name = f"jet {jet.order} of signal {jet.signal}"
-    pair = (2 if jet.order % 2 else 4) * block.most
-    place = _WORD - math.ceil(math.log2(block.most))  # where there are no weights: as many bits as x leaves free
-    if weights.size:
-        room = min(2.0**_WORD / float(np.abs(weights).max()), 2.0**61 / (pair * float(np.abs(weights).sum())))
-        place = math.floor(math.log2(room))
-    if jet.order == 0:
-        place = min(place, _WORD)
-    whole = np.rint(weights * 2.0**place).astype(np.int64)
-    total = pair * float(np.abs(whole).sum()) + (block.most * 2.0**place if jet.order == 0 else 0.0)
-    margins.take(f"the sum of {name}", total, 62)
-    # A sum beyond an int32 of the jet's format saturates, as a jet beyond its reach: its upper bits are not needed.
-    gain = block.unit * 2.0 ** (bits - place)
-    rescale = rescale_to(min(total, 2.0**31 / gain), gain, name)
-    return WeakFilterQ31(whole.astype(np.int32), place if jet.order == 0 else 0, rescale)
+    pair = 4 * block.most
+    whole = np.concatenate([[1.0 if jet.order == 0 else 0.0], weights])
+    spans = np.array([block.most] + [pair] * weights.size)
+    gained = whole * block.unit * 2.0**bits  # to the jet's format
+    total, largest = float(np.abs(gained) @ spans), float(np.abs(gained).max())
+    down = min(62, math.floor(_WORD - math.log2(largest)), math.floor(61 - math.log2(total)))
+    if down < 0:
+        raise PvidError(
+            f"the fixed-point weak form cannot hold {name}: its unit and that of its sensor differ too much"
+        )
+    # Beyond an int32 of the jet's format the sum saturates, as a jet beyond its reach.
+    rounded = np.rint(gained * 2.0**down)
+    margins.take(f"the sum of {name}", total * 2.0**down, 62)
+    return WeakFilterQ31(int(weights.size), down, rounded.astype(np.int32))
 
 
 def _run(reach: float, rate_bits: int, bits: int, dt: float, margins: _Margins) -> Rescale:
@@ -243,8 +258,39 @@ def _run(reach: float, rate_bits: int, bits: int, dt: float, margins: _Margins) 
     return rescale_to(reach / unit, unit * 2.0**bits, "an integral since the start of the run")
 
 
+@dataclass(frozen=True)
+class _Integral:
+    """An integrand's shifts, and the largest integers of its integrals."""
+
+    down: int
+    twice: int
+    of_once: float
+    of_twice: float
+
+    @classmethod
+    def of(cls, most: int, hop: int, margins: _Margins) -> _Integral:
+        # a step adds 140 integrands to I^1 [dt/120], and two of these and 72 integrands to I^2 [dt^2/240]
+        down = shift_to((280.0 * hop + 72.0) * most, 31 - 1e-3)
+        left = most / 2.0**down + 1
+        once = 140.0 * hop * left
+        margins.take("an integral", 2 * once + 72 * left, 31)
+        all_rises = (140.0 * hop * (hop + 1) + 72.0 * hop) * left
+        twice = max(1, shift_to(all_rises, 31 - 1e-3))
+        whole = all_rises / 2.0**twice + hop
+        margins.take("a double integral", whole, 31)
+        return cls(down, twice, once, whole)
+
+
+def _off(shift: int) -> float:
+    """Largest error of the upper half of a product that is shifted."""
+    return 2.0 ** max(UPPER - shift, 0)
+
+
 class _Channels:
-    """Shifts and bounds of the channels and their sums."""
+    """Shifts and bounds of the channels and their sums.
+
+    The unit of an integral is that of its integrand, or 1, times dt/24 or dt^2/48 (of 1: dt/2) times a power of two.
+    """
 
     def __init__(
         self,
@@ -252,54 +298,77 @@ class _Channels:
         hop: int,
         sum_shift: int,
         formats: Formats,
-        integral: tuple[tuple[int, int], ...],
+        integral: tuple[_Integral, ...],
+        cosine: tuple[float, int],
         margins: _Margins,
     ) -> None:
         self.model, self.hop, self.sum_shift = model, hop, sum_shift
         self.formats, self.integral, self.margins = formats, integral, margins
+        self.one, self.down = cosine  # 1, and the shift of the products
 
     def edge(self, one: WeakChannel, fold: int) -> float:
         """Largest I^fold at the end of a half, as an integer."""
         if one.integrand == NONE:
-            return 24.0 * self.hop**2 if fold == 2 else 24.0 * self.hop
-        most = self.formats.integrand_most[one.integrand]
-        size = 28.0 * self.hop * most if fold == 1 else (28.0 * self.hop + 8.0) * self.hop * most
-        return size / 2.0 ** self.integral[one.integrand][fold - 1] + 1
+            once = 2.0 * self.hop if one.fold == 1 else 24.0 * self.hop
+            return once * (self.hop if fold == 2 else 1) * 2.0 ** self.lift(one)
+        own = self.integral[one.integrand]
+        return own.of_once if fold == 1 else own.of_twice
+
+    def lift(self, one: WeakChannel) -> int:
+        """Of the integral of 1."""
+        if not one.fold or one.integrand != NONE:
+            return 0
+        return 31 - (2 * self.hop if one.fold == 1 else 24 * self.hop**2).bit_length()
+
+    def power(self, one: WeakChannel, fold: int) -> int:
+        """Of two in the unit of I^fold at the end of a half."""
+        if one.integrand == NONE:
+            return -self.lift(one)
+        own = self.integral[one.integrand]
+        return own.down if fold == 1 else own.down + own.twice
+
+    def exponent(self, k: int) -> int:
+        """Of two in the unit of the channel."""
+        one = self.model.channel[k]
+        if not one.fold:
+            return self.value(k)
+        return self.value(k) + UPPER + self.power(one, one.fold)
 
     def most(self, k: int) -> float:
-        """Largest gain times integral."""
+        """Largest integer before the last shift."""
         one = self.model.channel[k]
         if one.gain == NONE:
             return 0.0
         gain = float(self.formats.gain_most[one.gain])
-        return gain * self.edge(one, one.fold) if one.fold else gain
+        if not one.fold:
+            return gain
+        return gain * self.edge(one, one.fold) / 2.0**UPPER + 1
 
     def value(self, k: int) -> int:
-        """Shift from there to the channel, at least 1."""
+        """Shift from there to the channel."""
         return max(1, shift_to(self.most(k), CHANNEL_BITS - 1e-6))
 
     def half_sum(self, k: int) -> float:
         """Largest sum of half a window."""
-        size = self.hop * (self.most(k) / 2.0 ** self.value(k) + 1) * CIRCLE / 2.0**DOWN
+        size = self.hop * (self.most(k) / 2.0 ** self.value(k) + 1) * 2  # the cosine times 2^-DOWN is below 2
         return size / 2.0**self.sum_shift + self.hop
 
     def format(self, k: int) -> WeakFormatQ31:
         """Its shifts; the sums with shifted integrals fit 30 bits."""
         one = self.model.channel[k]
-        value, own = self.value(k), 0
+        own = 0
         while True:
             plain = ramp = 0
             total = 2 * self.half_sum(k) / 2.0**own + 1
             if one.fold:
-                plain = value + own - self.value(one.plain)
-                total += self.edge(one, one.fold) * self.half_sum(one.plain) / 2.0**plain + 1
+                plain = self.exponent(k) + own - self.power(one, one.fold) - self.exponent(one.plain)
+                total += self.edge(one, one.fold) * self.half_sum(one.plain) / 2.0**plain + _off(plain)
             if one.fold == 2:
-                once, twice = self.integral[one.integrand] if one.integrand != NONE else (0, 0)
-                ramp = twice - once + value + own - self.value(one.ramp)
-                total += self.edge(one, 1) * self.half_sum(one.ramp) / 2.0**ramp + 1
-            if plain >= 0 and ramp >= 0 and total < 2**30:
+                ramp = self.exponent(k) + own - self.power(one, 1) - self.exponent(one.ramp)
+                total += self.edge(one, 1) * self.half_sum(one.ramp) / 2.0**ramp + _off(ramp)
+            if (plain >= 2 or not one.fold) and (ramp >= 2 or one.fold < 2) and total < 2**30:
                 self.margins.take("the sums of a window", total, 30)
-                return WeakFormatQ31(value, own, plain, ramp)
+                return WeakFormatQ31(self.value(k), self.lift(one), own, plain, ramp)
             own += 1
 
     def unit(self, k: int, dt: float) -> float:
@@ -311,7 +380,6 @@ class _Channels:
         if one.fold and one.integrand == NONE:
             unit *= dt / 2 if one.fold == 1 else dt**2 / 48
         elif one.fold:
-            shift = self.integral[one.integrand][one.fold - 1]
-            unit *= (dt / 24 if one.fold == 1 else dt**2 / 48) * 2.0 ** (shift - self.formats.integrands[one.integrand])
-        form = self.format(k)
-        return unit * 2.0 ** (form.value + form.own + DOWN + self.sum_shift) / CIRCLE
+            unit *= (dt / 120 if one.fold == 1 else dt**2 / 240) * 2.0 ** -self.formats.integrands[one.integrand]
+        power = self.exponent(k) + self.format(k).own + self.down + self.sum_shift
+        return unit * 2.0**power / self.one

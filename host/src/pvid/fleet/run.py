@@ -27,7 +27,7 @@ def run(
     paths : of the recordings; workers on other machines read them under the same names
     progress : called with the number of recordings that are done
     scheduler : address of a running scheduler of dask.distributed; None: processes on this machine
-    workers : number of these processes; None: one a processor
+    workers : number of these processes; None: one a processor. One is this process
 
     Raises
     ------

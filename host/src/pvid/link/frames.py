@@ -449,6 +449,34 @@ class Estimate(Message):
 
 
 @dataclass(frozen=True)
+class RefinedEstimate(Message):
+    """Board to PC beside every Estimate, which is the weak form's, if there is a second stage (refine.h).
+
+    p and covariance are what both stages publish (pvid_refine_best_f32), `stage` is whose they are (Stage). r, se,
+    level and clash are of the refinement's estimate, and `number` is its number; all are 0 while none stands. `reason`
+    is what its last block told.
+    """
+
+    TYPE = 15
+    session: int = wire("u32")
+    number: int = wire("u32")
+    p: tuple[float, ...] = wire("f32", MAX_P)
+    covariance: tuple[float, ...] = wire("f32", _UPPER)  # upper triangle by rows, of all MAX_P
+    r: tuple[float, ...] = wire("f32", MAX_P)
+    se: tuple[float, ...] = wire("f32", MAX_P)
+    level: float = wire("f32")
+    clash: float = wire("f32")
+    reason: int = wire("u8")
+    stage: int = wire("u8")
+    tick_high: int = wire("u16")
+
+    @property
+    def of_p(self) -> tuple[Float, Float]:
+        """p [MAX_P] and its covariance [MAX_P, MAX_P]."""
+        return np.array(self.p), _symmetric(self.covariance)
+
+
+@dataclass(frozen=True)
 class EstimateQ31(Message):
     """Board to PC: the same of the fixed-point core (pvid_estimate_q31)."""
 

@@ -5,12 +5,14 @@
     sample phi rad
     p R ohm
     p d1
+    r R ohm
+    r friction N*m*s
     count V 0.000366
 
 The mechanism's name, then its samples and its parameters in order, each with its name and, except for a pure number,
-its unit; of a board that sends counts also the value of a count of each sample. A board is not trusted:
-names are those of a program's variables, units are few printable characters, and nothing is read of a text that breaks
-a rule.
+its unit; of a board with a second stage also the refined parameters (frames.RefinedEstimate), of one that sends counts
+the value of a count of each sample. A board is not trusted: names are those of a program's variables, units are few
+printable characters, and nothing is read of a text that breaks a rule.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from pvid.models.model import Model
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]{0,31}"
 _COUNT = re.compile(rf"count ({_NAME}) ([0-9.e+-]{{1,24}})")
-_LINE = re.compile(rf"(sample|p) ({_NAME})(?: ([A-Za-z0-9/*^()%.+-]{{1,24}}))?")
+_LINE = re.compile(rf"(sample|p|r) ({_NAME})(?: ([A-Za-z0-9/*^()%.+-]{{1,24}}))?")
 MOST = 1200  # characters of a text
 
 
@@ -35,17 +37,20 @@ class BoardNames:
     """A mechanism by the names and units of its samples and of its parameters; a unit of "" is that of a number.
 
     counts : value of a count of each sample, if the board sends counts
+    refined : entries of the refinement's r; () without a second stage
     """
 
     mechanism: str
     samples: tuple[tuple[str, str], ...]
     parameters: tuple[tuple[str, str], ...]
     counts: tuple[float, ...] = ()
+    refined: tuple[tuple[str, str], ...] = ()
 
     @property
     def text(self) -> str:
         """As in a frame."""
-        lines = [("sample", *one) for one in self.samples] + [("p", *one) for one in self.parameters]
+        named = (("sample", self.samples), ("p", self.parameters), ("r", self.refined))
+        lines = [(what, *one) for what, quantities in named for one in quantities]
         lines += [("count", name, repr(float(x))) for (name, _), x in zip(self.samples, self.counts, strict=False)]
         return "\n".join([self.mechanism, *(" ".join(line).rstrip() for line in lines)])
 
@@ -63,7 +68,7 @@ class BoardNames:
         mechanism, *lines = text.decode("ascii", "replace").split("\n")
         if not re.fullmatch(_NAME, mechanism):
             raise PvidError(f"{shown(mechanism, 40)} is no name of a mechanism")
-        found: dict[str, list[tuple[str, str]]] = {"sample": [], "p": []}
+        found: dict[str, list[tuple[str, str]]] = {"sample": [], "p": [], "r": []}
         counts: dict[str, float] = {}
         for line in lines:
             if (of_count := _COUNT.fullmatch(line)) is not None:
@@ -73,13 +78,16 @@ class BoardNames:
             if match is None:
                 raise PvidError(f"{shown(line, 60)} names no sample and no parameter")
             found[match[1]].append((match[2], match[3] or ""))
-        for what, most in (("sample", MAX_SAMPLES), ("p", MAX_P)):
+        for what, least, most in (("sample", 1, MAX_SAMPLES), ("p", 1, MAX_P), ("r", 0, MAX_P)):
             named = [name for name, _ in found[what]]
-            if not 0 < len(named) <= most or len(set(named)) < len(named):
-                raise PvidError(f"{mechanism}: {len(named)} names of {what}, where 1 to {most} different ones belong")
+            if not least <= len(named) <= most or len(set(named)) < len(named):
+                raise PvidError(
+                    f"{mechanism}: {len(named)} names of {what}, where {least} to {most} different ones belong"
+                )
         if counts and list(counts) != [name for name, _ in found["sample"]]:
             raise PvidError(f"{mechanism}: the counts of {len(counts)} samples, and not of all in their order")
-        return cls(mechanism, tuple(found["sample"]), tuple(found["p"]), tuple(counts.values()))
+        samples, parameters, refined = (tuple(found[what]) for what in ("sample", "p", "r"))
+        return cls(mechanism, samples, parameters, tuple(counts.values()), refined)
 
 
 def _number(text: str) -> float:

@@ -20,8 +20,8 @@ from pvid.base.errors import PvidError
 from pvid.base.version import __version__
 from pvid.log.json_messages import encoded, messages, schema, topic, units
 from pvid.log.reader import LogReader
-from pvid.log.rig import hello_of_log
-from pvid.log.values import TABLE_NAMES, Column, Rows, Tables, Values
+from pvid.log.rig import hello_of_log, names_of_log
+from pvid.log.values import Column, Rows, Tables, Values, refined_of
 from pvid.models.model import Mechanism
 
 _BATCH = 1 << 15  # rows
@@ -33,7 +33,7 @@ class Writer(Protocol):
     def __init__(self, base: Path, files: Mapping[str, Path], tables: Tables) -> None: ...
 
     @staticmethod
-    def suffixes() -> list[str]: ...
+    def suffixes(tables: Tables) -> list[str]: ...
 
     def write(self, rows: Rows) -> None: ...
 
@@ -53,9 +53,9 @@ class CsvWriter:
         files["-metadata.json"].write_text(json.dumps(self._metadata(base), indent=1), encoding="utf-8")
 
     @staticmethod
-    def suffixes() -> list[str]:
+    def suffixes(tables: Tables) -> list[str]:
         """Endings of what is written."""
-        return [*(f"-{table}.csv" for table in TABLE_NAMES), "-metadata.json"]
+        return [*(f"-{table}.csv" for table in tables), "-metadata.json"]
 
     def _metadata(self, base: Path) -> dict[str, Any]:
         kinds = {"f8": "double", "i8": "long"}
@@ -122,9 +122,9 @@ class ParquetWriter:
         }
 
     @staticmethod
-    def suffixes() -> list[str]:
+    def suffixes(tables: Tables) -> list[str]:
         """Endings of what is written."""
-        return [f"-{table}.parquet" for table in TABLE_NAMES]
+        return [f"-{table}.parquet" for table in tables]
 
     def _schema(self, columns: Mapping[str, Column]) -> Any:
         arrow = self._arrow
@@ -163,7 +163,7 @@ class NpzWriter:
         self._gathered = _Gathered(tables)
 
     @staticmethod
-    def suffixes() -> list[str]:
+    def suffixes(tables: Tables) -> list[str]:
         """Endings of what is written."""
         return [".npz"]
 
@@ -200,7 +200,7 @@ class McapWriter:
             self._channels[table] = self._mcap.register_channel(topic(table), "json", number, metadata=units(columns))
 
     @staticmethod
-    def suffixes() -> list[str]:
+    def suffixes(tables: Tables) -> list[str]:
         """Endings of what is written."""
         return [".mcap"]
 
@@ -236,10 +236,12 @@ def export_log(log: Path, form: str, base: Path, mechanism: Mechanism) -> list[P
         When the log cannot be read or a file cannot be written.
     """
     kind = FORMATS[form]
-    values = Values(mechanism, hello_of_log(log))
+    names = names_of_log(log)
+    values = Values(mechanism, hello_of_log(log), refined=() if names is None else refined_of(names))
+    suffixes = kind.suffixes(values.tables)
     try:
         with ExitStack() as stack:
-            files = {one: stack.enter_context(appearing(base.with_name(base.name + one))) for one in kind.suffixes()}
+            files = {one: stack.enter_context(appearing(base.with_name(base.name + one))) for one in suffixes}
             writer = kind(base, files, values.tables)
             for record in LogReader(log):
                 for rows in values.rows(record):
@@ -247,4 +249,4 @@ def export_log(log: Path, form: str, base: Path, mechanism: Mechanism) -> list[P
             writer.close()
     except OSError as error:
         raise PvidError(f"cannot write {base}: {error.strerror}") from error
-    return [base.with_name(base.name + suffix) for suffix in kind.suffixes()]
+    return [base.with_name(base.name + suffix) for suffix in suffixes]

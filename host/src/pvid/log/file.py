@@ -158,6 +158,7 @@ class LogWriter:
         self._segments = 0
         self._received = 0
         self._unsynced = 0
+        self.written = 0  # bytes, since it was opened
         self._between = self.start == 0  # whether the last byte was the end of a frame
         self._marked = self._synced = time.time_ns()
         self._write(b"" if self._between else b"\0")
@@ -165,6 +166,7 @@ class LogWriter:
 
     def _write(self, data: bytes) -> None:
         self._unsynced += len(data)
+        self.written += len(data)
         view = memoryview(data)
         try:
             while view:

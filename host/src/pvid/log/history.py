@@ -18,11 +18,12 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Names, Raw, RawCount
+from pvid.link.frames import Configuration, Estimate, EstimateQ31, Hello, Names, Raw, RawCount, RefinedEstimate
 from pvid.log.file import Segment
 from pvid.log.reader import Account, Record, Restart
-from pvid.log.values import UNKNOWN_RIG, Rows, Values
-from pvid.models.model import Constants, Mechanism, Model
+from pvid.log.values import UNKNOWN_RIG, Rows, Values, extras_of
+from pvid.models.model import Constants, Mechanism, Model, Quantity
+from pvid.settings.enums import Stage
 
 Float = npt.NDArray[np.float64]
 
@@ -81,6 +82,11 @@ class _Point:
     row: tuple[float, ...] = ()
     reason: str = ""
 
+    @property
+    def table(self) -> str:
+        """Its table."""
+        return "refined" if isinstance(self.record.item, RefinedEstimate) else "estimates"
+
 
 class History:
     """Feeds on every record of a log, in order.
@@ -101,9 +107,10 @@ class History:
         self._values = Values(mechanism, follows=mechanism is UNKNOWN_RIG)
         self._aside: list[Record | _Point] = []
         self._aside_samples = 0
-        self._estimates: Thinned[_Point] = Thinned(points)
-        self._newest: dict[str, float] = {}
-        self._reason = ""
+        self._points: dict[str, Thinned[_Point]] = {"estimates": Thinned(points), "refined": Thinned(points)}
+        self._newest: dict[str, dict[str, float]] = {"estimates": {}, "refined": {}}
+        self._reason = {"estimates": "", "refined": ""}
+        self._stage = ""
         self._samples: deque[Float] = deque()  # t and the channels: [1 + channels, n] each
         self._count = 0
         self._began: int | None = None
@@ -129,7 +136,10 @@ class History:
     def numbers(self) -> tuple[str, ...]:
         """Names of the estimates' columns that hold numbers, but for the time."""
         self._work_off()
-        columns = self._values.tables["estimates"].items()
+        return self._numbers("estimates")
+
+    def _numbers(self, table: str) -> tuple[str, ...]:
+        columns = self._values.tables.get(table, {}).items()
         return tuple(name for name, column in columns if column.kind == "f8" and name != "t")
 
     @property
@@ -141,27 +151,52 @@ class History:
     def is_physical(self) -> bool:
         """Whether the newest estimate lies in the physical region; so it is called where that cannot be known."""
         return not self.has_physical or all(
-            math.isfinite(self.newest.get(name, 0.0)) for name in self.model.physical_names
+            math.isfinite(self.published.get(name, 0.0)) for name in self.model.physical_names
         )
 
     @property
     def newest(self) -> dict[str, float]:
-        """The newest estimate: its numbers by name; empty before the first."""
+        """The newest estimate of the weak form, or of the strong one: its numbers by name; empty before the first."""
         self._work_off()
-        return self._newest
+        return self._newest["estimates"]
+
+    @property
+    def published(self) -> dict[str, float]:
+        """The newest estimate of the stage that is published."""
+        self._work_off()
+        refined = self._newest["refined"] if self._stage == Stage.REFINED.text else {}
+        return {**self._newest["estimates"], **{name: x for name, x in refined.items() if math.isfinite(x)}}
+
+    @property
+    def stage(self) -> str:
+        """Whose estimate is published (Stage.text); empty without a second stage."""
+        self._work_off()
+        return self._stage
+
+    @property
+    def refined_reason(self) -> str:
+        """Of the refinement's last block; empty without a second stage."""
+        self._work_off()
+        return self._reason["refined"]
+
+    @property
+    def extras(self) -> tuple[Quantity, ...]:
+        """Refined parameters that the weak form does not have."""
+        self._work_off()
+        return extras_of(self.model, self._values.refined)
 
     @property
     def reason(self) -> str:
         """That of the newest estimate (Reason.text); empty before the first."""
         self._work_off()
-        return self._reason
+        return self._reason["estimates"]
 
     def take(self, record: Record) -> None:
         """The next record; it costs the same whatever it holds."""
         match record.item:
-            case Estimate() | EstimateQ31():
+            case Estimate() | EstimateQ31() | RefinedEstimate():
                 point = _Point(record)
-                self._estimates.append(point)
+                self._points[point.table].append(point)
                 self._aside.append(point)
             case Raw() | RawCount() as raw:
                 self._aside.append(record)
@@ -179,15 +214,23 @@ class History:
     def estimates(self, name: str) -> Float:
         """A column of the estimates' history: "t" [s] or one of `numbers`, [n]."""
         self._work_off()
-        at = 0 if name == "t" else 1 + self.numbers.index(name)
-        return np.array([point.row[at] for point in self._estimates.rows if point.row], np.float64)
+        return self._column("estimates", name)
+
+    def refined(self, name: str) -> Float:
+        """The same of the refined estimates: "t", or what `estimates` has, and `extras`; NaN while none stands."""
+        self._work_off()
+        return self._column("refined", name)
+
+    def _column(self, table: str, name: str) -> Float:
+        at = 0 if name == "t" else 1 + self._numbers(table).index(name)
+        return np.array([point.row[at] for point in self._points[table].rows if point.row], np.float64)
 
     def withheld(self) -> list[tuple[float, str]]:
         """Time [s] and reason (Reason.text) of each window in the history that was held or rejected."""
         self._work_off()
         return [
             (point.row[0], point.reason)
-            for point in self._estimates.rows
+            for point in self._points["estimates"].rows
             if point.row and point.reason.startswith(("held", "rejected"))
         ]
 
@@ -204,7 +247,7 @@ class History:
         if not self._aside:
             return
         aside, self._aside, self._aside_samples = self._aside, [], 0
-        kept = set(self._estimates.rows)
+        kept = {point for points in self._points.values() for point in points.rows}
         wanted = (one for one in aside if not isinstance(one, _Point) or one in kept)
         for one in _joined(wanted):
             record = one.record if isinstance(one, _Point) else one
@@ -227,9 +270,11 @@ class History:
         """What was computed of another mechanism."""
         self._samples.clear()
         self._count = 0
-        self._newest, self._reason = {}, ""
-        for point in self._estimates.rows:
-            point.row = ()
+        self._stage = ""
+        for table, points in self._points.items():
+            self._newest[table], self._reason[table] = {}, ""
+            for point in points.rows:
+                point.row = ()
 
     def _since_began(self, log_time: npt.NDArray[Any]) -> Float:
         if self._began is None:
@@ -252,9 +297,12 @@ class History:
 
     def _take_estimate(self, point: _Point, rows: Rows) -> None:
         t = float(self._since_began(rows.columns["log_time"])[0])
-        self._newest = {name: float(rows.columns[name][0]) for name in self.numbers}
-        self._reason = str(rows.columns["reason"][0])
-        point.row, point.reason = (t, *self._newest.values()), self._reason
+        table = point.table
+        newest = {name: float(rows.columns[name][0]) for name in self._numbers(table)}
+        point.row, point.reason = (t, *newest.values()), str(rows.columns["reason"][0])
+        self._newest[table], self._reason[table] = newest, point.reason
+        if table == "refined":
+            self._stage = str(rows.columns["stage"][0])
 
 
 def _joined(aside: Iterator[Record | _Point]) -> Iterator[Record | _Point]:

@@ -26,7 +26,7 @@ from pvid.log.values import UNKNOWN_RIG, Column, Rows, Tables, Values
 from pvid.models.model import Mechanism
 
 SCHEMES = ("udp", "teleplot", "foxglove")
-_TABLES = ("samples", "estimates")
+_TABLES = ("samples", "estimates", "refined")
 _LEFT_OUT = ("segment", "run", "log_time", "tick")
 _TELEPLOT_ROWS = 8  # a row of samples is at most 3 points of 46 bytes
 

@@ -1,4 +1,5 @@
-"""The rig of a mechanism with a compiled model: --model, --rig, RUN.toml beside RUN.csv, and --set over any of them."""
+"""The rig of a mechanism with a compiled model: --model, --rig, a log, RUN.toml beside RUN.csv, and --set over any of
+them."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pvid.base.toml_text import toml_document
+from pvid.log.rig import LOG_SUFFIX, described_document_of_log
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import parsed_file, rig_path_of
 from pvid.rig.mechanism_file import MechanismRig, with_settings
@@ -20,7 +22,7 @@ def mechanism_rig(
 
     Parameters
     ----------
-    run_path, rig_path : a run may have a rig file beside it; the other one comes before it
+    run_path, rig_path : a log has its own rig, a run may have a rig file beside it; the other one comes before both
     settings : `KEY=VALUE`, which come before the file
     model : name or model file, before both
 
@@ -31,6 +33,10 @@ def mechanism_rig(
     """
     if rig_path is None and run_path is not None and is_run(run_path) and rig_path_of(run_path).is_file():
         rig_path = rig_path_of(run_path)
+    if rig_path is None and run_path is not None and run_path.suffix == LOG_SUFFIX:
+        logged = described_document_of_log(run_path)
+        if logged is not None and model in (None, logged["model"]["name"]):
+            return MechanismRig.of_document(with_settings(logged, settings))
     if model is None and rig_path is None:
         return None
     document = {} if rig_path is None else parsed_file(rig_path, toml_document)

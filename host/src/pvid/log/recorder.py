@@ -30,6 +30,8 @@ from pvid.log.reader import Account, LogStream, Observer, Record
 from pvid.log.tail import LogTail
 
 _CHUNK = 1 << 14
+_NEAR = 1 << 10  # bytes: some frames
+_LEAST_SAMPLE = 4  # bytes that a sample of one sensor takes in a frame
 _RETRY_S = 0.25  # twice as long after every segment that lasts less than _SHORT_S, up to _LONGEST_RETRY_S
 _SHORT_S = 1.0
 _LONGEST_RETRY_S = 8.0
@@ -37,6 +39,7 @@ _DRAIN_S = 1.0
 _MOST_FAILURES = 8  # that are named
 _CATCH_UP_S = 3.0  # for what is not decoded yet when the recording ends
 _LOOK_S = 0.05
+_FOLLOWED_S = 0.005
 _RESEND_S = 1.0
 
 
@@ -141,12 +144,19 @@ class Recorder(threading.Thread):
     `error` is what ended it before that, if anything did; `obstacle` why the link cannot be taken up again, while it is
     tried. On every connection the board is asked for its description;
     an emulator only after its first word (Target.coming_up_s), for what it is sent before is lost.
+
+    Parameters
+    ----------
+    room
+        How many bytes may be read before more of the log is decoded; None: all that come. It holds for an emulator,
+        which may send faster than frames are decoded and waits; a board on a line does not, and is read at once.
     """
 
-    def __init__(self, source: Source, writer: LogWriter) -> None:
+    def __init__(self, source: Source, writer: LogWriter, room: Callable[[], int] | None = None) -> None:
         super().__init__(name="recorder", daemon=True)
         self.source = source
         self.writer = writer
+        self._room = room
         self.stop = threading.Event()
         self.why = "ended"
         self.connected = False
@@ -189,25 +199,29 @@ class Recorder(threading.Thread):
         self.writer.begin(self.source.name, self.source.usb)
         self._target, self.connected = target, True
         try:
-            why = self._read(target.port, target.coming_up_s)
+            why = self._read(target.port, target.coming_up_s, None if target.process is None else self._room)
         finally:
             self._target, self.connected = None, False
             with contextlib.suppress(serial.SerialException, OSError):
                 target.close()
         self.writer.end(why)
 
-    def _read(self, port: Port, silent_s: float) -> str:
+    def _read(self, port: Port, silent_s: float, room: Callable[[], int] | None) -> str:
         """Until the port is gone or the end is requested; returns which."""
         ask_at: float | None = time.monotonic() + silent_s
         try:
             while not self.stop.is_set():
-                data = port.read(_CHUNK)
+                most = _CHUNK if room is None else min(_CHUNK, room())
+                data = port.read(most) if most > 0 else b""
+                if most <= 0:
+                    self.stop.wait(_FOLLOWED_S)
                 self.writer.take(data)
                 if ask_at is not None and (data or time.monotonic() >= ask_at):
                     ask_at = None
                     self.send(Credit(0, 0, 0, 0))
-            limit = time.monotonic() + _DRAIN_S
-            while time.monotonic() < limit and (data := port.read(_CHUNK)):
+            limit, left = time.monotonic() + _DRAIN_S, _CHUNK if room is None else _NEAR
+            while left > 0 and time.monotonic() < limit and (data := port.read(left)):
+                left -= 0 if room is None else len(data)
                 self.writer.take(data)
         except (serial.SerialException, OSError) as error:
             return f"the port is gone: {loss_cause(error)}"
@@ -320,7 +334,7 @@ class Logger:
     duration_s
         Duration after the first connection [s]; None: until the end is requested.
     samples
-        Ends by itself when so many have come; None: likewise.
+        Ends by itself when so many have come, and of an emulator before some frames more have; None: likewise.
     begin, restart
         See Starter; without `begin` nothing is configured.
     failures
@@ -339,6 +353,7 @@ class Logger:
     stream: LogStream = field(default_factory=LogStream)
     failures: list[str] = field(default_factory=list)
     _observers: list[Observer] = field(default_factory=list)
+    _decoded: int = 0  # bytes of this recording
 
     def run(self) -> Account:
         """Until SIGINT, SIGTERM or the duration; in the main thread.
@@ -350,7 +365,7 @@ class Logger:
             written; what came is in the log.
         """
         writer = LogWriter(self.out, rig=self.rig, append=self.append)
-        recorder = Recorder(self.source, writer)
+        recorder = Recorder(self.source, writer, None if self.samples is None else lambda: self._room(writer))
         starter = None if self.begin is None else Starter(recorder.send, self.begin, self.restart)
         self._observers = [*self.observers, *([] if starter is None else [starter])]
         with _asked_to_end(recorder), self.out.open("rb") as file:
@@ -392,8 +407,14 @@ class Logger:
                 recorder.why = f"the {self.samples} samples that were asked for have come"
                 recorder.stop.set()
 
+    def _room(self, writer: LogWriter) -> int:
+        """Bytes that cannot hold more samples than are still wanted, less those that are not decoded."""
+        wanted = (self.samples or 0) - self.stream.account.samples
+        return max(_NEAR, _LEAST_SAMPLE * wanted) - (writer.written - self._decoded)
+
     def _catch_up(self, data: bytes) -> bool:
         self._hand_out(lambda: self.stream.feed(data))
+        self._decoded = self.stream.account.bytes
         self._each(lambda one: one.idle(self.stream.account))
         return bool(data)
 

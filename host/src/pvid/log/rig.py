@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
 from pvid.link.frames import Hello, Names
+from pvid.link.names import BoardNames
 from pvid.log.board_model import mechanism_of
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.values import UNKNOWN_RIG, Values, is_rate
@@ -85,6 +87,23 @@ def rig_in(text: str) -> RigFile | None:
     return rig if isinstance(rig, RigFile) else None
 
 
+def described_document_of_log(path: Path) -> dict[str, Any] | None:
+    """The tables of the rig in a log of a described mechanism, without the engine's; None: the log has another rig, or
+    none.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, or the rig file in it is none.
+    """
+    text = _text_of_log(path)
+    if text is None or rig_in(text) is not None:
+        return None
+    document = toml_document(text)
+    del document["engine"]
+    return document
+
+
 def mechanism_of_log(path: Path) -> Mechanism:
     """The mechanism of a log: that of its rig file, else the first one that the board named; UNKNOWN_RIG if none did.
 
@@ -97,11 +116,22 @@ def mechanism_of_log(path: Path) -> Mechanism:
     rig = None if text is None else rig_in(text)
     if rig is not None:
         return rig.mechanism
-    for record in LogReader(path):
-        if isinstance(record.item, Names):
-            with suppress(PvidError):
-                return mechanism_of(record.item.text)
+    for names in _names_of_log(path):
+        with suppress(PvidError):
+            return mechanism_of(names.text)
     return UNKNOWN_RIG
+
+
+def _names_of_log(path: Path) -> Iterator[Names]:
+    return (record.item for record in LogReader(path) if isinstance(record.item, Names))
+
+
+def names_of_log(path: Path) -> BoardNames | None:
+    """What the first board named that named what there can be; None when none did."""
+    for names in _names_of_log(path):
+        with suppress(PvidError):
+            return BoardNames.parse(names.text)
+    return None
 
 
 def refuse_to_append(path: Path, rig: RigFile | str | None) -> None:

@@ -7,12 +7,12 @@ from contextlib import suppress
 from typing import TextIO
 
 from pvid.base.errors import PvidError
-from pvid.link.frames import Estimate, EstimateQ31, Hello, Names
+from pvid.link.frames import Estimate, EstimateQ31, Hello, Names, RefinedEstimate
 from pvid.log.board_model import mechanism_of
 from pvid.log.reader import Account, Record
 from pvid.log.values import UNKNOWN_RIG, in_si
 from pvid.models.model import Model
-from pvid.settings.enums import Reason
+from pvid.settings.enums import Reason, Stage
 
 _ON_TERMINAL_S = 0.25
 _ELSEWHERE_S = 10.0
@@ -30,15 +30,19 @@ class StatusLine:
         self._written = self._rated = time.monotonic()
         self._samples = 0
         self._estimate: Estimate | EstimateQ31 | None = None
+        self._refined: RefinedEstimate | None = None
         self._tick = 0
 
     def take(self, record: Record, account: Account) -> None:
         """See logreader.Observer."""
         if isinstance(record.item, Estimate | EstimateQ31):
             self._estimate, self._tick = record.item, record.tick
+        elif isinstance(record.item, RefinedEstimate):
+            self._refined = record.item
         elif isinstance(record.item, Names) and self._follows:
             with suppress(PvidError):
                 self._model, self._estimate = mechanism_of(record.item.text).model, None
+                self._refined = None
 
     def idle(self, account: Account) -> None:
         """See logreader.Observer."""
@@ -66,8 +70,11 @@ class StatusLine:
             text += f"; waiting for the link ({account.obstacle or account.segments[-1].why})"
         hello, estimate = account.lasting.get(Hello), self._estimate
         if isinstance(hello, Hello) and estimate is not None:
-            numbers = zip(self._model.parameters[: self._model.n_mapped], in_si(estimate, hello)[0], strict=False)
+            refined, p = self._refined, in_si(estimate, hello)[0]
+            if is_refined := refined is not None and refined.stage == Stage.REFINED:
+                p = refined.of_p[0]
+            numbers = zip(self._model.parameters[: self._model.n_mapped], p, strict=False)
             values = ", ".join(f"{one.name} {value:.5g} {one.unit}".rstrip() for one, value in numbers)
             reason = Reason(estimate.reason).text if estimate.reason in list(Reason) else str(estimate.reason)
-            text += f"; tick {self._tick}: {values}, {reason}"
+            text += f"; tick {self._tick}: {values}, {'refined' if is_refined else reason}"
         return text

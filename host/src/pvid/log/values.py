@@ -11,7 +11,7 @@ Each of `values.tables` has the columns written there, with their units; a numbe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -35,15 +35,16 @@ from pvid.link.frames import (
     Names,
     Raw,
     RawCount,
+    RefinedEstimate,
     Status,
 )
 from pvid.link.names import BoardNames
-from pvid.log.board_model import mechanism_of
+from pvid.log.board_model import TAKEN, mechanism_of
 from pvid.log.file import Close, Segment
 from pvid.log.reader import Gap, Record, Restart
 from pvid.models.model import Mechanism, Model, Quantity
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.settings.enums import Reason
+from pvid.settings.enums import Reason, Stage
 
 _SLOWEST, _FASTEST = 1e-3, 1e9  # [Hz]
 _LONGEST_S = 3e9  # between the PC's clock and a tick: a century, which a time in ns has room for
@@ -91,14 +92,20 @@ def _number(of: Quantity, what: str) -> Column:
     return Column(of.unit or "1", "f8", what)
 
 
-TABLE_NAMES = ("samples", "estimates", "status", "events")
+def extras_of(model: Model, refined: Sequence[Quantity]) -> tuple[Quantity, ...]:
+    """Refined parameters that the weak form does not have, as friction; none with the name of another column."""
+    taken = {*TAKEN, *_OF_REFINED, *(f"{one.name}{end}" for one in model.answers for end in ("", "_se"))}
+    return tuple(one for one in refined if not taken & {one.name, f"{one.name}_se"})
+
+
+_OF_REFINED = ("stage", "number", "level", "clash")
 
 
 @lru_cache(maxsize=64)
-def tables_of(model: Model) -> Tables:
-    """The tables of a model's logs."""
+def tables_of(model: Model, refined: tuple[Quantity, ...] = ()) -> Tables:
+    """The tables of a model's logs; with the refined parameters of a board that has a second stage."""
     estimated = (*model.published, *model.physical)
-    return {
+    tables = {
         "samples": {**_WHERE, **{one.name: _number(one, f"measured {one.meaning}") for one in model.channels}},
         "estimates": {
             **_WHERE,
@@ -112,6 +119,19 @@ def tables_of(model: Model) -> Tables:
         "status": _STATUS,
         "events": _EVENTS,
     }
+    if refined:
+        of_r = (*estimated, *extras_of(model, refined))
+        tables["refined"] = {
+            **_WHERE,
+            "stage": Column("", "U8", "whose estimate is published: that of the table estimates (weak), or this one"),
+            "number": Column("1", "i8", "number of the refined estimate; 0: there is none"),
+            **{one.name: _number(one, "refined estimate") for one in of_r},
+            **{f"{one.name}_se": _number(one, f"standard error of refined {one.name}") for one in of_r},
+            "level": Column("1", "f8", "variance of the residuals over that of the sensors' noise"),
+            "clash": Column("1", "f8", "square by which blocks differ from their past, over its expectation"),
+            "reason": Column("", "U24", "reason of the last block"),
+        }
+    return tables
 
 
 @dataclass(frozen=True)
@@ -133,13 +153,23 @@ class Values:
         Who the board is, where that is known before its records; without it times are NaN until it has said so.
     follows
         Take the mechanism that the board names, from there on; the tables change with it.
+    refined
+        Refined parameters of the log's boards; None: those that the board names, from there on.
     """
 
     def __init__(
-        self, mechanism: Mechanism = UNKNOWN_RIG, hello: Hello | None = None, *, follows: bool = False
+        self,
+        mechanism: Mechanism = UNKNOWN_RIG,
+        hello: Hello | None = None,
+        *,
+        follows: bool = False,
+        refined: tuple[Quantity, ...] | None = None,
     ) -> None:
         self.mechanism = mechanism
         self.follows = follows
+        self.refined = refined or ()
+        self._names_refined: tuple[str, ...] = ()  # in the order of the frames
+        self._refined_follows = refined is None
         self._hello = hello
         self._row_sd = math.nan
         self._offset = 0.0  # of the angle in fixed point [rad]
@@ -154,7 +184,7 @@ class Values:
     @property
     def tables(self) -> Tables:
         """The columns of each table."""
-        return tables_of(self.mechanism.model)
+        return tables_of(self.mechanism.model, self.refined)
 
     @property
     def sample_rate(self) -> float:
@@ -178,6 +208,9 @@ class Values:
                 with suppress(PvidError):  # a board that names nothing that there can be
                     names = BoardNames.parse(item.text)
                     self._named, self._counts = tuple(name for name, _ in names.samples), names.counts
+                    self._names_refined = tuple(name for name, _ in names.refined)
+                    if self._refined_follows:
+                        self.refined = refined_of(names)
                     self.mechanism = mechanism_of(item.text) if self.follows else self.mechanism
             case Configure() | ConfigureQ31():
                 self._row_sd = item.row_sd if 0 < item.row_sd < math.inf else math.nan
@@ -186,6 +219,8 @@ class Values:
                 yield self._samples(record, item)
             case Estimate() | EstimateQ31():
                 yield self._estimate(record, item)
+            case RefinedEstimate() if self.refined:
+                yield self._refined(record, item)
             case Status():
                 state = Code(item.code).name if item.code in list(Code) else str(item.code)
                 yield self._one(
@@ -258,10 +293,32 @@ class Values:
 
     @np.errstate(all="ignore")
     def _estimate(self, record: Record, item: Estimate | EstimateQ31) -> Rows:
+        numbers: dict[str, Any] = dict.fromkeys(self.tables["estimates"], np.nan)
+        numbers |= self._answers(*in_si(item, self._hello, self._offset))
+        numbers["kappa"] = item.kappa / item.FULL_KAPPA
+        numbers["residual"] = item.residual_sd / self._row_sd
+        reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)
+        return self._one("estimates", record, **{**numbers, "updates": item.updates, "reason": reason})
+
+    @np.errstate(all="ignore")
+    def _refined(self, record: Record, item: RefinedEstimate) -> Rows:
+        numbers: dict[str, Any] = dict.fromkeys(self.tables["refined"], np.nan)
+        if item.stage == Stage.REFINED:
+            numbers |= self._answers(*item.of_p)
+            extras = {one.name for one in extras_of(self.mechanism.model, self.refined)}
+            for name, r, se in zip(self._names_refined, item.r, item.se, strict=False):
+                if name in extras:
+                    numbers[name], numbers[f"{name}_se"] = r, se
+            numbers |= {"level": item.level, "clash": item.clash}
+        stage = Stage(item.stage).text if item.stage in list(Stage) else str(item.stage)
+        reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)
+        return self._one("refined", record, **{**numbers, "stage": stage, "number": item.number, "reason": reason})
+
+    def _answers(self, p: npt.NDArray[np.float64], covariance: npt.NDArray[np.float64]) -> dict[str, float]:
+        """Published and physical parameters with their standard errors, from p [MAX_P] and its covariance."""
         model = self.mechanism.model
         n_p = min(MAX_P if self._hello is None else self._hello.n_p, len(model.published))
-        p, covariance = in_si(item, self._hello, self._offset)
-        numbers: dict[str, Any] = dict.fromkeys(self.tables["estimates"], np.nan)
+        numbers: dict[str, Any] = {}
         errors = np.sqrt(np.diag(covariance))
         for i, name in enumerate(model.p_names[:n_p]):
             numbers[name], numbers[f"{name}_se"] = p[i], errors[i]
@@ -270,10 +327,12 @@ class Values:
             of_physical = self.mechanism.physical_errors(p, covariance)
             for i, name in enumerate(model.physical_names):
                 numbers[name], numbers[f"{name}_se"] = physical[i], of_physical[i]
-        numbers["kappa"] = item.kappa / item.FULL_KAPPA
-        numbers["residual"] = item.residual_sd / self._row_sd
-        reason = Reason(item.reason).text if item.reason in list(Reason) else str(item.reason)
-        return self._one("estimates", record, **{**numbers, "updates": item.updates, "reason": reason})
+        return numbers
+
+
+def refined_of(names: BoardNames) -> tuple[Quantity, ...]:
+    """The refined parameters that a board names."""
+    return tuple(Quantity(name, unit, f"refined {name}") for name, unit in names.refined)
 
 
 def is_rate(sample_rate: float) -> bool:

@@ -38,6 +38,7 @@ from pvid.link.frames import (
     Loss,
     Raw,
     RawCount,
+    RefinedEstimate,
 )
 from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
@@ -46,10 +47,11 @@ from pvid.settings.enums import Reason
 from pvid.settings.kinds import Settings
 from pvid.settings.record import HASHED_TYPES
 from pvid.twin import fnv
+from pvid.twin.both_stages import BothStagesTwin
 from pvid.twin.weak import WeakTwin
 from pvid.twin.weak_q31 import WeakTwinQ31
 
-Check = Estimate | EstimateQ31 | Hash | Credit
+Check = Estimate | EstimateQ31 | RefinedEstimate | Hash | Credit
 
 
 class EngineBoard(Protocol):
@@ -64,7 +66,7 @@ class EngineBoard(Protocol):
     @property
     def matrix(self) -> str: ...
 
-    def twin_of(self, frame: Configuration) -> WeakTwin | WeakTwinQ31: ...
+    def twin_of(self, frame: Configuration) -> WeakTwin | WeakTwinQ31 | BothStagesTwin: ...
 
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
@@ -239,7 +241,7 @@ class Verifier:
                     self._open.begin_with(configuration)
             case Raw() | RawCount() as raw:
                 yield from self._take_samples(record, raw)
-            case Estimate() | EstimateQ31() | Hash() | Credit() as check:
+            case Estimate() | EstimateQ31() | RefinedEstimate() | Hash() | Credit() as check:
                 self._take_check(record.tick, check)
             case Restart():
                 yield from self._close()
@@ -340,7 +342,10 @@ class Verifier:
             self._number = self.rig.stream_image.number
         if configuration.settings != self._number:
             raise PvidError("the board's image was made for other settings than the log's, or by another version")
-        return _EngineTwin(self.rig.twin_of(configuration), self.rig.matrix), self.rig.p_names
+        twin = self.rig.twin_of(configuration)
+        if isinstance(twin, BothStagesTwin):
+            return _RefinedTwin(twin, self.rig.matrix), self.rig.p_names
+        return _EngineTwin(twin, self.rig.matrix), self.rig.p_names
 
     def _config(self, rig: RigFile, configuration: Configuration) -> Settings:
         """The identifier's settings: those of the rig file, with the values of the configuration."""
@@ -377,11 +382,16 @@ class _Twin(Protocol):
     def estimate(self) -> Any:
         """What the board says at present."""
 
+    @property
+    def both(self) -> BothStagesTwin | None:
+        """With a second stage."""
+
 
 class _StrongTwin:
     """The strong form, in the rig file's core."""
 
     samples = 2
+    both = None
 
     def __init__(self, config: Settings) -> None:
         case = case_of(config)
@@ -399,6 +409,8 @@ class _StrongTwin:
 class _EngineTwin:
     """The engine of any mechanism, in either arithmetic, which reports what it publishes."""
 
+    both: BothStagesTwin | None = None
+
     def __init__(self, twin: WeakTwin | WeakTwinQ31, matrix: str) -> None:
         self._twin, self.matrix = twin, matrix
         self.samples, self.reach, self.estimator = twin.samples, twin.reach, twin.estimator
@@ -408,6 +420,18 @@ class _EngineTwin:
 
     def estimate(self) -> Any:
         return self._twin.trust.estimate[0]
+
+
+class _RefinedTwin(_EngineTwin):
+    """The engine with its second stage."""
+
+    def __init__(self, both: BothStagesTwin, matrix: str) -> None:
+        super().__init__(both.weak, matrix)
+        self.both = both
+
+    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
+        assert self.both is not None
+        return self.both.follow(samples, after)
 
 
 class _DifferentError(Exception):
@@ -449,6 +473,8 @@ class _Recomputation:
     def _after(self, tick: int, reasons: npt.NDArray[np.uint8]) -> None:
         reason = int(reasons[0])
         self._hash = fnv.fold_bytes(self._hash, self._state(reason))
+        if self.twin.both is not None:
+            self._hash = fnv.fold_bytes(self._hash, self.twin.both.refine.hashed)
         if reason != Reason.ACCUMULATED:
             self._verdict = reason
         self._count()
@@ -483,6 +509,8 @@ class _Recomputation:
                 yield "status", check.reason, reason
             case Estimate() | EstimateQ31():
                 yield from self._compared_estimate(check)
+            case RefinedEstimate():
+                yield from self._compared_refined(check)
 
     def _compared_estimate(self, check: Estimate | EstimateQ31) -> Iterator[tuple[str, int, int]]:
         matrix = self.twin.matrix
@@ -506,6 +534,30 @@ class _Recomputation:
             yield name.replace("_", " "), _word(getattr(check, name)), _word(own[name])
         yield "updates", check.updates, int(self.twin.estimator.counters["updates"][0])
         yield "status", check.reason, self._verdict
+
+    def _compared_refined(self, check: RefinedEstimate) -> Iterator[tuple[str, int, int]]:
+        both = self.twin.both
+        if both is None:
+            raise PvidError("the estimates are of a second stage, which the rig file does not set")
+        (stage, best), refine = both.best(), both.refine
+        n_p = len(self.twin.estimator.p)
+        for i in range(n_p):
+            yield f"published {self._p_names[i]}", _word(check.p[i]), _word(best["p"][i])
+        logged = dict(zip(_UPPER, check.covariance, strict=True))
+        for a, b in ((a, b) for a, b in _UPPER if b < n_p):
+            what = f"published covariance of {self._p_names[a]} and {self._p_names[b]}"
+            yield what, _word(logged[a, b]), _word(best["covariance"][a, b])
+        own = refine.estimate
+        zero = np.zeros(refine.shape.parameters, np.float32)
+        for name, values in (("r", zero if own is None else own.r), ("se", zero if own is None else own.se)):
+            for i, value in enumerate(values):
+                yield f"refined {name}[{i}]", _word(getattr(check, name)[i]), _word(value)
+        for name in ("level", "clash"):
+            value = np.float32(0) if own is None else getattr(own, name)
+            yield f"refined {name}", _word(getattr(check, name)), _word(value)
+        yield "number of the refined estimate", check.number, 0 if own is None else refine.published
+        yield "stage", check.stage, int(stage)
+        yield "status of the refinement", check.reason, int(refine.told)
 
 
 def _word(value: Any) -> int:

@@ -9,7 +9,7 @@ from pvid.base.errors import PvidError
 from pvid.link.frames import Code, Core, Form, Hello, Names, Status
 from pvid.log.board_model import mechanism_of
 from pvid.log.reader import Account
-from pvid.settings.enums import Reason
+from pvid.settings.enums import Reason, Stage
 from pvid.settings.forms import FORMS
 
 _REASONS = {
@@ -35,6 +35,17 @@ _REASONS = {
 # What the core publishes (trust.h), and what a good drive reaches (theory.md 4).
 KAPPA_MIN, KAPPA_WEAK, KAPPA_GOOD = 3e-5, 1e-3, 5e-3
 _KAPPA_SHOWN = (1e-6, 1.0)
+
+
+def stage_words(stage: str, reason: str) -> str:
+    """Whose estimate is published (Stage.text), and why, by the reason of the refinement's last block; empty without a
+    second stage."""
+    if not stage:
+        return ""
+    words = reason_words(reason).removeprefix("refinement: ")
+    if stage == Stage.REFINED.text:
+        return "the refined one" + (f"; of the last block: {words}" if reason != Reason.UPDATED.text else "")
+    return f"the weak form's; the refinement: {words}"
 
 
 def board_words(hello: Hello | None, account: Account) -> str:

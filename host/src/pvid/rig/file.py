@@ -122,9 +122,10 @@ class Identifier:
     window_s : strong form: window of the differentiator; 0: 0.241 s
     differentiator : filters of the strong form
     degree : strong form: degree of the Savitzky-Golay polynomial
-    stride : strong form: samples between the points of the differentiator; with a block at least its length
-    block : strong form, Savitzky-Golay: odd number of samples whose mean is a point; a window of window_s then
-        takes the time of window_s / block points, with 2 % (phi) to 14 % (its fourth derivative) more noise
+    stride : strong form: points between the taps of the differentiator; a point is a sample, or a block of them
+    block : strong form, Savitzky-Golay: odd number of samples whose mean is a point, with a row for each block:
+        memory and time of a window of window_s fall by this factor, with 2 % (phi) to 14 % (its fourth derivative)
+        more noise
     forgetting_s : time constant of forgetting; 0: no forgetting; the cores f32 and q31
     feedback_hz : strong form, stationary law: rate at which F decays; 0: a whole Gauss-Newton step at every solve
     divider : strong form: ticks per solve
@@ -142,7 +143,7 @@ class Identifier:
     window_s: float = _number(0.0, "s", 0.0, 1e6)
     differentiator: Differentiator = _choice("savitzky-golay", Differentiator)
     degree: int = _number(12, "", 4, 12)
-    stride: int = _number(1, "samples", 1, 65535)
+    stride: int = _number(1, "points", 1, 65535)
     block: int = _number(1, "samples", 1, 8191)
     forgetting_s: float = _number(0.0, "s", 0.0, 1e12)
     feedback_hz: float = _number(10.0, "1/s", 0.0, 1e12)

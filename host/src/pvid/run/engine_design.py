@@ -101,7 +101,12 @@ def config_for_recording(
     """
     design, p, known = design_and_p(compiled, recording, functions, ranking)
     config = engine_config(compiled, recording.signals, design, p, start_there=known)
-    return replace(config, trust=replace(config.trust, neglected=neglected_part(compiled, recording.signals)))
+    return with_neglected(config, neglected_part(compiled, recording.signals))
+
+
+def with_neglected(config: WeakConfig, part: float) -> WeakConfig:
+    """Settings whose published standard errors contain this part of each positive parameter."""
+    return replace(config, trust=replace(config.trust, neglected=part))
 
 
 def neglected_part(compiled: CompiledModel, run: Run) -> float:
@@ -178,7 +183,8 @@ def _with_fewer_functions(design: WeakDesign) -> Iterator[WeakDesign]:
 
 
 def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = None) -> WeakConfig:
-    """Settings for the shipped rig of a mechanism, with its own design.
+    """Settings for the shipped rig of a mechanism, with its own design, and for its simulation, whose equations are
+    those of the model: nothing is neglected.
 
     Raises
     ------
@@ -187,6 +193,12 @@ def config_for_simulated_rig(compiled: CompiledModel, functions: int | None = No
     """
     run, design, p = simulated_run_of(compiled, functions)
     return engine_config(compiled, run, design, p)
+
+
+def config_for_rig_like_the_shipped(compiled: CompiledModel, functions: int | None = None) -> WeakConfig:
+    """The same for a real rig that moves as much: its standard errors contain what linearised equations neglect."""
+    part = neglected_part(compiled, simulated_run_of(compiled, functions)[0])
+    return with_neglected(config_for_simulated_rig(compiled, functions), part)
 
 
 def simulated_run_of(compiled: CompiledModel, functions: int | None = None) -> tuple[Run, WeakDesign, Float]:

@@ -235,3 +235,11 @@ def engine_for_simulated_rig(
     """For the shipped rig of a mechanism, with its own design."""
     run, design, p = simulated_run_of(compiled, functions)
     return fixed_engine(compiled, run, design, p, soft_signs=soft_signs)
+
+
+def engine_for_rig_like_the_shipped(
+    compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
+) -> FixedEngine:
+    """The same for a real rig that moves as much: as config_for_rig_like_the_shipped."""
+    part = neglected_part(compiled, simulated_run_of(compiled, functions)[0])
+    return with_neglected(engine_for_simulated_rig(compiled, functions, soft_signs), part)

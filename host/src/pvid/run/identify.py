@@ -292,7 +292,8 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
     d_phi = bank.apply(run.phi, run.sample_rate).T
     d_y = bank.apply(run.y, run.sample_rate).T
     u = d_y[:, 2:5] / rig.l1
-    driven = oracle.driven(u[:, 0], run.sample_rate, config.drive_min)
+    rate = run.sample_rate / bank.every
+    driven = oracle.driven(u[:, 0], rate, config.drive_min)
     if not driven.any():
         return _start_held(run, rig, config)
     n, y = oracle.strong_rows(d_phi[driven], u[driven])
@@ -306,7 +307,7 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
             lower=settings.lower.astype(np.float64),
             upper=settings.upper.astype(np.float64),
             row_sd=settings.row_sd,
-            rate=run.sample_rate,
+            rate=rate,
             law=rig.identifier.law,
             feedback_hz=settings.feedback_hz,
             forgetting_s=settings.forgetting_s,
@@ -317,7 +318,7 @@ def _in_float64(run: Run, rig: RigFile, config: StrongConfig, every: int) -> Ide
         ),
         estimate_every=every,
     )
-    times = run.t[2 * config.delay :][driven][[tick for tick, _ in result.estimates]]
+    times = run.t[config.window - 1 :: config.every][driven][[tick for tick, _ in result.estimates]]
     moved_at_end = bool(driven[-1] and result.updated[-settings.divider :].any())
     return _identification(
         rig,

@@ -144,6 +144,11 @@ def gains_of(model: CompiledModel, found: Identified) -> Float:
     return np.array([*given(model, found.by_gain, found.by_known), found.by_neglect])
 
 
+def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
+    """The same of a refined estimate, whose equations neglect nothing where the refinement has its own."""
+    return gains_of(model, found)[:-1] if model.refinement.equations else gains_of(model, found)
+
+
 def values_of(model: CompiledModel, p: Float, covariance: Float, gains: Float, *, identified: bool) -> dict[str, Value]:
     """Outputs of the model, then p, by name.
 

@@ -28,6 +28,8 @@ _DAMPINGS = (1e-3, 1e-2, 0.1, 1.0, 10.0)  # of a step that leads nowhere
 _SETTLED = 0.01  # standard errors: of the last step
 _START_SD = 1e3  # of the outputs' spread: the starts are free
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
+_PARTS = (1, 2, 4, 8, 16, 32, 64)  # of a block, whose scores scatter
+_FEWEST_PARTS = 3  # times the unknowns: with fewer, the scatter is not estimated
 _LONG_S = 0.016  # residuals are averaged over this for the chi^2 of slow residuals
 
 GOOD = 3.0  # slow chi^2 up to which a refined answer is preferred to a published one
@@ -320,20 +322,33 @@ class Problem:
         slow = self._slow_chi2(found.error, use, len(cut.first) * states + len(free))
         inverse = np.linalg.pinv(triangle, rcond=1e-14)
         information = inverse @ inverse.T
-        # scatter of the blocks: each one's score after its start is eliminated
-        corner = found.triangle[:, states:, states:]
-        scores = np.einsum("bki,bk->bi", corner[:, :, free], corner[:, :, -1])
-        blocks = len(cut.first)
-        factor = max(1.0, chi2, slow)
-        wide = factor * information
-        if blocks > 2 * len(free):
-            clustered = information @ (scores.T @ scores) @ information * blocks / (blocks - len(free))
-            grown = np.sqrt(np.maximum(np.diag(clustered) / np.diag(wide), 1.0))
-            wide = wide * np.outer(grown, grown)
+        wide = max(1.0, chi2, slow) * information
+        grown = np.sqrt(np.maximum(self._scatter(found, free, information) / np.diag(wide), 1.0))
+        wide = wide * np.outer(grown, grown)
         covariance, noise = np.zeros((n, n)), np.zeros((n, n))
         covariance[np.ix_(free, free)], noise[np.ix_(free, free)] = wide, information
         kept = count / max(np.isfinite(cut.rows(self.measured.z)).sum(), 1)
         return Refined(r, covariance, noise, chi2, slow, converged, passes, cut, starts, float(kept), cost)
+
+    def _scatter(self, found: Block, free: npt.NDArray[np.intp], information: Float) -> Float:
+        """Variances of the free steps from the scatter of the scores of parts of the run, the largest of several
+        lengths of a part: residuals that are alike for longer than a sample count as fewer."""
+        blocks, states = len(found.error), self.kernel.states
+        error = found.error.reshape(blocks, -1, 1)
+        jacobian = found.jacobian.reshape(blocks, error.shape[1], -1)
+        q = np.linalg.qr(jacobian[:, :, :states])[0]
+        across = np.swapaxes(q, 1, 2)
+        rest = jacobian[:, :, states + free]
+        scores = (rest - q @ (across @ rest)) * (error - q @ (across @ error))  # their starts are eliminated
+        out = np.zeros(len(free))
+        for parts in _PARTS:
+            many, length = blocks * parts, error.shape[1] // parts
+            if length == 0 or many <= _FEWEST_PARTS * len(free):
+                continue
+            sums = scores[:, : length * parts].reshape(many, length, len(free)).sum(1)
+            clustered = information @ (sums.T @ sums) @ information * many / (many - len(free))
+            out = np.maximum(out, np.diag(clustered))
+        return out
 
     def _slow_chi2(self, error: Float, use: Bool, parameters: int) -> float:
         """Of averages of residuals, each with the variance that white noise of as many samples has."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
@@ -10,11 +11,13 @@ import numpy.typing as npt
 
 from pvid.base.recent import Recent
 from pvid.codegen.files_refine import DOUBLE, function
-from pvid.codegen.refine import RefineFunctions, has_skew, refine_functions_of, without_optional
+from pvid.codegen.refine import RefinedParameter, RefineFunctions, has_skew, refine_functions_of, without_optional
 from pvid.model.compiled import CompiledModel
 from pvid.sim.compiled_plant import loaded
 
 Float = npt.NDArray[np.float64]
+
+PLAY = "play"  # the parameter of PlayedKernel
 
 
 class RefinedKernel:
@@ -116,6 +119,62 @@ class RefinedKernel:
     def possible(self, r: Float) -> bool:
         """Whether a mechanism can have these parameters."""
         return bool(self._library.refine_region(_pointer(r)))
+
+
+class PlayedKernel(RefinedKernel):
+    """A kernel with one more parameter behind the others: half the play between the mechanism and its sensor, or half
+    the sensor's hysteresis."""
+
+    def __init__(self, inner: RefinedKernel, unit: str) -> None:
+        self._inner, self._library, self.states = inner, inner._library, inner.states
+        own = RefinedParameter(PLAY, unit, False, -1, 1.0)
+        self.made = replace(inner.made, parameters=(*inner.made.parameters, own))
+        self._place = len(inner.made.parameters)
+        self.columns = inner.columns + 1
+
+    def blocks(
+        self,
+        r: Float,
+        first: npt.NDArray[np.int32],
+        samples: int,
+        sub: int,
+        h: float,
+        u: Float,
+        du: Float,
+        starts: Float,
+        derivatives: bool = True,
+        coarse: int = 1,
+    ) -> tuple[Float, Float | None, Float]:
+        """As of RefinedKernel; ends are those of the motion."""
+        z, inner, ends = self._inner.blocks(
+            self._without(r), first, samples, sub, h, u, du, starts, derivatives, coarse
+        )
+        jacobian = None if inner is None else np.concatenate([inner, np.zeros((*z.shape, 1))], -1)
+        self._library.refine_play(
+            len(first),
+            samples,
+            ctypes.c_double(float(r[self._place])),
+            _pointer(z),
+            None if jacobian is None else _pointer(jacobian),
+            self.columns,
+            self.columns - 1,
+        )
+        return z, jacobian, ends
+
+    def _without(self, r: Float) -> Float:
+        return np.delete(r, self._place)
+
+    def derivatives(self, r: Float, q: Float, v: Float, u: Float) -> dict[str, Float]:
+        """As of RefinedKernel."""
+        return self._inner.derivatives(self._without(r), q, v, u)
+
+    def chart(self, r: Float) -> Float:
+        """As of RefinedKernel."""
+        return self._inner.chart(self._without(r))
+
+    def possible(self, r: Float) -> bool:
+        """Whether a mechanism can have these parameters."""
+        return bool(r[self._place] >= 0) and self._inner.possible(self._without(r))
 
 
 def _pointer(array: Float) -> ctypes.c_void_p:

@@ -11,10 +11,15 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.codegen.refine import LOG_SD, has_skew, signs_of, width_name
 from pvid.model.compiled import CompiledModel
-from pvid.run.mechanism import MechanismAnswer, gains_of, values_of
+from pvid.models.model import Mechanism
+from pvid.models.registry import DEFAULT, MODELS
+from pvid.rig.file import Nominal, RigFile, Sensor
+from pvid.rig.run import Run
+from pvid.run.mechanism import MechanismAnswer, refined_gains_of, values_of
 from pvid.run.refined import GOOD, Measured, Prior, Problem, Refined, refined, without_outliers
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
+from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
 
 Float = npt.NDArray[np.float64]
 
@@ -109,8 +114,6 @@ def refine_mechanism(
     block_s : length of a block [s]
     widths : of signs, by argument; from the sampling by default
     """
-    if has_skew(model):
-        raise PvidError(f"{model.name} is refined from its own weak form: omit --form and --model")
     problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
     sd = np.array([LOG_SD if one.log else one.prior_sd for one in problem.kernel.made.parameters])
     prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), np.ones(problem.n, bool))
@@ -119,17 +122,55 @@ def refine_mechanism(
     return RefinedMechanism(problem, without_outliers(problem, prior, found))
 
 
-def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMechanism | None, str]:
+def _as_pendulum(answer: MechanismAnswer) -> RefinedPendulum:
+    """By the pendulum's own refinement, whose input is the second derivative of a sample.
+
+    Raises
+    ------
+    PvidError
+        For another mechanism with such an input.
+    """
+    model, recording = answer.model, answer.recording
+    if model.name != DEFAULT:
+        raise PvidError(
+            f"an input of {model.name} is the derivative of a sample, which the refinement in float64 has for the "
+            "pendulum alone: use --core f32"
+        )
+    p, known = (
+        dict(zip(model.p_names, map(float, answer.found.p), strict=True)),
+        {x.name: x.value for x in model.knowns},
+    )
+    pendulum = MODELS[DEFAULT]
+    own = Mechanism(pendulum, {one.name: known[one.name] for one in pendulum.constants})
+    lengths = own.physical([p[name] for name in pendulum.mapped_names])
+    rig = RigFile(
+        l1=known["l1"],
+        nominal=Nominal(**dict(zip(pendulum.physical_names, map(float, lengths), strict=True))),
+        sensor=Sensor(phi_lsb=model.signal("phi").resolution, y_lsb=model.signal("y").resolution),
+        sample_rate=recording.sample_rate,
+    )
+    run = Run(recording.t, recording.signals["phi"], recording.signals["y"], recording.sample_rate)
+    return refine_pendulum(run, rig, [p], sure=answer.identified)
+
+
+def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMechanism | RefinedPendulum | None, str]:
     """The answer after a refinement that starts from it, the refinement, and what became of it in a clause."""
     weak, model, recording = answer.found, answer.model, answer.recording
+    refined: RefinedMechanism | RefinedPendulum
     try:
-        refined = refine_mechanism(model, recording.signals, recording.sample_rate, weak.p, 2 * weak.design.window_s)
+        if has_skew(model):
+            refined = _as_pendulum(answer)
+        else:
+            refined = refine_mechanism(
+                model, recording.signals, recording.sample_rate, weak.p, 2 * weak.design.window_s
+            )
     except PvidError as error:
         return answer, None, f"not refined: {error}"
     found = refined.found
     if not found.converged:
         return answer, refined, "the refinement did not converge: the weak form's answer stands"
-    if found.slow_chi2 > GOOD and not _better(refined, weak.p, weak.se):
+    better = isinstance(refined, RefinedMechanism) and _better(refined, weak.p, weak.se)
+    if found.slow_chi2 > GOOD and not better:
         text = (
             f"slow residuals have {found.slow_chi2:.2g} times the variance of the noise: the weak form's answer stands"
         )
@@ -137,7 +178,7 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
     made = refined.problem.kernel.made
     places = [next(k for k, one in enumerate(made.parameters) if one.place == n) for n in range(len(weak.p))]
     p, covariance = refined.problem.values(found, places)
-    values = values_of(model, p, covariance, gains_of(model, weak), identified=answer.identified)
+    values = values_of(model, p, covariance, refined_gains_of(model, weak), identified=answer.identified)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
     return replace(answer, values=values), refined, text
 

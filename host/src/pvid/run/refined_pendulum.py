@@ -15,8 +15,8 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.refined import GOOD, Inputs, Measured, Prior, Problem, Refined, refined, without_outliers
-from pvid.run.refined_kernel import kernel_of
+from pvid.run.refined import GOOD, Cut, Inputs, Measured, Prior, Problem, Refined, gated, refined, without_outliers
+from pvid.run.refined_kernel import PLAY, PlayedKernel, kernel_of
 from pvid.setup.f32 import NOISE_LSB, row_sd_of
 
 Float = npt.NDArray[np.float64]
@@ -24,22 +24,30 @@ Float = npt.NDArray[np.float64]
 _PERIODS = 2.0  # of the slow mode in a block
 _SEARCH = (0.15, 0.4)  # of that: blocks of the search for w, d1, d2 and the zero alone
 _SEARCH_PASSES = 12
+_VAGUE = 0.1  # largest standard error of a logarithm from which a search goes on with longer blocks
 _BOUND = 1.5  # slow chi^2 of a search that needs no other start
 _EDGE = 1.25  # times the drive's: the pass band
 _STEP = 0.1  # of a step times the fast mode's angular frequency
 _A_PERIOD = 60  # decimated samples in a period of the fast mode
-_SD = {"k1": 0.5, "k2": 0.5, "tau": 5e-3, "c": 1.0, "f1": 1.0, "f2": 1.0, "slant": 0.1}  # what is known before: little
+# what is known of the extras before: little
+_SD = {"k1": 0.5, "k2": 0.5, "tau": 5e-3, "c": 1.0, "f1": 1.0, "f2": 1.0, "slant": 0.1, PLAY: 5e-3}
 _SAME = 0.02  # two searches agree: relative difference of all parameters
 _SIGN_COARSE = 8  # steps in a smooth one where dry friction may reverse
-_WIDTH = 0.02  # of the sign of a dry friction: share of the joint's speed, over the steps
+_WIDTHS = (0.3, 0.1, 0.03, 0.01)  # of the sign of a dry friction, in turn: share of the joint's largest speed
 _FIRST = tuple(one.name for one in MODELS[DEFAULT].published)
-_OPTIONS = (("slant",), ("f1", "f2"), ("slant", "f1", "f2"))
+_OPTIONS: tuple[tuple[str, ...], ...] = ((PLAY,), ("slant",), ("f1", "f2"))  # tried one after another
+_EXTRAS = ("slant", "f1", "f2", PLAY)  # in the order of r
 _DRY = ("f1", "f2")
+_FRICTIONS = ("k1", "k2", *_DRY)
 _DRY_STARTS = 4  # of a search with them
+_NEAREST = 2  # of them from the shortest blocks
 _OPTION_PASSES = 10
 _SHORTER = (0.5, 0.25)  # of a block: tried where the residuals are larger than the sensors' noise
+_LONGER = 3  # times a block: tried where they are not
+_GROWN = 1.25  # of standard errors: by which those of two lengths of a block differ by chance
 _CHEAP = 1.3  # growth of the others' standard errors up to which an extra is free
 _TOLD = 9.0  # fall of the sum of squares from which it is free in any case
+_UNSURE = 0.05  # standard error of a logarithm from which friction is searched where residuals are no noise
 _ASKED = 1.3  # slow chi^2 from which options are tried
 _GAINED = 25.0  # fall of the sum of squares over chi^2 that an option needs
 
@@ -61,6 +69,24 @@ class RefinedPendulum:
     def values(self) -> dict[str, float]:
         """Parameters by name."""
         return dict(zip(self.names, map(float, self.found.r), strict=False))
+
+    def halves_differ(self) -> Float:
+        """By how many of their standard errors w, d1, d2 of the two halves of the run differ [3], the extras left as
+        they are; inf where a half determines none."""
+        problem, found = self.problem, self.found
+        prior = Prior(found.r, np.full(problem.n, 10.0), np.array([name in _FIRST for name in self.names]))
+        cut = found.cut if len(found.cut.first) > 1 else Cut.of(len(problem.measured.z), found.cut.samples // 2)
+        starts = problem.starts_along(found.r, found, cut)
+        use = gated(problem, found) & problem.used(found.cut) if cut is found.cut else problem.used(cut)
+        middle = len(cut.first) // 2
+        halves = []
+        for part in (slice(middle), slice(middle, None)):
+            of = Cut(cut.first[part], cut.samples)
+            halves.append(problem.searched(found.r, prior, of, starts[part], use[part]))
+        if not all(np.isfinite(one.chi2) and one.converged for one in halves):
+            return np.full(3, np.inf)
+        both = np.sqrt(sum(np.diag(one.covariance)[:3] for one in halves))
+        return np.asarray(np.abs(problem.step_between(halves[0].r, halves[1].r)[:3]) / both)
 
     @property
     def extras(self) -> dict[str, tuple[float, float]]:
@@ -95,6 +121,7 @@ class _Search:
         middle = self.first + (self.mean - 1) / 2  # of the first average
         self._track = times - middle / rate, acceleration / rig.l1
         self._problems: dict[tuple[str, ...], Problem] = {}
+        self.short: list[tuple[float, dict[str, float]]] = []  # chi^2 and values of the shortest blocks, of each start
 
     def problem(self, optional: tuple[str, ...] = ()) -> Problem:
         """With these extras."""
@@ -106,17 +133,26 @@ class _Search:
             inputs = _inputs(*self._track, rate, sub, self.samples)
             phi, grown = averages(self.run.phi[self.first :][: self.samples * self.mean], self.mean)
             sd = np.array([row_sd_of(self.rig, self.mean)])
-            kernel = kernel_of(compiled_of(DEFAULT), optional)
+            kernel = kernel_of(compiled_of(DEFAULT), tuple(name for name in optional if name != PLAY))
+            if PLAY in optional:
+                kernel = PlayedKernel(kernel, "rad")
             self._problems[optional] = Problem(kernel, Measured(phi[:, None], sd, inputs, rate, sub, grown, coarse))
         return self._problems[optional]
 
     def r(self, problem: Problem, values: Mapping[str, float]) -> Float:
-        """r and its settings from values by name."""
+        """r and its settings from values by name, with the widest sign."""
         made = problem.kernel.made
-        width = _WIDTH * 2 * np.pi * self.fast * float(np.nanstd(self.run.phi)) / problem.measured.sub
-        settings = {"l1": self.rig.l1, **{name: width for name in made.settings if name.startswith("width")}}
         names = [*(one.name for one in made.parameters), *made.settings]
-        return np.array([{**settings, **values}.get(name, 0.0) for name in names])
+        r = np.array([{"l1": self.rig.l1, **values}.get(name, 0.0) for name in names])
+        return self.with_width(problem, r, _WIDTHS[0])
+
+    def with_width(self, problem: Problem, r: Float, share: float) -> Float:
+        """r with this width of the signs."""
+        made, out = problem.kernel.made, r.copy()
+        for place, name in enumerate(made.settings, len(made.parameters)):
+            if name.startswith("width"):
+                out[place] = share * 2 * np.pi * self.fast * float(np.nanstd(self.run.phi))
+        return out
 
     def prior(self, problem: Problem, r: Float, free: Sequence[str] | None = None) -> Prior:
         """About r, wide; of these parameters, or of all."""
@@ -124,6 +160,10 @@ class _Search:
         sd = np.array([3 * LOG_SD if one.log else _SD[one.name] for one in made.parameters])
         searched = np.array([free is None or one.name in free for one in made.parameters])
         return Prior(r, sd, searched)
+
+    def nearest(self) -> list[dict[str, float]]:
+        """Where the shortest blocks fit best: what no equation has moves their parameters least."""
+        return [values for _, values in sorted(self.short, key=lambda one: one[0])[:_NEAREST]]
 
     def lengths(self, slow_hz: float, shares: Sequence[float]) -> list[int]:
         """Of blocks [samples]."""
@@ -170,13 +210,17 @@ def refine_pendulum(
     found = without_outliers(problem, prior, found)
     if found.slow_chi2 > _ASKED:
         problem, found = _with_options(search, problem, found)
-    if found.slow_chi2 > GOOD or not found.converged:
+    unsure = found.slow_chi2 > _ASKED and _largest_error(found) > _UNSURE
+    if found.slow_chi2 > GOOD or not found.converged or unsure:
         outcomes.sort(key=lambda one: one.chi2)
-        about = [*map(_values_of(search.problem()), outcomes[:2]), *starts]
-        problem, found = _with_friction(search, (problem, found), about[: 1 if sure else _DRY_STARTS])
+        reached = [_values_of(search.problem())(one) for one in outcomes[:2]]
+        about = reached[:1] if sure else [*search.nearest(), *reached, *starts][:_DRY_STARTS]
+        problem, found = _with_friction(search, (problem, found), about)
         slow = model.modes_hz(found.r[:3])[0]
     if found.slow_chi2 > _ASKED:
         found = _shorter(problem, search.prior(problem, found.r), found, search.lengths(slow, _SHORTER))
+    elif found.converged:
+        found = _longer(search, problem, found)
     return RefinedPendulum(problem, found, search.first)
 
 
@@ -215,16 +259,40 @@ def _values_of(problem: Problem) -> Callable[[Refined], dict[str, float]]:
 def _with_friction(
     search: _Search, before: tuple[Problem, Refined], starts: Sequence[Mapping[str, float]]
 ) -> tuple[Problem, Refined]:
-    """Searches in which dry friction is free from the first block on; the one before where they explain no more."""
+    """Searches in which friction is free from the first block on; the one before where they explain no more."""
     problem = search.problem(_DRY)
-    outcomes = _outcomes(search, problem, starts, True, _DRY)
+    outcomes = _outcomes(search, problem, starts, True, _FRICTIONS)
     if not outcomes:
         return before
     found = _likeliest(outcomes)
     slow = search.rig.mechanism.model.modes_hz(found.r[:3])[0]
-    found, prior = _whole(search, problem, found, slow, _DRY)
-    found = without_outliers(problem, prior, found)
+    found, prior = _whole(search, problem, found, slow, _FRICTIONS)
+    found = _sharper(search, problem, prior, found)
+    problem, found = _with_options(search, problem, without_outliers(problem, prior, found), _DRY)
     return (problem, found) if found.converged and found.slow_chi2 < before[1].slow_chi2 else before
+
+
+def _sharper(search: _Search, problem: Problem, prior: Prior, found: Refined) -> Refined:
+    """With narrower signs of the friction as long as they explain more."""
+    for share in _WIDTHS[1:]:
+        r = search.with_width(problem, found.r, share)
+        again = problem.searched(r, prior, found.cut, found.starts, problem.used(found.cut), most=_OPTION_PASSES)
+        if not again.sum_of_squares < found.sum_of_squares:
+            break
+        found = again
+    return _without_push(problem, prior, found)
+
+
+def _without_push(problem: Problem, prior: Prior, found: Refined) -> Refined:
+    """Without a dry friction that would push."""
+    names = [one.name for one in problem.kernel.made.parameters]
+    negative = [place for place, name in enumerate(names) if name in _DRY and found.r[place] < 0]
+    if not negative:
+        return found
+    r, free = found.r.copy(), prior.free.copy()
+    r[negative], free[negative] = 0.0, False
+    within = Prior(prior.r, prior.sd, free)
+    return problem.searched(r, within, found.cut, found.starts, problem.used(found.cut), most=_OPTION_PASSES)
 
 
 def _whole(
@@ -234,7 +302,13 @@ def _whole(
     first = [*_FIRST, *more]
     prior = search.prior(problem, found.r, first)
     found = refined(problem, prior, search.lengths(slow_hz, (1.0,)), before=found)
+    return _with_extras(search, problem, prior, found)
+
+
+def _with_extras(search: _Search, problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:
+    """Skew and frictions are free where that costs the others little, or explains much."""
     names = [one.name for one in problem.kernel.made.parameters]
+    first = [name for name, free in zip(names, prior.free, strict=True) if free]
     for extras in (("tau", "k1", "k2"), ("k1", "k2"), ("tau",)):
         if any(one in first for one in extras):
             continue
@@ -261,6 +335,31 @@ def _shorter(problem: Problem, prior: Prior, found: Refined, lengths: Sequence[i
     return best
 
 
+def _longer(search: _Search, problem: Problem, found: Refined) -> Refined:
+    """Longer blocks, of which fewer starts are unknown, as long as residuals stay noise and the standard errors do not
+    grow by more than their own uncertainty."""
+    total, dry = len(problem.measured.z), [one.name in _DRY for one in problem.kernel.made.parameters]
+    best, least = found, _largest_error(found)
+    while len(found.cut.first) > 1:
+        prior = search.prior(problem, found.r)
+        prior = Prior(prior.r, prior.sd, (np.diag(found.covariance) > 0) | dry)
+        found = refined(problem, prior, [min(_LONGER * found.cut.samples, total)], before=found, most=_OPTION_PASSES)
+        if not np.isfinite(found.chi2):
+            break
+        found, prior = _with_extras(search, problem, prior, found)
+        found = without_outliers(problem, prior, _without_push(problem, prior, found))
+        if not (found.slow_chi2 < _ASKED and _largest_error(found) < _GROWN * least):
+            break
+        if found.converged:
+            best, least = found, min(least, _largest_error(found))
+    return best
+
+
+def _is_vague(found: Refined) -> bool:
+    """Whether the noise alone makes w, d1 or d2 uncertain: the blocks are too short."""
+    return not float(np.sqrt(np.diag(found.noise)[:3]).max()) < _VAGUE
+
+
 def _largest_error(found: Refined) -> float:
     """Of the logarithms of w, d1, d2."""
     return float(np.sqrt(np.diag(found.covariance)[:3]).max())
@@ -277,8 +376,15 @@ def _searched(
     r = search.r(problem, values)
     prior = search.prior(problem, r, (*_FIRST, *more))
     wide = Prior(r, np.maximum(prior.sd, 1.0), prior.free)
+    total = len(problem.measured.z)
+    short, full = search.lengths(model.modes_hz(p)[0], _SEARCH)
     try:
-        found = refined(problem, wide, search.lengths(model.modes_hz(p)[0], _SEARCH), most=_SEARCH_PASSES)
+        found = refined(problem, wide, [short], most=_SEARCH_PASSES)
+        search.short.append((found.chi2, _values_of(problem)(found)))
+        found = refined(problem, wide, [full], before=found, most=_SEARCH_PASSES)
+        while _is_vague(found) and len(found.cut.first) > 1:
+            samples = min(_LONGER * found.cut.samples, total)
+            found = refined(problem, wide, [samples], before=found, most=_SEARCH_PASSES)
     except (PvidError, np.linalg.LinAlgError):
         return None
     if not np.isfinite(found.chi2) or not model.is_plausible(found.r[:3]):
@@ -287,29 +393,41 @@ def _searched(
     return found if fits else None
 
 
-def _with_options(search: _Search, problem: Problem, found: Refined) -> tuple[Problem, Refined]:
-    """With the optional extras that explain most, where they explain enough."""
-    made = problem.kernel.made
-    values = dict(zip([one.name for one in made.parameters], map(float, found.r), strict=False))
-    best = problem, found
-    for optional in _OPTIONS:
-        other = search.problem(optional)
-        r = search.r(other, values)
-        prior = search.prior(other, r)
-        use = other.used(found.cut)
-        again = other.searched(r, prior, found.cut, found.starts, use, most=_OPTION_PASSES)
-        now = best[1]
-        factor = max(again.chi2, again.slow_chi2, 1.0)
-        if np.isfinite(again.chi2) and now.sum_of_squares - again.sum_of_squares > _GAINED * factor * len(optional):
-            best = other, without_outliers(other, prior, again)
-        if best[1].slow_chi2 < _ASKED:
+def _with_options(
+    search: _Search, problem: Problem, found: Refined, kept: tuple[str, ...] = ()
+) -> tuple[Problem, Refined]:
+    """With the optional extras that explain enough, beside those of `kept`: of each round the one that explains
+    most."""
+    while found.slow_chi2 >= _ASKED:
+        tried: list[tuple[Problem, Prior, Refined, tuple[str, ...]]] = []
+        for optional in _OPTIONS:
+            if optional[0] in kept or any(one.slow_chi2 < _ASKED for _, _, one, _ in tried):
+                continue
+            other, prior, again = _with_option(search, problem, found, (*kept, *optional))
+            factor = max(again.chi2, again.slow_chi2, 1.0)
+            gained = found.sum_of_squares - again.sum_of_squares
+            if np.isfinite(again.chi2) and gained > _GAINED * factor * len(optional):
+                tried.append((other, prior, again, optional))
+        if not tried:
             break
-    problem, found = best
+        problem, prior, found, optional = min(tried, key=lambda one: one[2].sum_of_squares)
+        found, kept = without_outliers(problem, prior, found), (*kept, *optional)
     if not found.converged:
         prior = search.prior(problem, found.r)
         found = problem.searched(found.r, prior, found.cut, found.starts, problem.used(found.cut))
         found = without_outliers(problem, prior, found)
     return problem, found
+
+
+def _with_option(
+    search: _Search, problem: Problem, found: Refined, optional: tuple[str, ...]
+) -> tuple[Problem, Prior, Refined]:
+    """With these extras, from an outcome of another problem."""
+    other = search.problem(tuple(one for one in _EXTRAS if one in optional))
+    r = search.r(other, _values_of(problem)(found))
+    prior = search.prior(other, r)
+    again = other.searched(r, prior, found.cut, found.starts, other.used(found.cut), most=_OPTION_PASSES)
+    return other, prior, _sharper(search, other, prior, again) if "f1" in optional else again
 
 
 def _inputs(t: Float, u: Float, rate: float, sub: int, samples: int) -> Inputs:

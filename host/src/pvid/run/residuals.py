@@ -86,11 +86,12 @@ def _strong(run: Run, rig: RigFile, p: Float) -> Residuals:
     bank, config = bank_of(rig, run.sample_rate), strong_config(rig, run.sample_rate)
     d_phi, d_y = bank.apply(run.phi, run.sample_rate).T, bank.apply(run.y, run.sample_rate).T
     u = d_y[:, 2:5] / rig.l1
-    driven = oracle.driven(u[:, 0], run.sample_rate, config.drive_min)
+    period = bank.every / run.sample_rate
+    driven = oracle.driven(u[:, 0], 1 / period, config.drive_min)
     if not driven.any():
         raise PvidError("the pivot rests: there are no rows")
     n, y = oracle.strong_rows(d_phi[driven], u[driven])
     e = (y - n @ oracle.theta(p[: oracle.N_P]))[-_MOST_ROWS:]
-    t = run.t[2 * bank.delay :][driven][-_MOST_ROWS:]
+    t = run.t[bank.window - 1 :: bank.every][driven][-_MOST_ROWS:]
     scaled = (e / e.std())[:, np.newaxis]
-    return Residuals(t, scaled, 1, 1 / run.sample_rate, expected=False, shared=2 * bank.delay)
+    return Residuals(t, scaled, 1, period, expected=False, shared=bank.memory - 1)

@@ -87,6 +87,13 @@ class Status(_Named):
     BAD_POINTER = 44
 
 
+class Stage(_Named):
+    """Whose estimate is published (pvid_stage)."""
+
+    WEAK = 0
+    REFINED = 1
+
+
 class Law(_Named):
     """How the estimate follows the data (pvid_law)."""
 

@@ -50,7 +50,9 @@ class RefineConfig:
     prior_sd : of the weak form's estimate [parameters], relative if logarithmic
     gain_sd : errors of the steps by one error of a sensor's gain, with their signs [parameters]
     state_limit : largest |start| of a block [states]
-    passes, most_passes : of a block: at least, and while the steps are not small
+    passes, most_passes : of a block: at least (in the track one with a short step), and while the steps are not small
+    jobs : of a pass in one tick: 1 without a floating point unit
+    rests : ticks in a row, at most, without jobs because the weak form is busy
     forgetting_s : time constant; 0: none
     gate, chi_max, clash_max, step_max, step_limit, se_max, distance : limits
     """
@@ -67,6 +69,8 @@ class RefineConfig:
     state_limit: Float32
     passes: int = 2
     most_passes: int = 8
+    jobs: int = 3
+    rests: int = 1
     forgetting_s: float = 0.0
     gate: float = 8.0
     chi_max: float = 3.0
@@ -89,6 +93,7 @@ class RefineRig:
     sample_sd : white noise of a sample of each output [outputs]
     prior_sd, gain_sd : [parameters]
     state_limit : [states]
+    rests : ticks in a row, at most, that the refinement leaves to the weak form
     """
 
     sample_rate: float
@@ -99,3 +104,4 @@ class RefineRig:
     prior_sd: Sequence[float]
     gain_sd: Sequence[float]
     state_limit: Sequence[float]
+    rests: int = 1

@@ -14,7 +14,7 @@ Int64 = npt.NDArray[np.int64]
 
 
 class Folded:
-    """What folded tables [5, half], whose points are `stride` samples apart, span."""
+    """What folded tables [5, half], whose taps are `stride` points of `block` samples apart, span."""
 
     weights: npt.NDArray[Any]
     stride: int
@@ -28,18 +28,22 @@ class Folded:
     @property
     def window(self) -> int:
         """Samples from the first to the last, both included."""
-        return 2 * self.half * self.stride + self.block
+        return self.memory * self.every
 
     @property
     def memory(self) -> int:
-        """Places of PVID_MAX_WINDOW that they need."""
-        points = 2 * self.half * self.stride + 1
-        return points + self.block + 2 if self.block > 1 else points
+        """Points from the first to the last, both included: places of PVID_MAX_WINDOW."""
+        return 2 * self.half * self.stride + 1
+
+    @property
+    def every(self) -> int:
+        """Samples from a result to the next."""
+        return max(self.block, 1)
 
     @property
     def delay(self) -> int:
         """Samples from the newest one back to the instant the derivatives refer to."""
-        return self.half * self.stride + (self.block - 1) // 2
+        return (self.window - 1) // 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,7 @@ class FirBankQ31(Folded):
     Attributes
     ----------
     weights : int32 [5, half], folded
-    stride : samples from point to point
+    stride : points from tap to tap
     block : samples whose sum is a point
     centre : weight of the centre point in order 0
     phi_max, y_max : full scale of the counts
@@ -73,12 +77,6 @@ class FirBankQ31(Folded):
     tau_bits: int
     margins: dict[str, float]
     block: int = 1
-
-    @property
-    def memory(self) -> int:
-        """Places of PVID_MAX_WINDOW that it needs: sums of integers are exact, so one sum of a block is enough."""
-        points = 2 * self.half * self.stride + 1
-        return points + self.block + 1 if self.block > 1 else points
 
 
 RATE_BITS = 24  # after the point of u, u', u'' and w_r in fixed point; w has one more

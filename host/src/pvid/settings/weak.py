@@ -148,6 +148,11 @@ class WeakModel:
         return len(self.signal)
 
     @property
+    def plain(self) -> bool:
+        """Whether the signals are the samples, in their order."""
+        return self.signal == tuple(WeakSignal(place, Source.SAMPLED) for place in range(self.samples))
+
+    @property
     def jets(self) -> int:
         """Inputs of `prepare`."""
         return len(self.jet)

@@ -63,16 +63,18 @@ class Rescale:
 
 @dataclass(frozen=True, eq=False)
 class WeakFilterQ31:
-    """pvid_weak_filter_q31: weights int32 [half], outwards; bits of the leading x of order 0."""
+    """pvid_weak_filter_q31.
 
+    Attributes
+    ----------
+    half : steps to either side; 0: the signal itself
+    down : shift of the sum
+    weights : int32 within 2^30: of order 0 that of the signal itself, else 0; then outwards [half + 1]
+    """
+
+    half: int
+    down: int
     weights: Int32
-    bits: int
-    rescale: Rescale
-
-    @property
-    def half(self) -> int:
-        """0: the signal itself."""
-        return int(self.weights.size)
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,7 @@ class WeakFormatQ31:
     """pvid_weak_format_q31: shifts of a channel."""
 
     value: int
+    lift: int
     own: int
     plain: int = 0
     ramp: int = 0
@@ -110,15 +113,16 @@ class WeakDesignQ31:
     power : n of sin^n
     decimation : D, ticks a step
     hop : steps of half a window, a multiple of 4
-    sum_shift : of four steps' products 2^-22 before they are added
+    sum_shift : of four steps' products 2^-14 (fine: 2^-22) before they are added
     full_scale : of the counts about their offsets [samples]
     down : shift of the block sums of each signal to 28 bits
     filter : of each jet, at the steps: its compensator
     run : from twice the sum over the steps to the input of `values` [runs]
     sign_width : of the soft sign, in the format of its argument [signs]; 0: the mean of sgn over a step
-    integral : shifts (once, twice) of each integrand
+    integral : shifts (down, twice) of each integrand
     format : of each channel
-    circle : int32 (2^23 - 1) cos(pi j / hop) [2 hop]
+    fine : the cosine has 24 bits; else 16
+    circle : int32 cos(pi j / hop) times its first entry [2 hop + 3 hop/2 + 3 H]
     factor : of each term (m, e), of h^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
@@ -140,6 +144,7 @@ class WeakDesignQ31:
     sign_width: tuple[int, ...]
     integral: tuple[tuple[int, int], ...]
     format: tuple[WeakFormatQ31, ...]
+    fine: bool
     circle: Int32
     factor: tuple[tuple[int, int], ...]
     noise: tuple[WeakNoiseQ31, ...]

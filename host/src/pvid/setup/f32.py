@@ -38,13 +38,13 @@ def bank_of(rig: RigFile, sample_rate: float) -> FirBank:
             raise PvidError("[identifier] block is of the Savitzky-Golay filters: omit it with finite differences")
         bank = finite_difference(settings.stride)
     else:
-        stride = max(settings.stride, settings.block)
-        points = max(round(settings.strong_window_s * sample_rate / stride), settings.degree + 1)
-        bank = savitzky_golay(points | 1, settings.degree, stride, settings.block)
+        apart = settings.stride * settings.block
+        taps = max(round(settings.strong_window_s * sample_rate / apart), settings.degree + 1)
+        bank = savitzky_golay(taps | 1, settings.degree, settings.stride, settings.block)
     if bank.memory > MAX_WINDOW:
         raise PvidError(
-            f"the differentiator's window is {bank.memory} samples at {sample_rate:g} Hz and the core holds "
-            f"{MAX_WINDOW} (PVID_MAX_WINDOW): shorten window_s or raise stride"
+            f"the differentiator's window is {bank.memory} points at {sample_rate:g} Hz and the core holds "
+            f"{MAX_WINDOW} (PVID_MAX_WINDOW): shorten window_s or set a block"
         )
     return bank
 
@@ -62,7 +62,7 @@ def estimator_config(rig: RigFile, bank: FirBank, start: npt.ArrayLike | None = 
         forgetting_s=settings.forgetting_s,
         feedback_hz=settings.feedback_hz,
         # rows closer than the bank's reach share samples: count half a window as one row
-        correlation=float(max(bank.delay if bank.block > 1 else bank.half, 1)),
+        correlation=float(max(bank.half, 1)),
         kappa_min=settings.kappa_min,
         law=LAWS[settings.law],
         dead_zone=settings.dead_zone,
@@ -78,7 +78,8 @@ def drive_threshold(rig: RigFile, bank: FirBank, sample_rate: float) -> float:
     """
     weights = bank.weights[2]
     white_gain = np.sqrt(2 * np.sum(weights**2) + 4 * np.sum(weights) ** 2)
-    noise = 0.5 * rig.sensor.y_lsb / math.sqrt(bank.block) * white_gain * (sample_rate / bank.stride) ** 2 / rig.l1
+    rate = sample_rate / (bank.stride * bank.block)
+    noise = 0.5 * rig.sensor.y_lsb / math.sqrt(bank.block) * white_gain * rate**2 / rig.l1
     return float(max(10 * noise, 1e-3 * nominal_start(rig)[0]))
 
 

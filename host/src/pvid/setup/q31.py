@@ -185,7 +185,8 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
     design = strong_design_of(rig, sample_rate)
     config = strong_config(rig, sample_rate, start)
     e = config.estimator
-    gain = e.feedback_hz * e.divider / sample_rate if e.feedback_hz > 0 else 1.0
+    rate = sample_rate / design.bank.every  # of rows
+    gain = e.feedback_hz * e.divider / rate if e.feedback_hz > 0 else 1.0
     estimator = _estimator_q31(
         e,
         strong_config(rig, sample_rate).estimator,
@@ -194,15 +195,15 @@ def strong_config_q31(rig: RigFile, sample_rate: float, start: npt.ArrayLike | N
         0,
         design.row_angle / design.dt**8,
         w_bits=RATE_BITS + 1,
-        forgetting_groups=forgetting_groups_q31(e.forgetting_s, sample_rate),
+        forgetting_groups=forgetting_groups_q31(e.forgetting_s, rate),
         gain=0 if e.law is Law.PSEUDOVELOCITY else round(min(gain, 1.0) * 2**30),
         correlation=round(e.correlation * 2**16),
     )
     return StrongConfigQ31(
         design=design,
         estimator=estimator,
-        drive_ticks=min(max(round(sample_rate), 1), 2**30),
-        gate=gate_config_q31(config.gate, sample_rate),
+        drive_ticks=min(max(round(rate), 1), 2**30),
+        gate=gate_config_q31(config.gate, rate),
         drive_min=min(round(config.drive_min * design.dt**2 * 2.0**RATE_BITS), 2**29),
     )
 

@@ -51,9 +51,10 @@ class LiveSimulation:
             return
         if history.model.name != MODEL.name or constants is None or not history.newest or len(t) < 100:
             return
-        p = np.array([history.newest.get(name, math.nan) for name in history.model.mapped_names])
+        newest = history.published
+        p = np.array([newest.get(name, math.nan) for name in history.model.mapped_names])
         offset = next(one.name for one in history.model.parameters if one.role == "offset")
-        rest = history.newest.get(offset, math.nan)
+        rest = newest.get(offset, math.nan)
         if not np.isfinite(p).all():
             return
         whole = np.append(p, rest) if math.isfinite(rest) else p

@@ -13,6 +13,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from pvid.base.errors import PvidError
@@ -20,9 +21,11 @@ from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
 from pvid.log.history import History
 from pvid.log.reader import LogReader
-from pvid.log.words import board_words, reason_words, residual_words
+from pvid.log.words import board_words, reason_words, residual_words, stage_words
 from pvid.models.model import Mechanism
 from pvid.show.axis_limits import interesting
+
+Float = npt.NDArray[np.float64]
 
 _COLUMNS = 2
 _LINE = 130  # characters of the title
@@ -44,21 +47,25 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
     t = history.estimates("t")
     if not len(t):
         raise PvidError(f"{log} holds no estimate: there is nothing to plot")
-    model = history.model
-    panels = len(model.parameters) + 2 + len(model.channels)
+    model, extras = history.model, history.extras
+    drawn = (*model.published, *extras)
+    panels = len(drawn) + 2 + len(model.channels)
     rows = -(-panels // _COLUMNS)
     figure, grid = plt.subplots(rows, _COLUMNS, squeeze=False, figsize=(13, 1.5 + 1.9 * rows), layout="constrained")
     try:
         axes = list(grid.T.flat)
-        for one, axis in zip(model.parameters, axes, strict=False):
-            value, band = history.estimates(one.name), 2 * history.estimates(f"{one.name}_se")
-            axis.fill_between(t, value - band, value + band, color="C0", alpha=0.25, label="±2 standard errors")
-            axis.plot(t, value, color="C0", linewidth=1.2, label="estimate")
-            low, high = interesting(value, band)
-            if math.isfinite(low) and low < high:
-                axis.set_ylim(low, high)
+        for one, axis in zip(drawn, axes, strict=False):
+            limits = []
+            if one not in extras:
+                of_weak = t, history.estimates(one.name), history.estimates(f"{one.name}_se")
+                limits += _curve(axis, *of_weak, "C0", "weak form" if history.stage else "estimate")
+            if history.stage:
+                of_refined = history.refined("t"), history.refined(one.name), history.refined(f"{one.name}_se")
+                limits += _curve(axis, *of_refined, "C1", "refined, published where drawn")
+            if limits:
+                axis.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
             axis.set_ylabel(one.name_and_unit)
-        rest = axes[len(model.parameters) :]
+        rest = axes[len(drawn) :]
         _quality(history, rest[0], rest[1])
         seconds, *signals = history.samples()
         for channel, x, axis in zip(model.channels, signals, rest[2:], strict=False):
@@ -69,7 +76,7 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
             axis.set_xlabel("time of the log [s]")
         for axis in axes[panels:]:
             axis.set_axis_off()
-        for axis in (axes[0], *rest[2:3]):
+        for axis in (*([axes[0], axes[len(model.published)]] if extras else [axes[0]]), *rest[2:3]):
             axis.legend(loc="upper right", fontsize="small")
         lines = [f"{log.name}, {board_words(history.hello, reader.account)}", _last(history), reader.account.text]
         folded = [part for line in lines for part in textwrap.wrap(drawable(line), _LINE) or [""]]
@@ -77,6 +84,14 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
         save(figure, path, dpi=110)
     finally:
         plt.close(figure)
+
+
+def _curve(axis: Axes, t: Float, value: Float, se: Float, colour: str, name: str) -> list[tuple[float, float]]:
+    """An estimate [n] with its band over t [n, s]; returns the limits that show it, none where there is nothing."""
+    axis.fill_between(t, value - 2 * se, value + 2 * se, color=colour, alpha=0.25, label="±2 standard errors")
+    axis.plot(t, value, color=colour, linewidth=1.2, label=name)
+    low, high = interesting(value, 2 * se)
+    return [(low, high)] if math.isfinite(low) and low < high else []
 
 
 def _quality(history: History, residual: Axes, kappa: Axes) -> None:
@@ -91,11 +106,12 @@ def _quality(history: History, residual: Axes, kappa: Axes) -> None:
 
 def _last(history: History) -> str:
     """The last estimate in words."""
-    newest = history.newest
+    newest = history.published
     parts = []
-    for one in history.model.parameters:
+    for one in (*history.model.published, *history.extras):
         if math.isfinite(newest.get(one.name, math.nan)):
             value, error = with_error(newest[one.name], newest[f"{one.name}_se"])
             parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())
     words = reason_words(history.reason)
-    return f"{', '.join(parts)} (± standard error); {history.reason}{': ' if words else ''}{words}"
+    published = f"published: {stage_words(history.stage, history.refined_reason)}; weak form: " if history.stage else ""
+    return f"{', '.join(parts)} (± standard error); {published}{history.reason}{': ' if words else ''}{words}"

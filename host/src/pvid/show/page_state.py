@@ -28,6 +28,7 @@ from pvid.log.words import (
     reason_words,
     received_words,
     residual_words,
+    stage_words,
 )
 from pvid.models.model import Parameter, Quantity
 from pvid.show.axis_limits import interesting
@@ -110,6 +111,7 @@ class LiveState(threading.Thread):
             "lost": loss_words(account) + (f"; {self._failed} records cannot be shown" if self._failed else ""),
             "reason": history.reason,
             "reasonWords": reason_words(history.reason),
+            "stage": stage_words(history.stage, history.refined_reason),
             "kappa": f"{kappa:.2g}, {kappa_words(kappa)}" if newest else "",
             "kappaShare": kappa_share(kappa),
             "residual": f"{residual:.3g} {residual_words(history.hello)}" if newest else "",
@@ -125,10 +127,11 @@ class LiveState(threading.Thread):
         rows: list[dict[str, Any]] = []
         model = self._history.model
         large = {one.name for one in self._drawn()}
-        for one in model.answers:
-            value = self._history.newest.get(one.name, math.nan)
+        published = self._history.published
+        for one in (*model.answers, *self._history.extras):
+            value = published.get(one.name, math.nan)
             if not math.isnan(value):
-                shown, spread = with_error(value, self._history.newest[f"{one.name}_se"])
+                shown, spread = with_error(value, published[f"{one.name}_se"])
                 row = {"symbol": one.shown, "meaning": one.meaning, "unit": one.shown_unit, "value": shown}
                 rows.append({**row, "error": f"± {spread}", "large": one.name in large})
         if not self._history.is_physical:
@@ -148,21 +151,24 @@ class LiveState(threading.Thread):
         return {"t": [t for t, _ in withheld], "rejected": [why.startswith("rejected") for _, why in withheld]}
 
     def _estimates(self) -> dict[str, Any]:
-        """Of those that are drawn, of the residual and of kappa."""
+        """Of those that are drawn, of the residual and of kappa; with a second stage of its estimate, too."""
         history = self._history
         curves = []
         for one in self._drawn():
-            value, band = history.estimates(one.name), 2 * history.estimates(f"{one.name}_se")
-            limits = interesting(value, band)
-            curves.append(
-                {
-                    "label": f"{one.shown}, {one.meaning}" + (f" [{one.shown_unit}]" if one.unit else ""),
-                    "value": _numbers(value),
-                    "low": _numbers(value - band),
-                    "high": _numbers(value + band),
-                    "limits": list(limits) if limits[0] < limits[1] else None,
-                }
-            )
+            stages = {"": (history.estimates(one.name), 2 * history.estimates(f"{one.name}_se"))}
+            if history.stage:
+                stages["refined"] = self._at_estimates(one.name), 2 * self._at_estimates(f"{one.name}_se")
+            curve: dict[str, Any] = {
+                "label": f"{one.shown}, {one.meaning}" + (f" [{one.shown_unit}]" if one.unit else ""),
+            }
+            found = []
+            for stage, (value, band) in stages.items():
+                for name, x in (("value", value), ("low", value - band), ("high", value + band)):
+                    curve[stage + name.title() if stage else name] = _numbers(x)
+                low, high = interesting(value, band)
+                found += [(low, high)] if low < high else []
+            curve["limits"] = [min(low for low, _ in found), max(high for _, high in found)] if found else None
+            curves.append(curve)
         residual, kappa = history.estimates("residual"), history.estimates("kappa")
         largest = interesting(residual, np.zeros(len(residual)))[1]
         return {
@@ -173,6 +179,12 @@ class LiveState(threading.Thread):
             "residualLimits": [0.0, 1.3 * largest] if largest > 0 else None,
             "kappa": _numbers(np.where(kappa > 0, kappa, np.nan)),
         }
+
+    def _at_estimates(self, name: str) -> Float:
+        """A refined parameter at the times of the estimates, NaN where there is none."""
+        history = self._history
+        known = dict(zip(history.refined("t").tolist(), history.refined(name).tolist(), strict=True))
+        return np.array([known.get(t, math.nan) for t in history.estimates("t").tolist()], np.float64)
 
     def _motion(self) -> list[dict[str, Any]]:
         """Of each channel its curve over the last seconds; of the pendulum's angle what the estimate predicts, too."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
@@ -27,15 +28,16 @@ from pvid.link.frames import Hello
 from pvid.log.reader import LogReader
 from pvid.log.rig import run_of_log
 from pvid.log.rig_settings import rig_for
-from pvid.log.values import Values
-from pvid.log.words import KAPPA_MIN, reason_words
+from pvid.log.values import Rows, Values, extras_of
+from pvid.log.words import KAPPA_MIN, reason_words, stage_words
+from pvid.models.model import Model, Quantity
 from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run, is_run, read_run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advised import identified
 from pvid.run.residuals import Residuals, residuals_of
-from pvid.settings.enums import Reason
+from pvid.settings.enums import Reason, Stage
 from pvid.show.axis_limits import interesting
 from pvid.sim.simulated_angle import simulated_angle
 
@@ -54,6 +56,23 @@ _PUBLISHED = (Reason.UPDATED.text, Reason.MISFIT.text)
 
 
 @dataclass(frozen=True)
+class Refined:
+    """Estimates of the second stage, NaN while none stands.
+
+    t : [n, s];  physical, physical_se : [n, n_physical];  words : whose estimate is published at the end, and why
+    extras : parameters in `newest` that the weak form does not have
+    newest : of the published estimate: value and standard error by name; empty while the weak form's is published
+    """
+
+    t: Float
+    physical: Float
+    physical_se: Float
+    words: str
+    extras: tuple[Quantity, ...]
+    newest: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
 class Recording:
     """What is drawn.
 
@@ -63,7 +82,7 @@ class Recording:
     reasons : how many estimates came with each;  state : the last, with what it means
     remarks : sentences on the answer
     breaks : when the board began anew or the link came up again [s];  account : what was recorded and lost
-    run : the longest stretch of samples without a gap
+    run : the longest stretch of samples without a gap;  refined : None without a second stage
     """
 
     title: str
@@ -81,6 +100,7 @@ class Recording:
     remarks: tuple[str, ...]
     breaks: tuple[float, ...]
     account: str
+    refined: Refined | None = None
 
 
 def recording_of(path: Path, rig: RigFile | None, columns: Columns | None = None) -> Recording:
@@ -110,6 +130,7 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
     reader, values, model = LogReader(path), Values(rig.mechanism), rig.mechanism.model
     columns: dict[str, list[Any]] = {name: [] for name in ("log_time", "run", "kappa", "reason")}
     columns |= {name: [] for one in model.answers for name in (one.name, f"{one.name}_se")}
+    refined: list[Rows] = []
     hello, began = None, None
     for record in reader:
         if isinstance(record.item, Hello):
@@ -120,10 +141,15 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
             if rows.table == "estimates":
                 for name, column in columns.items():
                     column.append(rows.columns[name][0])
+            elif rows.table == "refined":
+                refined.append(rows)
     if not columns["run"]:
         return None
     series = {name: np.array(column) for name, column in columns.items()}
-    t = (series["log_time"] - (series["log_time"][0] if began is None else began)) / 1e9
+    began = int(series["log_time"][0]) if began is None else began
+    t = (series["log_time"] - began) / 1e9
+    of_refined = _refined(refined, began, values, model) if refined else None
+    newest = {} if of_refined is None else of_refined.newest
     counts = zip(*np.unique(series["reason"], return_counts=True), strict=True)
     if hello is None:
         title = path.name
@@ -140,17 +166,43 @@ def _of_log(path: Path, rig: RigFile) -> Recording | None:
         physical=np.stack([series[name] for name in model.physical_names], axis=1),
         physical_se=np.stack([series[f"{name}_se"] for name in model.physical_names], axis=1),
         kappa=series["kappa"],
-        p=np.array([series[name][-1] for name in model.p_names[: rig.n_core]]),
+        p=np.array([newest.get(name, (series[name][-1],))[0] for name in model.p_names[: rig.n_core]]),
         estimate={
             name: (float(series[name][-1]), float(series[f"{name}_se"][-1]))
             for name in (*model.physical_names, *model.mapped_names)
             if np.isin(series["reason"], _PUBLISHED).any() and np.isfinite(series[name][-1])
-        },
+        }
+        | newest,
         reasons={str(reason): int(count) for reason, count in counts},
-        state=_with_words(str(series["reason"][-1])),
-        remarks=(),
+        state=("" if of_refined is None else "weak form: ") + _with_words(str(series["reason"][-1])),
+        remarks=() if of_refined is None else (f"published: {of_refined.words}",),
         breaks=tuple(t[1:][np.diff(series["run"]) > 0]),
         account=reader.account.text,
+        refined=of_refined,
+    )
+
+
+def _refined(rows: Sequence[Rows], began: int, values: Values, model: Model) -> Refined:
+    """Of the rows of the table `refined`, in order; the origin of their times is `began` [ns]."""
+
+    def column(name: str) -> Float:
+        return np.array([one.columns[name][0] for one in rows], np.float64)
+
+    last = {name: x[0] for name, x in rows[-1].columns.items()}
+    stands = last["stage"] == Stage.REFINED.text
+    extras = extras_of(model, values.refined) if stands else ()
+    answers = [one.name for one in (*model.answers, *extras)]
+    return Refined(
+        t=(np.array([one.columns["log_time"][0] for one in rows]) - began) / 1e9,
+        physical=np.stack([column(name) for name in model.physical_names], axis=1),
+        physical_se=np.stack([column(f"{name}_se") for name in model.physical_names], axis=1),
+        words=stage_words(str(last["stage"]), str(last["reason"])),
+        extras=extras,
+        newest={
+            name: (float(last[name]), float(last[f"{name}_se"]))
+            for name in answers
+            if stands and np.isfinite(last[name])
+        },
     )
 
 
@@ -233,7 +285,9 @@ def _last(recording: Recording) -> list[str]:
         model = recording.rig.mechanism.model
         physical = all(name in known for name in model.physical_names)
         parts = []
-        for one in model.physical if physical else model.parameters[: model.n_mapped]:
+        shown: Sequence[Quantity] = model.physical if physical else model.parameters[: model.n_mapped]
+        extras = () if recording.refined is None else recording.refined.extras
+        for one in (*shown, *extras):
             value, error = with_error(*known[one.name])
             parts.append(f"{one.name} = {value} ± {error} {one.shown_unit}".rstrip())
         where = "" if physical else "outside the physical region: "
@@ -288,12 +342,20 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     t = recording.t
     shown = recording.rig.mechanism.model.physical
     for column, (one, axis) in enumerate(zip(shown, axes[:-1], strict=True)):
-        value, band = recording.physical[:, column], 2 * recording.physical_se[:, column]
-        axis.fill_between(t, value - band, value + band, alpha=0.25, color="C0", label="±2 standard errors")
-        axis.plot(t, value, color="C0", linewidth=1.2, label="estimate" if recording.estimate else "not published")
-        low, high = interesting(value, band)
-        if math.isfinite(low) and low < high:
-            axis.set_ylim(low, high)
+        of_weak = "estimate" if recording.estimate else "not published"
+        curves = [(t, recording.physical, recording.physical_se, of_weak)]
+        if (refined := recording.refined) is not None:
+            curves[0] = (*curves[0][:3], "weak form")
+            curves.append((refined.t, refined.physical, refined.physical_se, "refined, published where drawn"))
+        limits = []
+        for k, (at, values, errors, name) in enumerate(curves):
+            value, band = values[:, column], 2 * errors[:, column]
+            axis.fill_between(at, value - band, value + band, alpha=0.25, color=f"C{k}", label="±2 standard errors")
+            axis.plot(at, value, color=f"C{k}", linewidth=1.2, label=name)
+            low, high = interesting(value, band)
+            limits += [(low, high)] if math.isfinite(low) and low < high else []
+        if limits:
+            axis.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         axis.set_ylabel(one.label)
     axes[0].set_title("Convergence")
     kappa = axes[len(shown)]
@@ -303,8 +365,8 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     kappa.set_ylabel("kappa: identifiability\nof w [1]")
     kappa.set_xlabel(f"time {recording.clock} [s]")
     for axis in axes:
-        for i, at in enumerate(recording.breaks):
-            axis.axvline(at, color="0.5", linestyle=":", label="the board began anew" if i == 0 else None)
+        for i, when in enumerate(recording.breaks):
+            axis.axvline(when, color="0.5", linestyle=":", label="the board began anew" if i == 0 else None)
         axis.set_xlim(min(0.0, float(t[0])), max(float(t[-1]), 1e-9))
         axis.grid(alpha=0.3)
         axis.legend(loc="best", fontsize=9)

@@ -29,6 +29,7 @@ from pvid.log.words import (
     reason_words,
     received_words,
     residual_words,
+    stage_words,
 )
 from pvid.models.model import Mechanism
 
@@ -115,10 +116,11 @@ class LiveView:
         table.add_column("estimate", justify="right", min_width=12)
         table.add_column("± standard error", justify="left", min_width=12)
         table.add_column("in %", justify="right", min_width=8)
-        for one in self.history.model.answers:
+        published = self.history.published
+        for one in (*self.history.model.answers, *self.history.extras):
             name = one.name
-            value = self.history.newest.get(name, math.nan)
-            error = self.history.newest.get(f"{name}_se", math.nan)
+            value = published.get(name, math.nan)
+            error = published.get(f"{name}_se", math.nan)
             if math.isnan(value):
                 continue
             relative = f"{100 * error / abs(value):.2g} %" if name != self.history.model.offset_name and value else ""
@@ -155,6 +157,8 @@ class LiveView:
             rows.add_row("motion", f"{', '.join(shown)} ({t[-1] - t[0]:.0f} s)")
         rows.add_row("state", Text(history.reason or "no estimate yet", style="bold"))
         rows.add_row("", Text(reason_words(history.reason), style="dim"))
+        if history.stage:
+            rows.add_row("published", Text(stage_words(history.stage, history.refined_reason)))
         return rows
 
 

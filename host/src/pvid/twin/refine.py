@@ -29,8 +29,11 @@ _LEVEL_GAIN = _F(0.2)
 _CLASH_GAIN = _F(0.3)
 _FIRST_CLASH = _F(2)
 _KEPT = _F(1 / 16)
-_JOBS = 6
-_OTHER_JOBS = 40
+_APART = 4
+_SHORT = _F(0.25)
+_JOBS = 9
+_FIRST_JOBS = 16
+_SOLVE_TICKS = 45
 _SPARE = 16
 _ERRORS = _F(5)
 
@@ -48,6 +51,7 @@ class Phase(Enum):
     JUDGE = auto()
     PUBLISH = auto()
     NEXT = auto()
+    START = auto()
 
 
 @dataclass(frozen=True)
@@ -99,8 +103,8 @@ class RefineTwin:
         n = shape.parameters
         self.phase = Phase.WAIT
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
-        self.again = self.same_start = self.beside = False
-        self.passed = self.taken = self.refused = self.lost = self.length = self.begin = self.origin = 0
+        self.again = self.same_start = False
+        self.rested = self.passed = self.taken = self.refused = self.lost = self.length = self.begin = self.origin = 0
         self.level = self.clash = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
         self.weak_se = np.zeros(len(shape.place_of_p), _F)
@@ -108,7 +112,9 @@ class RefineTwin:
         self.start, self.expected = np.zeros(shape.states, _F), np.zeros(shape.states, _F)
         self.covariance = np.zeros((n, n), _F)
         self.verdict = Reason.UPDATED
-        self.estimate: RefineEstimate | None = None
+        self.told = Reason.WARMING_UP  # of the last block
+        self.estimate: RefineEstimate | None = None  # published, not withdrawn
+        self.published = 0  # estimates so far
         self.hash = START
 
     # ---- blocks ----
@@ -135,6 +141,27 @@ class RefineTwin:
         self.linear, self.start = self.next.copy(), self.expected.copy()
         self.passed = 0
         self._begin_pass()
+        if any(self.shape.measured) and self.restarted:
+            self.phase = Phase.START
+
+    def _start_job(self) -> None:
+        behind = self.begin + 2 * _APART + 1
+        if self.front.end < behind:
+            self.waiting, self.due = True, behind
+            return
+        at = [self.front.read(self.begin + k * _APART)[1] for k in range(3)]
+        scale = _F(1) / ((_F(2) * _F(_APART)) * self.h)
+        for i, code in enumerate(self.shape.measured):
+            if code > 0:
+                first, middle, last = (one[(code - 1) // 2] for one in at)
+                rate = (((_F(4) * middle) - last) - (_F(3) * first)) * scale
+                x = first if code % 2 else rate
+                self.start[i] = x if abs(x) < self.state_limit[i] else _F(0)
+        self._begin_pass()
+
+    def _is_off(self) -> bool:
+        few = self.work.used * 10 < self.length * 6 * self.shape.outputs
+        return any(self.shape.measured) and not self.restarted and self.taken > 0 and self.passed == 0 and few
 
     def _begin_search(self) -> None:
         self.triangle = np.diag(self.sd[0] / self.prior_sd)
@@ -155,8 +182,9 @@ class RefineTwin:
         self.length = self.config.first_block
 
     def _oldest(self) -> int:
-        jobs = self.config.passes * (_JOBS * self.length + _OTHER_JOBS)
-        taken = jobs // max(self.config.ratio - 1, 1) + _SPARE
+        jobs = _JOBS * self.length + _FIRST_JOBS
+        ticks = self.config.passes * (jobs // self.config.jobs + _SOLVE_TICKS)
+        taken = ticks // max(self.config.ratio - 1, 1) + _SPARE
         back = max(self.front.room - taken, 0)
         return max(self.front.end - back, self.origin)
 
@@ -294,20 +322,20 @@ class RefineTwin:
 
     # ---- jobs ----
 
-    def _pass_job(self) -> None:
-        first, steps = self.work.needs()
-        signals = None
-        if steps > 0:
-            entry = self.begin + first
-            behind = entry + steps + self.shape.reach
-            if self.front.end < behind:
-                self.waiting, self.due = True, behind
+    def _pass_jobs(self) -> None:
+        for _ in range(self.config.jobs):
+            step, signals = self.work.awaited(), None
+            if step is not None:
+                entry = self.begin + step
+                if self.front.end <= entry:
+                    self.waiting, self.due = True, entry + 1
+                    return
+                signals = self.front.read(entry)
+            self.work.do(self.linear, self.weight, signals)
+            if self.work.ends(self.length):
+                self.solve.begin()
+                self.phase = Phase.SOLVE
                 return
-            signals = self.front.read(entry, steps)
-        self.work.do(self.linear, self.weight, signals)
-        if self.work.ends(self.length):
-            self.solve.begin()
-            self.phase = Phase.SOLVE
 
     def _solve_job(self) -> None:
         solution = self.solve.do(
@@ -319,8 +347,9 @@ class RefineTwin:
 
     def _is_enough(self) -> bool:
         config = self.config
-        small = bool(self.solve.size < _F(config.step_max))
-        return self.passed >= config.most_passes or (small and self.passed >= config.passes) or not self._is_there()
+        tracks = self.taken > 0 and self.solve.bend < _SHORT * _F(config.step_max)
+        small = (tracks or self.passed >= config.passes) and self.solve.size < _F(config.step_max)
+        return bool(small) or self.passed >= config.most_passes or not self._is_there()
 
     def _grows(self) -> bool:
         config = self.config
@@ -328,6 +357,10 @@ class RefineTwin:
         return bool(short and self.solve.size < _ROUGH and self._mean_square() < _MAY_GROW * _F(config.chi_max))
 
     def _move(self) -> None:
+        if self._is_off():
+            self._forget_state()
+            self._begin_block()
+            return
         self.linear = self.steps.moved(self.linear, self.solve.step)
         self.start = self.start + self.solve.shift
         self.passed += 1
@@ -337,8 +370,8 @@ class RefineTwin:
         elif self._is_enough():
             self.phase = Phase.END
         elif self.taken == 0 and self.renewed and not self.solve.size < _ASTRAY:
-            self._begin_anew_in_the_past()
-            self._begin_block()
+            self.lost, self.length = 1, self.config.first_block
+            self.verdict, self.phase = Reason.HELD_SEARCHING, Phase.NEXT
         else:
             self._begin_pass()
 
@@ -358,13 +391,20 @@ class RefineTwin:
             self._begin_anew()
             self._begin_block()
 
+    def _withdraw(self) -> None:
+        """The published estimate, if the last block refutes it."""
+        if self.verdict != Reason.UPDATED and not (self.verdict == Reason.HELD_BLOCK and self.taken > 0):
+            self.estimate = None
+
     def _do(self) -> Reason:
         match self.phase:
             case Phase.WAIT:
                 self._wait()
                 return Reason.WARMING_UP
+            case Phase.START:
+                self._start_job()
             case Phase.PASS:
-                self._pass_job()
+                self._pass_jobs()
             case Phase.SOLVE:
                 self._solve_job()
             case Phase.MOVE:
@@ -384,9 +424,11 @@ class RefineTwin:
             case Phase.PUBLISH:
                 if self.verdict == Reason.UPDATED:
                     self.estimate = self.candidate
+                    self.published += 1
                 self.phase = Phase.NEXT
             case Phase.NEXT:
-                reason = self.verdict
+                reason = self.told = self.verdict
+                self._withdraw()
                 self._next_block()
                 return reason
         return Reason.ACCUMULATED
@@ -406,12 +448,9 @@ class RefineTwin:
         """pvid_refine_freeze_f32."""
         self.frozen = frozen
 
-    def step(self, sample: Float32, p: Float32, se: Float32) -> Reason:
-        """A tick; p and se [p] of the weak form if they are new, else NaN."""
-        renewed = bool(np.isfinite(p[0]))
-        rests = renewed and not self.beside
-        self.beside = renewed
-        if renewed:
+    def step(self, sample: Float32, p: Float32, se: Float32, busy: bool) -> Reason:
+        """A tick; p and se [p] of the weak form if they are new, else NaN; whether it is busy."""
+        if np.isfinite(p[0]):
             self._take_weak(p, se)
         entry = self.front.step(sample)
         if entry is Entry.BROKEN:
@@ -421,20 +460,36 @@ class RefineTwin:
             return Reason.HELD_FROZEN
         if entry is Entry.ENTERED:
             self.waiting = self.waiting and self.front.end < self.due
-        works = entry is Entry.NOTHING or self.config.ratio == 1
-        if works and not rests and not self.waiting:
-            return self._do()
+        if self.front.wait == self.config.ratio > 1 or self.waiting:
+            return self._idle()
+        if busy and self.rested < self.config.rests:
+            self.rested += 1
+            return self._idle()
+        self.rested = 0
+        return self._do()
+
+    def _idle(self) -> Reason:
         return Reason.WARMING_UP if self.phase is Phase.WAIT else Reason.ACCUMULATED
 
-    def _fold(self, reason: Reason) -> None:
+    def _state(self, reason: Reason) -> bytes:
+        """The bytes that a hash covers, as in fnv_refine.h."""
         values = np.concatenate([self.linear, self.work.state, [self.level]]).astype(_F)
         words = np.where(np.isfinite(values), values.view(np.uint32), np.uint32(0x7FC00000))
-        self.hash = fold_bytes(self.hash, words.astype("<u4").tobytes() + int(reason).to_bytes(4, "little"))
+        return words.astype("<u4").tobytes() + int(reason).to_bytes(4, "little")
 
-    def run(self, samples: npt.ArrayLike, weak_p: npt.ArrayLike, weak_se: npt.ArrayLike) -> TwinRefineRecord:
-        """Steps through samples [ticks, samples] with the weak form's new estimates, else NaN [ticks, p]."""
+    @property
+    def hashed(self) -> bytes:
+        """What the running hash of both stages covers of the refinement after a tick."""
+        return self._state(self.told)
+
+    def run(
+        self, samples: npt.ArrayLike, weak_p: npt.ArrayLike, weak_se: npt.ArrayLike, busy: npt.ArrayLike | None = None
+    ) -> TwinRefineRecord:
+        """Steps through samples [ticks, samples] with the weak form's new estimates, else NaN [ticks, p]; by default it
+        is never busy."""
         given, p, se = (np.asarray(x, _F) for x in (samples, weak_p, weak_se))
         ticks, n = len(given), self.shape.parameters
+        long = np.zeros(ticks, bool) if busy is None else np.asarray(busy, bool)
         record = TwinRefineRecord(
             np.zeros(ticks, np.uint8),
             np.zeros(ticks, np.uint32),
@@ -443,8 +498,8 @@ class RefineTwin:
         )
         with np.errstate(all="ignore"):
             for tick in range(ticks):
-                reason = self.step(given[tick], p[tick], se[tick])
-                self._fold(reason)
+                reason = self.step(given[tick], p[tick], se[tick], bool(long[tick]))
+                self.hash = fold_bytes(self.hash, self._state(reason))
                 record.reason[tick], record.hash[tick] = reason, self.hash
                 if self.estimate is not None:
                     record.r[tick], record.se[tick] = self.estimate.r, self.estimate.se

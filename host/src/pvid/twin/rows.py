@@ -24,7 +24,8 @@ def follow_rows(
     step
         Takes a row and returns its reasons [lanes].
     row_reason
-        Outcome of a tick before it reached the estimator [ticks]: ACCUMULATED where it has a row, as all by default.
+        Outcome of a tick before it reached the estimator [ticks]: UPDATED where it has a row, as all by default;
+        ACCUMULATED within a block of samples.
 
     Returns
     -------
@@ -32,11 +33,11 @@ def follow_rows(
     """
     reason = np.empty((len(rows), estimator.p.shape[1]), np.uint8)
     for tick, row in enumerate(rows):
-        if row_reason is None or row_reason[tick] == Reason.ACCUMULATED:
+        if row_reason is None or row_reason[tick] == Reason.UPDATED:
             reason[tick] = step(row)
         else:
             reason[tick] = row_reason[tick]
-            if row_reason[tick] not in (Reason.WARMING_UP, Reason.HELD_FROZEN):
+            if row_reason[tick] not in (Reason.WARMING_UP, Reason.ACCUMULATED, Reason.HELD_FROZEN):
                 estimator.counters[Reason(row_reason[tick]).name.lower()] += 1
         after(tick, reason[tick])
     return reason

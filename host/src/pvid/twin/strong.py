@@ -34,32 +34,34 @@ class StrongTwin(Twin):
 
     def __init__(self, config: StrongConfig, estimators: Sequence[EstimatorConfig] | None = None) -> None:
         self.config = config
+        self._rate = np.float32(config.sample_rate) / np.float32(config.every)  # of rows
         self.estimator = self._rows = StrongEstimator(
-            estimators or [config.estimator], config.sample_rate, config.exact_every
+            estimators or [config.estimator], float(self._rate), config.exact_every
         )
-        rate = np.float32(config.sample_rate)
+        rate = self._rate
         floor = np.float32(1e-6) * self.estimator.row_variance
         self.gate = Gate(config.gate, rate, np.float32(0.25) * rate, floor)
         settings = estimators or [config.estimator]
         self.misfit = Misfit(rate, np.array([one.forgetting_s for one in settings], np.float32))
 
     def rows(self, phi: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Float32, Reasons]:
-        """Rows [ticks, 6] and the reason of each tick: ACCUMULATED if it has a row."""
+        """Rows [ticks, 6] and the reason of each tick: UPDATED if it has a row, ACCUMULATED within a block."""
         phi32 = np.asarray(phi, np.float32)
         y32 = np.asarray(y, np.float32)
         finite = np.isfinite(phi32) & np.isfinite(y32)
-        d_phi, u, ready = window.derivatives(self.config, phi32, y32, finite)
-        row_reason = np.full(len(phi32), Reason.ACCUMULATED, np.uint8)
-        row_reason[ready & ~self._driven(u[:, 0], ready)] = Reason.HELD_NOT_EXCITED
+        d_phi, u, at = window.derivatives(self.config, phi32, y32, finite)
+        row_reason = np.full(len(phi32), Reason.UPDATED, np.uint8)
+        row_reason[at.ready & ~self._driven(u[:, 0], at.ready)] = Reason.HELD_NOT_EXCITED
         if self.frozen is not None:
             row_reason[self.frozen] = Reason.HELD_FROZEN
-        row_reason[~ready] = Reason.WARMING_UP
+        row_reason[~at.ready] = Reason.ACCUMULATED
+        row_reason[~at.full] = Reason.WARMING_UP
         row_reason[~finite] = Reason.REJECTED_NOT_FINITE
         return model.rows(d_phi, u), row_reason
 
     def _driven(self, u: Float32, ready: Mask) -> Mask:
         """Whether the mean square of u over about a second reaches its threshold [ticks]."""
-        rate = np.float32(self.config.sample_rate)
+        rate = self._rate
         forgetting = np.float32(1) / rate if rate > 1 else np.float32(1)
         threshold = np.float32(self.config.drive_min) * np.float32(self.config.drive_min)
         mean_square = np.float32(0)

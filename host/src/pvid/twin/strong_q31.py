@@ -37,25 +37,26 @@ class StrongTwinQ31(Twin):
         self.misfit = MisfitQ31(config.drive_ticks, forgetting)
 
     def rows(self, phi: Int, y: Int) -> tuple[Int, Reasons]:
-        """Rows [ticks, 13] and the reason of each tick: ACCUMULATED if it has a row."""
+        """Rows [ticks, 13] and the reason of each tick: UPDATED if it has a row, ACCUMULATED within a block."""
         config, design = self.config, self.config.design
         phi = phi - config.phi_offset
         y = y - config.y_offset
         within = (np.abs(phi) <= design.bank.phi_max) & (np.abs(y) <= design.bank.y_max)
-        d_phi, d_y, ready = derivatives(phi, y, within, design.bank)
+        d_phi, d_y, at = derivatives(phi, y, within, design.bank)
         u = model.accelerations(d_y, design.u_multiplier, design.u_shift)
         limits = np.array([RATE_LIMIT, DERIVATIVE_LIMIT, DERIVATIVE_LIMIT])
-        usable = ready & ((u >= -limits) & (u < limits)).all(axis=1)
+        usable = at.ready & ((u >= -limits) & (u < limits)).all(axis=1)
         u[~usable] = 0
         rows, fits = model.rows(design.row, d_phi, u)
         driven = self._driven(u[:, 0], usable)
-        row_reason = np.full(len(phi), Reason.ACCUMULATED, np.uint8)
+        row_reason = np.full(len(phi), Reason.UPDATED, np.uint8)
         row_reason[~fits] = Reason.REJECTED_SATURATED
         row_reason[~driven] = Reason.HELD_NOT_EXCITED
         if self.frozen is not None:
             row_reason[self.frozen] = Reason.HELD_FROZEN
         row_reason[~usable] = Reason.REJECTED_SATURATED
-        row_reason[~ready] = Reason.WARMING_UP
+        row_reason[~at.ready] = Reason.ACCUMULATED
+        row_reason[~at.full] = Reason.WARMING_UP
         row_reason[~within] = Reason.REJECTED_SATURATED
         return rows, row_reason
 

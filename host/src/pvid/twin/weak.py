@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -85,9 +86,11 @@ class WeakTwin:
     Attributes
     ----------
     frozen : complete windows are dropped [ticks]; set before a run
+    busy : the last tick did more than to take its samples
     """
 
     frozen: npt.NDArray[np.bool_] | None = None
+    busy: bool = False
 
     def __init__(self, config: WeakConfig, estimators: Sequence[EstimatorConfig] | None = None) -> None:
         self.config = config
@@ -149,7 +152,7 @@ class WeakTwin:
         hop, schedule = self.design.hop, self.schedule
         warm, pending, joining = False, 0, -1
         for tick, step in enumerate(stretch.steps, first):
-            dropped = None
+            dropped, self.busy = None, step >= 0
             if step >= 2:
                 done = int(step) - 1  # channels of steps that are known
                 if done % _BLOCK == 0:
@@ -168,12 +171,13 @@ class WeakTwin:
             reason[tick] = Reason.ACCUMULATED if warm else Reason.WARMING_UP
             if stretch.free[tick - first]:
                 if pending > 0:
+                    self.busy = True
                     pending -= schedule.items_per_tick
                     if pending <= 0 and joining >= 0:
                         work = self.finish.process(stretch.windows[joining])
                 else:
-                    for _ in range(self.stages_per_tick):
-                        latest = next(work, None)
+                    for latest in islice(work, self.stages_per_tick):
+                        self.busy = True
                         if latest is not None:
                             reason[tick] = latest
             if dropped is not None:
@@ -206,7 +210,7 @@ class WeakTwin:
         for first, last in (*parts, (len(given), len(given))):
             for tick in range(behind, first):
                 self.estimator.counters["rejected_not_finite"] += 1
-                self.finish.alone = True
+                self.finish.alone, self.busy = True, False
                 reason[tick] = Reason.REJECTED_NOT_FINITE
                 after(tick, reason[tick])
             if last > first:

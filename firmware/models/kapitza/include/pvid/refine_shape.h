@@ -20,16 +20,17 @@
 #ifndef PVID_REFINE_SHAPE_H
 #define PVID_REFINE_SHAPE_H
 
-#define PVID_REFINE_ORDER 2         /* q'' = a(q, v, u, r) */
-#define PVID_REFINE_COORDINATES 2   /* entries of q, hidden ones included */
-#define PVID_REFINE_INPUTS 1        /* entries of u */
-#define PVID_REFINE_OUTPUTS 1       /* entries of z, which are measured */
-#define PVID_REFINE_OUTPUT_RATES 0  /* 1: an output depends on v */
-#define PVID_REFINE_OUTPUT_LINEAR 1 /* 1: the derivatives of the outputs are constants */
-#define PVID_REFINE_MOVING 6        /* first entries of r: they change the motion */
-#define PVID_REFINE_PARAMETERS 7    /* entries of r */
-#define PVID_REFINE_CONSTANTS 14    /* that the equations need of r */
-#define PVID_REFINE_SKEW 1          /* 1: the last moving entry is the skew of the sensors */
-#define PVID_REFINE_P 4             /* entries of the weak form's p that r needs */
+#define PVID_REFINE_ORDER 2              /* q'' = a(q, v, u, r) */
+#define PVID_REFINE_COORDINATES 2        /* entries of q, hidden ones included */
+#define PVID_REFINE_INPUTS 1             /* entries of u */
+#define PVID_REFINE_OUTPUTS 1            /* entries of z, which are measured */
+#define PVID_REFINE_OUTPUT_RATES 0       /* 1: an output depends on v */
+#define PVID_REFINE_OUTPUT_LINEAR 1      /* 1: the derivatives of the outputs are constants */
+#define PVID_REFINE_MOVING 5             /* first entries of r: they change the motion */
+#define PVID_REFINE_SKEW 1               /* 1: the entry behind them is the skew of the sensors */
+#define PVID_REFINE_PARAMETERS 7         /* entries of r */
+#define PVID_REFINE_CONSTANTS 14         /* that the equations need of r */
+#define PVID_REFINE_P 4                  /* entries of the weak form's p that r needs */
+#define PVID_REFINE_MODEL_ID 0x4B072EBAu /* changes with everything that the generated functions are made from */
 
 #endif

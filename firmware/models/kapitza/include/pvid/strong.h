@@ -7,19 +7,23 @@
  * longest tick: host/docs/benchmarks/cost.md):
  *
  *   divider 1, exact_every 1: S = C^T M C and F from all sums at every row; the paper's law (5) literally
- *   divider 1, exact_every 8: a solve at every row; S and F come from all sums at every eighth row, between them each
- *                             row adds its gradient's square to S, and F is the row's own innovation
- *   divider 8:                a solve every eighth row; its projection, its solve and the folding of the sums have
- *                             rows of their own (any multiple of 4 from 8 to 64)
+ *   divider 1, exact_every 8: a solve at every row; S and F come from all sums at every eighth row. In between, each
+ *                             row adds the square of its gradient to S, and F is the innovation of the row
+ *   divider 8:                a solve at every eighth row; the projection, the solve and the folding of the sums are
+ *                             done at different rows. The same for all multiples of 4 from 8 to 64, without a dead
+ *                             zone; any other divider above 1 does the whole solve in one row
  *
  *   static pvid_strong_f32 identifier;
- *   pvid_strong_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .bank = ...,
- *                                     .estimator = pvid_estimator_defaults_f32 };
+ *   static pvid_strong_config_f32 config = { .sample_rate_hz = 1000.0f, .l1 = 0.3f, .bank = ... };
+ *   config.estimator = pvid_estimator_defaults_f32; ...
  *   if (pvid_strong_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick: reason = pvid_strong_step_f32(&identifier, phi, y);
  *
+ * The identifier does not copy its configuration: the configuration must outlive the identifier, unchanged. A constant
+ * one, as `pvid tables --form strong` prints it, takes no RAM.
+ *
  * Never allocates; every input is allowed. Call all functions of an object from one context; publication.h passes
- * estimates to other contexts. RAM: sizeof(pvid_strong_f32), mostly the two windows.
+ * estimates to other contexts. RAM: sizeof(pvid_strong_f32), mostly the windows.
  */
 #ifndef PVID_STRONG_H
 #define PVID_STRONG_H
@@ -39,31 +43,30 @@ typedef struct {
     float l1;             /* length of rod 1 [m], > 0 */
     float drive_min; /* least rms of u = y_A''/l1 over the last second [1/s^2], >= 0: with less drive no row is used.
                         Choose ten times the noise of u. 0: every row is used */
-    pvid_fir_bank_f32 bank;    /* filters of both channels; the weights must outlive the identifier */
+    pvid_fir_bank_f32 bank;    /* filters of both channels */
     pvid_gate_config_f32 gate; /* outlier gate on the innovation of a row */
     uint16_t exact_every;      /* rows from one exact projection to the next if divider is 1, 1..255; 0: 8, with the law
                                   pseudovelocity or a dead zone 1 */
-    pvid_estimator_config_f32
-        estimator; /* model and update_rate_hz are not used; noise_margin and row_weight neither */
+    pvid_estimator_config_f32 estimator; /* model, update_rate_hz, noise_margin and row_weight are not used */
 } pvid_strong_config_f32;
 
 /* State: detail/strong_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_strong_f32 pvid_strong_f32;
 typedef struct pvid_strong_estimator_f32 pvid_strong_estimator_f32;
 
-/* Initialises `self`. Fails iff
+/* Initialises `self`. config and its tables must outlive the identifier, unchanged. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or
  *   - a field of config is out of its range (the status names it). */
 pvid_status pvid_strong_init_f32(pvid_strong_f32 *self, const pvid_strong_config_f32 *config);
 
 /* One tick: phi [rad] and y_A [m], sampled at the same time. Returns
- *   - PVID_WARMING_UP until the windows are full,
+ *   - PVID_WARMING_UP until the windows are full, PVID_ACCUMULATED within a block of samples,
  *   - PVID_REJECTED_NOT_FINITE for a sample that is not finite: it restarts the windows, the sums are kept,
  *   - PVID_HELD_NOT_EXCITED without drive: the noise of a resting sensor, differentiated four times, would look
  *     like motion,
  *   - PVID_REJECTED_OUTLIER for a row that the gate rejects, PVID_HELD_FROZEN while frozen,
  *   - PVID_MISFIT instead of PVID_UPDATED during the alarm of misfit.h: do not trust the estimate,
- *   - else the estimator's reason. */
+ *   - otherwise the estimator's reason. */
 pvid_reason pvid_strong_step_f32(pvid_strong_f32 *self, float phi, float y);
 
 /* The same for a row from derivatives of your own: phi, phi', .. phi'''' [rad/s^k] and u = y_A''/l1, u', u'' [1/s^2 ..]

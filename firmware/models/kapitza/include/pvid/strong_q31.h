@@ -42,7 +42,7 @@ typedef struct {
     int32_t y_offset;                        /* reading of the pivot's sensor at mid-travel [counts] */
     int32_t drive_min;    /* least rms of u over drive_ticks, 0..PVID_DERIVATIVE_LIMIT_Q31 in the format of u: with less
                              drive no row is used. 0: every row is used */
-    uint32_t drive_ticks; /* ticks in about one second, 1..2^30 */
+    uint32_t drive_ticks; /* rows in about one second, 1..2^30: those of samples, or of blocks of them */
     pvid_gate_config_q31 gate; /* outlier gate on the innovation of a row; its scale averages over drive_ticks / 4 */
     pvid_estimator_config_q31 estimator; /* see pvid_kapitza_estimator_init_q31 */
 } pvid_strong_config_q31;

@@ -9,6 +9,6 @@ RIG = SimulatedRig(
     drive={"V": Sum((Sines(((4.4, 0.7, 0.0), (2.8, 2.3, 1.0))), RandomSteps(1.5, 0.01, seed=1)))},
     start={"i": 0.03},
     friction_width=3.0,
-    window_s=0.5,
-    design=dict(functions=40, rate_taps=31, rate_degree=6, joint=True),
+    window_s=0.64,
+    design=dict(functions=10, decimation=4, comb=True, taps=7, degree=4, rate_taps=11, rate_degree=4, joint=True),
 )

@@ -19,6 +19,7 @@ _PRIOR_SD = (0.15, 0.15, 0.15, 0.1, 0.05, 0.005, 0.1)
 _STATE_LIMIT = (3.5, 3.5, 60.0, 60.0)
 _ANGLE_RANGE = 1.0
 _INPUT_RANGE = 3.0  # over gravity's w
+_RESTS = 255  # the weak form is busy at 29 % of the ticks
 _GAIN_OF_Y = next(one for one in MODEL.scales if one.name == "y_gain")
 
 
@@ -61,6 +62,7 @@ def refine_rig(
         prior_sd=_PRIOR_SD,
         gain_sd=tuple(y_gain_sd * power for power in (*_GAIN_OF_Y.p, 0.0, 0.0, 0.0, 0.0)),
         state_limit=_STATE_LIMIT,
+        rests=_RESTS,
     )
 
 

@@ -10,5 +10,5 @@ RIG = SimulatedRig(
     start={"phi1": 0.06, "phi": 0.08},
     duration=40.0,
     window_s=1.536,
-    design=dict(functions=7, decimation=16, taps=41, rate_taps=61, rate_degree=6, comb=True),
+    design=dict(functions=7, decimation=24, taps=41, rate_taps=61, rate_degree=6, comb=True),
 )

@@ -349,12 +349,13 @@ class Record:
 def running_integrals(f: Float, hop: int, fold: int, dt: float) -> list[Float]:
     """I^0..I^fold of f [n] from the start of each half window: [halves, hop + 1] each, the last place is the end.
 
-    I^1 by the cubic through four samples; further ones by the trapezoid rule with its end correction, for which the
-    derivative of I^n is I^(n - 1).
+    I^1 by the cubic through four samples. Further ones by the trapezoid rule with its end correction, for which the
+    derivative of I^n is I^(n - 1); that of I^2 has the third difference of f as well, which removes the error of I^1.
     """
     count = len(f) // hop
     e = np.concatenate([2 * f[:1] - f[1:2], f, 2 * f[-1:] - f[-2:-1]])
     step = np.concatenate([dt / 24 * (-e[:-3] + 13 * e[1:-2] + 13 * e[2:-1] - e[3:]), dt * f[-1:]])
+    third = np.append(e[3:] - e[:-3] - 3 * (e[2:-1] - e[1:-2]), 0.0)
     values = np.empty((count, hop + 1))
     values[:, :-1] = f[: count * hop].reshape(count, hop)
     values[:-1, -1] = values[1:, 0]
@@ -363,6 +364,8 @@ def running_integrals(f: Float, hop: int, fold: int, dt: float) -> list[Float]:
     for n in range(2, fold + 1):
         last, slope = out[n - 1], out[n - 2]
         rise = dt / 2 * (last[:, 1:] + last[:, :-1]) - dt**2 / 12 * (slope[:, 1:] - slope[:, :-1])
+        if n == 2:
+            rise += dt**2 / 60 * third[: count * hop].reshape(count, hop)
         out.append(from_steps(rise))
     return out
 

@@ -18,7 +18,7 @@ from pvid.base.errors import PvidError
 Float = npt.NDArray[np.float64]
 
 # Frequencies at which a compensator is exact, over the highest frequency of the motion, by their number.
-_NODES = {2: (0.57, 1.05), 3: (0.37, 0.67, 1.05)}
+_NODES = {2: (0.57, 1.05), 4: (0.3, 0.58, 0.85, 1.05)}
 
 _HIGHEST_NODE = 0.42  # of the rate of the steps
 
@@ -31,8 +31,11 @@ def comb_gain(hz: Float, decimation: int, sample_rate: float) -> Float:
 
 
 def nodes_of(order: int, degree: int) -> int:
-    """How many a compensator has that takes the place of a polynomial: as many even or odd powers as that, 2 or 3."""
-    return 3 if order and degree >= 5 else 2
+    """How many a compensator has that takes the place of a polynomial of this degree: 4 where that is for derivatives.
+
+    With 3, y'' of the pendulum at 42 steps a second biases w by 1.4 standard deviations of a 40 s run with 16 bits.
+    """
+    return 4 if order and degree >= 5 else 2
 
 
 @cache
@@ -45,7 +48,7 @@ def compensator(
     ----------
     half : steps on either side, at least `count`
     band_hz : highest frequency of the motion
-    count : of frequencies at which it is exact, 2 or 3
+    count : of frequencies at which it is exact, 2 or 4
     """
     if half < count:
         raise PvidError(f"a compensator with {count} nodes has {count} steps on either side or more")

@@ -8,7 +8,7 @@ import numpy as np
 
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import EquationError
-from pvid.oracle.weak.solve import Fit, inverse
+from pvid.oracle.weak.solve import RIDGE, Fit, inverse
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,10 @@ def uncertainty(fit: Fit) -> Uncertainty:
     unit = fit.parameters.unit(fit.p)
     information, neighbours = moments_of(fit, designs)
     s_inverse = inverse(information)
-    covariance = s_inverse @ (information + neighbours + neighbours.T) @ s_inverse
+    covariance = covariance_of(information, neighbours)
     free = sum(one.free for one in fit.white) - len(fit.p)
     weighted = sum(float(np.sum(e**2)) for e in residuals) / max(free, 1)
-    variance = np.diag(covariance)
-    # Not positive: the run says nothing of a combination of parameters.
-    predicted = unit * np.sqrt(np.where(variance >= 0, variance, np.inf) * max(1.0, weighted))
+    predicted = unit * np.sqrt(np.diag(covariance) * max(1.0, weighted))
     scores = sum((np.einsum("wkp,wk->wp", d, e) for d, e in zip(designs, residuals, strict=True)))
     clustered = unit * np.sqrt(clustered_variance(np.asarray(scores), s_inverse))
     return Uncertainty(
@@ -58,6 +56,20 @@ def uncertainty(fit: Fit) -> Uncertainty:
         covariance * np.outer(unit, unit),
         explained(fit),
     )
+
+
+def covariance_of(information: Float, neighbours: Float) -> Float:
+    """Covariance of p from that of the scores of windows and their next ones [n_p, n_p].
+
+    Where the run says nothing of a combination of parameters, as when the input is a law of the output, the information
+    is singular, and the products would leave rounding of either sign in place of a variance. There it is that of
+    independent windows: the inverse of the information, as large as its ridge allows.
+    """
+    s_inverse = inverse(information)
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    if np.linalg.eigvalsh(information * np.outer(scale, scale))[0] <= RIDGE:
+        return s_inverse
+    return np.asarray(s_inverse @ (information + neighbours + neighbours.T) @ s_inverse)
 
 
 def moments_of(fit: Fit, designs: list[Float]) -> tuple[Float, Float]:

@@ -12,6 +12,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.rows import EquationError, WeakRows, WhiteRows
 
+RIDGE = 1e-13  # added to the unit diagonal of what is inverted
 _STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
 PASSES = 25  # of whitening at the present p
 _STEPS = 30  # of Gauss-Newton between two whitenings
@@ -82,13 +83,13 @@ def solved(s: Float, f: Float) -> Float:
 
 @cache
 def _ridge(n: int) -> Float:
-    return 1e-13 * np.eye(n)
+    return RIDGE * np.eye(n)
 
 
 def inverse(s: Float) -> Float:
     """S^-1, S scaled to a unit diagonal."""
     scale = 1 / np.sqrt(np.maximum(np.diag(s), 1e-300))
-    scaled = s * np.outer(scale, scale) + 1e-13 * np.eye(len(s))
+    scaled = s * np.outer(scale, scale) + _ridge(len(s))
     return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
 
 

@@ -162,11 +162,18 @@ const held = uPlot.paths.stepped({ align: 1 });
 function drawPlots({ estimates, motion, marks: newest }) {
   const t = estimates.t;
   marks = newest;
-  estimates.curves.forEach((one, i) => draw({
-    id: `parameter${i}`, section: "parameters", label: one.label, data: [t, one.value, one.low, one.high], limits: one.limits, marked: true,
-    series: [{ label: "estimate", colour: "blue", width: 2, paths: held }, { label: "−2 s.e.", paths: held, width: 0 }, { label: "+2 s.e.", paths: held, width: 0 }],
-    bands: [[3, 2]],
-  }));
+  const edges = [{ label: "−2 s.e.", paths: held, width: 0 }, { label: "+2 s.e.", paths: held, width: 0 }];
+  estimates.curves.forEach((one, i) => {
+    const refined = one.refinedValue ? [one.refinedValue, one.refinedLow, one.refinedHigh] : [];
+    draw({
+      id: `parameter${i}`, section: "parameters", label: one.label, data: [t, one.value, one.low, one.high, ...refined], limits: one.limits, marked: true,
+      series: [
+        { label: refined.length ? "weak form" : "estimate", colour: "blue", width: 2, paths: held }, ...edges,
+        ...(refined.length ? [{ label: "refined", colour: "orange", width: 2, paths: held }, ...edges] : []),
+      ],
+      bands: refined.length ? [[3, 2], [6, 5]] : [[3, 2]],
+    });
+  });
   for (const one of plots.keys()) {
     if (one.startsWith("parameter") && Number(one.slice(9)) >= estimates.curves.length) {
       plots.get(one).figure.remove();
@@ -206,6 +213,8 @@ function drawWords(state) {
   say("lost", state.lost || "nothing", state.lost ? "bad" : "good");
   say("reason", state.reason || "no estimate yet");
   say("reasonWords", state.reasonWords, "quiet");
+  for (const one of ["stageName", "stage"]) place(one).hidden = !state.stage;
+  say("stage", state.stage);
   say("kappa", state.kappa);
   say("residual", state.residual);
   say("modelled", state.modelled || "not simulated yet", state.modelled ? "" : "quiet");

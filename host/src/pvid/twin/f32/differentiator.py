@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
@@ -16,31 +18,38 @@ def segments(usable: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def block_sums(samples: Float32, block: int) -> Float32:
-    """pvid_block_sum_f32 after every sample of a stretch [n]: a sum of the last `block`, begun anew every `block`."""
-    if block <= 1:
-        return samples
-    count = -(-len(samples) // block)
-    x = np.zeros((count, block), np.float32)
-    x.reshape(-1)[: len(samples)] = samples
-    anew = np.add.accumulate(x, axis=1)
-    change = x.copy()
-    change[1:] = x[1:] - x[:-1]
-    change[0] = x[0] - np.float32(0)
-    out = np.empty_like(x)
-    running = np.concatenate([np.zeros(1, np.float32), anew[:-1, -1]])
-    for at in range(block):
-        running = running + change[:, at]
-        out[:, at] = running
-    out[:, -1] = anew[:, -1]
-    return out.reshape(-1)[: len(samples)]
+def points(samples: Float32, block: int) -> Float32:
+    """The sums of blocks of a stretch [n], each from its first sample on [n // block]."""
+    whole = len(samples) // block * block
+    return np.asarray(np.add.accumulate(samples[:whole].reshape(-1, block), axis=1)[:, -1])
 
 
-def filtered(samples: Float32, weights: Float32, stride: int, block: int) -> tuple[Float32, Float32]:
-    """The middle points of all full windows of a stretch [n] and the sums of the five filters [5, n]."""
+@dataclass(frozen=True)
+class Ticks:
+    """At which ticks a bank has results, in the stretches of usable samples."""
+
+    rows: list[tuple[int, int, slice]]  # of each stretch: its samples [first, last), the ticks of its results
+    ready: npt.NDArray[np.bool_]  # [ticks] there is one
+    full: npt.NDArray[np.bool_]  # [ticks] the window is full
+
+
+def ticks_of(usable: npt.NDArray[np.bool_], window: int, block: int) -> Ticks:
+    """Ticks with results of a window of so many samples, in blocks."""
+    rows, ready, full = [], np.zeros(len(usable), np.bool_), np.zeros(len(usable), np.bool_)
+    for first, last in segments(usable):
+        if last - first < window:
+            continue
+        now = slice(first + window - 1, last, block)
+        rows.append((first, last, now))
+        ready[now] = True
+        full[first + window - 1 : last] = True
+    return Ticks(rows, ready, full)
+
+
+def filtered(x: Float32, weights: Float32, stride: int) -> tuple[Float32, Float32]:
+    """The middle points of all full windows of a stretch of points [n] and the sums of the five filters [5, n]."""
     half = weights.shape[1]
     reach = half * stride
-    x = block_sums(samples, block)[max(block, 1) - 1 :]
     count = len(x) - 2 * reach
     middle = x[reach : reach + count]
     sums = np.empty((ORDERS, count), np.float32)
@@ -70,27 +79,23 @@ def derivatives(
     weights
         The folded bank, float32 [5, half].
     stride, sample_rate, block
-        As in the configuration [samples], [Hz], [samples].
+        As in the configuration [points], [Hz], [samples].
 
     Returns
     -------
-    float32 [ticks, 5], zero until the window is full, and bool [ticks]: whether it was.
+    float32 [ticks, 5], zero where there is no result, and bool [ticks]: where there is one.
     """
-    window = 2 * weights.shape[1] * stride + max(block, 1)
-    rate = np.float32(sample_rate) / np.float32(stride)
+    every = max(block, 1)
+    ticks = ticks_of(usable, (2 * weights.shape[1] * stride + 1) * every, every)
+    rate = np.float32(sample_rate) / np.float32(stride * every)
     scale = np.empty(ORDERS, np.float32)
-    scale[0] = np.float32(1) / np.float32(max(block, 1))
+    scale[0] = np.float32(1) / np.float32(every)
     for k in range(1, ORDERS):
         scale[k] = scale[k - 1] * rate
     out = np.zeros((len(samples), ORDERS), np.float32)
-    ready = np.zeros(len(samples), np.bool_)
     with np.errstate(all="ignore"):
-        for first, last in segments(usable):
-            if last - first < window:
-                continue
-            middle, sums = filtered(samples[first:last], weights, stride, block)
+        for first, last, now in ticks.rows:
+            middle, sums = filtered(points(samples[first:last], every), weights, stride)
             sums[0] = middle + sums[0]
-            now = slice(first + window - 1, last)
             out[now] = (sums * scale[:, None]).T
-            ready[now] = True
-    return out, ready
+    return out, ticks.ready

@@ -208,7 +208,7 @@ class RelativeEstimator(Estimator):
     theta float32 [n_theta, lanes] is f(p); B and yy are b = B - M theta and the sum of squared residuals.
     """
 
-    _ROWS_PER_STAGE = 2
+    _ROWS_PER_STAGE = 3
     _COLUMNS_PER_STAGE = 2
 
     def __init__(self, configs: Sequence[EstimatorConfig], update_rate: float, pattern: PatternModel) -> None:

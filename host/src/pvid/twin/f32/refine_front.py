@@ -29,14 +29,15 @@ class Front:
     """pvid_refine_front_f32."""
 
     def __init__(self, config: RefineConfig, shape: RefineShape) -> None:
-        self.config, self.inputs, self.reach = config, shape.inputs, shape.reach
+        self.config, self.inputs = config, shape.inputs
         signals = config.signal
         ratio = _F(config.ratio)
         self.share = _F(1) / ratio
-        self.droop = (_F(1) - _F(1) / (ratio * ratio)) / _F(24)
         self.to_counts = np.array([_F(one.scale) * (_FULL_SCALE / _F(one.range)) for one in signals], _F)
         self.from_counts = np.array([_F(one.range) / _FULL_SCALE for one in signals], _F)
         self.is_held = [one.source is Source.HELD for one in signals]
+        steps = _F(1) / (ratio * ratio)
+        self.droop = np.where(self.is_held, _F(1) + steps, _F(1) - steps) / _F(24)
         self.derived = [one.order == 2 for one in signals]
         self.sample = [one.sample for one in signals]
         self.second = None if config.second is None else np.asarray(config.second, _F)
@@ -62,7 +63,7 @@ class Front:
     @property
     def first(self) -> int:
         """First entry that a block may begin at."""
-        return self.behind + self.reach
+        return self.behind
 
     @property
     def room(self) -> int:
@@ -130,10 +131,9 @@ class Front:
         self.wait -= 1
         return Entry.NOTHING if self.wait > 0 else self._end_block(given - self.reference)
 
-    def read(self, entry: int, steps: int) -> Signals:
-        """Signals of so many entries; of inputs those of the reach as well."""
-        value = self.ring[(entry - self.reach + np.arange(steps + 2 * self.reach)) % RING]
+    def read(self, entry: int) -> Signals:
+        """Signals of an entry."""
+        value = self.ring[entry % RING]
         found = value.astype(_F) * self.from_counts
-        outputs = found[self.reach : self.reach + steps, self.inputs :]
-        outputs[value[self.reach : self.reach + steps, self.inputs :] == _MISSING] = np.nan
-        return found[:, : self.inputs], outputs
+        outputs = np.where(value[self.inputs :] == _MISSING, _F(np.nan), found[self.inputs :])
+        return found[: self.inputs], outputs

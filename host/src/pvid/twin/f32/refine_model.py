@@ -21,15 +21,11 @@ class RefineShape:
     outputs: int
     moving: int
     parameters: int
-    skew: bool
+    skew: bool  # the entry of r behind the moving ones
     rates: bool  # an output depends on v
     logarithmic: tuple[bool, ...]
     place_of_p: tuple[int, ...]
-
-    @property
-    def reach(self) -> int:
-        """Steps before and behind whose inputs a skew needs."""
-        return 2 if self.skew else 0
+    measured: tuple[int, ...] = ()  # of the states: 1 + 2 output: that output, 2 + 2 output: its rate, 0: neither
 
     @property
     def states(self) -> int:
@@ -54,20 +50,16 @@ class RefineShape:
     @property
     def rows(self) -> int:
         """That are added to the sums together."""
-        return 3 if self.outputs == 3 else 4
+        return max(2, self.outputs)
 
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Accelerations (order 1: rates) a [q], their derivatives K, D [q, q], U [q, inputs], B [moving, q].
-
-    The row of the skew is 0.
-    """
+    """Accelerations (order 1: rates) a [q], their derivatives K, D [q, q], B [moving, q]."""
 
     a: Float32
     K: Float32
     D: Float32
-    U: Float32
     B: Float32
 
 

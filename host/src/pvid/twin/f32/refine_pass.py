@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from fractions import Fraction
 
 import numpy as np
 
@@ -11,49 +10,41 @@ from pvid.settings.refine import BIG_STEP
 from pvid.twin.f32.refine_model import Float32, RefineModel
 
 _F = np.float32
-_POSITION = "139849/120960 -4511/2240 123133/40320 -88547/30240 1537/896 -11351/20160 275/3456"
-_VELOCITY = "198721/60480 -18637/2520 235183/20160 -10754/945 135713/20160 -5603/2520 19087/60480"
-_DIFFERENCE = "-7/1 21/1 -35/1 35/1 -21/1 7/1 -1/1"
-_CORRECTED_POSITION = _F(33953) / _F(453600)
-_CORRECTED_VELOCITY = _F(5257) / _F(17280)
+_POSITION = "1/2 1/6 1/8 19/180 3/32 863/10080 275/3456 33953/453600"
+_VELOCITY = "1/1 1/2 5/12 3/8 251/720 95/288 19087/60480 5257/17280"
 _STARTS = 3
 
 Signals = tuple[Float32, Float32]
-"""Inputs [steps + 2 reach, inputs] and outputs [steps, outputs] of up to three neighbouring steps."""
+"""Inputs [inputs] and outputs [outputs] of a step."""
 
 
 class Job(IntEnum):
-    """Jobs of a pass in their order."""
+    """Jobs of a pass."""
 
     CLEAR = 0
-    FIRST_A = 1
-    FIRST_B = 2
-    FIRST = 3
-    MIDDLE = 4
-    SECOND_A = 5
-    SECOND_B = 6
-    SECOND = 7
-    END = 8
-    COLUMNS = 9
+    START = 1
+    MEAN = 2
+    MEAN_AGAIN = 3
+    FULL = 4
+    END = 5
+    STEP = 6
+    KICK = 7
+    COLUMNS = 8
+    MORE_COLUMNS = 9
     ROWS = 10
+    MORE_ROWS = 11
 
 
-_NEEDED = {
-    **dict.fromkeys((Job.FIRST_A, Job.FIRST_B, Job.SECOND_A, Job.SECOND_B), 3),
-    **dict.fromkeys((Job.FIRST, Job.MIDDLE, Job.SECOND, Job.END), 1),
-}
-_BEGINS = {Job.FIRST: 1, Job.MIDDLE: 2, Job.SECOND_A: 2, Job.SECOND_B: 2, Job.SECOND: 3, Job.END: 4}
+_AHEAD = {Job.START: 0, Job.MEAN: 1, Job.MEAN_AGAIN: 1, Job.FULL: 2, Job.END: 2, Job.STEP: 1}
 
 
 def _weights(text: str) -> Float32:
-    quotients = [Fraction(one) for one in text.split()]
     given = [tuple(map(int, one.split("/"))) for one in text.split()]
-    assert len(quotients) == len(given)
     return np.array([_F(a) / _F(b) for a, b in given], _F)
 
 
-_OF_POSITION, _OF_VELOCITY, _OF_DIFFERENCE = map(_weights, (_POSITION, _VELOCITY, _DIFFERENCE))
-ORDER = len(_OF_POSITION)
+_OF_POSITION, _OF_VELOCITY = map(_weights, (_POSITION, _VELOCITY))
+ORDER = len(_OF_POSITION) - 1
 
 
 def _product(a: Float32, b: Float32) -> Float32:
@@ -77,33 +68,37 @@ class Pass:
         self.model = model
         self.q = shape.coordinates
         self.state = np.zeros(shape.states, _F)
-        self.rate = np.zeros((ORDER, self.q), _F)
+        self.difference = np.zeros((ORDER, self.q), _F)
         self.column = np.zeros((shape.columns, shape.states), _F)
         self.sum = np.zeros((shape.width, shape.width), _F)
         self.row = np.zeros((shape.rows, shape.width), _F)
         self.last = np.zeros(shape.outputs, _F)
         self.mean: Float32 = np.zeros(shape.outputs, _F)
         self.used = self.step = 0
+        self.middle = np.zeros(shape.states, _F)
         self.job = Job.CLEAR
 
     def begin(self, r: Float32, start: Float32, h: np.float32, gate: np.float32) -> None:
         """pvid_refine_pass_begin_f32."""
         self.h, self.gate = h, gate
         if self.shape.skew:
-            self._delay(r[self.shape.moving - 1])
+            skew = r[self.shape.moving]
+            square = (_F(0.5) * skew) * skew
+            self.skew = skew, square, (square * skew) / (_F(3) * h)
         self.constants = self.model.constants(r)
         self.state = start.copy()
-        self.job, self.head, self.rows, self.starts, self.step, self.used = Job.CLEAR, 0, 0, _STARTS, 0, 0
+        self.job, self.at, self.rows, self.starts, self.step, self.used = Job.CLEAR, 0, 0, _STARTS, 0, 0
 
-    def needs(self) -> tuple[int, int]:
-        """First step of the block whose signals the next job needs, and how many steps; 0: none."""
-        return self.step * BIG_STEP + _BEGINS.get(self.job, 0), _NEEDED.get(self.job, 0)
+    def awaited(self) -> int | None:
+        """The step of the block whose signals the next job needs; None: none."""
+        return None if self.job not in _AHEAD else self.step * BIG_STEP + self.at + _AHEAD[self.job]
 
     def ends(self, length: int) -> bool:
         """Whether the pass is complete."""
-        return self.step >= length and self.job != Job.ROWS
+        return self.step >= length and self.job <= Job.STEP
 
     def _clear(self) -> None:
+        self.difference[:] = 0
         self.column[:] = 0
         self.sum[:] = 0
         states = range(self.shape.states)
@@ -112,95 +107,65 @@ class Pass:
 
     # ---- the motion ----
 
-    def _adams_bashforth(self) -> None:
+    def _predict(self) -> None:
         q, h = self.q, self.h
-        position, velocity = np.zeros(q, _F), np.zeros(q, _F)
-        for j in range(ORDER):
-            age = (j - self.head) % ORDER
-            position = position + _OF_POSITION[age] * self.rate[j]
-            velocity = velocity + _OF_VELOCITY[age] * self.rate[j]
+        position, velocity = (of[ORDER - 1] * self.difference[-1] for of in (_OF_POSITION, _OF_VELOCITY))
+        for k in range(ORDER - 2, -1, -1):
+            position = position + _OF_POSITION[k] * self.difference[k]
+            velocity = velocity + _OF_VELOCITY[k] * self.difference[k]
         if self.shape.order == 1:
             self.state = np.asarray(self.state + h * velocity)
             return
         x, v = self.state[:q], self.state[q:]
         self.state = np.concatenate([x + h * (v + h * position), v + h * velocity])
 
-    def _correct(self, a: Float32) -> None:
-        difference = a
-        for j in range(ORDER):
-            difference = difference + _OF_DIFFERENCE[(j - self.head) % ORDER] * self.rate[j]
-        kick = self.h * difference
-        corrected = _CORRECTED_VELOCITY * kick
+    def _renew(self, a: Float32, corrects: bool) -> None:
+        newest = a
+        for k in range(ORDER):
+            before = self.difference[k].copy()
+            self.difference[k] = newest
+            newest = newest - before
+        if not corrects:
+            return
+        kick = self.h * newest
+        corrected = _OF_VELOCITY[ORDER] * kick
         if self.shape.order == 2:
-            corrected = np.concatenate([(self.h * _CORRECTED_POSITION) * kick, corrected])
+            corrected = np.concatenate([(self.h * _OF_POSITION[ORDER]) * kick, corrected])
         self.state = np.asarray(self.state + corrected)
-
-    def _push(self, a: Float32) -> None:
-        self.head = ORDER - 1 if self.head == 0 else self.head - 1
-        self.rate[self.head] = a
 
     def _motion(self, state: Float32, u: Float32) -> Float32:
         return self.model.motion(self.constants, state[: self.q], state[self.q :], u)
 
-    def _delay(self, skew: np.float32) -> None:
-        s, scale = skew / self.h, _F(1) / self.h
-        z = s * s
-        one, two, three, four = _F(1), _F(2), _F(3), _F(4)
-        self.late = (
-            ((s * (z - one)) * (s - two)) / _F(24),
-            ((s * (s - one)) * (four - z)) / _F(6),
-            ((one - z) * (four - z)) * _F(0.25),
-            ((s * (s + one)) * (four - z)) / _F(6),
-            ((s * (z - one)) * (s + two)) / _F(24),
-        )
-        self.slope = (
-            (scale / _F(12)) * ((s * (two * z - three * s)) - (s - one)),
-            (scale / _F(6)) * ((s * (three * s - four * z)) + (_F(8) * s - four)),
-            ((scale * s) * (two * z - _F(5))) * _F(0.5),
-            (scale / _F(6)) * ((four + _F(8) * s) - s * (three * s + four * z)),
-            (scale / _F(12)) * ((s * (two * z + three * s)) - (s + one)),
-        )
-
-    def _weighted(self, weights: tuple[np.float32, ...], signals: Signals, at: int) -> Float32:
-        total = weights[0] * signals[0][at]
-        for k, weight in enumerate(weights[1:], 1):
-            total = total + weight * signals[0][at + k]
-        return np.asarray(total, _F)
-
-    def _input(self, signals: Signals, at: int) -> Float32:
-        return self._weighted(self.late, signals, at) if self.shape.skew else np.asarray(signals[0][at])
-
-    def _first_half(self, r: Float32, signals: Signals) -> None:
-        h, q = self.h, self.q
+    def _mean_slope(self, u: Float32) -> Float32:
+        h, q, k0 = self.h, self.q, self.difference[0]
         x, v = self.state[:q], self.state[q:]
-        if self.starts == _STARTS:
-            u = self._input(signals, 0)
-            self._push(self._motion(self.state, u))
-            self.last = signals[1][0] - self.model.output(self.constants, x, v, u, r)
-        u, k0 = self._input(signals, 1), self.rate[self.head]
+        again = self.job == Job.MEAN_AGAIN
+        k = self.k1 if again else k0
         if self.shape.order == 1:
-            self.k1 = self._motion(x + h * k0, u)
-            self.k2 = self._motion(x + h * self.k1, u)
-            return
-        self.k1 = self._motion(np.concatenate([x + h * v, v + h * k0]), u)
-        self.k2 = self._motion(np.concatenate([x + h * (v + h * k0), v + h * self.k1]), u)
+            return self._motion(x + h * k, u)
+        rates = v + h * k0 if again else v
+        return self._motion(np.concatenate([x + h * rates, v + h * k]), u)
 
-    def _second_half(self, signals: Signals) -> None:
-        h, q, k1, k2 = self.h, self.q, self.k1, self.k2
-        h2, sixth = _F(2) * h, (_F(2) * h) / _F(6)
+    def _full_slope(self, u: Float32) -> Float32:
+        h, h2, q = self.h, _F(2) * self.h, self.q
         x, v = self.state[:q], self.state[q:]
-        u, k0 = self._input(signals, 2), self.rate[self.head]
         if self.shape.order == 1:
-            k3 = self._motion(x + h2 * k2, u)
-            dx = sixth * ((k0 + _F(2) * (k1 + k2)) + k3)
+            return self._motion(x + h2 * self.k2, u)
+        return self._motion(np.concatenate([x + h2 * (v + h * self.k1), v + h2 * self.k2]), u)
+
+    def _end_double(self, u: Float32) -> None:
+        h2, sixth, q, k0 = _F(2) * self.h, (_F(2) * self.h) / _F(6), self.q, self.difference[0]
+        mean = self.k1 + self.k2
+        if self.shape.order == 1:
+            x = self.state
+            dx = sixth * ((k0 + _F(2) * mean) + self.k3)
             self.end = np.asarray(x + dx)
             a = self._motion(self.end, u)
             self.middle = (x + _F(0.5) * dx) + (h2 * _F(0.125)) * (k0 - a)
             return
-        k3 = self._motion(np.concatenate([x + h2 * (v + h * k1), v + h2 * k2]), u)
-        mean = k1 + k2
+        x, v = self.state[:q], self.state[q:]
         dx = h2 * (v + sixth * (k0 + mean))
-        dv = sixth * ((k0 + _F(2) * mean) + k3)
+        dv = sixth * ((k0 + _F(2) * mean) + self.k3)
         x1, v1 = x + dx, v + dv
         self.end = np.concatenate([x1, v1])
         a = self._motion(self.end, u)
@@ -208,28 +173,44 @@ class Pass:
         rate = ((_F(1.875) * dx) / h2 - _F(0.4375) * (v + v1)) + (h2 * _F(0.03125)) * (a - k0)
         self.middle = np.concatenate([middle, rate])
 
-    def _residuals(self, r: Float32, state: Float32, u: Float32, measured: Float32) -> None:
-        e = measured - self.model.output(self.constants, state[: self.q], state[self.q :], u, r)
-        self.mean = np.asarray(self.mean + _F(0.5) * (self.last + e), _F)
-        self.last = e
+    def _residuals(self, r: Float32, state: Float32, signals: Signals) -> Float32:
+        q, (u, measured) = self.q, signals
+        late = state
+        if self.shape.skew:
+            a, jerk = self.difference[0], self.difference[1]
+            first, second, third = self.skew
+            v = state[-q:]
+            late = np.concatenate([state[:q] + (first * v + (second * a + third * jerk)), v + first * a])
+        return np.asarray(measured - self.model.output(self.constants, late[:q], late[-q:], u, r), _F)
 
-    def _derivatives(self, r: Float32, signals: Signals, u: Float32) -> Float32:
-        q, shape = self.q, self.shape
+    def _start(self, r: Float32, signals: Signals) -> None:
+        self.difference[0] = self._motion(self.state, signals[0])
+        self.last = self._residuals(r, self.state, signals)
+
+    def _derivatives(self, r: Float32, u: Float32) -> Float32:
+        q = self.q
         x, v = self.state[:q], self.state[q:]
-        found = self.model.jacobian(self.constants, x, v, u)
-        B = found.B.copy()
-        if shape.skew:
-            rate = self._weighted(self.slope, signals, 0)
-            total: Float32 = np.zeros(q, _F)
-            for j in range(shape.inputs):
-                total = total + found.U[:, j] * rate[j]
-            B[-1] = total
+        self.found = self.model.jacobian(self.constants, x, v, u)
         self.output_column = self.model.output_jacobian(self.constants, x, v, u, r)
-        if shape.order == 1:
-            self._first_order_kick(found.K, B)
+        return self.found.a
+
+    def _slip(self) -> Float32:
+        """Derivatives of the outputs by the skew."""
+        of_q, of_v, _ = self.output_column
+        a, v = self.difference[0], self.state[-self.q :]
+        total: Float32 = np.zeros(self.shape.outputs, _F)
+        for k in range(self.q):
+            total = total + of_q[:, k] * (v[k] + self.skew[0] * a[k])
+            if self.shape.rates:
+                total = total + of_v[:, k] * a[k]
+        return total
+
+    def _make_kick(self) -> None:
+        found = self.found
+        if self.shape.order == 1:
+            self._first_order_kick(found.K, found.B)
         else:
-            self._second_order_kick(found.K, found.D, B)
-        return found.a
+            self._second_order_kick(found.K, found.D, found.B)
 
     def _first_order_kick(self, K: Float32, B: Float32) -> None:
         big = _F(BIG_STEP) * self.h
@@ -250,21 +231,23 @@ class Pass:
         self.kick_r = _damped(D, half, (big * B).T)
 
     def _step(self, r: Float32, signals: Signals) -> None:
-        u, x, started = self._input(signals, 0), self.middle, self.starts == 0
+        x, started, middle = self.middle, self.starts == 0, self.at == BIG_STEP // 2 - 1
         if started:
-            if self.job != Job.MIDDLE:
-                self._adams_bashforth()
-            x = self.state
-        elif self.job in (Job.MIDDLE, Job.END):
+            if not middle:
+                self._predict()
+        elif self.at % 2:
             x = self.state = self.end
             self.starts -= 1
-        self._residuals(r, x, u, signals[1][0])
-        a = self._derivatives(r, signals, u) if self.job == Job.MIDDLE else self._motion(x, u)
-        if started:
-            self._correct(a)
-        self._push(a)
-        if started and self.job == Job.FIRST:
-            self._adams_bashforth()
+        a = self._derivatives(r, signals[0]) if middle else self._motion(self.state if started else x, signals[0])
+        self._renew(a, started)
+        e = self._residuals(r, self.state if started else x, signals)
+        self.mean = np.asarray(self.mean + _F(0.5) * (self.last + e), _F)
+        self.last = e
+        if middle and self.shape.skew:
+            self.slip = self._slip()
+        self.at += 1
+        if started and self.at == BIG_STEP // 2 - 1:
+            self._predict()
 
     # ---- columns and rows ----
 
@@ -288,6 +271,7 @@ class Pass:
         half = _F(0.5 * BIG_STEP) * self.h
         s, v = self.column[:, :q], self.column[:, q:]
         x = s + half * v
+        late = s + (half + self.skew[0]) * v if shape.skew else x
         following = np.empty_like(v)
         for i in range(q):
             total = v[:, i].copy()
@@ -297,9 +281,10 @@ class Pass:
                 total = total + self.kick_v[i, k] * v[:, k]
             total[shape.states :] = total[shape.states :] + self.kick_r[i]
             following[:, i] = total
-        rate = _F(0.5) * (v + following)
-        self.column = np.concatenate([x + half * following, following], 1)
-        return x, rate
+        twice = v + following
+        rate = _F(0.5) * twice
+        self.column = np.concatenate([s + half * twice, following], 1)
+        return late, rate
 
     def _end_rows(self, x: Float32, rate: Float32, weight: Float32) -> None:
         shape, q = self.shape, self.q
@@ -313,7 +298,9 @@ class Pass:
                 for k in range(q):
                     total = total + of_v[i, k] * rate[:, k]
             row[: shape.columns] = total
-            row[shape.columns : -1] = of_r[i]
+            if shape.skew:
+                row[shape.columns] = self.slip[i]
+            row[-1 - of_r.shape[1] : -1] = of_r[i]
             row[-1] = self.mean[i] * (_F(1) / _F(BIG_STEP))
             if i > 0:
                 row = weight[i] * row
@@ -324,6 +311,7 @@ class Pass:
                 row[:] = 0
             self.row[self.rows + i] = row
         self.rows += shape.outputs
+        self.at = 0
         self.step += 1
 
     def _add_rows(self) -> None:
@@ -335,30 +323,45 @@ class Pass:
 
     # ---- jobs ----
 
+    def _job_of_step(self) -> Job:
+        return Job.MEAN if self.starts and self.at % 2 == 0 else Job.STEP
+
     def do(self, r: Float32, weight: Float32, signals: Signals | None) -> None:
-        """pvid_refine_pass_job_f32."""
-        job = self.job
-        if job == Job.CLEAR:
-            self._clear()
-            self.job = Job.FIRST_A
-        elif job in (Job.COLUMNS, Job.ROWS):
-            if job == Job.COLUMNS:
+        """The next job of pvid_refine_pass_run_f32. Columns and sums are those of the second of their two jobs."""
+        match self.job:
+            case Job.CLEAR:
+                self._clear()
+                self.job = Job.START
+            case Job.KICK:
+                self._make_kick()
+                self.job = self._job_of_step()
+            case Job.COLUMNS | Job.ROWS:
+                self.job = Job(self.job + 1)
+            case Job.MORE_COLUMNS:
                 self._end_big_step(weight)
-            else:
+                self.job = Job.ROWS if self.rows == self.shape.rows else self._job_of_step()
+            case Job.MORE_ROWS:
                 self._add_rows()
-            full = job == Job.COLUMNS and self.rows == self.shape.rows
-            self.job = Job.ROWS if full else Job.FIRST_A if self.starts else Job.FIRST
-        else:
-            assert signals is not None
-            if job in (Job.FIRST_A, Job.SECOND_A):
-                self._first_half(r, signals)
-                self.job = Job(job + 1)
-            elif job in (Job.FIRST_B, Job.SECOND_B):
-                self._second_half(signals)
-                self.job = Job(job + 1)
-            else:
+                self.job = self._job_of_step()
+            case Job.STEP:
+                assert signals is not None
                 self._step(r, signals)
-                if job in (Job.FIRST, Job.SECOND):
-                    self.job = Job(job + 1)
-                else:
-                    self.job = Job.COLUMNS if job == Job.END else Job.SECOND_A if self.starts else Job.SECOND
+                behind = {BIG_STEP // 2: Job.KICK, BIG_STEP: Job.COLUMNS}
+                self.job = behind.get(self.at, self._job_of_step())
+            case _:
+                assert signals is not None
+                self._first_job(r, signals)
+                self.job = Job(self.job + 1)
+
+    def _first_job(self, r: Float32, signals: Signals) -> None:
+        match self.job:
+            case Job.START:
+                self._start(r, signals)
+            case Job.MEAN:
+                self.k1 = self._mean_slope(signals[0])
+            case Job.MEAN_AGAIN:
+                self.k2 = self._mean_slope(signals[0])
+            case Job.FULL:
+                self.k3 = self._full_slope(signals[0])
+            case _:
+                self._end_double(signals[0])

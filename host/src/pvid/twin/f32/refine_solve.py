@@ -12,6 +12,7 @@ from pvid.twin.f32.refine_pass import Pass
 _F = np.float32
 _LEAST_PART = _F(2e-6)
 _MOST_HALVINGS = 12
+_ROTATIONS = 4
 
 
 class Solution(Enum):
@@ -62,12 +63,12 @@ class Solve:
         self.triangle = np.zeros((n, n), _F)
         self.step = np.zeros(n, _F)
         self.shift = np.zeros(shape.states, _F)
-        self.size = self.residual = self.clash = _F(0)
+        self.size = self.bend = self.residual = self.clash = _F(0)
         self.begin()
 
     def begin(self) -> None:
         """pvid_refine_solve_begin_f32."""
-        self.job = self.halvings = 0
+        self.job = self.halvings = self.row = self.rotation = 0
 
     def _copy(self, sums: Float32, triangle: Float32, past: Float32, linear: Float32) -> None:
         self.sum = sums.copy()
@@ -114,13 +115,12 @@ class Solve:
         below = self.sum[column + 1 :, column + 1 :]
         self.sum[column + 1 :, column + 1 :] = below - np.multiply.outer(row[1:], row[1:])
 
-    def _join(self, row: int) -> None:
-        first, n = self.shape.states, self.shape.parameters
-        left = np.zeros(n, _F)
-        left[row:] = self.sum[first + row, first + row : -1]
-        rest = self.sum[first + row, -1]
-        for i in range(row, n):
+    def _join(self) -> bool:
+        first, n, row = self.shape.states, self.shape.parameters, self.row
+        left = self.sum[first + row, first:-1]
+        for i in range(self.rotation, min(self.rotation + _ROTATIONS, n)):
             a, b = self.triangle[i, i], left[i]
+            self.rotation += 1
             square = a * a + b * b
             if not square > 0:
                 continue
@@ -129,15 +129,20 @@ class Solve:
             x, y = self.triangle[i, i:].copy(), left[i:].copy()
             self.triangle[i, i:] = cosine * x + sine * y
             left[i:] = cosine * y - sine * x
-            own = self.right[i]
+            own, rest = self.right[i], self.sum[first + row, -1]
             self.right[i] = cosine * own + sine * rest
-            rest = cosine * rest - sine * own
-        self.clash = self.clash + rest * rest
+            self.sum[first + row, -1] = cosine * rest - sine * own
+        if self.rotation == n:
+            rest = self.sum[first + row, -1]
+            self.clash = self.clash + rest * rest
+            self.row += 1
+            self.rotation = self.row
+        return self.row == n
 
     def _solve(self, prior_sd: Float32, step_limit: np.float32) -> bool:
         n = self.shape.parameters
         step = self.step
-        largest = _F(0)
+        largest = bend = _F(0)
         for k in range(n - 1, -1, -1):
             total = self.right[k]
             for j in range(k + 1, n):
@@ -147,7 +152,8 @@ class Solve:
             step[k] = total / self.triangle[k, k]
             size = (-step[k] if step[k] < 0 else step[k]) / prior_sd[k]
             largest = largest if size <= largest else size
-        self.size = largest
+            bend = bend if size <= bend or not self.shape.logarithmic[k] else size
+        self.size, self.bend = largest, bend
         if not largest < _F(1e6):
             return False
         if largest > step_limit:
@@ -183,7 +189,7 @@ class Solve:
         """pvid_refine_solve_job_f32."""
         job, width = self.job, self.shape.width
         joined = 3 + width
-        solved = joined + self.shape.parameters
+        solved = joined + 1
         self.job += 1
         if job == 0:
             self._copy(sums, triangle, past, linear)
@@ -193,8 +199,8 @@ class Solve:
             self._to_steps(linear)
         elif job < joined:
             self._eliminate(job - 3)
-        elif job < solved:
-            self._join(job - joined)
+        elif job == joined:
+            self.job = solved if self._join() else joined
         elif job == solved:
             return Solution.SOLVING if self._solve(prior_sd, step_limit) else Solution.UNSOLVED
         elif job == solved + 1:

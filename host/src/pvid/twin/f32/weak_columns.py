@@ -18,20 +18,20 @@ _SMALLEST, _LARGEST = _F(1.17549435e-38), _F(3.4e38)
 
 def parts_of_columns(white: White, window: Float32) -> Float32:
     """Sums over the terms of each column, factor (-1)^m (i omega)^m S_h over its standard deviation
-    [columns, parts, lanes].
+    [columns, 2, harmonics, lanes].
 
     window: sums of the channels [channels, 2, harmonics]
     """
     rows, model = white.rows, white.rows.design.model
     rate = (np.arange(rows.harmonics).astype(np.float32) * rows.omega)[:, None]
-    sines = slice(1, 1 + rows.parts - rows.cosines)
-    out = np.zeros((model.kind[white.kind].columns, rows.parts, white.scale.shape[1]), np.float32)
+    sines = slice(0, rows.families[1].stop)
+    out = np.zeros((model.kind[white.kind].columns, 2, *white.scale.shape), np.float32)
     with np.errstate(all="ignore"):
         for one in model.terms_of(white.kind):
             factor, column = _F(one.factor), out[one.column]
             if model.channel[one.channel].gain == NONE:
                 whole = white.scale[0] * (factor * (_F(2) * _F(rows.design.hop)))
-                column[0] = column[0] + (whole if one.order == 0 else _F(0))
+                column[0, 0] = column[0, 0] + (whole if one.order == 0 else _F(0))
                 continue
             turned, negative = one.order % 2 == 1, (one.order + 1) % 4 >= 2
             re, im = window[one.channel][::-1] if turned else window[one.channel]
@@ -39,9 +39,8 @@ def parts_of_columns(white: White, window: Float32) -> Float32:
             weight = white.scale
             for _ in range(one.order):
                 weight = weight * rate
-            own = slice(0 if one.order == 0 else 1, rows.cosines)  # of h = 0 only order 0 counts
-            column[own] = column[own] + (((-sign if turned else sign) * weight) * re[:, None])[own]
-            column[rows.cosines :] = column[rows.cosines :] + ((sign * weight) * im[:, None])[sines]
+            column[0] = column[0] + ((-sign if turned else sign) * weight) * re[:, None]
+            column[1, sines] = column[1, sines] + ((sign * weight) * im[:, None])[sines]
     return out
 
 

@@ -13,7 +13,7 @@ from pvid.twin.f32.estimator import RelativeEstimator
 from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.trust import Trust
 from pvid.twin.f32.weak_columns import parts_of_columns, projected
-from pvid.twin.f32.weak_noise import Noise, pairs_of, shares
+from pvid.twin.f32.weak_noise import Noise
 from pvid.twin.f32.weak_scores import Scores
 from pvid.twin.f32.weak_white import Rows, White, total
 from pvid.twin.record import Mask, Reasons, of_all_lanes
@@ -23,8 +23,8 @@ Float32 = npt.NDArray[np.float32]
 Stages = Iterator[Reasons | None]
 
 _F = np.float32
-_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 8, 30, 4
-_NONZEROS_PER_STAGE, _PAIRS_PER_STAGE, _BOTH_FAMILIES = 8, 1, 16
+_ENTRIES_PER_STAGE, _PRODUCTS_PER_STAGE, _SHARES_PER_STAGE = 7, 30, 4
+_BOTH_FAMILIES = 16
 _GATE_MEMORY = _F(4)
 _VARIANCE_MAX = _F(1e36)
 
@@ -39,6 +39,7 @@ class Finish:
     Attributes
     ----------
     alone : the next window has no neighbour before it
+    candidate : the estimate of the last window [lanes], published or not
     """
 
     def __init__(self, config: WeakConfig, dt: np.float32, estimator: RelativeEstimator, trust: Trust) -> None:
@@ -46,7 +47,6 @@ class Finish:
         self.estimator, self.trust = estimator, trust
         self.rows = Rows(design, dt)
         self.compensation = config.compensation
-        self.shares = config.compensation or bool((np.asarray(design.error_variance) > 0).any())
         self.iterations = 1 if estimator.is_rate else config.iterations
         windows_hz = _F(1) / (dt * _F(design.hop))
         lanes = estimator.p.shape[1]
@@ -55,33 +55,81 @@ class Finish:
         ]
         self.scores = Scores(len(estimator.p), estimator.forgetting_s * windows_hz)
         self.alone = False
+        self.candidate: Candidate = np.zeros_like(trust.estimate)
 
     # ---- number of stages
 
     def _entries(self) -> int:
         return _parts(len(self.design.noise), _ENTRIES_PER_STAGE)
 
+    def _before_columns(self) -> int:
+        """Stages of a kind before its columns."""
+        basis = 2 * self.design.power + _parts(self.rows.harmonics, _SHARES_PER_STAGE)
+        noise = 1 + (self._entries() + 1) * len(self.estimator.p) if self._checks_noise else 1
+        return self._entries() + 2 + basis + noise
+
+    def _reflections(self, kind: int) -> int:
+        families = 1 if self.design.functions <= _BOTH_FAMILIES else 2
+        return families * self.design.model.kind[kind].columns
+
+    def _behind_projection(self, kind: int) -> int:
+        """Stages of a kind from its residuals to its gate."""
+        thetas = self.design.model.kind[kind].thetas
+        residual = _parts(self.design.functions, max(1, _PRODUCTS_PER_STAGE // (thetas + 1)))
+        return residual + _parts(thetas, self._products) + 1
+
+    @property
+    def _projections(self) -> int:
+        """Columns that a stage projects."""
+        return max(1, _PRODUCTS_PER_STAGE // (2 * self.design.functions))
+
+    @property
+    def _products(self) -> int:
+        """Products of columns that a stage forms."""
+        return max(1, _PRODUCTS_PER_STAGE // self.design.functions)
+
+    def _adding(self, kind: int) -> int:
+        """Stages with the products of the columns of a kind."""
+        thetas = self.design.model.kind[kind].thetas
+        return _parts(thetas * (thetas + 1) // 2, self._products)
+
     def _stages_of_rows(self, kind: int) -> int:
         """Stages of a kind up to its gate."""
         own = self.design.model.kind[kind]
-        nuisances = own.nuisances
-        at_once = max(1, _PRODUCTS_PER_STAGE // (2 * self.design.functions))
-        project = sum(1 + _parts(own.columns - 1 - i, at_once) for i in range(nuisances)) or 1
-        residual = _parts(self.design.functions, max(1, _PRODUCTS_PER_STAGE // (own.thetas + 1)))
-        squares = _parts(own.thetas, self._products)
-        return self._stages_of_columns(kind) + project + residual + squares + 1
-
-    def _stages_of_columns(self, kind: int) -> int:
-        """Stages of a kind until its columns are formed."""
-        own = self.design.model.kind[kind]
-        basis = 2 * self.design.power + self._stages_of_share
-        listed = _parts(len(self.estimator.model.c_row), _NONZEROS_PER_STAGE)
-        pairs = _parts(len(pairs_of(self.design, kind)), _PAIRS_PER_STAGE)
-        noise = 1 + listed + pairs if self._checks_noise else 1
-        reflect = 1 if self.design.functions <= _BOTH_FAMILIES else 2
         terms = [one.column for one in self.design.model.terms_of(kind)]
         gather = sum(max(1, terms.count(column)) for column in range(own.columns))
-        return self._entries() + 2 + noise + basis + gather + reflect * own.columns
+        project = sum(1 + _parts(own.columns - 1 - i, self._projections) for i in range(own.nuisances)) or 1
+        return self._before_columns() + gather + self._reflections(kind) + project + self._behind_projection(kind)
+
+    @property
+    def _stages_of_pull(self) -> int:
+        return (self._entries() if self.compensation else 1) + 1
+
+    def _most_of_columns(self, kind: int) -> int:
+        """Stages of a kind until its columns are formed, at most."""
+        terms, columns = len(self.design.model.terms_of(kind)), self.design.model.kind[kind].columns
+        return self._before_columns() + terms + columns + self._reflections(kind)
+
+    def _most_of_kind(self, kind: int) -> int:
+        """Stages of a kind, at most."""
+        own = self.design.model.kind[kind]
+        project = own.nuisances * (1 + _parts(own.columns - 1, self._projections)) + 1
+        behind = self._behind_projection(kind) + self._entries() + 1 + self._adding(kind) + 1
+        return self._most_of_columns(kind) + project + behind
+
+    @property
+    def stages_of_columns(self) -> int:
+        """Of a window until all its columns are formed, at most."""
+        last = self.design.model.kinds - 1
+        return sum(self._most_of_kind(kind) for kind in range(last)) + self._most_of_columns(last)
+
+    @property
+    def stages(self) -> int:
+        """Of a window with all its solves, at most."""
+        estimator = self.estimator
+        of_kinds = sum(self._most_of_kind(kind) for kind in range(self.design.model.kinds))
+        solves = estimator.solve_stages(True) + (self.iterations - 1) * (estimator.solve_stages(False) + 1)
+        return of_kinds + 7 + len(estimator.p) + solves + estimator.assess_solved_stages
 
     @property
     def _checks_noise(self) -> bool:
@@ -94,41 +142,6 @@ class Finish:
         return np.asarray(
             (_F(self.design.functions) * _F(self.design.model.kinds)) * self.estimator.row_weight, np.float32
         )
-
-    @property
-    def _products(self) -> int:
-        """Products of columns that a stage forms."""
-        return max(1, _PRODUCTS_PER_STAGE // self.design.functions)
-
-    def _stages_of_adding(self, kind: int) -> int:
-        """Stages of a kind behind its gate."""
-        thetas = self.design.model.kind[kind].thetas
-        return _parts(thetas * (thetas + 1) // 2, self._products) + 1
-
-    @property
-    def _stages_of_share(self) -> int:
-        return _parts(self.rows.parts, _SHARES_PER_STAGE) if self.shares else 0
-
-    @property
-    def _stages_of_pull(self) -> int:
-        return self._entries() + 1 if self.shares else 0
-
-    def _stages_of_kind(self, kind: int) -> int:
-        return self._stages_of_rows(kind) + self._stages_of_pull + self._stages_of_adding(kind)
-
-    @property
-    def stages_of_columns(self) -> int:
-        """Of a window until all its columns are formed, at most."""
-        last = self.design.model.kinds - 1
-        return sum(self._stages_of_kind(kind) for kind in range(last)) + self._stages_of_columns(last)
-
-    @property
-    def stages(self) -> int:
-        """Of a window with all its solves."""
-        estimator = self.estimator
-        of_kinds = sum(self._stages_of_kind(kind) for kind in range(self.design.model.kinds))
-        solves = estimator.solve_stages(True) + (self.iterations - 1) * (estimator.solve_stages(False) + 1)
-        return of_kinds + 7 + len(estimator.p) + solves + estimator.assess_solved_stages
 
     # ---- a window
 
@@ -150,7 +163,7 @@ class Finish:
             theta = estimator.theta[block]
             white = White(self.rows, kind, theta)
             if self._checks_noise:
-                self._add_noise(noise, white, first)
+                noise.add(white, first)
             first += own.thetas
             columns, live = projected(white.columns(parts_of_columns(white, window)), own.thetas)
             e, rss = _residuals(columns, theta)
@@ -180,11 +193,8 @@ class Finish:
             used += 1
             free, square = free + freedom, square + rss
             yield None
-            if self.shares:
-                yield from self._pull(white, block, score)
-                expected = expected + white.sensors()
-            else:
-                expected = expected + _F(1)
+            yield from self._pull(white, block, score)
+            expected = expected + white.sensors()
             yield from self._add(kind, np.concatenate([n, e[None]]), squares, score[block], rss)
         if used == 0:
             self.scores.skip()
@@ -216,12 +226,6 @@ class Finish:
         self.estimator.end_rows(kind, gradient, rss, self.design.functions)
         yield None
 
-    def _add_noise(self, noise: Noise, white: White, first: int) -> None:
-        share = white.share if self.shares else shares(white)
-        with np.errstate(all="ignore"):
-            for pair in pairs_of(self.design, white.kind):
-                noise.add(pair, first, share)
-
     def _pull(self, white: White, block: slice, score: Float32) -> Stages:
         """The stages of the compensation, the last of which adds it."""
         estimator = self.estimator
@@ -229,7 +233,7 @@ class Finish:
             yield None
         pull = np.zeros_like(score)
         if self.compensation:
-            pull[block] = white.pull()
+            pull[block] = white.pull(white.full)
         with np.errstate(all="ignore"):
             score[block] = score[block] + pull[block]
         if self.compensation:
@@ -276,7 +280,9 @@ class Finish:
         """The verdict; a tick later the publication."""
         verdict = self.trust.decide(reason, size, above_noise, variance_ratio, candidate)
         yield None
-        yield self.trust.publish(verdict, reason, candidate)
+        reported = self.trust.publish(verdict, reason, candidate)
+        self.candidate = np.where(verdict == Reason.UPDATED, self.trust.estimate, candidate)  # with what it neglects
+        yield reported
 
     def _cluster(self, candidate: Candidate) -> None:
         """The larger of the two standard errors of each parameter; the covariance grows with it."""

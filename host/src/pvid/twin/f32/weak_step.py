@@ -82,21 +82,21 @@ def _integrals(f: Float32, hop: int, dt: np.float32) -> tuple[Float32, Float32]:
     f: integrands at the steps [steps, integrands]; halves that are not whole are garbage where there is no step.
     """
     steps = len(f)
-    part, half, end = dt / _F(24), _F(0.5) * dt, (dt * dt) / _F(12)
+    part, half, bend = dt / _F(24), _F(0.5) * dt, (dt * dt) / _F(60)
     # rises from the step before to each step; the first and the last one have none
-    rise, slope = np.zeros_like(f), np.zeros_like(f)
+    rise, outside = np.zeros_like(f), np.zeros_like(f)
     if steps > 2:
         last, now, behind = f[:-2], f[1:-1], f[2:]
         before = np.concatenate([_F(2) * last[:1] - now[:1], last[:-1]])
         rise[1:-1] = part * (((-before + _F(13) * last) + _F(13) * now) - behind)
-        slope[1:-1] = end * (now - last)
+        outside[1:-1] = bend * ((behind - before) - _F(8) * (now - last))
     halves = -(-steps // hop)
     places = np.minimum(hop * np.arange(halves)[:, None] + np.arange(hop + 1), steps - 1)
     own = rise[places]
     own[:, 0] = 0
     once = np.add.accumulate(own, axis=1, dtype=np.float32)
     more = np.zeros_like(once)
-    more[:, 1:] = half * (once[:, :-1] + once[:, 1:]) - slope[places][:, 1:]
+    more[:, 1:] = half * (once[:, :-1] + once[:, 1:]) + outside[places][:, 1:]
     return once, np.add.accumulate(more, axis=1, dtype=np.float32)
 
 

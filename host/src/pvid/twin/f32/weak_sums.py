@@ -40,8 +40,10 @@ def half_sums(channels: Float32, circle: Float32, hop: int, harmonics: int) -> F
         for block in range(hop // _BLOCK):
             cosine, sine = factors(block * _BLOCK + centre)
             p, q = even[:, block], odd[:, block]
+            plain = total[:, :, 0, 0] + p[:, :, 0]  # of h = 0, whose cosine is 1
             total[:, :, 0] = (total[:, :, 0] + cosine * p) - sine * q
             total[:, :, 1] = (total[:, :, 1] + sine * p) + cosine * q
+            total[:, :, 0, 0], total[:, :, 1, 0] = plain, 0.0
     return total
 
 

@@ -36,7 +36,7 @@ def windows_still(samples: Float32, least: Float32, hop: int) -> Mask:
     Parameters
     ----------
     samples : at the steps' ticks [steps, samples]
-    least : standard deviations [samples]
+    least : standard deviations [samples]; 0: of any
     """
     halves = len(samples) // hop
     x = samples[: halves * hop].reshape(halves, hop, -1)
@@ -50,4 +50,4 @@ def windows_still(samples: Float32, least: Float32, hop: int) -> Mask:
         both = (total[:-1] + total[1:]) + n * d
         square = (squares[:-1] + (squares[1:] + ((_F(2) * d) * total[1:]))) + ((n * d) * d)
         variance = (square - ((both * both) / (_F(2) * n))) / (_F(2) * n)
-        return np.asarray((variance < least * least).any(axis=1))
+        return np.asarray(((variance < least * least) & (least > 0)).any(axis=1))

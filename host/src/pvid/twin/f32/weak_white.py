@@ -1,6 +1,7 @@
 """Twin of weak/white_f32.c: noise of a kind's rows at p, and the directions that the test functions leave out.
 
-Rows are made of parts of the sums S_h: real ones of the harmonics 0.., then imaginary ones of the harmonics 1...
+Rows are made of parts of the sums S_h, in two families: real parts of the harmonics 0.., imaginary parts of the
+harmonics 1...; both are arrays over all harmonics, with zeros where there is no part.
 """
 
 from __future__ import annotations
@@ -31,41 +32,38 @@ class Rows:
     Attributes
     ----------
     harmonics : H + 1
-    cosines : real parts
-    parts : with the imaginary parts, K + n
     omega : of h = 1 [rad/s]
     powers : of omega^2 in the noise
-    harmonic : of each part [parts]
     vectors : n/2, reflections of each family
+    families : harmonics of the real parts and of the imaginary parts
     """
 
     def __init__(self, design: WeakDesign32, dt: np.float32) -> None:
         self.design = design
         self.harmonics = design.highest + 1
-        self.cosines = self.harmonics
-        self.parts = design.functions + design.power
         self.vectors = design.power // 2
+        sines = (design.functions - 1) // 2 + self.vectors
+        self.families = slice(0, self.harmonics), slice(1, sines + 1)
         self.omega = _TURN / (_F(2) * (_F(design.hop) * dt))
         orders = [one.power for one in design.noise] + [int(one) for one in design.error_order]
         self.powers = max(orders, default=0) + 1
-        self.harmonic = np.concatenate([np.arange(self.cosines), np.arange(1, 1 + self.parts - self.cosines)])
         rate = np.arange(self.harmonics).astype(np.float32) * self.omega
         self.square = rate * rate
         self.samples = np.full(self.harmonics, design.hop, np.float32)
         self.samples[0] = _F(2) * _F(design.hop)
 
-    @property
-    def families(self) -> tuple[slice, slice]:
-        """Places of the real parts and of the imaginary parts."""
-        return slice(0, self.cosines), slice(self.cosines, self.parts)
-
 
 class White:
-    """Noise of the rows of a kind at its theta [thetas, lanes]."""
+    """Noise of the rows of a kind at its theta [thetas, lanes].
+
+    Attributes
+    ----------
+    full : theta, and -1 of Y [thetas + 1, lanes]
+    """
 
     def __init__(self, rows: Rows, kind: int, theta: Float32) -> None:
-        self.rows, self.kind, self.theta = rows, kind, theta
-        self._full = np.concatenate([theta, np.full((1, theta.shape[1]), _F(-1))])
+        self.rows, self.kind = rows, kind
+        self.full = np.concatenate([theta, np.full((1, theta.shape[1]), _F(-1))])
         with np.errstate(all="ignore"):
             self.weight = self._weighed()
             self.scale = self._scale()
@@ -74,9 +72,9 @@ class White:
 
     def _weighed(self) -> Float32:
         """c_j of the sensors [powers, lanes]."""
-        weight = np.zeros((self.rows.powers, self.theta.shape[1]), np.float32)
+        weight = np.zeros((self.rows.powers, self.full.shape[1]), np.float32)
         for one in self.rows.design.noise_of(self.kind):
-            weight[one.power] = weight[one.power] + one.factor * (self._full[one.a] * self._full[one.b])
+            weight[one.power] = weight[one.power] + one.factor * (self.full[one.a] * self.full[one.b])
         return weight
 
     def _scale(self) -> Float32:
@@ -94,84 +92,82 @@ class White:
         return np.asarray(_F(1) / np.sqrt(np.where(spectrum > least, spectrum, least)), np.float32)
 
     def _leverage(self) -> Float32:
-        """Sum of the squares of the directions [parts, lanes]; finds their reflections."""
+        """Sum of the squares of the directions [2, harmonics, lanes]; finds their reflections."""
         rows = self.rows
-        x = (rows.harmonic.astype(np.float32) * (_F(1) / _F(rows.cosines - 1)))[:, None]
-        scale = self.scale[rows.harmonic]
-        lanes = scale.shape[1]
-        leverage: Float32 = np.zeros(scale.shape, np.float32)
-        u, before = scale, np.zeros_like(scale)
+        x = (np.arange(rows.harmonics).astype(np.float32) * (_F(1) / _F(rows.harmonics - 1)))[:, None]
+        leverage: Float32 = np.zeros((2, *self.scale.shape), np.float32)
+        u, before = np.zeros_like(leverage), np.zeros_like(leverage)
+        for place, family in enumerate(rows.families):
+            u[place, family] = self.scale[family]
+        lanes = self.scale.shape[1]
         norm, slope = np.zeros((2, lanes), np.float32), np.zeros((2, lanes), np.float32)
         for k in range(rows.vectors):
             following = np.zeros_like(u)
             for place, family in enumerate(rows.families):
-                own, square = u[family], x[family] * x[family]
+                own, square = u[place, family], x[family] * x[family]
                 if k:
-                    y = (square - slope[place]) * own - norm[place] * before[family]
+                    y = (square - slope[place]) * own - norm[place] * before[place, family]
                 else:
                     y = own * x[family] if place else own
                 norm[place] = np.sqrt(total(y * y))
-                following[family] = y * (_F(1) / norm[place])
-                part = following[family] * following[family]
-                leverage[family] = leverage[family] + part if k else part
+                following[place, family] = y * (_F(1) / norm[place])
+                part = following[place, family] * following[place, family]
+                leverage[place, family] = leverage[place, family] + part if k else part
                 slope[place] = total(square * part)
             u, before = following, u if k else before
             self.reflections.append(self._reflections_of(u))
-        return np.asarray(leverage, np.float32)
+        return leverage
 
     def _reflections_of(self, u: Float32) -> Float32:
-        """Those of both families that follow from the next direction [parts, lanes]."""
-        v = u
-        for place in range(len(self.reflections)):
-            v = self._reflected(place, v)
+        """Those of both families that follow from the next direction [2, harmonics, lanes]."""
+        v = self._reflected(u)
         out: Float32 = np.zeros(v.shape, np.float32)
-        for family in self.rows.families:
+        for place, family in enumerate(self.rows.families):
             own = slice(family.start + len(self.reflections), family.stop)
-            out[own] = _reflection(v[own])
+            out[place, own] = _reflection(v[place, own])
         return out
 
-    def _reflected(self, place: int, x: Float32) -> Float32:
-        """x [parts, ..., lanes] behind a reflection of both families."""
-        out, v = x.copy(), self.reflections[place]
-        wide = v.reshape(len(v), *(1,) * (x.ndim - 2), v.shape[-1])
-        for family in self.rows.families:
-            own = slice(family.start + place, family.stop)
-            out[own] = x[own] - total(wide[own] * x[own]) * wide[own]
+    def _reflected(self, x: Float32) -> Float32:
+        """x [2, harmonics, ..., lanes] behind all reflections of both families."""
+        out = x.copy()
+        for v in self.reflections:
+            wide = v.reshape(*v.shape[:2], *(1,) * (x.ndim - 3), v.shape[-1])
+            for place in range(2):
+                out[place] = out[place] - total(wide[place] * out[place]) * wide[place]
         return out
 
     def columns(self, parts: Float32) -> Float32:
-        """White columns [columns, rows, lanes] from their parts in standard deviations [columns, parts, lanes]."""
-        x = np.moveaxis(parts, 0, 1)
+        """White columns [columns, rows, lanes] from their parts in standard deviations
+        [columns, 2, harmonics, lanes]."""
         with np.errstate(all="ignore"):
-            for place in range(self.rows.vectors):
-                x = self._reflected(place, x)
-        kept = np.concatenate([x[one.start + self.rows.vectors : one.stop] for one in self.rows.families])
-        return np.moveaxis(kept, 0, 1)
+            x = self._reflected(np.moveaxis(parts, 0, 2))
+        kept = [x[place, one.start + self.rows.vectors : one.stop] for place, one in enumerate(self.rows.families)]
+        return np.moveaxis(np.concatenate(kept), 0, 1)
 
     @cached_property
     def share(self) -> Float32:
         """Q_j = tr(R^-1 dR/dc_j) [powers, lanes]."""
-        rows = self.rows
-        scale = self.scale[rows.harmonic]
+        rows, sines = self.rows, self.rows.families[1]
         with np.errstate(all="ignore"):
-            weight = rows.samples[rows.harmonic][:, None] * ((_F(1) - self.leverage) * (scale * scale))
+            left = _F(1) - self.leverage[0]
+            left[sines] = left[sines] + (_F(1) - self.leverage[1, sines])
+            weight = rows.samples[:, None] * (left * (self.scale * self.scale))
             share = []
             for _ in range(rows.powers):
                 share.append(total(weight))
-                weight = weight * rows.square[rows.harmonic][:, None]
+                weight = weight * rows.square[:, None]
         return np.array(share)
 
-    def pull(self) -> Float32:
-        """g = 1/2 sum_j dc_j/dtheta Q_j [thetas, lanes]."""
-        g = np.zeros_like(self.theta)
+    def pull(self, x: Float32) -> Float32:
+        """V x, V the covariance that the sensors' noise has in the columns of the kind; x: of theta's columns and of Y
+        [thetas + 1, lanes]."""
+        out = np.zeros_like(x)
         with np.errstate(all="ignore"):
             for one in self.rows.design.noise_of(self.kind):
                 half = (_F(0.5) * one.factor) * self.share[one.power]
-                if one.a < len(g):
-                    g[one.a] = g[one.a] + half * self._full[one.b]
-                if one.b < len(g):
-                    g[one.b] = g[one.b] + half * self._full[one.a]
-        return g
+                out[one.a] = out[one.a] + half * x[one.b]
+                out[one.b] = out[one.b] + half * x[one.a]
+        return out[:-1]
 
     def sensors(self) -> Float32:
         """Mean variance of the white rows by the sensors alone [lanes]."""

@@ -159,6 +159,8 @@ def project(p: Float32, sums: Float32) -> tuple[Float32, Float32, Float32]:
 
     q_q = (w * q_a) + (w2 * q_e)
     q_y = (w * ya) + (w2 * ye)
-    rss_minus_yy = (q_q - (_F(2) * q_y)) - ((d1 * (r_1 + f_1)) + (d2 * (r_2 + f_2)))
+    back_1 = f_1 + ((d1 * k22_high) + (d2 * k20_high))
+    back_2 = f_2 + ((d1 * k20_high) + (d2 * k00_high))
+    rss_minus_yy = (q_q - (_F(2) * q_y)) - ((d1 * (back_1 + f_1)) + (d2 * (back_2 + f_2)))
     s = np.stack([s_ww, s_w1, s_w2, k22_high, k20_high, k00_high])
     return s, np.stack([f_w, f_1, f_2]), rss_minus_yy

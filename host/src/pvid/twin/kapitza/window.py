@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.f32 import StrongConfig
-from pvid.twin.f32.differentiator import filtered, segments
+from pvid.twin.f32.differentiator import Ticks, filtered, points, ticks_of
 
 Float32 = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
@@ -26,14 +26,14 @@ def _five_points(x: Float32, stride: int) -> tuple[Float32, Float32]:
     return x2, np.stack([np.zeros_like(x2), second, odd2 - (_F(2) * odd1), even2 - (_F(4) * even1)])
 
 
-def derivatives(config: StrongConfig, phi: Float32, y: Float32, usable: Mask) -> tuple[Float32, Float32, Mask]:
-    """phi, phi', .. phi'''' [ticks, 5] (its order 1 is zero), u, u', u'' [ticks, 3] after every tick, and whether the
-    window was full; samples that are not usable empty it."""
+def derivatives(config: StrongConfig, phi: Float32, y: Float32, usable: Mask) -> tuple[Float32, Float32, Ticks]:
+    """phi, phi', .. phi'''' [ticks, 5] (its order 1 is zero) and u, u', u'' [ticks, 3] after every tick, and the
+    ticks that have them; samples that are not usable empty the window."""
     weights = config.weights.astype(np.float32)
     block = max(config.block, 1)
     five = block == 1 and np.array_equal(weights, _FIVE_POINTS)
-    window = 2 * weights.shape[1] * config.stride + block
-    rate = _F(config.sample_rate) / _F(config.stride)
+    ticks = ticks_of(usable, config.window, block)
+    rate = _F(config.sample_rate) / _F(config.stride * block)
     rate2 = rate * rate
     share = _F(1) / _F(block)
     scale = np.array(
@@ -47,23 +47,18 @@ def derivatives(config: StrongConfig, phi: Float32, y: Float32, usable: Mask) ->
     )
     u_scale = scale[1:] * (_F(1) / _F(config.l1))
     d_phi, u = np.zeros((len(phi), 5), np.float32), np.zeros((len(phi), 3), np.float32)
-    ready = np.zeros(len(phi), np.bool_)
 
     def sums_of(x: Float32) -> tuple[Float32, Float32]:
         if five:
             return _five_points(x, config.stride)
-        middle, sums = filtered(x, weights, config.stride, block)
+        middle, sums = filtered(points(x, block), weights, config.stride)
         return middle, sums[[0, 2, 3, 4]]
 
     with np.errstate(all="ignore"):
-        for first, last in segments(usable):
-            if last - first < window:
-                continue
-            now = slice(first + window - 1, last)
+        for first, last, now in ticks.rows:
             middle, sums = sums_of(phi[first:last])
             d_phi[now, 0] = middle if five else (middle + sums[0]) * scale[0]
             d_phi[now, 2:] = (sums[1:] * scale[1:, None]).T
             _, sums = sums_of(y[first:last])
             u[now] = (sums[1:] * u_scale[:, None]).T
-            ready[now] = True
-    return d_phi, u, ready
+    return d_phi, u, ticks

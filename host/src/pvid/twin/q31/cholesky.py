@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.twin.q31.integer import Int, bit_length, clamp, reciprocal, round_shift, scale, square_root
+from pvid.twin.q31.integer import Int, bit_length, clamp, round_shift, scale
+from pvid.twin.q31.scaled import inverse_root, scaled
 
 Mask = npt.NDArray[np.bool_]
 
@@ -55,7 +56,8 @@ def factor(s: Int) -> Factor:
         pivot = np.where(ok, pivot, np.int64(1) << 60)
         relative = pivot // np.maximum(diagonal, 1)
         least = np.minimum(least, relative)
-        inverse[j], k[j] = reciprocal(square_root(pivot))
+        root = inverse_root(scaled(pivot, 0))
+        inverse[j], k[j] = 2 * root.m, root.e + 60
         for i in range(j):
             total = s[i, j] << 30
             for m in range(j + 1, n):

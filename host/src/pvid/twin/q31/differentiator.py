@@ -8,13 +8,13 @@ import numpy.typing as npt
 from pvid.design.fir import ORDERS
 from pvid.design.fir_q31 import Y_LOWEST
 from pvid.settings.tables import FirBankQ31
-from pvid.twin.f32.differentiator import segments
+from pvid.twin.f32.differentiator import Ticks, ticks_of
 from pvid.twin.q31.integer import Int, round_shift
 
 Mask = npt.NDArray[np.bool_]
 
 
-def derivatives(phi: Int, y: Int, within: Mask, bank: FirBankQ31) -> tuple[Int, Int, Mask]:
+def derivatives(phi: Int, y: Int, within: Mask, bank: FirBankQ31) -> tuple[Int, Int, Ticks]:
     """Derivatives after every tick.
 
     Parameters
@@ -28,43 +28,36 @@ def derivatives(phi: Int, y: Int, within: Mask, bank: FirBankQ31) -> tuple[Int, 
 
     Returns
     -------
-    int64 [ticks, 5] of phi and [ticks, 3] (orders 2, 3, 4) of y, zero until the window is full, and bool [ticks]:
-    whether it was.
+    int64 [ticks, 5] of phi and [ticks, 3] (orders 2, 3, 4) of y, zero where there is no result, and the ticks that have
+    one.
     """
     out_phi = np.zeros((len(phi), ORDERS), np.int64)
     out_y = np.zeros((len(phi), ORDERS - Y_LOWEST), np.int64)
-    ready = np.zeros(len(phi), np.bool_)
-    for first, last in segments(within):
-        count = last - first - bank.window + 1
-        if count <= 0:
-            continue
-        now = slice(first + bank.window - 1, last)
-        ready[now] = True
-        phi_points, y_points = _points(phi[first:last], bank.block), _points(y[first:last], bank.block)
+    at = ticks_of(within, bank.window, bank.every)
+    for first, last, now in at.rows:
+        phi_points, y_points = _points(phi[first:last], bank.every), _points(y[first:last], bank.every)
+        count = len(phi_points) - bank.memory + 1
         for k in range(ORDERS):
             out_phi[now, k] = round_shift(_sum(phi_points, count, bank, k), bank.phi_shift[k])
         for k in range(Y_LOWEST, ORDERS):
             out_y[now, k - Y_LOWEST] = round_shift(_sum(y_points, count, bank, k), bank.y_shift[k - Y_LOWEST])
-    return out_phi, out_y, ready
+    return out_phi, out_y, at
 
 
 def _points(x: Int, block: int) -> Int:
-    """The sums of `block` samples up to each from the first full one on."""
-    if block == 1:
-        return x
-    sums = np.concatenate([np.zeros(1, np.int64), np.cumsum(x)])
-    return np.asarray(sums[block:] - sums[:-block])
+    """The sums of blocks of a stretch [n // block]."""
+    return np.asarray(x[: len(x) // block * block].reshape(-1, block).sum(axis=1))
 
 
 def _sum(x: Int, count: int, bank: FirBankQ31, order: int) -> Int:
     """The exact sum of one order of the points x in each of the `count` full windows."""
-    delay = bank.half * bank.stride
-    middle = x[delay : delay + count]
+    reach = bank.half * bank.stride
+    middle = x[reach : reach + count]
     total = middle * bank.centre if order == 0 else np.zeros(count, np.int64)
     for i in range(bank.half):
         away = (i + 1) * bank.stride
-        after = x[delay + away : delay + away + count]
-        before = x[delay - away : delay - away + count]
+        after = x[reach + away : reach + away + count]
+        before = x[reach - away : reach - away + count]
         pair = (after + before) - 2 * middle if order % 2 == 0 else after - before
         total = total + int(bank.weights[order, i]) * pair
     return total

@@ -22,6 +22,7 @@ from pvid.twin.q31.integer import (
     round_shift,
     scale,
     times_q31,
+    upper_product,
 )
 from pvid.twin.q31.model import ModelQ31
 from pvid.twin.q31.scaled import Scaled, pick, scaled
@@ -432,7 +433,7 @@ class EstimatorQ31:
         s = np.zeros((model.n_p, model.n_p, self.lanes), np.int64)
         rows = self._c_row
         for a, own in enumerate(self._columns):
-            t = round_shift((m[rows[own]] * c[own][:, None]).sum(axis=0), 32)
+            t = upper_product(m[rows[own]], c[own][:, None]).sum(axis=0)
             for b in range(a, model.n_p):
                 there = self._columns[b]
                 s[a, b] = (c[there] * t[rows[there]]).sum(axis=0)

@@ -28,6 +28,17 @@ def round_shift(x: Int, s: npt.ArrayLike | int) -> Int:
     return (twice >> one) + (twice & one)
 
 
+def upper_product(a: Int | int, b: Int | int) -> Int:
+    """a b 2^-32 rounded down, |a|, |b| < 2^31."""
+    return np.asarray((integers(a) * b) >> 32)
+
+
+def shifted_with_rest(x: Int, s: npt.ArrayLike) -> Int:
+    """x 2^-s rounded down along the last axis, where each entry gets what the one before it lost."""
+    whole = np.cumsum(x, axis=-1) >> integers(s)
+    return np.diff(whole, axis=-1, prepend=0)
+
+
 def scale(x: Int, s: npt.ArrayLike) -> Int:
     """x 2^-s, rounded half up where s > 0, saturated at WIDE where s < 0."""
     shift = integers(s)
@@ -64,13 +75,6 @@ def square_root(x: Int) -> Int:
     root = np.sqrt(values.astype(np.float64)).astype(np.int64)  # the nearest float's: one off at most
     root = root - (root * root > values)
     return root + ((root + 1) * (root + 1) <= values)
-
-
-def reciprocal(x: Int) -> tuple[Int, Int]:
-    """(m, k) with 1/x = m 2^(k - 61), 2^30 <= m < 2^31, for 1 <= x < 2^31."""
-    k = 31 - bit_length(x)
-    m = np.int64(2**61) // (x << k)
-    return np.minimum(m, 2**31 - 1), k
 
 
 def times_q31(a: Int, b: Int) -> Int:

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pvid.twin.q31.integer import Int, bit_length, integers, round_shift, scale
+from pvid.twin.q31.integer import Int, bit_length, integers, round_shift, scale, upper_product
 
 _DIGITS = 30
+_NEWTON_STEPS = 4
 
 
 class Scaled(NamedTuple):
@@ -49,6 +50,17 @@ class Scaled(NamedTuple):
     def fixed(self, bits: npt.ArrayLike) -> Int:
         """As integers of `bits` bits after the point, saturated."""
         return scale(self.m, -(self.e + integers(bits)))
+
+
+def inverse_root(x: Scaled) -> Scaled:
+    """1 / sqrt(x), x > 0, by Newton's method."""
+    odd = x.e & 1
+    m, exponent = x.m >> odd, x.e + 30 + odd
+    y: Int = 1181116006 - 5 * (m >> 3)
+    for _ in range(_NEWTON_STEPS):
+        part = 4 * upper_product(m, 4 * upper_product(y, y))
+        y = np.clip(8 * upper_product(y, 3 * 2**28 - part), 1 << 29, (1 << 30) - 1)
+    return Scaled(y, -(exponent // 2) - 29)
 
 
 def scaled(x: npt.ArrayLike, exponent: npt.ArrayLike) -> Scaled:

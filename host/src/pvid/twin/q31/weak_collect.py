@@ -61,6 +61,11 @@ class Schedule:
         """Before the next window is joined, at least."""
         return (self.hop // _BLOCK - 1) * (self._others - -(-self.harmonics // self.items))
 
+    @property
+    def ticks_behind_join(self) -> int:
+        """Of those, before the next half's first block is added."""
+        return max(self._others - -(-2 * self.harmonics // self.items), 0)
+
     def play(self, ticks: int, count: int) -> Int:
         """What each tick of a stretch does that has `count` steps of channels [ticks]."""
         at_once = self.front.decimation == 1

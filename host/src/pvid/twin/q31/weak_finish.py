@@ -17,6 +17,7 @@ from pvid.twin.q31.gate import GateQ31
 from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
 from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.trust import TrustQ31
+from pvid.twin.q31.weak_collect import Schedule
 from pvid.twin.record import Mask, of_all_lanes
 
 _ENTRIES_PER_STAGE = 4
@@ -42,16 +43,23 @@ def _noise_stages(design: WeakDesignQ31) -> int:
     return design.power + _parts(harmonics, _SHARES_PER_STAGE) + 2 + len(design.noise)
 
 
-def _stages_before_gate(design: WeakDesignQ31, kind: WeakKind, live: int = 0) -> int:
-    """Up to the residuals, these included."""
+def _white_stages(design: WeakDesignQ31) -> int:
+    """Of a kind, likewise."""
     harmonics = design.highest + 1
-    project = sum(kind.columns - i for i in range(kind.nuisances)) or 1
     return (
         _parts(len(design.noise), _ENTRIES_PER_STAGE)
         + _parts(harmonics, _HARMONICS_PER_STAGE)
         + _parts(harmonics, _ROOTS_PER_STAGE)
         + design.power
-        + _parts(harmonics, _UNITS_PER_STAGE)
+    )
+
+
+def _stages_before_gate(design: WeakDesignQ31, kind: WeakKind, live: int = 0) -> int:
+    """From the columns' units up to the residuals, these included."""
+    harmonics = design.highest + 1
+    project = sum(kind.columns - i for i in range(kind.nuisances)) or 1
+    return (
+        _parts(harmonics, _UNITS_PER_STAGE)
         + harmonics
         + kind.columns
         + project
@@ -61,10 +69,22 @@ def _stages_before_gate(design: WeakDesignQ31, kind: WeakKind, live: int = 0) ->
     )
 
 
+def _stages_of_kind(design: WeakDesignQ31, kind: WeakKind, uses_noise: bool) -> int:
+    noise = _noise_stages(design) if uses_noise else 0
+    return _white_stages(design) + _stages_before_gate(design, kind) + _END_PARTS + design.functions + noise + 1
+
+
+def shares_place(design: WeakDesignQ31) -> bool:
+    """Whether all columns of a window are formed before the next half's first block, at one stage a tick."""
+    *before, _ = design.model.kind
+    stages = sum(_stages_of_kind(design, kind, True) for kind in before) + _white_stages(design)
+    harmonics = design.highest + 1
+    return stages + _parts(harmonics, _UNITS_PER_STAGE) + harmonics <= Schedule.of(design).ticks_behind_join
+
+
 def number_of_stages(design: WeakDesignQ31, iterations: int, estimator: EstimatorQ31, uses_noise: bool) -> int:
     """Of a window, at most."""
-    rows = len(design.model.kind) * (_noise_stages(design) if uses_noise else 0)
-    rows += sum(_stages_before_gate(design, kind) + _END_PARTS + design.functions + 1 for kind in design.model.kind)
+    rows = sum(_stages_of_kind(design, kind, uses_noise) for kind in design.model.kind)
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
     return rows + solves + estimator.assessment_stages + 1
 
@@ -106,14 +126,33 @@ class NoiseOfWindows:
         self.is_used = weak_noise.is_used(design, estimator.noise_margin, compensation)
         self.compensates = compensation and bool(design.noise)
         self.size = np.zeros(estimator.lanes, np.int64)  # of the last step
+        self.white: dict[int, weak_white.White] = {}  # of each kind
         self._age = _NOISE_WINDOWS
 
     def begin(self) -> bool:
-        """A window; whether it is computed in it."""
+        """A window; whether it and what whitens it are computed in it."""
         large = of_all_lanes(self.size > _SMALL_STEP)
-        renewed = self.is_used and (self._age >= _NOISE_WINDOWS or large)
-        self._age = 1 if renewed else self._age + self.is_used
+        renewed = self._age >= _NOISE_WINDOWS or large
+        self._age = 1 if renewed else self._age + 1
         return renewed
+
+
+def _take_noise(
+    noise: NoiseOfWindows,
+    renewed: bool,
+    white: weak_white.White,
+    place: int,
+    first: int,
+    theta: Scaled,
+    formats: tuple[Sequence[int], int],
+) -> Work:
+    """Of a kind, behind its rows, where it is computed anew."""
+    if renewed and noise.is_used:
+        if not place:
+            noise.known.begin(white.design)
+        noise.known.take(white, white.design, place, first, theta, formats)
+        for _ in range(_noise_stages(white.design)):
+            yield None
 
 
 def stages(
@@ -139,16 +178,13 @@ def stages(
     for place, kind in enumerate(design.model.kind):
         own = slice(first, first + kind.thetas)
         theta = scaled(estimator.theta[own], -integers(estimator.theta_bits[own])[:, np.newaxis])
-        white = weak_white.white(design, place, theta)
         if renewed:
-            if not place:
-                known.begin(design)
-            known.take(white, design, place, first, theta, formats)
-            for _ in range(_noise_stages(design)):
+            noise.white[place] = weak_white.white(design, place, theta)
+            for _ in range(_white_stages(design)):
                 yield None
+        white = noise.white[place]
         made = weak_white.columns(white, place, sums)
         n, y = _rows(made, first, *formats)
-        first += kind.thetas
         live = _of_all_lanes(made.live)
         freedom = np.full(lanes, max(design.functions - live, 1))
         saturated = np.zeros(lanes, np.bool_)
@@ -167,6 +203,8 @@ def stages(
             if not of_all_lanes(passes):
                 estimator.counters["rejected_outlier"] += 1
                 yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
+                yield from _take_noise(noise, renewed, white, place, first, theta, formats)
+                first += kind.thetas
                 continue
             if of_all_lanes(opens):
                 trust.begin_anew()
@@ -178,6 +216,8 @@ def stages(
         for k in range(live, design.functions):
             added = estimator.take_row(n[k], innovations[k], ~saturated, place)
             yield None if (added == Reason.ACCUMULATED).all() else added
+        yield from _take_noise(noise, renewed, white, place, first, theta, formats)
+        first += kind.thetas
         if noise.compensates:
             estimator.add_to_b(_of_kind(known.pull, own, ~saturated))
         yield None

@@ -56,13 +56,14 @@ def block_sums(x: Int, design: WeakDesignQ31) -> Int:
     return np.asarray(out >> np.array(design.down)[:, np.newaxis])
 
 
-def _sum(x: Int, one: WeakFilterQ31, order: int, centres: Int) -> Int:
+def _jet(x: Int, one: WeakFilterQ31, order: int, centres: Int) -> Int:
     middle = x[centres]
-    total = middle << one.bits if order == 0 else np.zeros_like(middle)
-    for i, weight in enumerate(one.weights, start=1):
+    first, *weights = one.weights.tolist()
+    total = middle * first
+    for i, weight in enumerate(weights, start=1):
         after, before = x[centres + i], x[centres - i]
-        total = total + int(weight) * (after - before if order % 2 else (after + before) - 2 * middle)
-    return total
+        total = total + weight * (after - before if order % 2 else (after + before) - 2 * middle)
+    return clamp(round_shift(total, one.down), _MOST)
 
 
 def jets(counts: Int, design: WeakDesignQ31) -> Int:
@@ -74,8 +75,5 @@ def jets(counts: Int, design: WeakDesignQ31) -> Int:
     x = block_sums(signals(counts, design), design)
     centres = ticks.lost + ticks.half + np.arange(steps)
     return np.stack(
-        [
-            rescaled(_sum(x[jet.signal], one, jet.order, centres), one.rescale)
-            for jet, one in zip(design.model.jet, design.filter, strict=True)
-        ]
+        [_jet(x[jet.signal], one, jet.order, centres) for jet, one in zip(design.model.jet, design.filter, strict=True)]
     )

@@ -111,10 +111,10 @@ class Known:
                 bits = n_bits[first + one.a] + n_bits[first + one.b]
                 part = (whole if one.a == one.b else half).shifted(bits)
                 self._add(first + one.a, first + one.b, part, c, f)
-        total = number(0, like)
-        for j in range(design.powers):
-            total = total.plus(white.weight[j].times(share[j]))
-        self.sensors = self.sensors.plus(total.over(number(design.functions, like)))
+        if design.noise:
+            error = Scaled(*(np.full_like(like, x) for x in design.error_variance[kind]))
+            share_of_error = error.times(share[design.error_order[kind]]).over(number(design.functions, like))
+            self.sensors = self.sensors.plus(number(1, like).minus(share_of_error))
 
     def _add(self, a: int, b: int, own: Scaled, c: Int, f: Int) -> None:
         model, table = self.estimator.model, self.estimator.noise_table

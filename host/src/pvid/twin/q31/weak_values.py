@@ -9,7 +9,7 @@ import numpy as np
 from pvid.settings.weak import NONE, WeakChannel
 from pvid.settings.weak_q31 import WeakDesignQ31
 from pvid.twin.q31.elementary import sign, tanh
-from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
+from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift, shifted_with_rest, upper_product
 from pvid.twin.q31.weak_front import rescaled
 
 LATER = 2  # steps from a step's jets to its channels
@@ -95,28 +95,29 @@ def _last(sums: Int, before: Int, n: int) -> Int:
 
 
 def _integrals(f: Int, design: WeakDesignQ31) -> tuple[Int, Int, Int]:
-    """Rounded integrals [integrands, steps - 1] since the start of each half, and those at the ends of halves."""
+    """Integrals [integrands, steps - 1] since the start of each half, and those at the ends of halves."""
     hop, count = design.hop, f.shape[1] - 1
-    last, now, behind = f[:, :-2], f[:, 1:-1], f[:, 2:]
+    down, shift = integers(design.integral).reshape(-1, 2).T
+    given = shifted_with_rest(f, down[:, np.newaxis])
+    last, now, behind = given[:, :-2], given[:, 1:-1], given[:, 2:]
     before = np.concatenate([2 * last[:, :1] - now[:, :1], last[:, :-1]], axis=1)
-    rise = integers(13 * (last + now) - (before + behind))
-    bend = integers(4 * (now - last))
+    rise = integers(5 * (13 * (last + now) - (before + behind)))
+    bend = integers(4 * (behind - before - 8 * (now - last)))
     once: Int = np.zeros((len(f), count), np.int64)
     twice: Int = np.zeros((len(f), count), np.int64)
     edges = np.zeros((2, len(f), max((count - 1) // hop, 0)), np.int64)
-    shifts = np.array(design.integral, np.int64).reshape(-1, 2)
     first: Int = once[:, 0]
     second: Int = twice[:, 0]
     for k in range(1, count):
         next_first = first + rise[:, k - 1]
-        second = integers(second + (first + next_first - bend[:, k - 1]))
+        second = second + round_shift(first + next_first + bend[:, k - 1], shift)
         first = next_first
         if k % hop == 0:
-            edges[0, :, k // hop - 1] = round_shift(first, shifts[:, 0])
-            edges[1, :, k // hop - 1] = round_shift(second, shifts[:, 1])
+            edges[0, :, k // hop - 1] = first
+            edges[1, :, k // hop - 1] = second
             first, second = 0 * first, 0 * second
         once[:, k], twice[:, k] = first, second
-    return round_shift(once, shifts[:, 0:1]), round_shift(twice, shifts[:, 1:2]), edges
+    return once, twice, edges
 
 
 def of_one(fold: int, index: Int) -> Int:
@@ -124,9 +125,9 @@ def of_one(fold: int, index: Int) -> Int:
     return 2 * index if fold == 1 else 24 * index * index
 
 
-def _integral(one: WeakChannel, once: Int, twice: Int, index: Int) -> Int:
+def _integral(one: WeakChannel, lift: int, once: Int, twice: Int, index: Int) -> Int:
     if one.integrand == NONE:
-        return of_one(one.fold, index)
+        return of_one(one.fold, index) << lift
     return np.asarray((once if one.fold == 1 else twice)[one.integrand])
 
 
@@ -136,8 +137,8 @@ def _channels(gains: Int, once: Int, twice: Int, design: WeakDesignQ31) -> Int:
     for k, one in enumerate(design.model.channel):
         if one.gain == NONE:
             continue
-        value = gains[one.gain]
+        value, form = gains[one.gain], design.format[k]
         if one.fold:
-            value = value * _integral(one, once, twice, index)
-        out[k] = round_shift(value, design.format[k].value)
+            value = upper_product(value, _integral(one, form.lift, once, twice, index))
+        out[k] = round_shift(value, form.value)
     return out

@@ -18,8 +18,8 @@ from pvid.twin.q31.scaled import Scaled, pick, scaled
 _COLUMN_BITS = 27
 _SUM_BITS = 30  # of the sums of a channel
 _PRODUCT_DOWN = 33
-_NEWTON_STEPS = 4
 _NONE = -(2**31)  # exponent where there is no term
+_NEWTON_STEPS = 4
 _FLOOR_BITS = 33
 _LEAST_EXPONENT = -200
 _KEPT_BITS = 20
@@ -74,7 +74,6 @@ class White:
     design : of the weak form
     gain : [H + 1, lanes]
     exponent : [H + 1, lanes]
-    weight : c_j [powers][lanes]
     mirrors : of the real parts, of the imaginary parts [n/2][entries, lanes]
     """
 
@@ -82,7 +81,6 @@ class White:
     gain: Int
     exponent: Int
     mirrors: tuple[list[Int], list[Int]]
-    weight: list[Scaled]
 
     @property
     def cosines(self) -> int:
@@ -121,8 +119,8 @@ def _number(x: int, like: Int) -> Scaled:
     return scaled(np.full_like(like, x), 0)
 
 
-def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int, list[Scaled]]:
-    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, and c_j [powers], at theta of the kind [thetas, lanes]."""
+def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]:
+    """1 / sqrt(D_h) [H + 1, lanes] with the exponents, at theta of the kind [thetas, lanes]."""
     like = theta.m[0]
     thetas = design.model.kind[kind].thetas
     powers = design.powers
@@ -154,7 +152,7 @@ def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int,
     out = []
     for one_h in found:
         out.append(inverse_root(pick(least.exceeds(one_h), least, one_h)))
-    return np.stack([one.m for one in out]), np.stack([one.e for one in out]), weight
+    return np.stack([one.m for one in out]), np.stack([one.e for one in out])
 
 
 def _mirrors(design: WeakDesignQ31, gain: Int, exponent: Int, first: int, count: int) -> list[Int]:
@@ -174,13 +172,13 @@ def _mirrors(design: WeakDesignQ31, gain: Int, exponent: Int, first: int, count:
 
 def white(design: WeakDesignQ31, kind: int, theta: Scaled) -> White:
     """At theta of the kind [thetas, lanes]."""
-    gain, exponent, weight = spectrum(design, kind, theta)
+    gain, exponent = spectrum(design, kind, theta)
     cosines = design.highest + 1
     mirrors = (
         _mirrors(design, gain, exponent, 0, cosines),
         _mirrors(design, gain, exponent, 1, design.parts - cosines),
     )
-    return White(design, gain, exponent, mirrors, weight)
+    return White(design, gain, exponent, mirrors)
 
 
 def column(made: White, kind: int, place: int, window: Int) -> tuple[Int, Int]:
@@ -252,9 +250,10 @@ def columns(made: White, kind: int, window: Int) -> Columns:
             rest = x[place][begin:, at]
             left = square(rest)
             kept = (left > 0) & (left > (whole[place][at] >> _KEPT_BITS))
-            mirror = np.where(kept, mirror_of(block(rest)[0]), 0) if len(rest) else rest
+            mirror = mirror_of(block(rest)[0]) if len(rest) else rest
             for other in [*range(own.thetas + 1), *range(place + 1, own.columns)]:
-                x[other][begin:, at] = mirrored(mirror, x[other][begin:, at])
+                before = x[other][begin:, at]
+                x[other][begin:, at] = np.where(kept, mirrored(mirror, before), before)
             live[at] = begin + kept
     used = own.thetas + 1
     return Columns(x[:used], np.stack([e for _, e in plain[:used]]), live)

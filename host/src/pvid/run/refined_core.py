@@ -1,0 +1,237 @@
+"""Both stages in C on a recording of a described mechanism: the refined estimate, and the twin of the second stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.refine_twin import GeneratedRefine
+from pvid.codegen.weak_library import weak_native
+from pvid.core.weak_native import RefinedIdentifier, RefinedRecord
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.choice import Scored
+from pvid.rig.run import Recording
+from pvid.run.compare import Comparison, Difference
+from pvid.run.engine_design import config_to_identify, samples_of
+from pvid.run.mechanism import MechanismAnswer, Value, own_keys, refined_gains_of, values_of
+from pvid.run.mechanism_compare import compare_samples
+from pvid.run.mechanism_core import CoreAnswer, identify_in_c
+from pvid.run.refine_design import refine_design
+from pvid.settings.enums import Reason
+from pvid.settings.refine import RefineConfig
+from pvid.settings.weak import Float32, WeakConfig
+from pvid.twin.refine import RefineTwin
+
+_PIECE = 500  # ticks between two reports of progress
+_ENDS = (
+    Reason.UPDATED,
+    Reason.HELD_SEARCHING,
+    Reason.HELD_BLOCK,
+    Reason.HELD_UNCERTAIN,
+    Reason.HELD_DISAGREES,
+)  # of a block
+
+
+@dataclass(frozen=True, eq=False)
+class BothStages:
+    """Both stages for a recording.
+
+    Attributes
+    ----------
+    made : functions of the refinement
+    config, settings : of the weak form and of the refinement
+    samples : as the core gets them [ticks, samples]
+    """
+
+    model: CompiledModel
+    made: RefineFunctions
+    config: WeakConfig
+    settings: RefineConfig
+    samples: Float32
+
+    @classmethod
+    def of(cls, model: CompiledModel, recording: Recording, config: WeakConfig) -> BothStages:
+        """PvidError where the refinement in C does not have what the model needs."""
+        settings = refine_design(model, config, recording.signals)
+        return cls(model, refine_functions(model), config, settings, samples_of(config, recording.signals))
+
+    def run(self) -> tuple[RefinedIdentifier, RefinedRecord]:
+        """The C core after the recording, and what it did."""
+        native = weak_native(self.model, self.config.design, self.made)
+        identifier = native.refined_of(self.config, self.settings)
+        return identifier, identifier.run_both(self.samples)
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedCoreAnswer:
+    """An identification by both stages in C.
+
+    Attributes
+    ----------
+    weak : of the first stage
+    values : by name: outputs of the model, p, then what the refinement has beside p; of the last refined estimate, or
+        those of the first stage where there is none
+    adopted : whether there is one
+    reason : of the refinement's last block
+    first_s : time of the first refined estimate [s]
+    level, clash : as in pvid/refine.h
+    hash : running hash of both stages after the last tick
+    """
+
+    weak: CoreAnswer
+    values: Mapping[str, Value]
+    adopted: bool
+    reason: Reason
+    first_s: float | None
+    level: float | None
+    clash: float | None
+    hash: int
+
+    @property
+    def identified(self) -> bool:
+        """Whether a stage has published, and the recording shows every parameter."""
+        return (self.adopted and self.weak.oracle.identified) or self.weak.identified
+
+    @property
+    def text(self) -> str:
+        """Which estimate it is, in a clause."""
+        if not self.adopted:
+            return f"not refined: {self.reason.text}; the estimate is that of the weak form"
+        held = "" if self.reason == Reason.UPDATED else f", held since: {self.reason.text}"
+        return (
+            f"refined by the second stage, first after {self.first_s:.3g} s{held}; residual level {self.level:.2g}, "
+            f"clash {self.clash:.2g}"
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        parameters = {
+            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
+            for name, one in self.values.items()
+        }
+        refinement = {
+            "adopted": self.adopted,
+            "text": self.text,
+            "reason": self.reason.text,
+            "first_s": self.first_s,
+            "level": self.level,
+            "clash": self.clash,
+        }
+        return self.weak.as_json() | {
+            "identified": self.identified,
+            "parameters": parameters,
+            **own_keys(self.weak.oracle.model, parameters),
+            "hash": f"{self.hash:08x}",
+            "refinement": refinement,
+        }
+
+
+def refined_in_c(answer: MechanismAnswer) -> RefinedCoreAnswer:
+    """The recording of an analysis by both stages in C.
+
+    Raises
+    ------
+    PvidError
+        When there is no C compiler, or a stage does not have what the model needs.
+    """
+    weak = identify_in_c(answer, "f32")
+    config = config_to_identify(answer.model, answer.recording, answer.ranking)
+    try:
+        stages = BothStages.of(answer.model, answer.recording, config)
+    except PvidError as error:
+        raise PvidError(f"--core f32 --refine: {error}") from error
+    identifier, record = stages.run()
+    last, t = identifier.refined, answer.recording.t
+    published = np.flatnonzero(record.told == Reason.UPDATED)
+    return RefinedCoreAnswer(
+        weak=weak,
+        values=weak.values if last is None else _values(answer, stages.made, last),
+        adopted=last is not None,
+        reason=Reason(int(record.told[-1])),
+        first_s=float(t[published[0]] - t[0]) if len(published) else None,
+        level=None if last is None else float(last["level"]),
+        clash=None if last is None else float(last["clash"]),
+        hash=int(record.hash[-1]),
+    )
+
+
+def _values(answer: MechanismAnswer, made: RefineFunctions, estimate: npt.NDArray[np.void]) -> dict[str, Value]:
+    """Of the model's outputs and of p; then those that the weak form does not have."""
+    parameters = made.parameters
+    r = np.asarray(estimate["r"], np.float64)
+    unit = np.where([one.log for one in parameters], r, 1.0)
+    covariance = np.asarray(estimate["covariance"], np.float64) * np.outer(unit, unit)
+    places = [next(k for k, one in enumerate(parameters) if one.place == n) for n in range(len(answer.found.p))]
+    gains = refined_gains_of(answer.model, answer.found)
+    values = values_of(answer.model, r[places], covariance[np.ix_(places, places)], gains, identified=answer.identified)
+    for k, one in enumerate(parameters):
+        if one.place < 0 and answer.identified:
+            se = float(np.sqrt(covariance[k, k]))
+            values[one.name] = Value(one.unit, float(r[k]), se, se)
+    return values
+
+
+def compare_both(
+    model: CompiledModel,
+    recording: Recording,
+    progress: Callable[[int], None] | None = None,
+    ranking: Sequence[Scored] = (),
+) -> tuple[Comparison, Comparison | str]:
+    """Both stages against their twins, bit for bit, after every tick; in place of the second one why there is none."""
+    config = config_to_identify(model, recording, ranking)
+    first = compare_samples(model, config, samples_of(config, recording.signals), progress)
+    try:
+        stages = BothStages.of(model, recording, config)
+    except PvidError as error:
+        return first, str(error)
+    return first, compare_refined(stages, progress)
+
+
+def compare_refined(stages: BothStages, progress: Callable[[int], None] | None = None) -> Comparison:
+    """The second stage against its twin, which gets the estimates of the first one in C: r, its standard errors and the
+    outcome of the last block after every tick; the state of the last block.
+
+    Cost: 0.1 ms a tick.
+    """
+    identifier, core = stages.run()
+    ticks = len(core.told)
+    twin = RefineTwin(GeneratedRefine(stages.made), stages.settings)
+    pieces = []
+    for first in range(0, ticks, _PIECE):
+        part = slice(first, first + _PIECE)
+        pieces.append(twin.run(stages.samples[part], core.weak_p[part], core.weak_se[part], core.busy[part]))
+        if progress is not None:
+            progress(min(first + _PIECE, ticks))
+    reason = np.concatenate([one.reason for one in pieces])
+    told = _last(reason, np.isin(reason, _ENDS))
+    end = np.zeros((ticks, twin.shape.states), np.float32), np.zeros((ticks, twin.shape.states), np.float32)
+    end[0][-1], end[1][-1] = list(identifier.refinement.work.state), twin.work.state
+    names = [one.name for one in stages.made.parameters]
+    compared = {
+        "refined ": (core.r, np.concatenate([one.r for one in pieces]), names),
+        "standard error of ": (core.se, np.concatenate([one.se for one in pieces]), names),
+        "state of the last block ": (*end, [str(k) for k in range(twin.shape.states)]),
+    }
+    found = [
+        Difference(int(k), "reason", int(core.told[k]), int(told[k])) for k in np.flatnonzero(core.told != told)[:1]
+    ]
+    for what, (own, other, labels) in compared.items():
+        words = own.view(np.uint32), other.view(np.uint32)
+        for tick, place in np.argwhere(words[0] != words[1])[:1]:
+            ours, theirs = (int(one[tick, place]) for one in words)
+            found.append(Difference(int(tick), f"{what}{labels[place]}", ours, theirs))
+    last = int(core.hash[-1])
+    return Comparison(ticks, last, last, min(found, key=lambda one: one.tick) if found else None)
+
+
+def _last(reason: npt.NDArray[np.uint8], ends: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    """The reason of the last block's end up to each tick."""
+    at = np.maximum.accumulate(np.where(ends, np.arange(len(reason)), -1))
+    return np.where(at >= 0, reason[at], np.uint8(Reason.WARMING_UP)).astype(np.uint8)

@@ -1,0 +1,26 @@
+"""The bench of the strong form of described mechanisms: one row, and that a wrong bit shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from bench.strong_mechanisms import HEADER, ON, comparison_of, row_of
+from pvid.board.strong_image import differs_at, play_on_board
+
+
+@pytest.mark.slow
+def test_a_row_has_the_cost_of_each_board_and_equal_bits() -> None:
+    row = row_of("rigid_body")
+    assert len(row) == len(HEADER) and row[0] == "rigid_body" and row[-1] == "equal"
+    means = [int(cell.split(" / ")[0]) for cell in row[3 : 3 + len(ON)]]
+    assert means[0] * 5 < min(means[1:])  # soft float
+
+
+def test_a_wrong_hash_is_found() -> None:
+    run = comparison_of("rigid_body", 600)
+    report = play_on_board("mps2-an386", run)
+    assert differs_at(report, run) is None
+    assert differs_at(replace(report, hash=report.hash ^ 1), run) == report.ticks
+    assert differs_at(replace(report, hashes={500: report.hashes[500] ^ 1}), run) == 500

@@ -1,0 +1,160 @@
+"""Both stages in C on the simulated rigs of the shipped mechanisms: errors beside the Cramer-Rao bound, and why a
+mechanism has no second stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.mechanisms import size_of, start_of
+from pvid.base.errors import PvidError
+from pvid.codegen.build import refine_functions
+from pvid.codegen.weak_library import weak_native
+from pvid.core.weak_native import RefinedIdentifier
+from pvid.models import mechanisms
+from pvid.models.registry import DEFAULT
+from pvid.models.simulated_rig import SimulatedRig, simulated_rig
+from pvid.oracle.weak.design import WeakDesign
+from pvid.run.engine_design import engine_config, samples_of
+from pvid.run.refine_design import refine_design
+from pvid.settings.enums import Reason
+from pvid.settings.refine import RefineConfig
+from pvid.settings.weak import Float32, WeakConfig
+from pvid.sim.bound import bound
+from pvid.sim.simulated_run import RigSimulation
+
+Float = npt.NDArray[np.float64]
+
+SEEDS = 20
+NAMES = tuple(one for one in mechanisms.names() if one != DEFAULT)  # which has its own page
+RATES = {"furuta": (1000.0, 1250.0, 2000.0)}  # beside the rig's own [Hz]
+HEADER = (
+    *("mechanism", "Hz", "parameter", "bound %", "weak: RMS / bound", "refined: RMS / bound", "RMS / s.e."),
+    *("in 2 s.e. %", "refined", "first after s"),
+)
+REFUSED = ("mechanism", "Hz", "why it has no second stage")
+
+
+def at_rate(rig: SimulatedRig, rate: float) -> SimulatedRig:
+    """The rig with faster samples, and filters of the same lengths in seconds."""
+    times = rate / rig.sample_rate
+    design = dict(rig.design)
+    design["decimation"] = round(design.get("decimation", 1) * times)
+    for key in ("taps", "rate_taps"):
+        if key in design:
+            design[key] = round(design[key] * times) | 1
+    return replace(rig, sample_rate=rate, design=design, substeps=max(2, round(rig.substeps / times)))
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A mechanism's rig with both stages; its settings are made from the run of seed 0."""
+
+    simulation: RigSimulation
+    config: WeakConfig
+    settings: RefineConfig
+
+    @classmethod
+    def of(cls, name: str, rate: float) -> Case:
+        """PvidError where the refinement in C does not have what the mechanism needs."""
+        compiled, rig = mechanisms.compiled_of(name), at_rate(simulated_rig(name), rate)
+        simulation = RigSimulation.of(compiled, rig)
+        run, truth = simulation.run(), simulation.truth
+        config = engine_config(compiled, run, WeakDesign(rate, rig.window_s, **rig.design), truth)  # type: ignore[arg-type]
+        return cls(simulation, config, refine_design(compiled, config, run, truth))
+
+    def identifier(self, seed: int) -> RefinedIdentifier:
+        """That starts within 50 % of the truth."""
+        start = start_of(self.simulation, seed).astype(np.float32)
+        config = replace(self.config, estimator=replace(self.config.estimator, start=start))
+        model = self.simulation.model
+        return weak_native(model, config.design, refine_functions(model)).refined_of(config, self.settings)
+
+    def samples(self, seed: int) -> Float32:
+        """Of a run."""
+        return samples_of(self.config, self.simulation.run(seed))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of a run, in the order of p: errors of the weak form; of the refined estimate at the end, its standard errors,
+    NaN where there is none; seconds until the first one."""
+
+    weak: Float
+    error: Float
+    se: Float
+    first: float
+
+
+def run_case(case: Case, seed: int) -> Outcome:
+    """One run through both stages."""
+    model, truth = case.simulation.model, case.simulation.truth
+    identifier = case.identifier(seed)
+    found = identifier.run_both(case.samples(seed))
+    order = [one.place for one in refine_functions(model).parameters if one.place >= 0]
+    places = np.argsort(order)
+    there = np.any(found.r[-1] != 0)
+    r, se = (np.where(there, one[-1].astype(np.float64), np.nan)[places] for one in (found.r, found.se))
+    weak = np.array(list(identifier.estimator.p), np.float64)[: len(truth)]
+    published = np.flatnonzero(found.told == Reason.UPDATED)
+    first = published[0] / case.simulation.rig.sample_rate if len(published) else np.nan
+    return Outcome(weak - truth, r - truth, se, float(first))
+
+
+@cache
+def cases() -> tuple[list[tuple[str, float, Case]], list[tuple[str, ...]]]:
+    """Those that a board can refine, and why it cannot the others."""
+    made: list[tuple[str, float, Case]] = []
+    refused: list[tuple[str, ...]] = []
+    for name in NAMES:
+        for rate in RATES.get(name, (simulated_rig(name).sample_rate,)):
+            try:
+                made.append((name, rate, Case.of(name, rate)))
+            except PvidError as error:
+                refused.append((name, f"{rate:g}", str(error)))
+    return made, refused
+
+
+def rows_of(name: str, rate: float, case: Case, runs: list[Outcome]) -> Iterator[tuple[str, ...]]:
+    """A row for each parameter: cells as in HEADER."""
+    simulation = case.simulation
+    least, size = bound(simulation), size_of(simulation)
+    weak = np.sqrt(np.mean([one.weak**2 for one in runs], axis=0))
+    refined = [one for one in runs if np.isfinite(one.error).all()]
+    first = [one.first for one in runs if np.isfinite(one.first)]
+    for k, parameter in enumerate(simulation.model.p_names):
+        cells = ("-", "-", "-")
+        if refined:
+            error, se = (np.array([getattr(one, key)[k] for one in refined]) for key in ("error", "se"))
+            rms = float(np.sqrt(np.mean(error**2)))
+            share = 100 * np.mean(np.abs(error) < 2 * se)
+            cells = f"{rms / least[k]:.2g}", f"{rms / np.mean(se):.2f}", f"{share:.0f}"
+        yield (
+            name,
+            f"{rate:g}",
+            parameter,
+            f"{100 * least[k] / size[k]:.2g}",
+            f"{weak[k] / least[k]:.2g}",
+            *cells,
+            f"{len(refined)} of {len(runs)}",
+            f"{np.median(first):.1f}" if first else "-",
+        )
+
+
+def refined_tables(
+    seeds: int, progress: Callable[[], None] = lambda: None
+) -> tuple[list[tuple[str, ...]], list[tuple[str, ...]]]:
+    """Rows of HEADER, and of REFUSED."""
+    made, refused = cases()
+    rows = []
+    for name, rate, case in made:
+        runs = []
+        for seed in range(seeds):
+            runs.append(run_case(case, seed))
+            progress()
+        rows += list(rows_of(name, rate, case, runs))
+    return rows, refused
