@@ -22,7 +22,8 @@ def version(*command: str) -> str:
 
 def preprocessed(compiler: Sequence[str], source: Path) -> str | None:
     """A source with its comments and macros by compiler and options; None where it is refused."""
-    done = subprocess.run([*compiler, "-E", "-C", "-dD", str(source)], capture_output=True, text=True, check=False)
+    command = [*compiler, "-E", "-C", "-dD", str(source)]
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     return done.stdout if done.returncode == 0 else None
 
 
