@@ -126,11 +126,11 @@ void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self)
 /* theta of the kind at the present p. */
 static void take_theta(pvid_weak_q31 *self)
 {
-    const pvid_estimator_q31 *estimator = &self->estimator;
-    const size_t first = self->finish.theta;
-    for (size_t j = 0; j < kind_of(self)->thetas; j++) {
-        const int32_t bits = estimator->theta_bits[first + j];
-        self->finish.work.rows.parts.noise.of_theta[j] = pvid_scaled_of_q31(estimator->theta[first + j], -bits);
+    const int16_t *bits = &self->estimator.theta_bits[self->finish.theta];
+    const int64_t *theta = &self->estimator.theta[self->finish.theta];
+    const size_t thetas = kind_of(self)->thetas;
+    for (size_t j = 0; j < thetas; j++) {
+        self->finish.work.rows.parts.noise.of_theta[j] = pvid_scaled_of_q31(theta[j], -bits[j]);
     }
 }
 

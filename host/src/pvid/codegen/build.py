@@ -60,7 +60,7 @@ target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
 target_link_libraries({name} PUBLIC pvid::pvid)
 set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
 if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
-  target_compile_options({name} PRIVATE -ffp-contract=off -fno-fast-math)
+  target_compile_options({name} PRIVATE -ffp-contract=off -fno-fast-math -fno-delete-null-pointer-checks)
 endif()
 
 # {name}_strong.h, an identifier from derivatives of the signals: needs a pvid of larger sizes, which its header names.
