@@ -291,6 +291,11 @@ def differences(shown: str, printed: str) -> Iterator[str]:
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
+def _words(line: str) -> str:
+    """A line without its figures and its hash."""
+    return " ".join(_NUMBER.sub("0", re.sub(r"hash \w+", "hash", line)).split())
+
+
 def alike(a: str, b: str, begins: bool = False) -> bool:
     """Whether two lines have the same words and nearly the same figures.
 
@@ -300,9 +305,9 @@ def alike(a: str, b: str, begins: bool = False) -> bool:
         b = " ".join(b.split()[: len(a.split())])
     if a == b:
         return True
-    a, b = (re.sub(r"hash \w+", "hash", one) for one in (a, b))
-    if " ".join(_NUMBER.sub("0", a).split()) != " ".join(_NUMBER.sub("0", b).split()):
+    if _words(a) != _words(b):
         return False
+    a, b = (re.sub(r"hash \w+", "hash", one) for one in (a, b))
     pairs = zip(map(float, _NUMBER.findall(a)), map(float, _NUMBER.findall(b)), strict=True)
     return all(abs(x - y) <= 0.05 * max(abs(x), abs(y)) or max(abs(x), abs(y)) < 1e-4 for x, y in pairs)
 
@@ -338,8 +343,21 @@ def updated(page: Path, folder: Path) -> str:
                 executed(line, folder, shows).text for line in commands_of(block) if not reason_not_to_execute(line)
             )
         elif block.kind == "output" and "..." not in block.text:
-            text = text.replace(block.text, "\n".join(shown_lines(printed)), 1)
+            text = text.replace(block.text, renewed(block.text, printed), 1)
     return text
+
+
+def renewed(shown: str, printed: str) -> str:
+    """What a page shows with the figures of what is printed; all that is printed if a line has other words."""
+    lines = shown_lines(printed)
+    found = []
+    rest = iter(lines)
+    for line in shown_lines(shown):
+        match = next((one for one in rest if _words(one) == _words(line)), None)
+        if match is None:
+            return "\n".join(lines)
+        found.append(match)
+    return "\n".join(found)
 
 
 def mechanism_page(page: Path) -> bool:

@@ -52,6 +52,7 @@ _SKEW_TOLD = 0.1  # ticks, at least
 _MOST_SAMPLES = 200_000  # of a run, for trials
 _BETTER = 0.5  # largest chi^2 of a trial that counts, relative to that without it
 _MOST_ROUNDS = 4
+_GRAVITY_VARIES = 0.003  # from its mean over the Earth
 _CLOCK_OFF = 0.3  # least relative error of the clock that is sought: smaller errors do not prevent an estimate
 
 
@@ -417,14 +418,20 @@ def _clock(case: Case) -> Cure | None:
     rate = case.run.sample_rate
     return Cure(
         f"t seems {_size(factor)} (gravity is 9.8 m/s^2 with {rate * factor:.3g} samples a second, not {rate:.4g}): "
-        f"if so, use --columns t=t:{1 / factor:.3g}",
+        f"if so, use --columns t=t:{_short(1 / factor)}",
         right,
     )
 
 
 def _size(ratio: float) -> str:
     """Words for a quantity that is `ratio` times its right value."""
-    return f"{ratio:.3g} times too large" if ratio > 1 else f"{1 / ratio:.3g} times too small"
+    return f"{_short(ratio)} times too large" if ratio > 1 else f"{_short(1 / ratio)} times too small"
+
+
+def _short(ratio: float) -> str:
+    """In the fewest of up to three digits that gravity, 0.3 % different from place to place, tells apart."""
+    tried = (float(f"{ratio:.{digits}g}") for digits in (1, 2))
+    return f"{next((short for short in tried if abs(short / ratio - 1) < _GRAVITY_VARIES), ratio):.3g}"
 
 
 def _clock_of(g: float, se: float, rig: RigFile) -> tuple[str, ...]:
@@ -438,8 +445,8 @@ def _clock_of(g: float, se: float, rig: RigFile) -> tuple[str, ...]:
         return ()
     ratio = g / GRAVITY
     return (
-        f"g* = {g:.3g} m/s^2 is {ratio:.3g} times gravity: {unless}t is {_size(1 / math.sqrt(ratio))} (if so, use "
-        f"--columns t=t:{math.sqrt(ratio):.3g}), or y is {_size(ratio)} (--columns y=y:{1 / ratio:.3g})",
+        f"g* = {g:.3g} m/s^2 is {_short(ratio)} times gravity: {unless}t is {_size(1 / math.sqrt(ratio))} (if so, use "
+        f"--columns t=t:{_short(math.sqrt(ratio))}), or y is {_size(ratio)} (--columns y=y:{_short(1 / ratio)})",
     )
 
 
