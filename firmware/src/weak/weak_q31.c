@@ -124,7 +124,7 @@ static void watch_drive(pvid_weak_q31 *self, size_t half, bool begins, const int
         if (self->drive_min[i] > 0) {
             const int32_t x = pvid_weak_count_q31(reading[i], self->collect.front.offset[i]);
             drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
-            drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_square_q31(x);
+            drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_short_square_q31(x);
         }
     }
 }
