@@ -262,7 +262,8 @@ static bool is_exact(const pvid_weak_design_q31 *design)
            (pvid_weak_harmonics_q31(design) == PVID_MAX_HARMONICS) && (model->samples == PVID_MAX_SAMPLES) &&
            (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
            (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
-           (model->integrands == PVID_EXACT_INTEGRANDS) && (pvid_weak_summed_q31(model) == PVID_EXACT_CHANNELS);
+           (model->gains == PVID_EXACT_GAINS) && (model->integrands == PVID_EXACT_INTEGRANDS) &&
+           (pvid_weak_summed_q31(model) == PVID_EXACT_CHANNELS);
 }
 
 /* Every number of the tables. */

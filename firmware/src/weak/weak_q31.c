@@ -37,7 +37,7 @@ static pvid_reason idle_reason(const pvid_weak_q31 *self)
 static void rest(pvid_weak_q31 *self)
 {
     const bool busy = (self->collect.sums.left > 0u) || pvid_weak_finish_is_busy_q31(&self->finish);
-    self->rest = busy ? BUSY : (uint32_t)idle_reason(self);
+    self->rest = (uint8_t)(busy ? BUSY : (uint32_t)idle_reason(self));
 }
 
 static void restart(pvid_weak_q31 *self)
@@ -235,7 +235,7 @@ static inline pvid_reason end_tick(pvid_weak_q31 *self, const int32_t reading[])
     if (self->collect.front.wait == 0u) {
         return after(self, end_step(self, reading));
     }
-    const uint32_t rested = self->rest;
+    const uint8_t rested = self->rest;
     return (rested == BUSY) ? work(self) : (pvid_reason)rested;
 }
 
