@@ -172,8 +172,8 @@ uint32_t pvid_bit_length_q31(uint64_t x);
 /* Number of bits of x < 256, as of a harmonic: without a call. */
 static inline uint32_t pvid_byte_length_q31(size_t x)
 {
-    static const uint8_t length_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
-    return (x > 15u) ? (4u + length_of[x >> 4]) : length_of[x];
+    static const uint8_t bits_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
+    return (x > 15u) ? (4u + bits_of[x >> 4]) : bits_of[x];
 }
 
 /* x / y rounded down, x < y 2^32: by two divisions of 32 by 16 bits, where there is none of 64 bits. */

@@ -156,11 +156,12 @@ static bool filters_are_valid(const pvid_weak_design_q31 *design)
     for (size_t i = 0; i < design->model->jets; i++) {
         const pvid_weak_filter_q31 *filter = &design->filter[i];
         const pvid_weak_jet jet = design->model->jet[i];
+        const size_t weights = (size_t)filter->half + 1u;
         uint64_t whole = 0;
         if ((filter->half > PVID_MAX_RING) || (filter->down > WORD) || (filter->weights == NULL)) {
             return false;
         }
-        for (size_t k = 0; k <= filter->half; k++) {
+        for (size_t k = 0; k < weights; k++) {
             const uint64_t one = pvid_magnitude_q31(filter->weights[k]);
             if (one > (uint64_t)PVID_ONE_Q30) {
                 return false;

@@ -50,8 +50,8 @@ static void restart(pvid_weak_q31 *self)
 /* Whether the sums of a window are read before others take their place. */
 static bool window_fits(const pvid_weak_q31 *self)
 {
-    const uint32_t ticks = pvid_weak_ticks_behind_join_q31(self->design);
-    return (PVID_MAX_WINDOWS > 0) || (pvid_weak_finish_columns_q31(self) <= (self->stages_per_tick * ticks));
+    return (PVID_MAX_WINDOWS > 0) || (pvid_weak_finish_columns_q31(self) <=
+                                      (self->stages_per_tick * pvid_weak_ticks_behind_join_q31(self->design)));
 }
 
 static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
