@@ -21,7 +21,7 @@ from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.forms import FORMS
 
 TICKS = 5000
-REFINED_TICKS = 16_000  # the refinement finds its track in the first 6 600
+REFINED_TICKS = 21_000  # the refinement finds its track in the first 6 600; the last 16 half windows count
 TIMEOUT_S = 300.0
 ALLOWANCE = 1.02
 
