@@ -285,6 +285,18 @@ def bench_strong_mechanisms(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="build-choices")
+@UPDATE
+def bench_build_choices(update: Path | None) -> int:
+    """What each choice of a build of the weak form takes and gives, on the pendulum's shipped rig."""
+    from bench import build_choices
+
+    with progress_bar("builds", len(build_choices.CHOICES)) as advance:
+        rows = list(build_choices.rows_of(progress=advance))
+    put_table(update, "build-choices", markdown(build_choices.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="model-boards")
 @UPDATE
 def bench_model_boards(update: Path | None) -> int:

@@ -207,6 +207,7 @@ def build_with(
     room: str = "weak",
     *,
     refined: bool = False,
+    choices: Mapping[str, str] | None = None,
 ) -> tuple[Path, Path]:
     """The same from generated files: name -> text.
 
@@ -214,6 +215,7 @@ def build_with(
     ----------
     room : of the core, of the form
     refined : the files of the second stage are among them
+    choices : further variables of CMake
     """
     stamp = zlib.crc32("".join(files.values()).encode())
     whole = f"{name}-{stamp:08x}"
@@ -226,6 +228,6 @@ def build_with(
     }
     if refined:
         options["PVID_REFINE_MODEL"] = str(folder)
-    options |= {macro: str(size) for macro, size in smallest(sizes).items()}
+    options |= {macro: str(size) for macro, size in smallest(sizes).items()} | dict(choices or {})
     tree = build(target, BUILD / f"{target.name}-{whole}", options)
     return tree / "apps" / "replay" / "replay.elf", tree

@@ -124,7 +124,7 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     PvidError
         When a compiler or emulator is missing, or the image fails.
     """
-    return _measured(configuration, _BUILT[configuration.form](configuration))
+    return _measured(configuration.board, _BUILT[configuration.form](configuration))
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,12 @@ _BUILT: dict[str, Callable[[Configuration], _Built]] = {
 }
 
 
-def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, ReplayReport]:
-    board = configuration.board
+def measure_engine(board: Board, image: Path, tree: Path, name: str) -> Footprint:
+    """Plays an image of the weak form of the mechanism called `name` in C."""
+    return _measured(board, _engine(image, tree, name))[0]
+
+
+def _measured(board: Board, built: _Built) -> tuple[Footprint, ReplayReport]:
     map_text = built.image.with_suffix(".map").read_text(encoding="utf-8")
     report = play(board, built.image, TIMEOUT_S)
     footprint = Footprint(
