@@ -15,7 +15,9 @@
 
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
-#define COUNT(tick, channel) ((int16_t)pgm_read_word(&replay_samples[tick][channel]))
+#define COUNT(tick, channel)                                                                                           \
+    ((REPLAY_COUNT)((sizeof(REPLAY_COUNT) == 2u) ? pgm_read_word(&replay_samples[tick][channel])                       \
+                                                 : pgm_read_dword(&replay_samples[tick][channel])))
 #else
 #define COUNT(tick, channel) (replay_samples[tick][channel])
 #endif
@@ -79,6 +81,9 @@ static uint32_t play(cost *whole)
         if (tick >= REPLAY_MEASURE_FROM) {
             add(whole, counts);
         }
+#if defined(REPLAY_LONGEST_OF_ALL)
+        whole->longest = (counts > whole->longest) ? counts : whole->longest;
+#endif
         hash = REPLAY_HASH(hash, &identifier.estimator, reason);
         if (((tick + 1u) % REPLAY_REPORT_EVERY) == 0u) {
             report_hash_at(tick + 1u, hash);

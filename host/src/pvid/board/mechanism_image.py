@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -50,7 +50,8 @@ class MechanismRun:
     config : of the float engine
     counts : int32 [ticks, samples]; a sample is float32(count) * lsb, rounded once, on the board and here
     lsb : float32 [samples]
-    measure_from : first tick that counts in the mean cost of a tick; whole half windows follow
+    measure_from : first tick that counts in the cost of a tick; whole half windows follow
+    longest_of_all : whether the ticks before count in the longest one
     """
 
     compiled: CompiledModel
@@ -58,6 +59,7 @@ class MechanismRun:
     counts: npt.NDArray[np.int32]
     lsb: Float32
     measure_from: int
+    longest_of_all: bool = False
 
     @property
     def name(self) -> str:
@@ -69,6 +71,31 @@ class MechanismRun:
         """As the core gets them [ticks, samples]."""
         values = self.counts.astype(np.float32) * self.lsb
         return np.where(self.counts == MISSING, np.float32(np.nan), values).astype(np.float32, copy=False)
+
+    def shortened(self, ticks: int) -> MechanismRun:
+        """Its first ticks; the whole half windows behind the first window count in the mean."""
+        design = self.config.design
+        start = alike_from(ticks, self.config.ticks_needed, design.hop * design.decimation)
+        return replace(self, counts=self.counts[:ticks], measure_from=start)
+
+
+def alike_from(ticks: int, ticks_needed: int, period: int) -> int:
+    """First tick that counts in the mean of so many: whole half windows of `period` follow, or half of a short run."""
+    whole = max((ticks - ticks_needed) // period, 0)
+    return ticks - whole * period if whole else ticks // 2
+
+
+def run_of_samples(compiled: CompiledModel, config: WeakConfig, samples: Float32) -> MechanismRun:
+    """Samples [ticks, samples] in counts: of the sensor, or where it has no resolution, of its largest value."""
+    resolution = {one.name: one.resolution for one in compiled.signals}
+    largest = np.abs(samples).max(axis=0)
+    steps = [
+        resolution[one] or top / _COUNTS or 1.0
+        for one, top in zip(config.design.model.sample_names, largest, strict=True)
+    ]
+    lsb = np.asarray(steps, np.float32)
+    counts = np.rint(samples.astype(np.float64) / lsb).astype(np.int32)
+    return MechanismRun(compiled, config, counts, lsb, 0).shortened(len(counts))
 
 
 @cache
@@ -87,15 +114,7 @@ def mechanism_run(name: str, ticks: int | None = None) -> MechanismRun:
     samples = samples_of(config, RigSimulation.of(compiled, simulated_rig(compiled.name)).run())
     if len(samples) < wanted:
         raise PvidError(f"the run of {name} has {len(samples)} samples, too few for {wanted}")
-    resolution = {one.name: one.resolution for one in compiled.signals}
-    largest = np.abs(samples).max(axis=0)
-    steps = [
-        resolution[one] or top / _COUNTS for one, top in zip(config.design.model.sample_names, largest, strict=True)
-    ]
-    lsb = np.asarray(steps, np.float32)
-    counts = np.rint(samples[:wanted].astype(np.float64) / lsb).astype(np.int32)
-    whole = max((wanted - config.ticks_needed) // period, 0)
-    return MechanismRun(compiled, config, counts, lsb, wanted - whole * period if whole else wanted // 2)
+    return run_of_samples(compiled, config, samples).shortened(wanted)
 
 
 def native_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
@@ -136,6 +155,7 @@ def header(run: MechanismRun) -> str:
             f'#define REPLAY_FORM "{run.name}, weak"',
             f"#define REPLAY_TICKS {len(run.counts)}u",
             f"#define REPLAY_MEASURE_FROM {run.measure_from}u",
+            *(["#define REPLAY_LONGEST_OF_ALL"] if run.longest_of_all else []),
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
             f"#define REPLAY_MISSING ({MISSING + 1} - 1)",
             f"#define replay_config {run.name}_config_f32",
@@ -172,11 +192,16 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
     -------
     The image, and the tree it was built in.
     """
+    refuse_float_on_avr(target)
+    return build_with(target, f"{run.name}-weak-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32")
+
+
+def refuse_float_on_avr(target: Board) -> None:
+    """PvidError for a board on which float32 is another one."""
     if target.toolchain == "avr":
         raise PvidError(
             f"{target.name}: float32 has no bits of the twin on an AVR: its division differs at the extremes"
         )
-    return build_with(target, f"{run.name}-weak-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32")
 
 
 def build_with(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
-from pvid.board.mechanism_image import PERIODS, build_with
+from pvid.board.mechanism_image import PERIODS, alike_from, build_with
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
 from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.models import mechanisms
@@ -32,17 +32,30 @@ class FixedRun:
     ----------
     engine : settings and tables
     counts : int32 [ticks, samples]
-    measure_from : first tick that counts in the mean cost of a tick; whole half windows follow
+    measure_from : first tick that counts in the cost of a tick; whole half windows follow
+    longest_of_all : whether the ticks before count in the longest one
     """
 
     engine: FixedEngine
     counts: npt.NDArray[np.int32]
     measure_from: int
+    longest_of_all: bool = False
 
     @property
     def name(self) -> str:
         """Of the mechanism, in C."""
         return self.engine.name
+
+    def shortened(self, ticks: int) -> FixedRun:
+        """Its first ticks; the whole half windows behind the first window count in the mean."""
+        design = self.engine.config.design
+        start = alike_from(ticks, self.engine.ticks_needed, design.hop * design.decimation)
+        return replace(self, counts=self.counts[:ticks], measure_from=start)
+
+    @property
+    def count_bytes(self) -> int:
+        """Of a count in the image."""
+        return 2 if np.abs(self.counts).max() <= np.iinfo(np.int16).max else 4
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -66,8 +79,7 @@ def fixed_run(name: str, ticks: int | None = None) -> FixedRun:
     counts = engine.counts_of(simulated_run_of(compiled)[0])
     if len(counts) < wanted:
         raise PvidError(f"the run of {name} has {len(counts)} samples, too few for {wanted}")
-    whole = max((wanted - engine.ticks_needed) // period, 0)
-    return FixedRun(engine, counts[:wanted], wanted - whole * period if whole else wanted // 2)
+    return FixedRun(engine, counts, 0).shortened(wanted)
 
 
 def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
@@ -85,7 +97,7 @@ def twin_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
 def header(run: FixedRun) -> str:
     """replay_run.h."""
     samples = run.counts.shape[1]
-    count = "int16_t" if np.abs(run.counts).max() <= np.iinfo(np.int16).max else "int32_t"
+    count = f"int{8 * run.count_bytes}_t"
     rows = ["    {" + ", ".join(map(str, row)) + "}," for row in run.counts.tolist()]
     return "\n".join(
         [
@@ -110,6 +122,7 @@ def header(run: FixedRun) -> str:
             f'#define REPLAY_FORM "{run.name}, weak"',
             f"#define REPLAY_TICKS {len(run.counts)}u",
             f"#define REPLAY_MEASURE_FROM {run.measure_from}u",
+            *(["#define REPLAY_LONGEST_OF_ALL"] if run.longest_of_all else []),
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
             f"#define replay_config {run.name}_config_q31",
             "",
