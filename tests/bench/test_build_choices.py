@@ -1,4 +1,4 @@
-"""The bench of the choices of a build: that each is there, and that a smaller build is smaller and has the same bits."""
+"""The bench of the choices of a build: each is there, and a smaller build is smaller."""
 
 from __future__ import annotations
 

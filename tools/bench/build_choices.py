@@ -9,7 +9,7 @@ from pvid.board import mechanism_image, mechanism_image_q31
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image import build_with, mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
-from pvid.board.sizes import Footprint, measure_engine
+from pvid.board.sizes import Footprint, built_engine, measured
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core
@@ -65,7 +65,7 @@ def footprint_of(choice: Choice, place: int) -> Footprint:
         name, files, fitted = fixed.name, mechanism_image_q31.files_of(fixed), fixed.sizes
     sizes = fitted | dict(choice.sizes)
     image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=choice.options)
-    return measure_engine(board, image, tree, name)
+    return measured(board, built_engine(image, tree, name))[0]
 
 
 def rows_of(progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:

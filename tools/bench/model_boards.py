@@ -15,11 +15,11 @@ from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
 from pvid.board.mechanism_image_q31 import twin_hashes as fixed_hashes
 from pvid.board.replay_image import ReplayReport, play
 from pvid.models import mechanisms
-from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 
 HEADER = ("board", "core", *mechanisms.names(), "bits")
-ROWS = tuple((board, core) for board in BOARDS.values() for core in ENGINE_CORES)
+CORES: tuple[Core, ...] = ("f32", "q31")
+ROWS = tuple((board, core) for board in BOARDS.values() for core in CORES)
 TIMEOUT_S = 600.0
 
 

@@ -59,17 +59,22 @@ def refined_run(name: str, ticks: int, **changes: object) -> RefinedRun:
     return RefinedRun(run, made, replace(settings, **changes))  # type: ignore[arg-type]
 
 
+def light_work(board: Board) -> dict[str, int]:
+    """Settings of the refinement with which the longest tick is short: without a floating point unit a tick has one
+    job, and ticks in which the weak form is busy have none."""
+    return {"jobs": 3 if board.has_fpu else 1, "rests": 255}
+
+
 def refined_pendulum(ticks: int, board: Board) -> RefinedRun:
     """The pendulum's standard rig with its full equations and 14 bits, on which the refinement finds its track; the
-    ticks of the steady state count in the mean, as in mechanism_run, behind the first window in which it is published. Without a floating point unit a tick has
-    one job of the refinement.
+    ticks of the steady state count in the mean, as in mechanism_run, behind the first window in which it is published.
 
     Raises
     ------
     PvidError
         Where it is not published within `ticks`.
     """
-    run = refined_run(DEFAULT, ticks, jobs=3 if board.core.endswith("F") else 1, rests=255)
+    run = refined_run(DEFAULT, ticks, **light_work(board))
     measured = full_pendulum((ticks + 1) / 1000.0)
     samples = np.stack([measured[one] for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
     run = replace(run, weak=replace(run.weak, counts=np.rint(samples / run.weak.lsb).astype(np.int32)))
