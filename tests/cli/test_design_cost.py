@@ -64,7 +64,7 @@ def test_the_cost_of_a_shipped_rig_is_that_of_sizes() -> None:
     expected = sizes.figures_of(footprint)
     assert found["state"] == expected["state"] and found["tables"] == expected["tables"]
     assert found["mean"] == pytest.approx(expected["mean"], rel=0.02)  # of other windows
-    assert found["longest"] >= 0.98 * expected["longest"]
+    assert found["longest"] == pytest.approx(expected["longest"], rel=0.02)
 
 
 def test_the_table_shows_fixed_point_and_warns_of_a_tick_that_is_too_long(pendulum: Path) -> None:

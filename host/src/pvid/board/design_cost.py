@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.mechanism_board import refuse_unrefined
-from pvid.board.mechanism_image import PERIODS, build_mechanism_image, refuse_float_on_avr, run_of_samples
+from pvid.board.mechanism_image import build_mechanism_image, long_run, refuse_float_on_avr, run_of_samples
 from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image
 from pvid.board.refined_image import RefinedRun, build_refined_image, light_work
 from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_engine, figures_of, measured
@@ -248,8 +248,9 @@ def _first(reason: npt.NDArray[np.uint8]) -> int | None:
 
 
 def _enough(first: int | None, ticks_needed: int, period: int, ticks: int) -> int:
-    """Ticks to replay: periods behind the first estimate; without one the whole run."""
-    return ticks if first is None else min(ticks, max(first + 1, ticks_needed) + PERIODS * period)
+    """Ticks to replay: up to the steady state behind the first estimate, as far as the run goes; without an estimate
+    the whole run."""
+    return ticks if first is None else long_run(max(first + 1, ticks_needed), period, ticks)
 
 
 def _measured(
