@@ -63,7 +63,7 @@ PVID_COLD void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pv
 
 uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self)
 {
-    return self->behind;
+    return (uint32_t)self->behind - PVID_REFINE_LATE;
 }
 
 uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)

@@ -73,7 +73,7 @@ class Front:
     @property
     def first(self) -> int:
         """First entry that a block may begin at."""
-        return self.behind
+        return self.behind - _LATE
 
     @property
     def room(self) -> int:
