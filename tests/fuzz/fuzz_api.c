@@ -98,6 +98,12 @@ static void spoil(float *const fields[], size_t n)
     }
 }
 
+/* A size for which there are tables, or one that init refuses. */
+static uint8_t any_size(uint8_t own, uint32_t most)
+{
+    return (uint8_t)(one_in(4) ? (most + 1u + below(100)) : below((uint32_t)own + 1u));
+}
+
 static void spoil_estimator_f32(pvid_estimator_config_f32 *config)
 {
     float *const fields[] = {
@@ -209,8 +215,8 @@ static void configure_weak(bool sound)
         spoil_estimator_f32(&config->estimator);
     }
     spoil_tables();
-    weak.design.functions = one_in(8) ? (uint8_t)below(13) : weak.design.functions;
-    weak.design.power = one_in(8) ? (uint8_t)below(9) : weak.design.power;
+    weak.design.functions = one_in(8) ? any_size(weak.design.functions, PVID_MAX_FUNCTIONS) : weak.design.functions;
+    weak.design.power = one_in(8) ? any_size(weak.design.power, PVID_MAX_POWER) : weak.design.power;
     weak.design.decimation = one_in(8) ? (uint8_t)below(40) : weak.design.decimation;
     weak.design.hop = one_in(8) ? (uint16_t)below((uint32_t)weak.design.hop + 1u) : weak.design.hop;
     weak.design.n_noise = one_in(8) ? (uint16_t)below((uint32_t)weak.design.n_noise + 1u) : weak.design.n_noise;
@@ -598,8 +604,8 @@ static void configure_weak_q31(bool sound)
     config->trust.neglected = one_in(4) ? any_size_i32() : config->trust.neglected;
     spoil_tables_q31();
     pvid_weak_design_q31 *design = &weak_q31.design;
-    design->functions = one_in(8) ? (uint8_t)below(13) : design->functions;
-    design->power = one_in(8) ? (uint8_t)below(9) : design->power;
+    design->functions = one_in(8) ? any_size(design->functions, PVID_MAX_FUNCTIONS) : design->functions;
+    design->power = one_in(8) ? any_size(design->power, PVID_MAX_POWER) : design->power;
     design->decimation = one_in(8) ? (uint8_t)below((uint32_t)design->decimation + 1u) : design->decimation;
     design->hop = one_in(8) ? (uint16_t)below((uint32_t)design->hop + 1u) : design->hop;
     design->n_noise = one_in(8) ? (uint16_t)below((uint32_t)design->n_noise + 1u) : design->n_noise;

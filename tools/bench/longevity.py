@@ -75,9 +75,11 @@ FAR = 6.0  # standard errors
 
 @dataclass(frozen=True)
 class Lane:
-    """One estimator: `kind` weak, refined (both stages), strong, RLS or UD RLS; forgetting_s 0: none; of ours in float32 or fixed
-    point, with the outlier gate as a rig file has it that does not say, or without; the strong form with exact sensors
-    or with FINE ones, as in fixed point always."""
+    """One estimator: `kind` weak, refined (both stages), strong, RLS or UD RLS; forgetting_s 0: none.
+
+    Of ours in float32 or fixed point, with the outlier gate as a rig file has it that does not say, or without; the
+    strong form with exact sensors or with FINE ones, as in fixed point always.
+    """
 
     kind: str
     forgetting_s: float
