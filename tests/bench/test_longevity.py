@@ -21,6 +21,7 @@ from bench.longevity import (
     ENCODER,
     FILTER_BIAS,
     FINE,
+    REFINED_LANES,
     STRONG_FORGETTING_S,
     STRONG_LANES,
     STRONG_Q31_LANES,
@@ -144,6 +145,21 @@ def test_the_weak_form_follows_a_step_without_forgetting_too(outcomes: Outcomes)
         assert abs(outcome.error_after) < 0.2
 
 
+# A block that contains the change may be taken once, before the next one refutes it.
+CHANGES = ("step", "drift")
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_no_refined_estimate_is_not_finite_or_silently_wrong(
+    scenario: str, native: Native, library: ctypes.CDLL
+) -> None:
+    for label, one in longevity.measure(native, library, SCENARIOS[scenario], REFINED_LANES, TICKS).items():
+        assert (one.ticks, one.not_finite) == (TICKS, 0), label
+        assert one.far <= (1 if scenario in CHANGES else 0), label
+        assert one.published > 5, label
+        assert not one.silent, label
+
+
 @pytest.mark.parametrize(("kind", "scenario"), [("weak", "drift"), ("strong", "step"), ("strong", "drift")])
 def test_sums_without_forgetting_report_a_change(kind: str, scenario: str, outcomes: Outcomes) -> None:
     outcome = outcomes[scenario][Lane(kind, 0.0).label]
@@ -241,7 +257,9 @@ def growth(library: ctypes.CDLL, change: float) -> float:
     after = np.eye(4)
     for state in after:
         arrays = [ctypes.c_void_p(a.ctypes.data) for a in (state, p, w, u, phi)]
-        library.longevity_motion(arrays[0], ctypes.c_uint32(ticks), ctypes.c_double(1 / RATE_HZ), *arrays[1:])
+        library.longevity_motion(
+            ctypes.c_bool(False), arrays[0], ctypes.c_uint32(ticks), ctypes.c_double(1 / RATE_HZ), *arrays[1:]
+        )
     return float(np.abs(np.linalg.eigvals(after)).max())
 
 
@@ -388,8 +406,9 @@ def test_the_table_of_held_out_signals_counts_what_is_silent(results: Path) -> N
     assert marker == "longevity-held-out"
     assert header == ("form", "cells", "right", "alarm", "silently wrong", "not finite", "wrong after")
     assert rows[0] == ("weak", "10", "10", "0", "0", "0", "")
-    assert rows[1] == ("strong", "14", "10", "2", "2", "0", f"{HELD_OUT[0].title}; {HELD_OUT[1].title}")
-    assert [row[:2] for row in rows[2:]] == [
+    assert rows[1][:2] == ("refined", "0")
+    assert rows[2] == ("strong", "14", "10", "2", "2", "0", f"{HELD_OUT[0].title}; {HELD_OUT[1].title}")
+    assert [row[:2] for row in rows[3:]] == [
         ("weak q31", "0"),
         ("strong q31", "0"),
         ("strong fine", "0"),
