@@ -331,7 +331,7 @@ static void spoil_refinement(pvid_refine_config_f32 *config)
     config->rests = one_in(4) ? (uint8_t)any_word() : config->rests;
     config->second = one_in(16) ? NULL : config->second;
     refined.signal[0].order = one_in(16) ? (uint8_t)below(4) : refined.signal[0].order;
-    refined.signal[1].sample = one_in(16) ? (uint8_t)below(KAPITZA_WEAK_SAMPLES) : refined.signal[1].sample;
+    refined.signal[1].sample = one_in(16) ? (uint8_t)below(KAPITZA_WEAK_SAMPLES + 1u) : refined.signal[1].sample;
     refined.signal[0].source = one_in(8) ? (uint8_t)below(3) : refined.signal[0].source;
 }
 

@@ -283,7 +283,7 @@ static pvid_refine_f32 refinement;
 static void refuses(const pvid_refine_config_f32 *config, pvid_status status)
 {
     const float sample[2] = {0.0f, 0.0f};
-    assert_int_equal(pvid_refine_init_f32(&refinement, config), status);
+    assert_int_equal(pvid_refine_init_f32(&refinement, config, 2), status);
     assert_int_equal(pvid_refine_step_f32(&refinement, sample, NULL, false), PVID_NOT_READY);
     assert_null(pvid_refine_latest_f32(&refinement));
 }
@@ -332,8 +332,9 @@ static void test_init_refuses(void **state)
     REFUSES(distance, -1.0f, PVID_BAD_START_SD);
     refuses(NULL, PVID_BAD_POINTER);
     const pvid_refine_config_f32 config = good();
-    assert_int_equal(pvid_refine_init_f32(NULL, &config), PVID_BAD_POINTER);
-    assert_int_equal(pvid_refine_init_f32(&refinement, &config), PVID_OK);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 1), PVID_BAD_DESIGN); /* it needs two */
+    assert_int_equal(pvid_refine_init_f32(NULL, &config, 2), PVID_BAD_POINTER);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2), PVID_OK);
 }
 
 static void test_it_waits_for_the_weak_form(void **state)
@@ -343,7 +344,7 @@ static void test_it_waits_for_the_weak_form(void **state)
     const float sample[2] = {0.1f, 0.0f};
     pvid_refine_estimate_f32 estimate;
     uint32_t number = 7;
-    assert_int_equal(pvid_refine_init_f32(&refinement, &config), PVID_OK);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2), PVID_OK);
     for (int i = 0; i < 3000; i++) {
         assert_int_equal(pvid_refine_step_f32(&refinement, sample, NULL, false), PVID_WARMING_UP);
     }
@@ -444,7 +445,7 @@ static bool is_at_its_end(void)
 static void begin_run(void)
 {
     const pvid_refine_config_f32 config = sampled();
-    assert_int_equal(pvid_refine_init_f32(&refinement, &config), PVID_OK);
+    assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2), PVID_OK);
 }
 
 static void is_near_the_truth(void)

@@ -117,10 +117,10 @@ typedef struct pvid_refine_f32 pvid_refine_f32;
  * calls only best, latest, read and reason. */
 extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
 
-/* Initialises `self`. Fails iff
+/* Initialises `self`; `samples`: in the argument of step. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or
  *   - a field of config is out of its range (the status names it). */
-pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config);
+pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config, size_t samples);
 
 /* One tick.
  *   sample:  the samples of signal[].sample, taken at the same time

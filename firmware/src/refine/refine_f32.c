@@ -565,9 +565,9 @@ PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
 
 /* ---- API ---- */
 
-PVID_COLD pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config)
+PVID_COLD pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config_f32 *config, size_t samples)
 {
-    pvid_status status = pvid_init_is_given(self, config) ? pvid_refine_valid_f32(config) : PVID_BAD_POINTER;
+    pvid_status status = pvid_init_is_given(self, config) ? pvid_refine_valid_f32(config, samples) : PVID_BAD_POINTER;
     if (status == PVID_OK) {
         memset(self, 0, sizeof *self);
         self->config = *config;

@@ -16,7 +16,7 @@ PVID_COLD static bool all_within(const float values[], size_t n, float low, floa
     return within;
 }
 
-static pvid_status signals_are_valid(const pvid_refine_config_f32 *config)
+static pvid_status signals_are_valid(const pvid_refine_config_f32 *config, size_t samples)
 {
     if (config->signal == NULL) {
         return PVID_BAD_DESIGN;
@@ -24,7 +24,7 @@ static pvid_status signals_are_valid(const pvid_refine_config_f32 *config)
     for (size_t i = 0; i < PVID_REFINE_SIGNALS; i++) {
         const pvid_refine_signal_f32 *signal = &config->signal[i];
         const bool derived = (signal->order == 2u) && (i < (size_t)PVID_REFINE_INPUTS) && (config->second != NULL);
-        if (((signal->order != 0u) && !derived) || (signal->sample >= PVID_MAX_SAMPLES) ||
+        if (((signal->order != 0u) && !derived) || (signal->sample >= samples) ||
             (signal->source >
              (((i < (size_t)PVID_REFINE_INPUTS)) ? (uint8_t)PVID_SIGNAL_HELD : (uint8_t)PVID_SIGNAL_SAMPLED)) ||
             !pvid_within_f32(signal->scale, -1.0e9f, 1.0e9f)) {
@@ -87,7 +87,7 @@ static pvid_status limits_are_valid(const pvid_refine_config_f32 *config)
     return pvid_within_f32(config->distance, 0.0f, 1.0e9f) ? PVID_OK : PVID_BAD_START_SD;
 }
 
-PVID_COLD pvid_status pvid_refine_valid_f32(const pvid_refine_config_f32 *config)
+PVID_COLD pvid_status pvid_refine_valid_f32(const pvid_refine_config_f32 *config, size_t samples)
 {
     if (!pvid_within_f32(config->sample_rate_hz, 1.0e-3f, 1.0e6f)) {
         return PVID_BAD_SAMPLE_RATE;
@@ -95,7 +95,7 @@ PVID_COLD pvid_status pvid_refine_valid_f32(const pvid_refine_config_f32 *config
     if (config->ratio < 1u) {
         return PVID_BAD_DECIMATION;
     }
-    pvid_status status = signals_are_valid(config);
+    pvid_status status = signals_are_valid(config, samples);
     if (status == PVID_OK) {
         status = blocks_are_valid(config);
     }

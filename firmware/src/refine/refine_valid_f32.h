@@ -4,6 +4,6 @@
 
 #include "pvid/refine.h"
 
-pvid_status pvid_refine_valid_f32(const pvid_refine_config_f32 *config);
+pvid_status pvid_refine_valid_f32(const pvid_refine_config_f32 *config, size_t samples);
 
 #endif

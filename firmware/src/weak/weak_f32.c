@@ -152,7 +152,7 @@ static pvid_status init_refinement(pvid_weak_f32 *self, const pvid_weak_refine_f
         return PVID_BAD_POINTER;
     }
     self->refine = refine;
-    return refine->stage->init(refine->storage, refine->config);
+    return refine->stage->init(refine->storage, refine->config, self->design->model->samples);
 }
 
 /* Returns whether the sums of a window have a place of their own, or are used before the next half's first block. */

@@ -46,6 +46,7 @@ class RefineNative:
 
     def __init__(self, native: Native, config: RefineConfig) -> None:
         self.native = native
+        self._samples = 1 + max(one.sample for one in config.signal)
         headers = native.headers
         shape = np.zeros(8, np.uint32)
         native.library.pvid_replay_refine_shape(headers.pointer(shape))
@@ -65,7 +66,7 @@ class RefineNative:
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
         address = self.native.headers.ffi.addressof(self._filled.struct)
-        return Status(self.native.library.pvid_refine_init_f32(self.state, address))
+        return Status(self.native.library.pvid_refine_init_f32(self.state, address, self._samples))
 
     def freeze(self, frozen: bool) -> None:
         """pvid_refine_freeze_f32."""
