@@ -29,6 +29,7 @@ static const uint32_t layout[] = {
     PLACE(collect.window),
     PLACE(finish),
     PLACE(finish.gate),
+    PLACE(finish.scores),
     PLACE(finish.work),
     PLACE(finish.work.rows.parts),
     PLACE(finish.candidate),

@@ -45,12 +45,42 @@ static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
     return pvid_system_scale_rows_q31(&self->information, self->model, solve->h, row, solve->m);
 }
 
+/* C^T force: C_k = c_k 2^(f_column - h_row), force in 2^h_row; rhs_a then is in 2^f_a. */
+static void project_force(const pvid_model_q31 *model, const int32_t c[], const int32_t force[],
+                          int64_t rhs[PVID_MAX_P])
+{
+    memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
+    for (size_t k = 0; k < model->n_c; k++) {
+        rhs[model->c_column[k]] += pvid_product_q31(c[k], force[model->c_row[k]]);
+    }
+}
+
+/* The score of the rows since the last solve, in units of rows that are not divided by 4^exponent. */
+static void project_fresh(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const size_t n = self->model->n_theta;
+    int64_t wide[PVID_MAX_THETA_Q31];
+    int32_t force[PVID_MAX_THETA_Q31];
+    int64_t rhs[PVID_MAX_P];
+    for (size_t i = 0; i < n; i++) {
+        wide[i] = pvid_scale_q31(self->fresh[i], solve->h[i]);
+    }
+    const int32_t up = pvid_to_block_q31((uint32_t)n, wide, 30, force) + (2 * (int32_t)self->information.exponent);
+    project_force(self->model, solve->part.early.c, force, rhs);
+    for (size_t a = 0; a < self->model->n_p; a++) {
+        solve->score[a] = pvid_scaled_packed_q31(pvid_scaled_of_q31(rhs[a], solve->now.system.f[a] + up));
+    }
+}
+
 /* Right-hand side of the step by rows of C, g b + (1 - g) sum N e since the last solve, scaled as these rows. */
 static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     const size_t n = self->model->n_theta;
     const int64_t *b = pvid_b_of_q31(&self->information);
     int64_t force[PVID_MAX_THETA_Q31];
+    if (solve->ends_group) {
+        project_fresh(self, solve);
+    }
     for (size_t i = 0; i < n; i++) {
         int64_t driving = b[i];
         if (solve->gain == 0) {
@@ -136,10 +166,7 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
 static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve_q31 *solve, const int32_t force[],
                          int64_t rhs[PVID_MAX_P], int32_t x[])
 {
-    memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
-    for (size_t k = 0; k < model->n_c; k++) {
-        rhs[model->c_column[k]] += pvid_product_q31(solve->part.early.c[k], force[model->c_row[k]]);
-    }
+    project_force(model, solve->part.early.c, force, rhs);
     for (size_t a = 0; a < model->n_p; a++) {
         rhs[a] = pvid_scale_q31(rhs[a], solve->now.system.g[a]);
     }

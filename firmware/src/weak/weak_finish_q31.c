@@ -12,6 +12,7 @@
 #include "weak/columns_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/noise_q31.h"
+#include "weak/scores_q31.h"
 #include "weak/steps.h"
 #include "weak/sums_q31.h"
 #include "weak/white_q31.h"
@@ -34,9 +35,11 @@ enum {
     STAGE_NOISE,    /* C, then bias and information by each entry of the noise table */
     STAGE_PULL,     /* what the noise takes from b */
     /* for the window */
-    STAGE_SOLVE,  /* `iterations` solves, several stages each */
-    STAGE_ASSESS, /* several stages */
-    STAGE_JUDGE,  /* trust_q31.h publishes the estimate or holds it */
+    STAGE_SOLVE,   /* `iterations` solves, several stages each */
+    STAGE_MEAN,    /* the score to the means; this and CLUSTER do nothing if no solve was due */
+    STAGE_ASSESS,  /* several stages */
+    STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
+    STAGE_JUDGE,   /* trust_q31.h publishes the estimate or holds it */
     STAGE_IDLE = PVID_WEAK_IDLE_Q31
 };
 
@@ -108,8 +111,17 @@ static void begin_kind(pvid_weak_finish_q31 *self)
     self->stage = self->known.renewed ? STAGE_WEIGH : STAGE_UNIT;
 }
 
+void pvid_weak_finish_skip_q31(pvid_weak_finish_q31 *self)
+{
+    self->alone = true;
+}
+
 void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self)
 {
+    if (self->alone) {
+        pvid_weak_scores_skip_q31(&self->scores);
+    }
+    self->alone = false;
     pvid_weak_known_q31 *known = &self->known;
     known->renewed = (known->age >= NOISE_WINDOWS) || (self->size > SMALL_STEP);
     known->age = (uint8_t)(known->renewed ? 1u : (known->age + 1u));
@@ -389,6 +401,7 @@ static bool passes(pvid_weak_q31 *self)
         pvid_gate_judge_q31(gate, variance_ratio_of(finish->expected, finish->rss, freedom_of(self)));
     if (verdict == PVID_GATE_OPENS) {
         pvid_trust_begin_anew_q31(&self->trust, &self->estimator);
+        memset(&finish->scores, 0, sizeof finish->scores);
     }
     return verdict != PVID_GATE_REJECTS;
 }
@@ -494,6 +507,48 @@ static bool solve_stage(pvid_weak_q31 *self)
     return true;
 }
 
+/* A window without rows has no score. */
+static void mean_stage(pvid_weak_q31 *self)
+{
+    pvid_weak_finish_q31 *finish = &self->finish;
+    if (finish->reason == PVID_ACCUMULATED) {
+        return;
+    }
+    if (finish->rss == 0) {
+        pvid_weak_scores_skip_q31(&finish->scores);
+        return;
+    }
+    const pvid_scaled_q31 square =
+        pvid_scaled_over_q31(pvid_scaled_of_q31(finish->rss, 0), pvid_scaled_of_q31((int64_t)finish->free, 0));
+    pvid_weak_scores_add_q31(&finish->scores, &self->estimator, finish->work.solve.score, square);
+}
+
+/* Rows of the windows between two solves. */
+static int64_t rows_of(const pvid_weak_q31 *self)
+{
+    const pvid_weak_model_q31 *model = self->design->model;
+    int64_t rows = 0;
+    for (size_t i = 0; i < model->kinds; i++) {
+        rows += (int64_t)self->design->functions - (int64_t)model->kind[i].nuisances;
+    }
+    return rows * (int64_t)self->estimator.divider;
+}
+
+/* The larger of the two standard errors of a parameter. */
+static void cluster_stage(pvid_weak_q31 *self)
+{
+    pvid_weak_finish_q31 *finish = &self->finish;
+    const size_t a = finish->index;
+    if ((finish->reason == PVID_ACCUMULATED) || !finish->work.solve.now.system.factor.positive) {
+        return;
+    }
+    const pvid_scaled_q31 windows = pvid_scaled_over_q31(pvid_scaled_of_q31((int64_t)finish->candidate.weight, 0),
+                                                         pvid_scaled_of_q31(rows_of(self), 0));
+    const int32_t se = pvid_weak_scores_error_q31(&finish->scores, &self->estimator, &finish->work.solve, a,
+                                                  finish->candidate.correlation[a], windows);
+    finish->candidate.se[a] = (se > finish->candidate.se[a]) ? se : finish->candidate.se[a];
+}
+
 static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
@@ -517,6 +572,7 @@ static void end_kind(pvid_weak_q31 *self)
         finish->stage = STAGE_SOLVE;
         begin_solves(self);
     } else {
+        pvid_weak_scores_skip_q31(&finish->scores);
         finish->stage = STAGE_IDLE;
     }
 }
@@ -610,13 +666,25 @@ void pvid_weak_finish_step_q31(pvid_weak_q31 *self, pvid_reason *reason)
     switch (finish->stage) {
     case STAGE_SOLVE:
         if (!solve_stage(self)) {
-            finish->stage = STAGE_ASSESS;
-            pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve, &finish->candidate);
-            finish->work.solve.keeps_matrix = keeps_matrix(self);
+            finish->stage = STAGE_MEAN;
         }
+        break;
+    case STAGE_MEAN:
+        mean_stage(self);
+        finish->stage = STAGE_ASSESS;
+        pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve, &finish->candidate);
+        finish->work.solve.keeps_matrix = keeps_matrix(self);
         break;
     case STAGE_ASSESS:
         if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->work.solve, &finish->candidate)) {
+            finish->stage = STAGE_CLUSTER;
+            finish->index = 0;
+        }
+        break;
+    case STAGE_CLUSTER:
+        cluster_stage(self);
+        finish->index++;
+        if (finish->index == self->estimator.model->n_p) {
             finish->stage = STAGE_JUDGE;
         }
         break;
@@ -676,7 +744,7 @@ uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self)
 uint32_t pvid_weak_finish_stages_q31(const pvid_weak_q31 *self)
 {
     const pvid_weak_model_q31 *model = self->design->model;
-    uint32_t stages = 1;
+    uint32_t stages = 2u + self->estimator.model->n_p; /* MEAN, JUDGE; CLUSTER */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }

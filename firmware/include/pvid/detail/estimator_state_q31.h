@@ -53,7 +53,7 @@ struct pvid_estimator_q31 {
     int64_t theta[PVID_MAX_THETA_Q31];    /* f(p) */
     int32_t mantissa[PVID_MAX_THETA_Q31]; /* of theta, 30 bits, */
     int16_t shift[PVID_MAX_THETA_Q31];    /* right shift of N_i mantissa_i to units of Y */
-    int64_t fresh[PVID_MAX_THETA_Q31];    /* sum N e since the last solve; only while g < 1 */
+    int64_t fresh[PVID_MAX_THETA_Q31];    /* sum N e since the last solve */
     int16_t align[PVID_MAX_THETA_Q31];    /* N_i theta_i 2^-align is in units of Y */
     int16_t theta_bits[PVID_MAX_THETA_Q31];
     int16_t c_exponent[PVID_MAX_C_Q31]; /* C_k 2^c_exponent: units of Y per N and p */
@@ -156,6 +156,7 @@ struct pvid_estimator_solve_q31 {
     pvid_solve_parts_q31 part;
     pvid_solve_equations_q31 now;
     int64_t dp[PVID_MAX_P];
+    int32_t score[PVID_MAX_P]; /* C^T sum N e since the last solve, packed (scaled_q31.h); of one that ends a group */
 };
 
 #endif

@@ -140,6 +140,21 @@ typedef struct {
     pvid_scaled_q31 pull[PVID_MAX_THETA_Q31]; /* what it takes from b in a window, in units of b */
 } pvid_weak_known_q31;
 
+/* Products of two parameters. */
+#define PVID_WEAK_PAIRS_Q31 ((PVID_MAX_P * (PVID_MAX_P + 1)) / 2)
+
+/* Mean products of the scores of windows (of all windows between two solves), of one with itself and with the one
+ * before. A score is C^T (sum N e); that of p[a] is an integer of 15 bits at most times 2^unit[a]. */
+typedef struct {
+    uint16_t windows; /* in the means */
+    bool known;       /* the window before has a score */
+    int16_t unit[PVID_MAX_P];
+    int16_t before[PVID_MAX_P];
+    int32_t residual;                  /* mean square of their residuals, packed (scaled_q31.h) */
+    int32_t same[PVID_WEAK_PAIRS_Q31]; /* upper triangle, row by row */
+    int32_t neighbour[PVID_WEAK_PAIRS_Q31];
+} pvid_weak_scores_q31;
+
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
     uint8_t stage;
@@ -153,6 +168,7 @@ typedef struct {
     bool kept;                         /* the present nuisance is */
     bool saturated;                    /* a row of the kind does not fit: none of them is used */
     bool rejected;                     /* by the gate: no row of the kind is used */
+    bool alone;                        /* the next window has no neighbour before it */
     uint16_t index;                    /* within the stage */
     uint16_t free;                     /* rows less nuisances of the kinds that were added */
     pvid_reason reason;                /* of the last solve, then of the window */
@@ -165,6 +181,7 @@ typedef struct {
     pvid_gate_q31 gate[PVID_MAX_KINDS];
     pvid_weak_known_q31 known;
     pvid_weak_white_q31 white[PVID_MAX_KINDS]; /* at the p of one of the last windows */
+    pvid_weak_scores_q31 scores;
     pvid_weak_work_q31 work;
     pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_weak_finish_q31;
