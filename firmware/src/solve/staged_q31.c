@@ -45,30 +45,26 @@ static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
     return pvid_system_scale_rows_q31(&self->information, self->model, solve->h, row, solve->m);
 }
 
-/* C^T force: C_k = c_k 2^(f_column - h_row), force in 2^h_row; rhs_a then is in 2^f_a. */
-static void project_force(const pvid_model_q31 *model, const int32_t c[], const int32_t force[],
-                          int64_t rhs[PVID_MAX_P])
-{
-    memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
-    for (size_t k = 0; k < model->n_c; k++) {
-        rhs[model->c_column[k]] += pvid_product_q31(c[k], force[model->c_row[k]]);
-    }
-}
-
 /* The score of the rows since the last solve, in units of rows that are not divided by 4^exponent. */
-static void project_fresh(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+PVID_COLD static void project_fresh(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
-    const size_t n = self->model->n_theta;
-    int64_t wide[PVID_MAX_THETA_Q31];
+    const pvid_model_q31 *model = self->model;
     int32_t force[PVID_MAX_THETA_Q31];
-    int64_t rhs[PVID_MAX_P];
-    for (size_t i = 0; i < n; i++) {
-        wide[i] = pvid_scale_q31(self->fresh[i], solve->h[i]);
+    int32_t largest = INT32_MIN;
+    for (size_t i = 0; i < model->n_theta; i++) {
+        const int32_t length = pvid_length_q31(self->fresh[i]) - solve->h[i];
+        largest = (length > largest) ? length : largest;
     }
-    const int32_t up = pvid_to_block_q31((uint32_t)n, wide, 30, force) + (2 * (int32_t)self->information.exponent);
-    project_force(self->model, solve->part.early.c, force, rhs);
-    for (size_t a = 0; a < self->model->n_p; a++) {
-        solve->score[a] = pvid_scaled_packed_q31(pvid_scaled_of_q31(rhs[a], solve->now.system.f[a] + up));
+    largest -= 30;
+    for (size_t i = 0; i < model->n_theta; i++) {
+        force[i] = (int32_t)pvid_scale_q31(self->fresh[i], largest + solve->h[i]);
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        solve->score[a] = 0;
+        solve->score_exponent[a] = solve->now.system.f[a] + largest + 32 + (2 * (int32_t)self->information.exponent);
+    }
+    for (size_t k = 0; k < model->n_c; k++) {
+        solve->score[model->c_column[k]] += pvid_upper_product_q31(solve->part.early.c[k], force[model->c_row[k]]);
     }
 }
 
@@ -166,7 +162,10 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
 static int32_t solve_for(const pvid_model_q31 *model, const pvid_estimator_solve_q31 *solve, const int32_t force[],
                          int64_t rhs[PVID_MAX_P], int32_t x[])
 {
-    project_force(model, solve->part.early.c, force, rhs);
+    memset(rhs, 0, PVID_MAX_P * sizeof rhs[0]);
+    for (size_t k = 0; k < model->n_c; k++) {
+        rhs[model->c_column[k]] += pvid_product_q31(solve->part.early.c[k], force[model->c_row[k]]);
+    }
     for (size_t a = 0; a < model->n_p; a++) {
         rhs[a] = pvid_scale_q31(rhs[a], solve->now.system.g[a]);
     }

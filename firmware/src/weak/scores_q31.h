@@ -13,15 +13,14 @@ static inline void pvid_weak_scores_skip_q31(pvid_weak_scores_q31 *self)
     self->known = false;
 }
 
-/* Adds a score, as a solve leaves it, to the means. residual: mean square of the window's rows before its steps of p,
- * > 0. */
+/* Adds the score that a solve has left to the means. variance_ratio: residual variance of the window's rows before its
+ * steps of p over its expectation, Q24, >= 0. */
 void pvid_weak_scores_add_q31(pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
-                              const int32_t score[PVID_MAX_P], pvid_scaled_q31 residual);
+                              const pvid_estimator_solve_q31 *solve, int64_t variance_ratio);
 
-/* Standard error of p[a] from the scatter, behind an assessment whose matrix was factored. correlation: row a of its
- * own; windows: scores in the sums. */
+/* Standard error of p[a] from the scatter, for an assessment whose matrix could be factored. rows: of a score. */
 int32_t pvid_weak_scores_error_q31(const pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
-                                   const pvid_estimator_solve_q31 *solve, size_t a, const int32_t correlation[],
-                                   pvid_scaled_q31 windows);
+                                   const pvid_estimator_solve_q31 *assessment, size_t a,
+                                   const pvid_estimate_q31 *estimate, uint32_t rows);
 
 #endif

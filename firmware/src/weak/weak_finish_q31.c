@@ -6,6 +6,7 @@
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
+#include "number/unroll.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
@@ -508,54 +509,49 @@ static bool solve_stage(pvid_weak_q31 *self)
 }
 
 /* A window without rows has no score. */
-static void mean_stage(pvid_weak_q31 *self)
+PVID_COLD static void mean_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    if (finish->reason == PVID_ACCUMULATED) {
-        return;
-    }
+    const pvid_scaled_q31 ratio = variance_ratio_of(expected_of(self), finish->rss, finish->free);
+    finish->rss = pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS);
     if (finish->rss == 0) {
         pvid_weak_scores_skip_q31(&finish->scores);
-        return;
+    } else if (finish->reason != PVID_ACCUMULATED) {
+        pvid_weak_scores_add_q31(&finish->scores, &self->estimator, &finish->work.solve, finish->rss);
+    } else {
+        /* no solve was due */
     }
-    const pvid_scaled_q31 square =
-        pvid_scaled_over_q31(pvid_scaled_of_q31(finish->rss, 0), pvid_scaled_of_q31((int64_t)finish->free, 0));
-    pvid_weak_scores_add_q31(&finish->scores, &self->estimator, finish->work.solve.score, square);
 }
 
 /* Rows of the windows between two solves. */
-static int64_t rows_of(const pvid_weak_q31 *self)
+static uint32_t rows_of(const pvid_weak_q31 *self)
 {
     const pvid_weak_model_q31 *model = self->design->model;
-    int64_t rows = 0;
+    uint32_t rows = 0;
     for (size_t i = 0; i < model->kinds; i++) {
-        rows += (int64_t)self->design->functions - (int64_t)model->kind[i].nuisances;
+        rows += (uint32_t)self->design->functions - model->kind[i].nuisances;
     }
-    return rows * (int64_t)self->estimator.divider;
+    return rows * self->estimator.divider;
 }
 
 /* The larger of the two standard errors of a parameter. */
-static void cluster_stage(pvid_weak_q31 *self)
+PVID_COLD static void cluster_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
     const size_t a = finish->index;
     if ((finish->reason == PVID_ACCUMULATED) || !finish->work.solve.now.system.factor.positive) {
         return;
     }
-    const pvid_scaled_q31 windows = pvid_scaled_over_q31(pvid_scaled_of_q31((int64_t)finish->candidate.weight, 0),
-                                                         pvid_scaled_of_q31(rows_of(self), 0));
     const int32_t se = pvid_weak_scores_error_q31(&finish->scores, &self->estimator, &finish->work.solve, a,
-                                                  finish->candidate.correlation[a], windows);
+                                                  &finish->candidate, rows_of(self));
     finish->candidate.se[a] = (se > finish->candidate.se[a]) ? se : finish->candidate.se[a];
 }
 
 static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    const pvid_scaled_q31 ratio = variance_ratio_of(expected_of(self), finish->rss, finish->free);
     *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
-                                   finish->work.solve.above_noise,
-                                   pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
+                                   finish->work.solve.above_noise, finish->rss, &finish->candidate);
 }
 
 /* ---- the order of the stages ---- */

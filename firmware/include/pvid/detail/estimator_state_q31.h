@@ -156,7 +156,8 @@ struct pvid_estimator_solve_q31 {
     pvid_solve_parts_q31 part;
     pvid_solve_equations_q31 now;
     int64_t dp[PVID_MAX_P];
-    int32_t score[PVID_MAX_P]; /* C^T sum N e since the last solve, packed (scaled_q31.h); of one that ends a group */
+    int32_t score[PVID_MAX_P]; /* of a solve that ends a group: C^T sum N e since the last such, times 2^-exponent */
+    int32_t score_exponent[PVID_MAX_P];
 };
 
 #endif

@@ -144,13 +144,13 @@ typedef struct {
 #define PVID_WEAK_PAIRS_Q31 ((PVID_MAX_P * (PVID_MAX_P + 1)) / 2)
 
 /* Mean products of the scores of windows (of all windows between two solves), of one with itself and with the one
- * before. A score is C^T (sum N e); that of p[a] is an integer of 15 bits at most times 2^unit[a]. */
+ * before. A score is C^T (sum N e); that of p[a] is an integer within 2^13 times 2^unit[a]. */
 typedef struct {
     uint16_t windows; /* in the means */
     bool known;       /* the window before has a score */
     int16_t unit[PVID_MAX_P];
     int16_t before[PVID_MAX_P];
-    int32_t residual;                  /* mean square of their residuals, packed (scaled_q31.h) */
+    int32_t residual;                  /* mean of their variance ratios, Q12 */
     int32_t same[PVID_WEAK_PAIRS_Q31]; /* upper triangle, row by row */
     int32_t neighbour[PVID_WEAK_PAIRS_Q31];
 } pvid_weak_scores_q31;
@@ -159,23 +159,23 @@ typedef struct {
 typedef struct {
     uint8_t stage;
     uint8_t kind;
-    uint8_t theta;                     /* first one of the kind */
-    uint8_t used;                      /* kinds whose rows have been added */
-    uint8_t live;                      /* nuisances of the kind that are projected out */
-    uint8_t iteration;                 /* solves done for this window */
-    uint8_t part;                      /* of a column's stages */
-    uint8_t exponent;                  /* of the sums before the solves */
-    bool kept;                         /* the present nuisance is */
-    bool saturated;                    /* a row of the kind does not fit: none of them is used */
-    bool rejected;                     /* by the gate: no row of the kind is used */
-    bool alone;                        /* the next window has no neighbour before it */
-    uint16_t index;                    /* within the stage */
-    uint16_t free;                     /* rows less nuisances of the kinds that were added */
-    pvid_reason reason;                /* of the last solve, then of the window */
-    int64_t size;                      /* of the last step, relative, Q22 */
-    int64_t rss;                       /* of the kind's rows before the steps */
-    int32_t fade_factor;               /* factor on the sums before this window's rows, Q31; 0: none */
-    pvid_scaled_q31 expected;          /* variance of a row */
+    uint8_t theta;            /* first one of the kind */
+    uint8_t used;             /* kinds whose rows have been added */
+    uint8_t live;             /* nuisances of the kind that are projected out */
+    uint8_t iteration;        /* solves done for this window */
+    uint8_t part;             /* of a column's stages */
+    uint8_t exponent;         /* of the sums before the solves */
+    bool kept;                /* the present nuisance is */
+    bool saturated;           /* a row of the kind does not fit: none of them is used */
+    bool rejected;            /* by the gate: no row of the kind is used */
+    bool alone;               /* the next window has no neighbour before it */
+    uint16_t index;           /* within the stage */
+    uint16_t free;            /* rows less nuisances of the kinds that were added */
+    pvid_reason reason;       /* of the last solve, then of the window */
+    int64_t size;             /* of the last step, relative, Q22 */
+    int64_t rss;              /* of the kind's rows before the steps; from MEAN on the window's variance ratio */
+    int32_t fade_factor;      /* factor on the sums before this window's rows, Q31; 0: none */
+    pvid_scaled_q31 expected; /* variance of a row */
     int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];

@@ -145,7 +145,7 @@ def assess_errors(out: npt.NDArray[np.void], s: Int, f: Int, start_sd: Int, root
 class EstimatorQ31:
     """pvid_estimator_q31 in every lane; all lanes share model, formats, divider and whether the law is a rate.
 
-    score : of the last solve that ended a group
+    score : of the last solve that ended a group, of fewer than 30 digits
     inverse : of the last assessment
 
     p int64 [n_p, lanes]; sums int64 [n_sums, lanes]: M, b, rr times 4^-exponent, weight in Q16.
@@ -510,16 +510,14 @@ class EstimatorQ31:
 
     def _score(self, c: Int, f: Int, h: Int) -> Scaled:
         """C^T sum N e since the last solve [n_p, lanes]."""
-        force, up = cholesky.to_block(scale(self.fresh, h), 30)
-        return scaled(self._onto_p(c, force), f + up + 2 * self.exponent).packed()
-
-    def _onto_p(self, c: Int, force: Int) -> Int:
-        """C^T force."""
-        return np.stack([(c[own] * force[self._c_row[own]]).sum(axis=0) for own in self._columns])
+        largest = np.max(length(self.fresh) - h, axis=0) - 30
+        force = scale(self.fresh, largest + h)
+        onto = [upper_product(c[own], force[self._c_row[own]]).sum(axis=0) for own in self._columns]
+        return Scaled(np.stack(onto), f + largest + 32 + 2 * self.exponent)
 
     def _solve_for(self, factor: cholesky.Factor, c: Int, force: Int, g: Int) -> tuple[Int, Int, Int]:
         """(rhs, x, h): C^T force, scaled as the rows of q, and its solution x 2^h."""
-        rhs = scale(self._onto_p(c, force), g)
+        rhs = scale(np.stack([(c[own] * force[self._c_row[own]]).sum(axis=0) for own in self._columns]), g)
         return rhs, *cholesky.solve(factor, rhs)
 
     def _at_rest(self, factor: cholesky.Factor, c: Int, b: Int, g: Int) -> Mask:

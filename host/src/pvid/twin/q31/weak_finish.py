@@ -241,13 +241,12 @@ def stages(
         if not estimator.was_due:
             break
     size = noise.size = estimator.size
-    if estimator.was_due:
-        scores.add(estimator, estimator.group_rss, free)
+    ratio = _ratio(estimator.group_rss, free, sensors).fixed(_VARIANCE_RATIO_BITS)
+    scores.add(estimator, ratio)
     for _ in range(1 + estimator.assessment_stages + estimator.model.n_p):
         yield None
     candidate, above_noise = estimator.judged()
     if estimator.was_due:
         rows = estimator.divider * sum(design.functions - kind.nuisances for kind in design.model.kind)
         scores.widen(candidate, estimator, rows)
-    ratio = _ratio(estimator.group_rss, free, sensors).fixed(_VARIANCE_RATIO_BITS)
     yield trust.judge(reason, size, above_noise, ratio, candidate)

@@ -6,14 +6,16 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.twin.q31.estimator import EstimatorQ31, length
-from pvid.twin.q31.integer import Int, clamp, integers, root_of, scale, times_q31, upper_product
-from pvid.twin.q31.scaled import Scaled, pick, scaled
+from pvid.twin.q31.integer import Int, clamp, root_of, round_shift, scale, times_q31, upper_product
+from pvid.twin.q31.scaled import Scaled
 
-_DIGITS, _FIRST_DIGITS = 14, 11
-_LEAST_SQUARE = 2**20
-_SCORE_MAX, _MEAN_MAX = 2**14, 2**29
-_WINDOWS_MAX = 0xFFFF
-_FAR_BELOW = Scaled(integers(858993459), integers(-34))  # 0.05
+_DIGITS, _FIRST_DIGITS = 13, 10
+_LEAST_SQUARE = 2**18
+_SCORE_MAX, _MEAN_MAX = 2**13, 2**27
+_Z_DOWN = 15
+_WINDOWS_MAX, _MOST = 0xFFFF, 2**31 - 1
+_FAR_BELOW = 20
+_STATE = ("windows", "known", "unit", "before", "residual", "same", "neighbour")
 
 
 class Scores:
@@ -36,7 +38,7 @@ class Scores:
         self.known = np.zeros(lanes, np.bool_)
         self.unit = np.zeros(self._shape, np.int64)
         self.before = np.zeros(self._shape, np.int64)
-        self.residual = scaled(np.zeros(lanes, np.int64), 0)
+        self.residual = np.zeros(lanes, np.int64)
         self.same = np.zeros((n_p, n_p, lanes), np.int64)  # upper triangles
         self.neighbour = np.zeros((n_p, n_p, lanes), np.int64)
 
@@ -44,42 +46,41 @@ class Scores:
         """A window without a score."""
         self.known = np.zeros_like(self.known)
 
-    def add(self, estimator: EstimatorQ31, rss: Int, free: Int) -> None:
-        """Adds the score of the last solve to the means; in lanes without rows there is none.
+    def add(self, estimator: EstimatorQ31, variance_ratio: Int) -> None:
+        """Adds the score of the last solve, if it was due, to the means; a lane without rows has none.
 
-        rss, free : of the window's rows before its steps [lanes]
+        variance_ratio : residual variance of the window's rows before its steps over its expectation, Q24 [lanes]
         """
-        if (rss == 0).all():
-            self.skip()
-            return
-        residual = scaled(rss, 0).over(scaled(free, 0))
-        self._restart(self.residual.times(_FAR_BELOW).exceeds(residual))
+        none = variance_ratio == 0
+        if estimator.was_due:
+            kept = {name: getattr(self, name).copy() for name in _STATE}
+            self._add(estimator, variance_ratio)
+            for name, value in kept.items():
+                setattr(self, name, np.where(none, value, getattr(self, name)))
+        self.known = self.known & ~none
+
+    def _add(self, estimator: EstimatorQ31, variance_ratio: Int) -> None:
+        residual = clamp(round_shift(variance_ratio, 12), _MOST)
+        anew = residual * _FAR_BELOW < self.residual
+        for name in _STATE:
+            setattr(self, name, np.where(anew, 0, getattr(self, name)))
         fading = (2**31 - estimator.retention) * estimator.divider
         newest = (2**32 - 1) // (self.windows + 2)
-        weight = np.minimum(np.maximum(newest, fading // estimator.block), 2**31 - 1)
-        change = scaled(weight, -31).times(residual.minus(self.residual))
-        self.residual = self.residual.plus(change).packed()
+        weight = np.minimum(np.maximum(newest, fading // estimator.block), _MOST)
+        self.residual = self.residual + times_q31(residual - self.residual, weight)
         own = np.stack([self._own(a, Scaled(*(x[a] for x in estimator.score))) for a in range(len(self.unit))])
         for a, b in zip(*np.triu_indices(len(own)), strict=True):
-            same = own[a] * own[b] - self.same[a, b]
-            both = own[a] * self.before[b] + self.before[a] * own[b] - self.neighbour[a, b]
-            self.same[a, b] += times_q31(same, weight)
-            self.neighbour[a, b] += np.where(self.known, times_q31(both, weight), 0)
+            both = own[a] * self.before[b] + self.before[a] * own[b]
+            known = _mean_with(self.neighbour[a, b], both, weight)
+            self.same[a, b] = _mean_with(self.same[a, b], own[a] * own[b], weight)
+            self.neighbour[a, b] = np.where(self.known, known, self.neighbour[a, b])
         self.before = own
-        self.known = np.ones_like(self.known)
+        self.known = np.ones_like(self.known, np.bool_)
         self.windows = np.minimum(self.windows + 1, _WINDOWS_MAX)
-
-    def _restart(self, where: npt.NDArray[np.bool_]) -> None:
-        """No windows yet in these lanes."""
-        for name in ("windows", "known", "unit", "before", "same", "neighbour"):
-            value = getattr(self, name)
-            setattr(self, name, np.where(where, np.zeros_like(value), value))
-        nothing = Scaled(np.zeros_like(self.residual.m), self.residual.e)
-        self.residual = pick(where, nothing, self.residual)
 
     def _own(self, a: int, score: Scaled) -> Int:
         """The score of p[a] in its unit, which is made to fit it [lanes]."""
-        highest = score.e + 30
+        highest = length(score.m) + score.e
         up = highest - _DIGITS - self.unit[a]
         square = self.same[a, a]
         some = score.m != 0
@@ -101,21 +102,26 @@ class Scores:
     def widen(self, candidate: npt.NDArray[np.void], estimator: EstimatorQ31, rows: int) -> None:
         """The larger of the two standard errors of each parameter of estimates [lanes]; rows: of a score."""
         inverse = estimator.inverse
-        windows = scaled(candidate["weight"].astype(np.int64), 0).over(scaled(integers(rows), 0))
+        weight = np.minimum(candidate["weight"].astype(np.int64), _MOST)
         n_p = len(self.unit)
+        exponent = inverse.e + self.unit
+        largest = exponent.max(axis=0)
+        down = largest - exponent + _Z_DOWN
         for a in range(n_p):
             correlation = candidate["correlation"][:, a, :n_p].T.astype(np.int64)
-            z = upper_product(correlation, inverse.r)
-            exponent = inverse.e + self.unit + 2
-            largest = np.max(length(z) + exponent, axis=0) - _DIGITS
-            z = scale(z, largest - exponent)
-            same, neighbour = np.zeros((2, len(estimator.p[0])), np.int64)
+            z = np.where(down < 32, upper_product(correlation, inverse.r) >> np.minimum(down, 31), 0)
+            same, neighbour = np.zeros((2, len(weight)), np.int64)
             for b, c in zip(*np.triu_indices(n_p), strict=True):
                 both = (1 if b == c else 2) * (z[b] * z[c])
                 same = same + upper_product(both, self.same[b, c])
                 neighbour = neighbour + upper_product(both, self.neighbour[b, c])
-            total = np.maximum(np.where(neighbour > 0, same + neighbour, same), 0)
-            square = windows.times(scaled(total, 2 * largest + 32 - 4 * estimator.exponent))
-            own = inverse.error(a, *root_of(*square))
+            total = np.maximum(same + np.maximum(neighbour, 0), 0)
+            square = total * weight // rows
+            own = inverse.error(a, *root_of(square, 2 * (largest + _Z_DOWN + 2) + 32 - 4 * estimator.exponent))
             se = candidate["se"][:, a]
-            candidate["se"][:, a] = np.where(inverse.ok, np.maximum(se, own), se)
+            candidate["se"][:, a] = np.where(inverse.ok & (total > 0), np.maximum(se, own), se)
+
+
+def _mean_with(mean: Int, x: Int, weight: Int) -> Int:
+    """A mean with a new value, rounded; weight in Q31."""
+    return mean + ((upper_product(4 * (x - mean), weight) + 1) >> 1)
