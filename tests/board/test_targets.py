@@ -65,8 +65,8 @@ def expected_hashes(form: str, core: str) -> npt.NDArray[np.uint32]:
     if form == "strong":
         return native_hashes(standard_run(sizes.TICKS, core), Native())
     if core == "q31":
-        return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run(DEFAULT))
-    return mechanism_image.twin_hashes(mechanism_image.mechanism_run(DEFAULT))
+        return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run(DEFAULT, long=True))
+    return mechanism_image.twin_hashes(mechanism_image.mechanism_run(DEFAULT, long=True))
 
 
 def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -> None:
@@ -85,7 +85,8 @@ def test_the_host_computes_the_bits_of_the_strong_twin(core: str, native: Native
 
 
 def test_the_host_computes_the_bits_of_the_weak_twin() -> None:
-    replay, fixed = mechanism_image.mechanism_run(DEFAULT), mechanism_image_q31.fixed_run(DEFAULT)
+    replay = mechanism_image.mechanism_run(DEFAULT, long=True)
+    fixed = mechanism_image_q31.fixed_run(DEFAULT, long=True)
     assert np.array_equal(mechanism_image.native_hashes(replay), expected_hashes("weak", "f32"))
     assert np.array_equal(mechanism_image_q31.native_hashes(fixed), expected_hashes("weak", "q31"))
 

@@ -6,12 +6,14 @@
 #include "pvid/weak.h"
 #include "stream_tables.h"
 
-static pvid_weak_f32 identifier;
-
 #ifdef STREAM_REFINED
 #include "pvid/fnv_refine.h"
 #include "stream_refine.h"
+#endif
 
+static pvid_weak_f32 identifier;
+
+#ifdef STREAM_REFINED
 #if PVID_REFINE_PARAMETERS > 8
 #error "the frames hold eight parameters"
 #endif

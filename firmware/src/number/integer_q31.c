@@ -50,7 +50,7 @@ int64_t pvid_scale_q31(int64_t x, int32_t s)
 #if !defined(__ARM_FEATURE_CLZ) || !defined(__GNUC__)
 uint32_t pvid_bit_length_q31(uint64_t x)
 {
-    static const uint8_t length_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
+    static const uint8_t bits_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
     const uint32_t high = (uint32_t)(x >> 32);
     uint32_t rest = (high != 0u) ? high : (uint32_t)(x & 0xFFFFFFFFu);
     uint32_t length = (high != 0u) ? 32u : 0u;
@@ -66,7 +66,7 @@ uint32_t pvid_bit_length_q31(uint64_t x)
         rest >>= 4;
         length += 4u;
     }
-    return length + length_of[rest];
+    return length + bits_of[rest];
 }
 #endif
 

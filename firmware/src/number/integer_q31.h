@@ -48,7 +48,7 @@ static inline int32_t pvid_upper_product_q31(int32_t a, int32_t b)
 #endif
 }
 
-/* a b where |a| and |b| are 2^30 at most, or |a| 2^28 and |b| 3 2^29: ten instructions less on such a core. */
+/* a b where |a| and |b| are 2^30 at most, or |a| + |b| 2^31 - 2^17: ten instructions less on such a core. */
 int64_t pvid_short_product_in_halves_q31(int32_t a, int32_t b);
 
 static inline int64_t pvid_short_product_q31(int32_t a, int32_t b)
@@ -57,6 +57,16 @@ static inline int64_t pvid_short_product_q31(int32_t a, int32_t b)
     return pvid_short_product_in_halves_q31(a, b);
 #else
     return (int64_t)a * b;
+#endif
+}
+
+/* a a, |a| <= 2^30. */
+static inline int64_t pvid_short_square_q31(int32_t a)
+{
+#if defined(__ARM_ARCH_6M__)
+    return pvid_short_product_in_halves_q31(a, a);
+#else
+    return (int64_t)a * a; /* as below */
 #endif
 }
 
@@ -162,8 +172,8 @@ uint32_t pvid_bit_length_q31(uint64_t x);
 /* Number of bits of x < 256, as of a harmonic: without a call. */
 static inline uint32_t pvid_byte_length_q31(size_t x)
 {
-    static const uint8_t length_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
-    return (x > 15u) ? (4u + length_of[x >> 4]) : length_of[x];
+    static const uint8_t bits_of[16] = {0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4};
+    return (x > 15u) ? (4u + bits_of[x >> 4]) : bits_of[x];
 }
 
 /* x / y rounded down, x < y 2^32: by two divisions of 32 by 16 bits, where there is none of 64 bits. */

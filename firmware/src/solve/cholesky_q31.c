@@ -43,7 +43,7 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     const int32_t diagonal = s[j][j];
     int64_t pivot = (int64_t)diagonal * PVID_ONE_Q30;
     for (size_t k = j + 1u; k < n; k++) {
-        pivot -= pvid_square_q31(self->u[j][k]);
+        pivot -= pvid_short_square_q31(self->u[j][k]);
     }
     if (!pvid_pivot_is_significant_q31(pivot, diagonal)) {
         self->positive = false;
@@ -57,7 +57,7 @@ void pvid_cholesky_eliminate_q31(pvid_cholesky_q31 *self, const int32_t s[][PVID
     for (size_t i = 0; i < j; i++) {
         int64_t sum = (int64_t)s[i][j] * PVID_ONE_Q30;
         for (size_t k = j + 1u; k < n; k++) {
-            sum -= pvid_product_q31(self->u[i][k], self->u[j][k]);
+            sum -= pvid_short_product_q31(self->u[i][k], self->u[j][k]);
         }
         self->u[i][j] = pvid_divide_q31(sum, self->inverse[j], PVID_ONE_Q30);
     }
@@ -88,7 +88,7 @@ void pvid_cholesky_lower_q31(const pvid_cholesky_q31 *self, const int32_t rhs[],
         const size_t i = self->n - eliminated;
         int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
         for (size_t k = i + 1u; k < self->n; k++) {
-            sum -= pvid_product_q31(self->u[i][k], x[k]);
+            sum -= pvid_short_product_q31(self->u[i][k], x[k]);
         }
         x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
     }
@@ -99,7 +99,7 @@ static void solve_upper(const pvid_cholesky_q31 *self, const int32_t rhs[], int3
     for (size_t i = 0; i < self->n; i++) {
         int64_t sum = (int64_t)rhs[i] * PVID_ONE_Q30;
         for (size_t k = 0; k < i; k++) {
-            sum -= pvid_product_q31(self->u[k][i], x[k]);
+            sum -= pvid_short_product_q31(self->u[k][i], x[k]);
         }
         x[i] = pvid_divide_q31(sum, self->inverse[i], PVID_ONE_Q30);
     }

@@ -82,7 +82,7 @@ void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *bloc
         sum[i] += product;
         fresh[block->first + i] += product;
     }
-    tail[0] = pvid_clamp_q31(tail[0] + pvid_square_q31(error), RESIDUAL_MAX);
+    tail[0] = pvid_clamp_q31(tail[0] + pvid_short_square_q31(error), RESIDUAL_MAX);
     tail[1] += (int64_t)self->row_weight;
 }
 

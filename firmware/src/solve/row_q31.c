@@ -49,7 +49,7 @@ bool pvid_estimator_terms_q31(const pvid_estimator_q31 *self, const pvid_block *
         fits = fits && (n[i] >= -PVID_ROW_LIMIT_Q31) && (n[i] <= PVID_ROW_LIMIT_Q31);
         const int32_t below = (n[i] > PVID_ROW_LIMIT_Q31) ? PVID_ROW_LIMIT_Q31 : n[i];
         const int32_t clamped = (below < -PVID_ROW_LIMIT_Q31) ? -PVID_ROW_LIMIT_Q31 : below;
-        term[i] = term_of(pvid_product_q31(clamped, mantissa[i]), shift[i]);
+        term[i] = term_of(pvid_short_product_q31(clamped, mantissa[i]), shift[i]);
         rest -= term[i];
     }
     *e = rest;

@@ -197,14 +197,15 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
 
 static void step_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve)
 {
+#if !PVID_FEEDBACK
     const float *rhs = solve->system.force;
-#if PVID_FEEDBACK
+#else
     float damped[PVID_MAX_P];
     for (size_t a = 0; a < self->model->n_p; a++) {
         damped[a] = (solve->gain * solve->system.force[a]) + ((1.0f - solve->gain) * self->innovation[a]);
         self->innovation[a] = 0.0f;
     }
-    rhs = damped;
+    const float *rhs = damped;
 #endif
     memcpy(solve->p, self->p, sizeof solve->p);
     if (solve->reason == PVID_UPDATED) {

@@ -122,7 +122,7 @@ void pvid_weak_columns_take_q31(pvid_weak_columns_q31 *self, const pvid_weak_des
             const int32_t constant[2] = {2 * (int32_t)design->hop, 0};
             const int32_t *s = is_constant(design, term.channel) ? constant : sums[term.channel];
             const int32_t whole =
-                (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight[term.order], design->factor[t].m), 30);
+                (int32_t)pvid_floor_shift_q31(pvid_short_product_q31(weight[term.order], design->factor[t].m), 30);
             const int32_t w = pvid_floor_shift_32_q31(whole, (uint32_t)below);
             const int32_t up = (int32_t)((uint32_t)1 << lift);
             const bool turned = (term.order % 2u) != 0u;
@@ -153,7 +153,7 @@ uint64_t pvid_weak_columns_square_q31(size_t n, const int32_t x[])
 {
     uint64_t square = 0;
     for (size_t i = 0; i < n; i++) {
-        square += (uint64_t)pvid_square_q31(x[i]) >> SQUARE_DOWN;
+        square += (uint64_t)pvid_short_square_q31(x[i]) >> SQUARE_DOWN;
     }
     return square;
 }

@@ -28,7 +28,7 @@ void pvid_weak_noise_leverage_q31(const pvid_weak_white_q31 *white, const pvid_w
         pvid_weak_mirror_q31(&white->mirror[j][first + j], n - j, &u[j]);
     }
     for (size_t i = 0; i < n; i++) {
-        const int32_t square = (int32_t)pvid_floor_shift_q31(pvid_square_q31(u[i]), 30);
+        const int32_t square = (int32_t)pvid_floor_shift_q31(pvid_short_square_q31(u[i]), 30);
         leverage[first + i] = ((k == 0u) ? 0 : leverage[first + i]) + square;
     }
 }

@@ -156,11 +156,12 @@ static bool filters_are_valid(const pvid_weak_design_q31 *design)
     for (size_t i = 0; i < design->model->jets; i++) {
         const pvid_weak_filter_q31 *filter = &design->filter[i];
         const pvid_weak_jet jet = design->model->jet[i];
+        const size_t weights = (size_t)filter->half + 1u;
         uint64_t whole = 0;
         if ((filter->half > PVID_MAX_RING) || (filter->down > WORD) || (filter->weights == NULL)) {
             return false;
         }
-        for (size_t k = 0; k <= filter->half; k++) {
+        for (size_t k = 0; k < weights; k++) {
             const uint64_t one = pvid_magnitude_q31(filter->weights[k]);
             if (one > (uint64_t)PVID_ONE_Q30) {
                 return false;
@@ -262,7 +263,8 @@ static bool is_exact(const pvid_weak_design_q31 *design)
            (pvid_weak_harmonics_q31(design) == PVID_MAX_HARMONICS) && (model->samples == PVID_MAX_SAMPLES) &&
            (model->signals == PVID_EXACT_SIGNALS) && (model->jets == PVID_EXACT_JETS) &&
            (model->runs == PVID_EXACT_RUNS) && (model->signs == PVID_EXACT_SIGNS) &&
-           (model->integrands == PVID_EXACT_INTEGRANDS) && (pvid_weak_summed_q31(model) == PVID_EXACT_CHANNELS);
+           (model->gains == PVID_EXACT_GAINS) && (model->integrands == PVID_EXACT_INTEGRANDS) &&
+           (pvid_weak_summed_q31(model) == PVID_EXACT_CHANNELS);
 }
 
 /* Every number of the tables. */

@@ -47,9 +47,9 @@ enum {
 #define ENTRIES_PER_STAGE 4u
 #define HARMONICS_PER_STAGE 2u
 #define ROOTS_PER_STAGE 4u
-#define UNITS_PER_STAGE 2u
+#define UNITS_PER_STAGE 4u
 #define SHARES_PER_STAGE 1u
-#define RESIDUALS_PER_STAGE 2u
+#define RESIDUALS_PER_STAGE 4u
 
 /* Windows after which the noise and what whitens it are computed anew, and relative step of p behind which they are at
  * once: 2^-7, Q22. */
@@ -369,7 +369,7 @@ static bool residual_stage(pvid_weak_q31 *self)
         const bool fits = pvid_estimator_innovation_q31(&self->estimator, &block, n, y[k], &e);
         y[k] = (int32_t)pvid_clamp_q31(e, PVID_ROW_LIMIT_Q31);
         finish->saturated = finish->saturated || !fits;
-        finish->rss = pvid_clamp_q31(finish->rss + pvid_square_q31(y[k]), PVID_WIDE);
+        finish->rss = pvid_clamp_q31(finish->rss + pvid_short_square_q31(y[k]), PVID_WIDE);
     }
     finish->index = (uint16_t)(last - finish->live);
     return last < rows;
@@ -437,7 +437,7 @@ static bool add_stage(pvid_weak_q31 *self, pvid_reason *reason)
         pvid_block block;
         row_of(self, k, n);
         pvid_information_block_q31(self->estimator.model, finish->theta, &block);
-        pvid_estimator_add_row_q31(&self->estimator, &block, n, e, pvid_square_q31(e));
+        pvid_estimator_add_row_q31(&self->estimator, &block, n, e, pvid_short_square_q31(e));
     }
     finish->index++;
     return (k + 1u) < self->design->functions;

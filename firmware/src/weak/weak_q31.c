@@ -37,7 +37,7 @@ static pvid_reason idle_reason(const pvid_weak_q31 *self)
 static void rest(pvid_weak_q31 *self)
 {
     const bool busy = (self->collect.sums.left > 0u) || pvid_weak_finish_is_busy_q31(&self->finish);
-    self->rest = busy ? BUSY : (uint32_t)idle_reason(self);
+    self->rest = (uint8_t)(busy ? BUSY : (uint32_t)idle_reason(self));
 }
 
 static void restart(pvid_weak_q31 *self)
@@ -51,8 +51,8 @@ static void restart(pvid_weak_q31 *self)
 /* Whether the sums of a window are read before others take their place. */
 static bool window_fits(const pvid_weak_q31 *self)
 {
-    const uint32_t ticks = pvid_weak_ticks_behind_join_q31(self->design);
-    return (PVID_MAX_WINDOWS > 0) || (pvid_weak_finish_columns_q31(self) <= (self->stages_per_tick * ticks));
+    return (PVID_MAX_WINDOWS > 0) || (pvid_weak_finish_columns_q31(self) <=
+                                      (self->stages_per_tick * pvid_weak_ticks_behind_join_q31(self->design)));
 }
 
 static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
@@ -125,7 +125,7 @@ static void watch_drive(pvid_weak_q31 *self, size_t half, bool begins, const int
         if (self->drive_min[i] > 0) {
             const int32_t x = pvid_weak_count_q31(reading[i], self->collect.front.offset[i]);
             drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
-            drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_square_q31(x);
+            drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_short_square_q31(x);
         }
     }
 }
@@ -238,7 +238,7 @@ static inline pvid_reason end_tick(pvid_weak_q31 *self, const int32_t reading[])
     if (self->collect.front.wait == 0u) {
         return after(self, end_step(self, reading));
     }
-    const uint32_t rested = self->rest;
+    const uint8_t rested = self->rest;
     return (rested == BUSY) ? work(self) : (pvid_reason)rested;
 }
 

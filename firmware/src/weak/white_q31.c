@@ -95,7 +95,7 @@ void pvid_weak_white_invert_q31(pvid_weak_white_q31 *self, pvid_scaled_q31 least
 {
     for (size_t h = first; h < last; h++) {
         const bool is_less = pvid_scaled_exceeds_q31(least, self->scale[h]);
-        self->scale[h] = pvid_weak_inverse_root_q31(is_less ? least : self->scale[h]);
+        self->scale[h] = pvid_inverse_root_q31(is_less ? least : self->scale[h]);
     }
 }
 

@@ -34,7 +34,7 @@ void pvid_weak_white_invert_q31(pvid_weak_white_q31 *self, pvid_scaled_q31 least
 static inline int32_t pvid_weak_white_times_q31(int32_t weight, size_t h)
 {
     const uint32_t up = 30u - pvid_byte_length_q31(h);
-    return (int32_t)pvid_floor_shift_q31(pvid_product_q31(weight, (int32_t)((uint32_t)h << up)), 30);
+    return (int32_t)pvid_floor_shift_q31(pvid_short_product_q31(weight, (int32_t)((uint32_t)h << up)), 30);
 }
 
 /* The exponent of 1 / sqrt(D_h) behind `order` of them. */
@@ -52,7 +52,7 @@ static inline size_t pvid_weak_mirrors_q31(const pvid_weak_design_q31 *design)
 /* Makes the reflection `place`, counted from 0: those of the real parts, then those of the imaginary parts. */
 void pvid_weak_white_mirror_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, size_t place);
 
-/* A column [K + n] of at most PVID_WEAK_COLUMN_BITS_Q31 bits to its K white rows. */
+/* A block [K + n] to its K white rows. */
 void pvid_weak_white_remove_q31(const pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, int32_t column[]);
 
 #endif

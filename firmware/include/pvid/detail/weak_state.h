@@ -2,6 +2,7 @@
 #ifndef PVID_DETAIL_WEAK_STATE_H
 #define PVID_DETAIL_WEAK_STATE_H
 
+#include "pvid/detail/weak_counts.h"
 #include "pvid/weak.h"
 
 /* Steps that are added to the sums together. */
@@ -30,27 +31,6 @@ typedef struct {
     float line[PVID_MAX_RING]; /* a and b of each signal; D a - b of the block before; outputs [2 half + 1][signals],
                                   twice */
 } pvid_weak_front_f32;
-
-/* Sizes of the next struct's arrays, at least 1: those of a build for one model, or enough for any. */
-#if PVID_EXACT
-#define PVID_WEAK_VALUES (PVID_EXACT_GAINS + PVID_EXACT_INTEGRANDS)
-#else
-#define PVID_WEAK_VALUES (PVID_MAX_CHANNELS + PVID_MAX_INTEGRANDS)
-#endif
-#if !PVID_EXACT
-#define PVID_WEAK_RUNS PVID_MAX_INTEGRANDS
-#elif PVID_EXACT_RUNS > 0
-#define PVID_WEAK_RUNS PVID_EXACT_RUNS
-#else
-#define PVID_WEAK_RUNS 1
-#endif
-#if !PVID_EXACT
-#define PVID_WEAK_SIGNS PVID_MAX_INTEGRANDS
-#elif PVID_EXACT_SIGNS > 0
-#define PVID_WEAK_SIGNS PVID_EXACT_SIGNS
-#else
-#define PVID_WEAK_SIGNS 1
-#endif
 
 /* From the jets of a step to the values of its channels, two steps later. */
 typedef struct {

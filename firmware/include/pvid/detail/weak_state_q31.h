@@ -2,6 +2,7 @@
 #ifndef PVID_DETAIL_WEAK_STATE_Q31_H
 #define PVID_DETAIL_WEAK_STATE_Q31_H
 
+#include "pvid/detail/weak_counts.h"
 #include "pvid/weak_q31.h"
 
 /* Steps that are added to the sums together. */
@@ -27,10 +28,10 @@ typedef struct {
 typedef struct {
     uint8_t known;                     /* steps since the restart, 0..4 */
     int32_t now[PVID_MAX_INPUTS];      /* inputs of `values` at the step before the newest; runs and signs last */
-    int32_t rate[PVID_MAX_INPUTS];     /* derivatives of the runs there */
-    int32_t v[2][PVID_MAX_INPUTS];     /* arguments of sgn there and at the step before */
-    int64_t run[PVID_MAX_INPUTS];      /* twice the sum of the derivatives of the runs up to there, by trapezoids */
-    int32_t gain[PVID_MAX_CHANNELS];   /* at the step before that */
+    int32_t rate[PVID_WEAK_RUNS];      /* derivatives of the runs there */
+    int32_t v[2][PVID_WEAK_SIGNS];     /* arguments of sgn there and at the step before */
+    int64_t run[PVID_WEAK_RUNS];       /* twice the sum of the derivatives of the runs up to there, by trapezoids */
+    int32_t gain[PVID_WEAK_GAINS];     /* at the step before that */
     int32_t f[3][PVID_MAX_INTEGRANDS]; /* integrands there and at the two steps before it, latest first */
     int32_t once[PVID_MAX_INTEGRANDS]; /* integrals since the start of the half [dt/24], [dt^2/48] */
     int32_t twice[PVID_MAX_INTEGRANDS];
@@ -190,7 +191,7 @@ typedef struct {
 struct pvid_weak_q31 {
     const pvid_weak_design_q31 *design;
     const int32_t *drive_min;
-    uint32_t rest; /* reason of a tick that ends no step and has no work; 255: there is work */
+    uint8_t rest;  /* reason of a tick that ends no step and has no work; 255: there is work */
     uint8_t plain; /* samples, if each is a signal; else 0 */
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */

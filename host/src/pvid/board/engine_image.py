@@ -1,4 +1,4 @@
-"""The replay image of the weak engine with a shipped mechanism, in either arithmetic."""
+"""The replay image of the weak engine with a shipped mechanism, in either arithmetic, on a run long enough to count."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def engine_image(board: Board, model: str, core: Core) -> EngineImage:
 
 
 def _in_float(board: Board, model: str) -> EngineImage:
-    run = mechanism_run(model)
+    run = mechanism_run(model, long=True)
     return EngineImage(*build_mechanism_image(board, run), run.name, run.measure_from)
 
 
 def _in_fixed_point(board: Board, model: str) -> EngineImage:
-    run = fixed_run(model)
+    run = fixed_run(model, long=board.toolchain != "avr")  # which has no larger arrays than 32 kB
     return EngineImage(*build_fixed_image(board, run), run.name, run.measure_from)
 
 

@@ -30,6 +30,7 @@ from pvid.settings.weak import WeakConfig
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin import fnv
+from pvid.twin.trust import EARLY_WINDOWS
 from pvid.twin.weak import WeakTwin
 
 Float32 = npt.NDArray[np.float32]
@@ -37,6 +38,7 @@ Float32 = npt.NDArray[np.float32]
 MISSING = int(np.iinfo(np.int32).min)  # marks a missing sample
 MADE_BY = "pvid.board.mechanism_image"
 PERIODS = 3  # half windows whose ticks are counted
+LONG_PERIODS = 16  # the same of a long run; the noise is computed anew once in as many
 _COUNTS = 2**22  # of a signal without a resolution, over its largest value; a float holds such a count exactly
 
 
@@ -50,7 +52,7 @@ class MechanismRun:
     config : of the float engine
     counts : int32 [ticks, samples]; a sample is float32(count) * lsb, rounded once, on the board and here
     lsb : float32 [samples]
-    measure_from : first tick that counts in the mean cost of a tick; whole half windows follow
+    measure_from : first tick that counts in the mean cost of a tick; PERIODS half windows follow, or LONG_PERIODS
     """
 
     compiled: CompiledModel
@@ -71,9 +73,22 @@ class MechanismRun:
         return np.where(self.counts == MISSING, np.float32(np.nan), values).astype(np.float32, copy=False)
 
 
+def long_run(first: int, period: int, available: int) -> int:
+    """Ticks of a run to count in: the first window, those that have several steps of p, and LONG_PERIODS half windows
+    of one step each, or as many as there are samples."""
+    return first + min(EARLY_WINDOWS + LONG_PERIODS, max(available - first, 0) // period) * period
+
+
+def measured_from(first: int, period: int, ticks: int) -> int:
+    """The first tick that counts in such a run, or in a shorter one."""
+    whole = max((ticks - first) // period, 0)
+    counted = LONG_PERIODS if whole > LONG_PERIODS else min(whole, PERIODS)
+    return ticks - counted * period if whole else ticks // 2
+
+
 @cache
-def mechanism_run(name: str, ticks: int | None = None) -> MechanismRun:
-    """The shipped rig of a mechanism; `ticks`: by default the first window, and then half windows enough to count.
+def mechanism_run(name: str, ticks: int | None = None, *, long: bool = False) -> MechanismRun:
+    """The shipped rig of a mechanism; `ticks`: by default the first window and PERIODS half windows, or a `long_run`.
 
     Raises
     ------
@@ -83,8 +98,10 @@ def mechanism_run(name: str, ticks: int | None = None) -> MechanismRun:
     compiled = mechanisms.compiled_of(name)
     config = config_for_simulated_rig(compiled)
     period = config.design.hop * config.design.decimation
-    wanted = config.ticks_needed + PERIODS * period if ticks is None else ticks
     samples = samples_of(config, RigSimulation.of(compiled, simulated_rig(compiled.name)).run())
+    wanted = config.ticks_needed + PERIODS * period if ticks is None else ticks
+    if long:
+        wanted = long_run(config.ticks_needed, period, len(samples))
     if len(samples) < wanted:
         raise PvidError(f"the run of {name} has {len(samples)} samples, too few for {wanted}")
     resolution = {one.name: one.resolution for one in compiled.signals}
@@ -94,8 +111,7 @@ def mechanism_run(name: str, ticks: int | None = None) -> MechanismRun:
     ]
     lsb = np.asarray(steps, np.float32)
     counts = np.rint(samples[:wanted].astype(np.float64) / lsb).astype(np.int32)
-    whole = max((wanted - config.ticks_needed) // period, 0)
-    return MechanismRun(compiled, config, counts, lsb, wanted - whole * period if whole else wanted // 2)
+    return MechanismRun(compiled, config, counts, lsb, measured_from(config.ticks_needed, period, wanted))
 
 
 def native_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
@@ -110,7 +126,10 @@ def twin_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
 
 def header(run: MechanismRun) -> str:
     """replay_run.h."""
-    rows = ["    {" + ", ".join(map(str, row)) + "}," for row in run.counts.tolist()]
+    narrow, missing = np.iinfo(np.int16), run.counts == MISSING
+    short = bool(np.abs(np.where(missing, 0, run.counts)).max() <= narrow.max)
+    mark, count = (int(narrow.min), "int16_t") if short else (MISSING, "int32_t")
+    rows = ["    {" + ", ".join(map(str, row)) + "}," for row in np.where(missing, mark, run.counts).tolist()]
     lsb = ", ".join(map(float_literal, run.lsb))
     return "\n".join(
         [
@@ -129,7 +148,7 @@ def header(run: MechanismRun) -> str:
             "#define REPLAY_STEP pvid_weak_step_f32",
             "#define REPLAY_HASH pvid_fnv_estimator_f32",
             "#define REPLAY_SAMPLE float",
-            "#define REPLAY_COUNT int32_t",
+            f"#define REPLAY_COUNT {count}",
             f"#define REPLAY_CHANNELS {run.counts.shape[1]}u",
             "#define REPLAY_FAULTS pvid_arithmetic_faults_f32()",
             "#define REPLAY_IS_FLOAT 1",
@@ -137,12 +156,12 @@ def header(run: MechanismRun) -> str:
             f"#define REPLAY_TICKS {len(run.counts)}u",
             f"#define REPLAY_MEASURE_FROM {run.measure_from}u",
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
-            f"#define REPLAY_MISSING ({MISSING + 1} - 1)",
+            f"#define REPLAY_MISSING ({mark + 1} - 1)",
             f"#define replay_config {run.name}_config_f32",
             "",
             f"static const float replay_lsb[REPLAY_CHANNELS] = {{{lsb}}};",
             "/* [tick][sample] in steps of these */",
-            f"static const int32_t replay_samples[REPLAY_TICKS][{run.counts.shape[1]}] = {{",
+            f"static const REPLAY_COUNT replay_samples[REPLAY_TICKS][{run.counts.shape[1]}] = {{",
             *rows,
             "};",
             "",

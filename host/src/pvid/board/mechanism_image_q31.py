@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
-from pvid.board.mechanism_image import PERIODS, build_with
+from pvid.board.mechanism_image import PERIODS, build_with, long_run, measured_from
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
 from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.models import mechanisms
@@ -32,7 +32,7 @@ class FixedRun:
     ----------
     engine : settings and tables
     counts : int32 [ticks, samples]
-    measure_from : first tick that counts in the mean cost of a tick; whole half windows follow
+    measure_from : as in MechanismRun
     """
 
     engine: FixedEngine
@@ -51,8 +51,8 @@ class FixedRun:
 
 
 @cache
-def fixed_run(name: str, ticks: int | None = None) -> FixedRun:
-    """The shipped rig of a mechanism; `ticks`: by default the first window, and then half windows enough to count.
+def fixed_run(name: str, ticks: int | None = None, *, long: bool = False) -> FixedRun:
+    """The shipped rig of a mechanism; `ticks` and `long` as in mechanism_run.
 
     Raises
     ------
@@ -62,12 +62,13 @@ def fixed_run(name: str, ticks: int | None = None) -> FixedRun:
     compiled = mechanisms.compiled_of(name)
     engine = engine_for_simulated_rig(compiled)
     period = engine.config.design.hop * engine.config.design.decimation
-    wanted = engine.ticks_needed + PERIODS * period if ticks is None else ticks
     counts = engine.counts_of(simulated_run_of(compiled)[0])
+    wanted = engine.ticks_needed + PERIODS * period if ticks is None else ticks
+    if long:
+        wanted = long_run(engine.ticks_needed, period, len(counts))
     if len(counts) < wanted:
         raise PvidError(f"the run of {name} has {len(counts)} samples, too few for {wanted}")
-    whole = max((wanted - engine.ticks_needed) // period, 0)
-    return FixedRun(engine, counts[:wanted], wanted - whole * period if whole else wanted // 2)
+    return FixedRun(engine, counts[:wanted], measured_from(engine.ticks_needed, period, wanted))
 
 
 def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:

@@ -57,8 +57,9 @@ def fitted_sizes_q31(config: WeakConfigQ31, n_p: int, n_c: int) -> dict[str, int
     }
     if found != needed:
         return fitted
-    counts = {"signals": len(model.signal), "jets": len(model.jet), "integrands": model.integrands}
-    return fitted | _exact(counts | {"runs": model.runs, "signs": model.signs}, model.channel)
+    counts = {"signals": len(model.signal), "jets": len(model.jet)}
+    counts |= {one: int(getattr(model, one)) for one in ("runs", "signs", "gains", "integrands")}
+    return fitted | _exact(counts, model.channel)
 
 
 def _shares_place(config: WeakConfig) -> bool:

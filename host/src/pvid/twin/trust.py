@@ -17,7 +17,7 @@ Candidate = npt.NDArray[np.void]
 SHORT, LONG, LONG_MEMORY = 8, 16, 4096
 _FADE_GROUPS = 4
 _COUNT_MAX = 0xFFFF
-_EARLY_WINDOWS = 8
+EARLY_WINDOWS = 8
 
 
 class TrustTwin(ABC):
@@ -64,7 +64,7 @@ class TrustTwin(ABC):
 
     def steps(self, iterations: int) -> int:
         """Gauss-Newton steps of the present window: pvid_weak_steps of steps.h."""
-        return iterations if self.groups < _EARLY_WINDOWS else 1
+        return iterations if self.groups < EARLY_WINDOWS else 1
 
     def place(self) -> None:
         """Publishes the start again."""

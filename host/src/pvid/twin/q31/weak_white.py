@@ -13,13 +13,12 @@ import numpy.typing as npt
 
 from pvid.settings.weak_q31 import WeakDesignQ31
 from pvid.twin.q31.integer import Int, bit_length, round_shift
-from pvid.twin.q31.scaled import Scaled, pick, scaled
+from pvid.twin.q31.scaled import Scaled, inverse_root, pick, scaled
 
-_COLUMN_BITS = 27
+_BITS, _MANY = 26, 43  # of a column's largest entry; entries with which it has a bit less
 _SUM_BITS = 30  # of the sums of a channel
 _PRODUCT_DOWN = 33
 _NONE = -(2**31)  # exponent where there is no term
-_NEWTON_STEPS = 4
 _FLOOR_BITS = 33
 _LEAST_EXPONENT = -200
 _KEPT_BITS = 20
@@ -30,19 +29,8 @@ _ONE = 1 << 30
 def block(x: Int) -> tuple[Int, Int]:
     """Entries [n, lanes] as a block: (x, exponent [lanes])."""
     longest = bit_length(np.bitwise_or.reduce(np.abs(x), axis=0))
-    exponent = np.where(longest > 0, longest - _COLUMN_BITS, 0)
+    exponent = np.where(longest > 0, longest - (_BITS if len(x) <= _MANY else _BITS - 1), 0)
     return (x >> np.maximum(exponent, 0)) << np.maximum(-exponent, 0), exponent
-
-
-def inverse_root(x: Scaled) -> Scaled:
-    """1 / sqrt(x), x > 0, by Newton's method."""
-    odd = x.e & 1
-    m, exponent = x.m >> odd, x.e + 30 + odd
-    y = 1181116006 - 5 * (m >> 3)
-    for _ in range(_NEWTON_STEPS):
-        part = (m * ((y * y) >> 30)) >> 30
-        y = (y * (3 * 2**28 - part)) >> 29
-    return Scaled(y, -(exponent // 2) - 29)
 
 
 def mirror_of(x: Int) -> Int:
