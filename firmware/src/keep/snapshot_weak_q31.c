@@ -32,7 +32,6 @@ static const uint32_t layout[] = {
     PLACE(finish.scores),
     PLACE(finish.work),
     PLACE(finish.work.rows.parts),
-    PLACE(finish.candidate),
     PLACE(estimator),
     PLACE(estimator.p),
     PLACE(estimator.counters),

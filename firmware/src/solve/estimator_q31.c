@@ -217,7 +217,7 @@ void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31
         return;
     }
     pvid_estimator_solve_q31 solve;
-    pvid_estimator_begin_assessment_q31(self, &solve, estimate);
+    pvid_estimator_begin_assessment_q31(self, &solve);
     bool done = false;
     for (uint16_t left = pvid_estimator_assessment_stages_q31(self); (left > 0u) && !done; left--) {
         done = pvid_estimator_assess_advance_q31(self, &solve, estimate);

@@ -18,9 +18,10 @@ static inline void pvid_weak_scores_skip_q31(pvid_weak_scores_q31 *self)
 void pvid_weak_scores_add_q31(pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
                               const pvid_estimator_solve_q31 *solve, int64_t variance_ratio);
 
-/* Standard error of p[a] from the scatter, for an assessment whose matrix could be factored. rows: of a score. */
-int32_t pvid_weak_scores_error_q31(const pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
-                                   const pvid_estimator_solve_q31 *assessment, size_t a,
-                                   const pvid_estimate_q31 *estimate, uint32_t rows);
+/* Widens the standard errors of p[first..last - 1] to those from the scatter, if these are larger, behind an assessment
+ * whose matrix could be factored. rows: of a score. */
+void pvid_weak_scores_widen_q31(const pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
+                                const pvid_estimator_solve_q31 *assessment, uint32_t rows, size_t first, size_t last,
+                                pvid_estimate_q31 *estimate);
 
 #endif

@@ -39,7 +39,7 @@ enum {
     STAGE_SOLVE,   /* `iterations` solves, several stages each */
     STAGE_MEAN,    /* the score to the means; this and CLUSTER do nothing if no solve was due */
     STAGE_ASSESS,  /* several stages */
-    STAGE_CLUSTER, /* n_p times: standard error of a parameter from the scatter of the scores */
+    STAGE_CLUSTER, /* standard errors of a few parameters from the scatter of the scores */
     STAGE_JUDGE,   /* trust_q31.h publishes the estimate or holds it */
     STAGE_IDLE = PVID_WEAK_IDLE_Q31
 };
@@ -50,6 +50,8 @@ enum {
 #define UNITS_PER_STAGE 4u
 #define SHARES_PER_STAGE 1u
 #define RESIDUALS_PER_STAGE 4u
+#define FORMATS_PER_STAGE 2u
+#define CLUSTERS_PER_STAGE 2u
 
 /* Windows after which the noise and what whitens it are computed anew, and relative step of p behind which they are at
  * once: 2^-7, Q22. */
@@ -336,12 +338,16 @@ static bool project_stage(pvid_weak_q31 *self)
 static bool format_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    const size_t place = finish->index;
-    const size_t thetas = kind_of(self)->thetas;
-    const int32_t bits = (place < thetas) ? finish->n_bits[finish->theta + place] : finish->y_bits;
-    pvid_weak_columns_format_q31(&finish->work.rows.parts.columns, place, finish->live, self->design->functions, bits);
-    finish->index++;
-    return finish->index <= thetas;
+    const size_t columns = (size_t)kind_of(self)->thetas + 1u;
+    const size_t end = lesser((size_t)finish->index + FORMATS_PER_STAGE, columns);
+    for (size_t place = finish->index; place < end; place++) {
+        const bool is_y = (place + 1u) == columns;
+        const int32_t bits = is_y ? finish->y_bits : finish->n_bits[finish->theta + place];
+        pvid_weak_columns_format_q31(&finish->work.rows.parts.columns, place, finish->live, self->design->functions,
+                                     bits);
+    }
+    finish->index = (uint16_t)end;
+    return end < columns;
 }
 
 /* The columns of theta in row k of the kind. */
@@ -534,24 +540,25 @@ static uint32_t rows_of(const pvid_weak_q31 *self)
     return rows * self->estimator.divider;
 }
 
-/* The larger of the two standard errors of a parameter. */
-PVID_COLD static void cluster_stage(pvid_weak_q31 *self)
+/* Returns whether there are more parameters. */
+PVID_COLD static bool cluster_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    const size_t a = finish->index;
-    if ((finish->reason == PVID_ACCUMULATED) || !finish->work.solve.now.system.factor.positive) {
-        return;
+    const size_t n_p = self->estimator.model->n_p;
+    const size_t end = lesser((size_t)finish->index + CLUSTERS_PER_STAGE, n_p);
+    if ((finish->reason != PVID_ACCUMULATED) && finish->work.solve.now.system.factor.positive) {
+        pvid_weak_scores_widen_q31(&finish->scores, &self->estimator, &finish->work.solve, rows_of(self), finish->index,
+                                   end, &finish->work.solve.matrix.estimate);
     }
-    const int32_t se = pvid_weak_scores_error_q31(&finish->scores, &self->estimator, &finish->work.solve, a,
-                                                  &finish->candidate, rows_of(self));
-    finish->candidate.se[a] = (se > finish->candidate.se[a]) ? se : finish->candidate.se[a];
+    finish->index = (uint16_t)end;
+    return end < n_p;
 }
 
 static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
     *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
-                                   finish->work.solve.above_noise, finish->rss, &finish->candidate);
+                                   finish->work.solve.above_noise, finish->rss, &finish->work.solve.matrix.estimate);
 }
 
 /* ---- the order of the stages ---- */
@@ -668,19 +675,18 @@ void pvid_weak_finish_step_q31(pvid_weak_q31 *self, pvid_reason *reason)
     case STAGE_MEAN:
         mean_stage(self);
         finish->stage = STAGE_ASSESS;
-        pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve, &finish->candidate);
+        pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve);
         finish->work.solve.keeps_matrix = keeps_matrix(self);
         break;
     case STAGE_ASSESS:
-        if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->work.solve, &finish->candidate)) {
+        if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->work.solve,
+                                              &finish->work.solve.matrix.estimate)) {
             finish->stage = STAGE_CLUSTER;
             finish->index = 0;
         }
         break;
     case STAGE_CLUSTER:
-        cluster_stage(self);
-        finish->index++;
-        if (finish->index == self->estimator.model->n_p) {
+        if (!cluster_stage(self)) {
             finish->stage = STAGE_JUDGE;
         }
         break;
@@ -723,8 +729,9 @@ static uint32_t stages_of_kind(const pvid_weak_q31 *self, const pvid_weak_kind *
         self->finish.known.used
             ? ((uint32_t)pvid_weak_mirrors_q31(design) + stages_of(harmonics, SHARES_PER_STAGE) + 2u + design->n_noise)
             : 0u;
-    return noise + stages_of_columns(design) + (uint32_t)columns_of(kind) + (uint32_t)project + kind->thetas + 1u +
-           stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
+    return noise + stages_of_columns(design) + (uint32_t)columns_of(kind) + (uint32_t)project +
+           stages_of((size_t)kind->thetas + 1u, FORMATS_PER_STAGE) + stages_of(rows, RESIDUALS_PER_STAGE) +
+           PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
 }
 
 uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self)
@@ -740,7 +747,7 @@ uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self)
 uint32_t pvid_weak_finish_stages_q31(const pvid_weak_q31 *self)
 {
     const pvid_weak_model_q31 *model = self->design->model;
-    uint32_t stages = 2u + self->estimator.model->n_p; /* MEAN, JUDGE; CLUSTER */
+    uint32_t stages = 2u + stages_of(self->estimator.model->n_p, CLUSTERS_PER_STAGE); /* MEAN, JUDGE */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }

@@ -144,16 +144,21 @@ typedef struct {
 /* Products of two parameters. */
 #define PVID_WEAK_PAIRS_Q31 ((PVID_MAX_P * (PVID_MAX_P + 1)) / 2)
 
-/* Mean products of the scores of windows (of all windows between two solves), of one with itself and with the one
- * before. A score is C^T (sum N e); that of p[a] is an integer within 2^13 times 2^unit[a]. */
+/* Mean products of two scores: of one window, and of neighbours both ways. */
+typedef struct {
+    int32_t same;
+    int32_t neighbour;
+} pvid_weak_pair_q31;
+
+/* The scores C^T (sum N e) of windows, or of all windows between two solves: that of p[a] is an integer within 2^13
+ * times 2^unit[a]. */
 typedef struct {
     uint16_t windows; /* in the means */
     bool known;       /* the window before has a score */
     int16_t unit[PVID_MAX_P];
     int16_t before[PVID_MAX_P];
-    int32_t residual;                  /* mean of their variance ratios, Q12 */
-    int32_t same[PVID_WEAK_PAIRS_Q31]; /* upper triangle, row by row */
-    int32_t neighbour[PVID_WEAK_PAIRS_Q31];
+    int32_t residual;                             /* mean of their variance ratios, Q12 */
+    pvid_weak_pair_q31 pair[PVID_WEAK_PAIRS_Q31]; /* upper triangle, row by row */
 } pvid_weak_scores_q31;
 
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
@@ -184,7 +189,6 @@ typedef struct {
     pvid_weak_white_q31 white[PVID_MAX_KINDS]; /* at the p of one of the last windows */
     pvid_weak_scores_q31 scores;
     pvid_weak_work_q31 work;
-    pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_weak_finish_q31;
 
 /* Only the functions of weak_q31.h write to it. */

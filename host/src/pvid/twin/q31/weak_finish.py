@@ -27,6 +27,8 @@ _ROOTS_PER_STAGE = 4
 _UNITS_PER_STAGE = 4
 _RESIDUALS_PER_STAGE = 4
 _SHARES_PER_STAGE = 1
+_FORMATS_PER_STAGE = 2
+_CLUSTERS_PER_STAGE = 2
 _NOISE_WINDOWS = 16
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
@@ -64,8 +66,7 @@ def _stages_before_gate(design: WeakDesignQ31, kind: WeakKind, live: int = 0) ->
         + harmonics
         + kind.columns
         + project
-        + kind.thetas
-        + 1
+        + _parts(kind.thetas + 1, _FORMATS_PER_STAGE)
         + _parts(design.functions - live, _RESIDUALS_PER_STAGE)
     )
 
@@ -87,7 +88,7 @@ def number_of_stages(design: WeakDesignQ31, iterations: int, estimator: Estimato
     """Of a window, at most."""
     rows = sum(_stages_of_kind(design, kind, uses_noise) for kind in design.model.kind)
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
-    return rows + solves + estimator.assessment_stages + 2 + estimator.model.n_p
+    return rows + solves + estimator.assessment_stages + 2 + _parts(estimator.model.n_p, _CLUSTERS_PER_STAGE)
 
 
 def _rows(made: weak_white.Columns, first: int, n_bits: Sequence[int], y_bits: int) -> tuple[Int, Int]:
@@ -243,7 +244,7 @@ def stages(
     size = noise.size = estimator.size
     ratio = _ratio(estimator.group_rss, free, sensors).fixed(_VARIANCE_RATIO_BITS)
     scores.add(estimator, ratio)
-    for _ in range(1 + estimator.assessment_stages + estimator.model.n_p):
+    for _ in range(1 + estimator.assessment_stages + _parts(estimator.model.n_p, _CLUSTERS_PER_STAGE)):
         yield None
     candidate, above_noise = estimator.judged()
     if estimator.was_due:

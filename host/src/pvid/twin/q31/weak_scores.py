@@ -12,7 +12,7 @@ from pvid.twin.q31.scaled import Scaled
 _DIGITS, _FIRST_DIGITS = 13, 10
 _LEAST_SQUARE = 2**18
 _SCORE_MAX, _MEAN_MAX = 2**13, 2**27
-_Z_DOWN = 15
+_Z_DOWN, _WINDOWS_BITS = 15, 8
 _WINDOWS_MAX, _MOST = 0xFFFF, 2**31 - 1
 _FAR_BELOW = 20
 _STATE = ("windows", "known", "unit", "before", "residual", "same", "neighbour")
@@ -64,9 +64,9 @@ class Scores:
         anew = residual * _FAR_BELOW < self.residual
         for name in _STATE:
             setattr(self, name, np.where(anew, 0, getattr(self, name)))
-        fading = (2**31 - estimator.retention) * estimator.divider
+        fading = (2**31 - estimator.retention) // estimator.block * estimator.divider
         newest = (2**32 - 1) // (self.windows + 2)
-        weight = np.minimum(np.maximum(newest, fading // estimator.block), _MOST)
+        weight = np.maximum(newest, np.minimum(fading, _MOST))
         self.residual = self.residual + times_q31(residual - self.residual, weight)
         own = np.stack([self._own(a, Scaled(*(x[a] for x in estimator.score))) for a in range(len(self.unit))])
         for a, b in zip(*np.triu_indices(len(own)), strict=True):
@@ -102,7 +102,7 @@ class Scores:
     def widen(self, candidate: npt.NDArray[np.void], estimator: EstimatorQ31, rows: int) -> None:
         """The larger of the two standard errors of each parameter of estimates [lanes]; rows: of a score."""
         inverse = estimator.inverse
-        weight = np.minimum(candidate["weight"].astype(np.int64), _MOST)
+        windows = np.minimum((candidate["weight"].astype(np.int64) << _WINDOWS_BITS) // rows, _MOST)
         n_p = len(self.unit)
         exponent = inverse.e + self.unit
         largest = exponent.max(axis=0)
@@ -110,14 +110,14 @@ class Scores:
         for a in range(n_p):
             correlation = candidate["correlation"][:, a, :n_p].T.astype(np.int64)
             z = np.where(down < 32, upper_product(correlation, inverse.r) >> np.minimum(down, 31), 0)
-            same, neighbour = np.zeros((2, len(weight)), np.int64)
+            same, neighbour = np.zeros((2, len(windows)), np.int64)
             for b, c in zip(*np.triu_indices(n_p), strict=True):
                 both = (1 if b == c else 2) * (z[b] * z[c])
                 same = same + upper_product(both, self.same[b, c])
                 neighbour = neighbour + upper_product(both, self.neighbour[b, c])
             total = np.maximum(same + np.maximum(neighbour, 0), 0)
-            square = total * weight // rows
-            own = inverse.error(a, *root_of(square, 2 * (largest + _Z_DOWN + 2) + 32 - 4 * estimator.exponent))
+            of_square = 2 * (largest + _Z_DOWN + 2) + 32 - 4 * estimator.exponent - _WINDOWS_BITS
+            own = inverse.error(a, *root_of(total * windows, of_square))
             se = candidate["se"][:, a]
             candidate["se"][:, a] = np.where(inverse.ok & (total > 0), np.maximum(se, own), se)
 
