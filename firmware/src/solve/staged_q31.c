@@ -57,7 +57,7 @@ PVID_COLD static void project_fresh(const pvid_estimator_q31 *self, pvid_estimat
     }
     largest -= 30;
     for (size_t i = 0; i < model->n_theta; i++) {
-        force[i] = (int32_t)pvid_scale_q31(self->fresh[i], largest + solve->h[i]);
+        force[i] = (int32_t)pvid_clamp_q31(pvid_scale_q31(self->fresh[i], largest + solve->h[i]), PVID_ONE_Q30);
     }
     for (size_t a = 0; a < model->n_p; a++) {
         solve->score[a] = 0;

@@ -74,10 +74,9 @@ static int32_t weight_of(const pvid_weak_scores_q31 *self, const pvid_estimator_
 {
     const pvid_information_q31 *information = &estimator->information;
     const uint32_t fading = (((uint32_t)1 << 31) - (uint32_t)information->retention) / information->block;
-    const uint32_t divider = estimator->divider;
-    const uint32_t least = (fading < ((uint32_t)INT32_MAX / divider)) ? (fading * divider) : (uint32_t)INT32_MAX;
-    const uint32_t newest = UINT32_MAX / ((uint32_t)self->windows + 2u);
-    return (int32_t)((newest > least) ? newest : least);
+    const uint64_t least = (uint64_t)fading * estimator->divider;
+    const uint64_t newest = UINT32_MAX / ((uint32_t)self->windows + 2u);
+    return (int32_t)pvid_clamp_q31((int64_t)((newest > least) ? newest : least), INT32_MAX);
 }
 
 PVID_COLD void pvid_weak_scores_add_q31(pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
@@ -89,7 +88,8 @@ PVID_COLD void pvid_weak_scores_add_q31(pvid_weak_scores_q31 *self, const pvid_e
         memset(self, 0, sizeof *self);
     }
     const int32_t weight = weight_of(self, estimator);
-    self->residual += (int32_t)pvid_times_q31(residual - self->residual, weight);
+    const int64_t mean = self->residual + pvid_times_q31(residual - self->residual, weight);
+    self->residual = (int32_t)pvid_clamp_q31(mean, INT32_MAX);
     int32_t own[PVID_MAX_P];
     for (size_t a = 0; a < n_p; a++) {
         own[a] = own_of(self, n_p, a, solve->score[a], solve->score_exponent[a]);
@@ -139,10 +139,15 @@ PVID_COLD void pvid_weak_scores_widen_q31(const pvid_weak_scores_q31 *self, cons
     const pvid_system_q31 *system = &assessment->now.system;
     const pvid_root_q31 *root = assessment->part.inverse.root;
     int32_t exponent[PVID_MAX_P];
+    uint32_t down[PVID_MAX_P];
     int32_t largest = INT32_MIN;
     for (size_t b = 0; b < n_p; b++) {
         exponent[b] = (root[b].e - (system->f[b] + system->g[b])) + self->unit[b];
         largest = (exponent[b] > largest) ? exponent[b] : largest;
+    }
+    for (size_t b = 0; b < n_p; b++) {
+        const int64_t below = pvid_clamp_q31((int64_t)largest - exponent[b], 31 - Z_DOWN);
+        down[b] = Z_DOWN + (uint32_t)((below > 0) ? below : 0);
     }
     const int32_t unit = (largest + Z_DOWN + 2) - (31 + PVID_UNIT_BITS); /* 2: a correlation has 30 bits, not 32 */
     const int32_t of_square = ((2 * unit) + 32) - (4 * (int32_t)estimator->information.exponent) - WINDOWS_BITS;
@@ -151,9 +156,8 @@ PVID_COLD void pvid_weak_scores_widen_q31(const pvid_weak_scores_q31 *self, cons
     for (size_t a = first; a < last; a++) {
         int32_t z[PVID_MAX_P];
         for (size_t b = 0; b < n_p; b++) {
-            const int32_t down = (largest - exponent[b]) + Z_DOWN;
             const int32_t product = pvid_upper_product_q31(estimate->correlation[a][b], root[b].r);
-            z[b] = (down < 32) ? pvid_floor_shift_32_q31(product, (uint32_t)down) : 0;
+            z[b] = pvid_floor_shift_32_q31(product, down[b]);
         }
         const int32_t sum = scatter_of(self, n_p, z);
         if (sum > 0) {

@@ -106,10 +106,10 @@ class Scores:
         n_p = len(self.unit)
         exponent = inverse.e + self.unit
         largest = exponent.max(axis=0)
-        down = largest - exponent + _Z_DOWN
+        down = _Z_DOWN + np.minimum(largest - exponent, 31 - _Z_DOWN)
         for a in range(n_p):
             correlation = candidate["correlation"][:, a, :n_p].T.astype(np.int64)
-            z = np.where(down < 32, upper_product(correlation, inverse.r) >> np.minimum(down, 31), 0)
+            z = upper_product(correlation, inverse.r) >> down
             same, neighbour = np.zeros((2, len(windows)), np.int64)
             for b, c in zip(*np.triu_indices(n_p), strict=True):
                 both = (1 if b == c else 2) * (z[b] * z[c])
