@@ -53,6 +53,7 @@ static const uint32_t layout[] = {
     PVID_MAX_POWER,
     PVID_MAX_FUNCTIONS,
     PVID_MAX_BLOCKS,
+    PVID_MAX_WINDOWS,
 };
 
 static const pvid_snapshot_pointer pointers[] = {
