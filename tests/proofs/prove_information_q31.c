@@ -20,7 +20,7 @@ static void any_group(const pvid_model_q31 *model)
         sums.sums[i] = any_i64(-SUM_BOUND, SUM_BOUND);
     }
     for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
-        fresh[i] = any_i64(-SUM_BOUND, SUM_BOUND);
+        fresh[i] = any_i64(-2 * SUM_BOUND, 2 * SUM_BOUND);
     }
     sums.exponent = (uint8_t)any_u32(0, 40);
     sums.age = (uint16_t)any_u32(0, sums.block - 1u);
@@ -43,7 +43,7 @@ static void any_group(const pvid_model_q31 *model)
         pvid_information_fade_q31(&sums, part, factor);
     }
     for (size_t i = 0; i < sums.n_theta; i++) {
-        /*@ assert -0x1000000000000000 <= fresh[i] <= 0x1000000000000000; */
+        /*@ assert -0x2000000000000000 <= fresh[i] <= 0x2000000000000000; */
     }
     for (size_t i = 0; i < sums.n_sums; i++) {
         /*@ assert -0x4000000000000000 <= sums.sums[i] <= 0x4000000000000000; */

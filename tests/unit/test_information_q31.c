@@ -123,8 +123,8 @@ static void sums_keep_below_their_limit(void **state)
     assert_int_equal(information.sums[6], information.sums[0]);
     assert_int_equal(information.sums[9], information.sums[0]);
     /* those since the last solve do not fade, and end at the limit */
-    assert_int_equal(fresh[0], PVID_SUM_LIMIT);
-    assert_int_equal(fresh[1], -PVID_SUM_LIMIT);
+    assert_int_equal(fresh[0], 2 * PVID_SUM_LIMIT);
+    assert_int_equal(fresh[1], -2 * PVID_SUM_LIMIT);
     /* nothing more comes in: 2^54 is where they are multiplied again */
     int64_t last = information.sums[0];
     while (information.exponent > 0u) {

@@ -154,7 +154,7 @@ void pvid_information_end_group_q31(pvid_information_q31 *self, const pvid_model
     self->age = (uint16_t)((self->age < self->block) ? self->age : 0u);
     rescale(self, model, fresh);
     for (size_t i = 0; i < self->n_theta; i++) { /* of more groups than the sums may remember */
-        fresh[i] = pvid_clamp_q31(fresh[i], PVID_SUM_LIMIT);
+        fresh[i] = pvid_clamp_q31(fresh[i], 2 * PVID_SUM_LIMIT);
     }
 }
 

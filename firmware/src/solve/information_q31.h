@@ -32,7 +32,7 @@ void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *bloc
                               int64_t fresh[]);
 
 /* Ends a group of rows: forgets when it is time to, and keeps the sums of squares below PVID_SUM_LIMIT and, as far as
- * they were divided before, above 2^54. fresh[n_theta] follows, within PVID_SUM_LIMIT. Call it for part = 0, 1.. of the
+ * they were divided before, above 2^54. fresh[n_theta] follows, within twice that. Call it for part = 0, 1.. of the
  * work. */
 #define PVID_INFORMATION_END_PARTS 2u
 void pvid_information_end_group_q31(pvid_information_q31 *self, const pvid_model_q31 *model, size_t part,

@@ -414,7 +414,7 @@ class EstimatorQ31:
             self.sums[:-1] = scale(self.sums[:-1], change)
             self.fresh = scale(self.fresh, change)
             self.exponent = self.exponent + change // 2
-        self.fresh = clamp(self.fresh, SUM_LIMIT)
+        self.fresh = clamp(self.fresh, HELD_LIMIT)
 
     def _matrix(self, sums: Int) -> Int:
         n = self.model.n_theta
