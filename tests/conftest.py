@@ -37,6 +37,7 @@ SLOW = (
     *("oracle/weak_engine", "core/bad_config", "show/page", "log/untrusted", "bench/campaign_population"),
     *("tools/core_rooms", "tools/docs", "tools/proofs", "tools/loops", "codegen/random", "core/snapshot"),
     "tools/analysis",
+    "cli/design_cost",
 )
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")

@@ -46,9 +46,11 @@ NOT_EXECUTED = (
     (r"^build/venv/bin/python tools/prove\.py", "takes minutes; tests/tools/test_proofs.py executes parts of it"),
     (r"^python3 -m venv|pip install", "tests/tools/test_wheel.py installs the package into a bare environment"),
 )
+# An emulated board, but for what is measured on it.
+ON_THIS_COMPUTER = (r"^(?!.*pvid design )(.*?)\b(mps2-an386|microbit)\b", r"\1stream-host")
 # ---- short forms: pattern, replacement, reason
 SHORT = (
-    (r"\b(mps2-an386|microbit)\b", "stream-host", "tests/board has the emulators; they compute the same bits"),
+    (*ON_THIS_COMPUTER, "tests/board has the emulators; they compute the same bits"),
     (r"--on all\b", "--on stream-host", "the same"),
     (r"/dev/ttyACM0 run", "stream-host board", "a board behind a pseudo-terminal of this machine; run.pvlog exists"),
     (r"(model predict \S+)(?: --duration \d+)?", r"\1 --drive steps --duration 4", "one short drive is enough"),
@@ -247,7 +249,7 @@ def executed(line: str, folder: Path, full: bool) -> Printed:
     if line.startswith("./tools/pvid "):
         line = line if full else short_form(line)
         with contextlib.chdir(folder):
-            return pvid(shlex.split(line.replace("mps2-an386", "stream-host"))[1:])
+            return pvid(shlex.split(re.sub(*ON_THIS_COMPUTER, line))[1:])
     # Three pages build the same package, each in a folder of its own.
     once = {**compiled_once(), "CCACHE_BASEDIR": str(folder)}
     if shutil.which("ccache"):

@@ -12,7 +12,7 @@ from weak_rig import assert_equals_the_twin
 
 from bench.board_engine import FloatBoard
 from bench.hard import CASES, HEADER, LARGEST, ZERO, Case, Outcome, modes, row, run_case
-from pvid.settings.enums import Core
+from pvid.settings.enums import Core, Reason
 from pvid.sim.pendulum import Sensors, simulate, standard_start
 
 SEEDS = 5
@@ -35,7 +35,6 @@ def case(label: str) -> Case:
     [
         "encoder of 8 bits",
         "14 bits, noise of 32 LSB",
-        "start x0.01, angle up to 2.8 LSB, 14 bits",
         "drive x0.1, 12 bits",
     ],
 )
@@ -45,6 +44,14 @@ def test_noise_raises_errors_and_standard_errors(label: str) -> None:
     assert outcome(label).covered.all()
     assert not outcome(label).alarmed.any()
     assert np.median(outcome(label).standard_errors[:, 0]) > 0.003  # 30 times those of the plain 14-bit run
+
+
+def test_an_angle_of_a_few_steps_of_the_encoder_tells_enough_or_is_held() -> None:
+    """Of 20 runs 18 are published, the others held."""
+    found = outcome("start x0.01, angle up to 2.8 LSB, 14 bits")
+    assert found.published.sum() >= SEEDS - 1
+    assert set(found.held) <= {Reason.HELD_UNCERTAIN.text}
+    assert found.covered[found.published].all() and not found.alarmed.any()
 
 
 @pytest.mark.parametrize(

@@ -63,9 +63,9 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "example"
 
 
-@pytest.mark.parametrize(("truth", "largest_se"), [("linear", 2e-3), ("full", 2e-2)])
-def test_program_identifies_the_standard_rig(program: Path, truth: Truth, largest_se: float) -> None:
-    """Where the angles of the full equations are no more small, the scatter of the windows widens the errors."""
+@pytest.mark.parametrize("truth", ["linear", "full"])
+def test_program_identifies_the_standard_rig(program: Path, truth: Truth) -> None:
+    """The standard errors, 1.1 % of g, contain what the linear equations neglect at this rig's angles."""
     run = simulate(truth=truth).run
     samples = "\n".join(f"{y:.9g} {phi:.9g}" for phi, y in zip(run.phi, run.y, strict=True))
     printed = subprocess.run([str(program)], input=samples, capture_output=True, text=True, check=True).stdout
@@ -74,7 +74,7 @@ def test_program_identifies_the_standard_rig(program: Path, truth: Truth, larges
     true_values = np.array([STANDARD_PENDULUM.g, STANDARD_PENDULUM.l2, STANDARD_PENDULUM.rho2])
     errors, standard_errors = np.abs(numbers[::2] - true_values), numbers[1::2]
     assert (errors < 4 * standard_errors).all(), printed
-    assert (standard_errors < largest_se * true_values).all(), printed
+    assert (standard_errors < 2e-2 * true_values).all(), printed
 
 
 def compile_as_cpp(source: str, standard: str, folder: Path) -> None:
@@ -95,11 +95,17 @@ def test_program_is_cpp_too(standard: str, tmp_path: Path) -> None:
     compile_as_cpp(blocks(README)[0], standard, tmp_path)
 
 
-def test_example_of_an_interrupt_compiles(tmp_path: Path) -> None:
+def test_examples_of_both_stages_and_of_an_interrupt_compile(tmp_path: Path) -> None:
     stubs = (
         '#include "pvid/pvid.h"\nfloat read_encoder();\nfloat read_pivot();\nvoid show(const pvid_estimate_f32 *);\n'
     )
-    compile_as_cpp(stubs + blocks(FIRMWARE)[0], "c++20", tmp_path)
+    both, interrupt = blocks(FIRMWARE)[:2]
+    compile_as_cpp(stubs + interrupt, "c++20", tmp_path)
+    settings = (
+        '#include "pvid/refine.h"\n#include "kapitza_design_f32.h"\n'
+        'extern "C" const pvid_refine_config_f32 kapitza_refine_config_f32;\n'
+    )
+    compile_as_cpp(settings + both, "c++20", tmp_path)
 
 
 # ---- the command line

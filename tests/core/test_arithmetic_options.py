@@ -75,7 +75,8 @@ def test_a_cortex_m4f_image_at_gccs_default_standard_has_the_same_bits(
     compiler.parent.mkdir()
     compiler.write_text(
         '#!/bin/bash\nkept=()\nfor one in "$@"; do\n'
-        '  case $one in -std=*|-ffp-contract=*|-fno-fast-math|-fno-delete-null-pointer-checks) ;; *) kept+=("$one") ;; esac\ndone\n'
+        "  case $one in -std=*|-ffp-contract=*|-fno-fast-math|-fno-delete-null-pointer-checks) ;;\n"
+        '  *) kept+=("$one") ;; esac\ndone\n'
         f"echo \"${{kept[@]}}\" >> '{tmp_path}/given'\n"
         f"exec '{shutil.which('arm-none-eabi-gcc')}' \"${{kept[@]}}\"\n",
         encoding="utf-8",

@@ -14,11 +14,12 @@
 #include "pendulum/kapitza_design_f32.h"
 #include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
+#include "pvid/snapshot_refine.h"
 #include "pvid/snapshot_weak_q31.h"
 #include "strong_table_q31.h"
 
 #define LAST_REASON PVID_NOT_READY
-#define ROOM ((size_t)PVID_SNAPSHOT_WEAK_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
+#define ROOM ((size_t)PVID_SNAPSHOT_REFINE_F32 + (size_t)PVID_SNAPSHOT_WEAK_Q31)
 #define MOST_TOLD 20u
 
 static struct {
@@ -43,7 +44,7 @@ static void require(bool holds, const char *what)
     }
 }
 
-/* One of the four identifiers, with whatever configuration it was last given. */
+/* One of the identifiers, with whatever configuration it was last given. */
 typedef struct {
     const char *name;
     void (*configure)(bool sound);
@@ -95,6 +96,12 @@ static void spoil(float *const fields[], size_t n)
     for (uint32_t left = 1u + below(3); left > 0u; left--) {
         *fields[below((uint32_t)n)] = hostile_float();
     }
+}
+
+/* A size for which there are tables, or one that init refuses. */
+static uint8_t any_size(uint8_t own, uint32_t most)
+{
+    return (uint8_t)(one_in(4) ? (most + 1u + below(100)) : below((uint32_t)own + 1u));
 }
 
 static void spoil_estimator_f32(pvid_estimator_config_f32 *config)
@@ -208,8 +215,8 @@ static void configure_weak(bool sound)
         spoil_estimator_f32(&config->estimator);
     }
     spoil_tables();
-    weak.design.functions = one_in(8) ? (uint8_t)below(13) : weak.design.functions;
-    weak.design.power = one_in(8) ? (uint8_t)below(9) : weak.design.power;
+    weak.design.functions = one_in(8) ? any_size(weak.design.functions, PVID_MAX_FUNCTIONS) : weak.design.functions;
+    weak.design.power = one_in(8) ? any_size(weak.design.power, PVID_MAX_POWER) : weak.design.power;
     weak.design.decimation = one_in(8) ? (uint8_t)below(40) : weak.design.decimation;
     weak.design.hop = one_in(8) ? (uint16_t)below((uint32_t)weak.design.hop + 1u) : weak.design.hop;
     weak.design.n_noise = one_in(8) ? (uint16_t)below((uint32_t)weak.design.n_noise + 1u) : weak.design.n_noise;
@@ -281,6 +288,133 @@ static bool weak_has_published(void)
 static void clear_weak(void)
 {
     memset(&weak.self, 0, sizeof weak.self);
+}
+
+/* ---- weak with its refinement, float32 ---- */
+
+static struct {
+    pvid_refine_f32 self;
+    pvid_refine_config_f32 config;
+    pvid_weak_refine_f32 second;
+    pvid_refine_signal_f32 signal[PVID_REFINE_SIGNALS];
+    float second_weights[PVID_REFINE_HALF + 1];
+} refined;
+
+static void spoil_refinement(pvid_refine_config_f32 *config)
+{
+    float *const fields[] = {&config->sample_rate_hz,
+                             &config->sd[0],
+                             &config->prior_sd[below(PVID_REFINE_PARAMETERS)],
+                             &config->gain_sd[below(PVID_REFINE_PARAMETERS)],
+                             &config->state_limit[below(PVID_REFINE_STATES)],
+                             &config->forgetting_s,
+                             &config->outlier_gate,
+                             &config->gate,
+                             &config->chi_max,
+                             &config->clash_max,
+                             &config->step_max,
+                             &config->step_limit,
+                             &config->se_max,
+                             &config->distance,
+                             &refined.signal[below(PVID_REFINE_SIGNALS)].scale,
+                             &refined.signal[below(PVID_REFINE_SIGNALS)].range,
+                             &refined.second_weights[below(PVID_REFINE_HALF + 1)]};
+    if (one_in(2)) {
+        spoil(fields, sizeof fields / sizeof fields[0]);
+    }
+    config->ratio = one_in(4) ? (uint8_t)below(12) : config->ratio;
+    config->block = one_in(8) ? (uint16_t)below(100) : config->block;
+    config->first_block = one_in(8) ? (uint16_t)below(100) : config->first_block;
+    config->passes = one_in(8) ? (uint8_t)below(18) : config->passes;
+    config->most_passes = one_in(8) ? (uint8_t)below(18) : config->most_passes;
+    config->jobs = one_in(8) ? (uint8_t)below(18) : config->jobs;
+    config->rests = one_in(4) ? (uint8_t)any_word() : config->rests;
+    config->second = one_in(16) ? NULL : config->second;
+    refined.signal[0].order = one_in(16) ? (uint8_t)below(4) : refined.signal[0].order;
+    refined.signal[1].sample = one_in(16) ? (uint8_t)below(KAPITZA_WEAK_SAMPLES) : refined.signal[1].sample;
+    refined.signal[0].source = one_in(8) ? (uint8_t)below(3) : refined.signal[0].source;
+}
+
+static void configure_refined(bool sound)
+{
+    static const pvid_refine_signal_f32 signals[PVID_REFINE_SIGNALS] = {
+        {0, 2, PVID_SIGNAL_SAMPLED, 1.0f / 0.3f, 100.0f}, {1, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const float six_steps[PVID_REFINE_HALF + 1] = {-868.0f, [6] = 434.0f};
+    static const pvid_refine_config_f32 fresh = {
+        .sample_rate_hz = 1000.0f,
+        .ratio = 8,
+        .second = refined.second_weights,
+        .signal = refined.signal,
+        .block = 84,
+        .first_block = 22,
+        .passes = 2,
+        .most_passes = 8,
+        .jobs = 3,
+        .rests = 1,
+        .sd = {4.0e-5f},
+        .prior_sd = {0.15f, 0.15f, 0.15f, 0.1f, 0.05f, 0.005f, 0.1f},
+        .state_limit = {3.5f, 3.5f, 60.0f, 60.0f},
+        .outlier_gate = 4.0f,
+        .gate = 8.0f,
+        .chi_max = 3.0f,
+        .clash_max = 25.0f,
+        .step_max = 0.02f,
+        .step_limit = 2.0f,
+        .se_max = 0.01f,
+        .distance = 0.03f,
+    };
+    configure_weak(sound || one_in(2));
+    memcpy(refined.signal, signals, sizeof signals);
+    memcpy(refined.second_weights, six_steps, sizeof six_steps);
+    refined.config = fresh;
+    refined.config.forgetting_s = one_in(3) ? 5.0f : 0.0f;
+    refined.config.outlier_gate = one_in(4) ? 0.0f : 4.0f;
+    if (!sound) {
+        spoil_refinement(&refined.config);
+    }
+    refined.second = (pvid_weak_refine_f32){&pvid_refine_stage_f32, &refined.self, &refined.config};
+    weak.config.refine = &refined.second;
+}
+
+static void check_refined(bool published)
+{
+    pvid_estimate_f32 best;
+    pvid_refine_estimate_f32 copy;
+    uint32_t number;
+    check_weak(published);
+    const pvid_refine_estimate_f32 *estimate = pvid_refine_latest_f32(&refined.self);
+    if ((estimate == NULL) || !one_in(20)) {
+        return;
+    }
+    for (size_t i = 0; i < PVID_REFINE_PARAMETERS; i++) {
+        require(isfinite(estimate->r[i]) && isfinite(estimate->se[i]) && (estimate->se[i] >= 0.0f),
+                "a finite refined estimate");
+        for (size_t j = 0; j < PVID_REFINE_PARAMETERS; j++) {
+            require(isfinite(estimate->covariance[i][j]), "a finite refined covariance");
+        }
+    }
+    require(isfinite(estimate->level) && isfinite(estimate->clash), "a finite level");
+    require(pvid_refine_read_f32(&refined.self, &copy, &number) && (number > 0u) &&
+                (memcmp(&copy, estimate, sizeof copy) == 0),
+            "a read refined estimate is the published one");
+    require((pvid_refine_best_f32(&refined.self, pvid_weak_estimate_f32(&weak.self), &best) == PVID_STAGE_REFINED) &&
+                isfinite(best.p[0]) && isfinite(best.se[0]),
+            "the refined estimate is the best one while it stands");
+}
+
+static size_t save_refined(uint8_t image[], size_t room)
+{
+    return pvid_snapshot_save_refine_f32(&weak.self, &weak.config, any_word(), image, room);
+}
+
+static pvid_snapshot_status restore_refined(const uint8_t image[], size_t length)
+{
+    return pvid_snapshot_restore_refine_f32(&weak.self, &weak.config, image, length);
+}
+
+static bool refined_has_published(void)
+{
+    return refined.self.published > 0u;
 }
 
 /* ---- strong, float32 ---- */
@@ -470,8 +604,8 @@ static void configure_weak_q31(bool sound)
     config->trust.neglected = one_in(4) ? any_size_i32() : config->trust.neglected;
     spoil_tables_q31();
     pvid_weak_design_q31 *design = &weak_q31.design;
-    design->functions = one_in(8) ? (uint8_t)below(13) : design->functions;
-    design->power = one_in(8) ? (uint8_t)below(9) : design->power;
+    design->functions = one_in(8) ? any_size(design->functions, PVID_MAX_FUNCTIONS) : design->functions;
+    design->power = one_in(8) ? any_size(design->power, PVID_MAX_POWER) : design->power;
     design->decimation = one_in(8) ? (uint8_t)below((uint32_t)design->decimation + 1u) : design->decimation;
     design->hop = one_in(8) ? (uint16_t)below((uint32_t)design->hop + 1u) : design->hop;
     design->n_noise = one_in(8) ? (uint16_t)below((uint32_t)design->n_noise + 1u) : design->n_noise;
@@ -633,6 +767,8 @@ static bool publishes_nothing(void)
 static const form forms[] = {
     {"weak f32", configure_weak, init_weak, step_weak, gap_weak, freeze_weak, check_weak, save_weak, restore_weak,
      weak_has_published, clear_weak, 12000},
+    {"refined f32", configure_refined, init_weak, step_weak, gap_weak, freeze_weak, check_refined, save_refined,
+     restore_refined, refined_has_published, clear_weak, 12000},
     {"strong f32", configure_strong, init_strong, step_strong, gap_strong, freeze_strong, check_strong, save_strong,
      restore_strong, publishes_nothing, clear_strong, 6000},
     {"weak q31", configure_weak_q31, init_weak_q31, step_weak_q31, gap_weak_q31, freeze_weak_q31, check_weak_q31,

@@ -3,8 +3,29 @@
 #include <math.h>
 #include <string.h>
 
-static void rate(const double x[4], const double p[2], double g, double dx[4])
+/* Of the full equations, in the angles from the vertical a1, a2 and their rates. */
+static void full_rate(const double x[4], const double p[2], double g, double dx[4])
 {
+    const double l2 = (p[0] - p[1]) - 1.0; /* L2 */
+    const double a2 = x[0] + x[1];
+    const double v2 = x[2] + x[3];
+    const double s = sin(x[1]);
+    const double c = cos(x[1]);
+    const double b1 = (((l2 / p[1]) * s) * (v2 * v2)) - (g * sin(x[0]));
+    const double b2 = (-s * (x[2] * x[2])) - (g * sin(a2));
+    const double det = (1.0 / l2) + (s * s);
+    dx[0] = x[2];
+    dx[1] = x[3];
+    dx[2] = (((1.0 + (1.0 / l2)) * b1) - (c * b2)) / det;
+    dx[3] = (((b2 - (c * b1)) / det) * (p[1] / l2)) - dx[2];
+}
+
+static void rate(bool full, const double x[4], const double p[2], double g, double dx[4])
+{
+    if (full) {
+        full_rate(x, p, g, dx);
+        return;
+    }
     const double l2 = (p[0] - p[1]) - 1.0; /* L2 */
     dx[0] = x[2];
     dx[1] = x[3];
@@ -12,20 +33,20 @@ static void rate(const double x[4], const double p[2], double g, double dx[4])
     dx[3] = (g * x[0]) - ((p[0] - 1.0) * g * x[1]);
 }
 
-void longevity_motion(double x[4], uint32_t ticks, double step, const double p[2], const double w[], const double u[],
-                      double phi[])
+void longevity_motion(bool full, double x[4], uint32_t ticks, double step, const double p[2], const double w[],
+                      const double u[], double phi[])
 {
     for (uint32_t tick = 0; tick < ticks; tick++) {
         double k[4][4];
         double part[4];
         phi[tick] = x[1];
-        rate(x, p, w[tick] + u[2u * tick], k[0]);
+        rate(full, x, p, w[tick] + u[2u * tick], k[0]);
         for (int stage = 1; stage < 4; stage++) {
             const double ahead = (stage == 3) ? step : (0.5 * step);
             for (int i = 0; i < 4; i++) {
                 part[i] = x[i] + (ahead * k[stage - 1][i]);
             }
-            rate(part, p, w[tick] + u[(2u * tick) + ((stage == 3) ? 2u : 1u)], k[stage]);
+            rate(full, part, p, w[tick] + u[(2u * tick) + ((stage == 3) ? 2u : 1u)], k[stage]);
         }
         for (int i = 0; i < 4; i++) {
             x[i] += (step / 6.0) * (k[0][i] + (2.0 * k[1][i]) + (2.0 * k[2][i]) + k[3][i]);

@@ -10,11 +10,11 @@
 #include "rls_f32.h"
 #include "ud_f32.h"
 
-/* Moves the pendulum of theory.md (1) on by `ticks` steps of fourth-order Runge-Kutta and writes phi at the
- * start of each.  x: phi1, phi and their rates;  p: d1, d2;  w[ticks];  u[2 ticks + 1]: at the ends and the middles of
- * steps. */
-void longevity_motion(double x[4], uint32_t ticks, double step, const double p[2], const double w[], const double u[],
-                      double phi[]);
+/* Moves the pendulum of theory.md (1), or of its full equations, on by `ticks` steps of fourth-order Runge-Kutta and
+ * writes phi at the start of each.  x: phi1, phi and their rates;  p: d1, d2;  w[ticks];  u[2 ticks + 1]: at the ends
+ * and the middles of steps. */
+void longevity_motion(bool full, double x[4], uint32_t ticks, double step, const double p[2], const double w[],
+                      const double u[], double phi[]);
 
 /* A recursive estimator of all eleven parameters, behind the strong form's differentiators and rows. */
 typedef struct {

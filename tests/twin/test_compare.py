@@ -13,7 +13,7 @@ from pvid.core.sources import INCLUDES, core_sources, source
 from pvid.settings.bounds import SIZES
 
 MUTANTS = {
-    "strong_f32.c": ("    rhs[0] = g[0] * e;", "    rhs[0] = 1.0000001f * (g[0] * e);"),
+    "strong_f32.c": ("    rhs[0] = own[0];", "    rhs[0] = 1.0000001f * own[0];"),
     "kapitza_estimator_f32.c": ("square = ratio * ratio;", "square = 1.0000001f * (ratio * ratio);"),
     "kapitza_sums_f32.c": (
         "self->low[i] = (kept_high - (total - part)) + (kept_low - part);",

@@ -83,6 +83,35 @@ def test_faults_of_all_kinds() -> None:
     assert Reason.REJECTED_NOT_FINITE in core.reason
 
 
+def wild(given: Float, sizes: tuple[float, float], every: int) -> Float:
+    """With a wild sample of phi or of y, in turn; they fall on every place of a mean."""
+    spoilt = given.copy()
+    hit = np.arange(700, len(given), every)
+    spoilt[hit, np.arange(len(hit)) % 2] += np.where(np.arange(len(hit)) % 4 < 2, 1, -1) * np.resize(sizes, len(hit))
+    return spoilt
+
+
+@pytest.mark.parametrize("gate", [0.0, 2.0, 4.0])
+def test_wild_samples(gate: float) -> None:
+    """1.9 rad and 25 mm every half second: without the gate no block fits."""
+    given = wild(samples(9.0, 2.0), (1.9, 0.025), 501)
+    core = both(given, configuration(outlier_gate=gate), (0.01, -0.01, 0.01))
+    assert (Reason.UPDATED in core.reason) == (gate > 0)
+    if gate > 0:
+        assert np.max(np.abs(core.r[-1, :3] / TRUTH - 1)) < 2e-3
+
+
+def test_jumps_and_kinks_are_no_wild_samples() -> None:
+    """A pivot that reverses sharply, an offset that jumps, motion after standstill: all as without the gate."""
+    given = samples(6.0, 1.0).copy()
+    t = np.arange(len(given)) / 1000.0
+    given[:, 1] += 0.02 * np.abs(np.mod(t, 1.4) - 0.7)
+    given[4000:, 0] += 0.3
+    given[:1500] = given[1500]
+    found = [both(given, configuration(outlier_gate=gate), (0.0, 0.0, 0.0)).hash for gate in (0.0, 4.0)]
+    np.testing.assert_array_equal(*found)
+
+
 def test_a_start_from_which_nothing_converges() -> None:
     core = both(samples(6.0, 2.0), configuration(), (0.6, -0.3, -0.3))
     assert Reason.HELD_SEARCHING in core.reason

@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -319,6 +320,9 @@ static void test_init_refuses(void **state)
     REFUSES(gain_sd[0], nan, PVID_BAD_START_SD);
     REFUSES(state_limit[3], 0.0f, PVID_BAD_BOUNDS);
     REFUSES(forgetting_s, -1.0f, PVID_BAD_FORGETTING);
+    REFUSES(outlier_gate, nan, PVID_BAD_GATE_SIGMAS);
+    REFUSES(outlier_gate, 1.0f, PVID_BAD_GATE_SIGMAS);
+    REFUSES(outlier_gate, -4.0f, PVID_BAD_GATE_SIGMAS);
     REFUSES(gate, nan, PVID_BAD_GATE_SIGMAS);
     REFUSES(chi_max, 0.5f, PVID_BAD_MISFIT_MAX);
     REFUSES(clash_max, nan, PVID_BAD_MISFIT_MAX);
@@ -679,6 +683,83 @@ static void test_rounding_to_counts_leaves_no_bias(void **state)
     assert_true((front.rest[1] >= 0.0f) && (front.rest[1] <= 0.0f));
 }
 
+/* The front end's ring behind tones with a ripple on both signals. A sample of the mean AT of one signal is off by
+ * `error`, and all later samples by `step`; signals are y and phi. */
+#define ENTRIES 200u
+#define AT 150u
+
+static void run_front(pvid_refine_front_f32 *front, float outlier_gate, size_t signal, float error, float step)
+{
+    static const float steps_of_8ms[PVID_REFINE_HALF + 1] = {-31250.0f, 15625.0f};
+    static pvid_refine_config_f32 config;
+    config = good();
+    config.second = steps_of_8ms;
+    config.outlier_gate = outlier_gate;
+    pvid_refine_front_init_f32(front, &config);
+    for (uint32_t i = 0; i < (8u * ENTRIES); i++) {
+        const double t = 0.001 * (double)i;
+        const double ripple = 2.0e-5 * (double)((i * 7919u) % 17u);
+        float sample[2] = {(float)((0.1 * sin(11.0 * t)) + ripple), (float)((0.005 * sin(9.0 * t)) + (0.1 * ripple))};
+        if (i == ((8u * (AT + 1u)) + 3u)) { /* the first mean has no entry */
+            sample[1u - signal] += error;
+        }
+        if (i >= (8u * (AT + 1u))) {
+            sample[1u - signal] += step;
+        }
+        enter(front, &config, sample);
+    }
+}
+
+/* Of the second derivatives [counts]. */
+static int largest_difference(const pvid_refine_front_f32 *front, const pvid_refine_front_f32 *other)
+{
+    int largest = 0;
+    for (uint32_t i = pvid_refine_front_first_f32(front); i < pvid_refine_front_end_f32(front); i++) {
+        const int difference = abs(front->ring[i][0] - other->ring[i][0]);
+        largest = (difference > largest) ? difference : largest;
+    }
+    return largest;
+}
+
+static void test_a_wild_sample_is_left_out(void **state)
+{
+    (void)state;
+    static pvid_refine_front_f32 clean;
+    static pvid_refine_front_f32 front;
+    run_front(&clean, 4.0f, 0u, 0.0f, 0.0f);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        run_front(&front, 4.0f, 1u, (float)sign * 0.05f, 0.0f);
+        for (uint32_t i = clean.behind; i < pvid_refine_front_end_f32(&clean); i++) {
+            const bool beside = (i >= (AT - 1u)) && (i <= (AT + 1u));
+            if (beside) {
+                assert_int_equal(front.ring[i][1], INT16_MIN);
+            } else {
+                assert_true(abs(front.ring[i][1] - clean.ring[i][1]) <= 1); /* what rounding passes on is another */
+            }
+            assert_int_equal(front.ring[i][0], clean.ring[i][0]);
+        }
+    }
+    run_front(&front, 0.0f, 1u, 0.05f, 0.0f);
+    assert_int_not_equal(front.ring[AT][1], INT16_MIN);
+    /* of 1 cm there remains the ripple's part in the cubic through the neighbours */
+    run_front(&front, 4.0f, 0u, 0.01f, 0.0f);
+    const int gated = largest_difference(&front, &clean);
+    run_front(&front, 0.0f, 0u, 0.01f, 0.0f);
+    const int without = largest_difference(&front, &clean);
+    assert_true((gated > 0) && ((50 * gated) < without));
+}
+
+static void test_a_jump_is_no_wild_sample_and_becomes_the_usual(void **state)
+{
+    (void)state;
+    static pvid_refine_front_f32 front;
+    run_front(&front, 4.0f, 1u, 0.0f, 0.2f);
+    for (uint32_t i = 0; i < front.next; i++) {
+        assert_int_not_equal(front.ring[i][1], INT16_MIN);
+    }
+    assert_true((front.usual[1] > 0.5f) && (front.usual[1] < 0.7f)); /* three times the jump */
+}
+
 /* ---- ticks ---- */
 
 /* Ticks of 2000 at which the refinement worked, while the weak form is busy at all but every `period`-th one. */
@@ -756,6 +837,8 @@ int main(void)
         cmocka_unit_test(test_the_best_estimate_is_the_refined_one_while_it_stands),
         cmocka_unit_test(test_a_gap_ends_a_longer_block_of_used_samples),
         cmocka_unit_test(test_rounding_to_counts_leaves_no_bias),
+        cmocka_unit_test(test_a_wild_sample_is_left_out),
+        cmocka_unit_test(test_a_jump_is_no_wild_sample_and_becomes_the_usual),
         cmocka_unit_test(test_a_busy_weak_form_does_not_starve_it),
         cmocka_unit_test(test_it_rests_at_so_many_ticks_in_a_row),
     };

@@ -285,6 +285,30 @@ def bench_strong_mechanisms(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="build-choices")
+@UPDATE
+def bench_build_choices(update: Path | None) -> int:
+    """What each choice of a build of the weak form takes and gives, on the pendulum's shipped rig."""
+    from bench import build_choices
+
+    with progress_bar("builds", len(build_choices.CHOICES)) as advance:
+        rows = list(build_choices.rows_of(progress=advance))
+    put_table(update, "build-choices", markdown(build_choices.HEADER, rows))
+    return DONE
+
+
+@bench.command(name="model-boards")
+@UPDATE
+def bench_model_boards(update: Path | None) -> int:
+    """The weak form of every mechanism on every emulated board, in both cores: its bits and the cost of a tick."""
+    from bench import model_boards
+
+    with progress_bar("boards", len(model_boards.ROWS)) as advance:
+        rows = list(model_boards.rows_of(progress=advance))
+    put_table(update, "model-boards", markdown(model_boards.HEADER, rows))
+    return DONE
+
+
 @bench.command(name="strong-schedules")
 @UPDATE
 def bench_strong_schedules(update: Path | None) -> int:

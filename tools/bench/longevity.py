@@ -22,13 +22,16 @@ import numpy.typing as npt
 
 from bench.longevity_signals import CHUNK, L1, RATE_HZ, Disturbance, Sensing, Signals
 from pvid.base.errors import PvidError
+from pvid.codegen.build import refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core.headers import Filled, Headers, default_library
 from pvid.core.native import Identifier, Native, Publisher
 from pvid.core.sources import PUBLIC_FOLDERS, ROOT
-from pvid.core.weak_native import WeakIdentifier, WeakNative
+from pvid.core.weak_native import RefinedIdentifier, WeakIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
+from pvid.design.refine import refine_config
+from pvid.models.kapitza.refinement import refine_rig, sample_sd
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
 from pvid.run.engine_design import config_for_simulated_rig
@@ -48,6 +51,7 @@ LIBRARY = "liblongevity.so"
 STRIDE = 8  # ticks between the points of the strong form's Savitzky-Golay filters
 STRONG_FORGETTING_S = (0.1, 1.0, 10.0, 100.0, 0.0)
 WEAK_FORGETTING_S = (10.0, 100.0, 0.0)  # a group is a window: below four of them init refuses
+REFINED_FORGETTING_S = (10.0, 0.0)
 PEERS = ("RLS", "UD RLS")
 ENCODER = Sensing()
 EXACT = Sensing(phi_lsb=0.0, y_lsb=0.0, zero=0.0)
@@ -65,14 +69,17 @@ BACK = 3.0  # standard errors
 PATIENCE = 1.0  # of the gate, in times of forgetting, as a rig file has it that does not say
 # What the filters make of the standard rig, relative, of w, d1, d2, and of which the standard errors know nothing: see
 # `filter_bias`; of the weak form with exact samples 0.9e-6, 0.8e-6 and 1.3e-6.
-FILTER_BIAS = {"weak": (1.4e-6, 1.2e-6, 2.0e-6), "strong": (0.0015, 0.0015, 0.0035)}
+FILTER_BIAS = {"weak": (1.4e-6, 1.2e-6, 2.0e-6), "strong": (0.0015, 0.0015, 0.0035), "refined": (0.0, 0.0, 0.0)}
+FAR = 6.0  # standard errors
 
 
 @dataclass(frozen=True)
 class Lane:
-    """One estimator: `kind` weak, strong, RLS or UD RLS; forgetting_s 0: none; of ours in float32 or fixed
-    point, with the outlier gate as a rig file has it that does not say, or without; the strong form with exact sensors
-    or with FINE ones, as in fixed point always."""
+    """One estimator: `kind` weak, refined (both stages), strong, RLS or UD RLS; forgetting_s 0: none.
+
+    Of ours in float32 or fixed point, with the outlier gate as a rig file has it that does not say, or without; the
+    strong form with exact sensors or with FINE ones, as in fixed point always.
+    """
 
     kind: str
     forgetting_s: float
@@ -88,9 +95,14 @@ class Lane:
         return f"{self.kind}{' q31' * (self.core == 'q31')}, {time}{more}"
 
     @property
+    def full(self) -> bool:
+        """The refinement has the full equations, and sees those of small angles as another mechanism."""
+        return self.kind == "refined"
+
+    @property
     def sensing(self) -> Sensing:
         """The weak form takes a 14-bit encoder, the others an exact or a fine one: they need it."""
-        if self.kind == "weak":
+        if self.kind in ("weak", "refined"):
             return ENCODER
         return FINE if self.fine or self.core == "q31" else EXACT
 
@@ -99,6 +111,7 @@ WEAK_LANES = (
     *(Lane("weak", tau) for tau in WEAK_FORGETTING_S),
     *(Lane("weak", tau, gated=False) for tau in (10.0, 0.0)),
 )
+REFINED_LANES = tuple(Lane("refined", tau) for tau in REFINED_FORGETTING_S)
 STRONG_LANES = (
     *(Lane("strong", tau) for tau in STRONG_FORGETTING_S),
     *(Lane("strong", tau, gated=False) for tau in (10.0, 0.0)),
@@ -110,6 +123,7 @@ PEER_LANES = tuple(Lane(kind, tau) for kind in PEERS for tau in STRONG_FORGETTIN
 # What is measured together, by the name of its columns.
 COLUMNS = {
     "weak": WEAK_LANES,
+    "refined": REFINED_LANES,
     "strong": STRONG_LANES,
     "weak-q31": WEAK_Q31_LANES,
     "strong-q31": STRONG_Q31_LANES,
@@ -132,6 +146,8 @@ class Outcome:
     errors : largest error of w, d1, d2 at the end, in its own standard errors, beyond FILTER_BIAS
     told : how the last windows or ticks ended
     disturbed : how they ended in the disturbance, by reason
+    published : estimates of the refinement
+    far : those whose w, d1 or d2 was off by more than FAR of its standard errors at that time
     """
 
     ticks: int = 0
@@ -142,6 +158,8 @@ class Outcome:
     errors: float = float("nan")
     told: str = ""
     disturbed: dict[str, int] = field(default_factory=dict)
+    published: int = 0
+    far: int = 0
 
     @property
     def silent(self) -> bool:
@@ -186,8 +204,9 @@ class _Ours(ABC):
     def look(self) -> tuple[Float, Float]:
         """(w, d1, d2) and their standard errors, as a user sees them."""
 
-    def run(self, phi: Float, y: Float, disturbed: bool) -> None:
-        """One chunk, and a look."""
+    def run(self, phi: Float, y: Float, disturbed: bool, w: Float) -> None:
+        """One chunk, and a look; `w`: the truth at its ticks."""
+        del w
         told, not_finite = self._play(phi, y)
         outcome = self.outcome
         outcome.ticks += len(phi)
@@ -272,6 +291,51 @@ class _WeakInFloat(_Ours):
 
     def look(self) -> tuple[Float, Float]:
         seen = self.identifier.estimate
+        return seen["p"][:3].astype(np.float64), seen["se"][:3].astype(np.float64)
+
+
+class _Refined(_Ours):
+    """Both stages with the compiled pendulum, in float32."""
+
+    identifier: RefinedIdentifier
+
+    def __init__(self, lane: Lane) -> None:
+        super().__init__(lane)
+        compiled = compiled_of("kapitza")
+        _, config = weak_of(replace(lane, kind="weak"))
+        about = refine_rig(RATE_HZ, L1, STANDARD_PENDULUM.linear[:3], sample_sd(14), 0.0, samples=("y", "phi"))
+        library = weak_native(compiled, config.design, refine_functions(compiled))
+        self.identifier = library.refined_of(config, refine_config(about, lane.forgetting_s))
+        self._last = np.zeros(3, np.float32)
+
+    def _play(self, phi: Float, y: Float) -> tuple[npt.NDArray[np.uint8], int]:
+        raise NotImplementedError
+
+    def run(self, phi: Float, y: Float, disturbed: bool, w: Float) -> None:
+        """One chunk: each estimate against the truth of its tick."""
+        record = self.identifier.run_both(np.stack([y, phi], axis=1))
+        outcome, r = self.outcome, record.r[:, :3]
+        outcome.ticks += len(phi)
+        finite = np.isfinite(record.r).all(axis=1) & np.isfinite(record.se).all(axis=1)
+        outcome.not_finite += int((~finite).sum()) + sum(not np.isfinite(seen).all() for seen in self.look())
+        new = np.any(np.diff(r, axis=0, prepend=self._last[None]) != 0, axis=1) & (r[:, 0] > 0)
+        self._last = r[-1].copy()
+        truth = np.stack([w[new], *(np.full(new.sum(), one) for one in STANDARD_PENDULUM.linear[1:3])], axis=1)
+        far = np.any(np.abs(r[new] - truth) > FAR * record.se[new, :3], axis=1)
+        outcome.published += len(far)
+        outcome.far += int(far.sum())
+        if disturbed:
+            told = Counter(Reason(one).text for one in [self.told])
+            outcome.disturbed = dict(Counter(outcome.disturbed) + told)
+        self._lately = [int(self.told)]
+
+    @property
+    def told(self) -> Reason:
+        """Of the last block."""
+        return Reason(self.identifier.refinement.told)
+
+    def look(self) -> tuple[Float, Float]:
+        _, seen = self.identifier.best
         return seen["p"][:3].astype(np.float64), seen["se"][:3].astype(np.float64)
 
 
@@ -376,9 +440,9 @@ class _Peer:
         if not made:
             raise PvidError("the baseline's differentiator was refused")
 
-    def run(self, phi: Float, y: Float, disturbed: bool) -> None:
+    def run(self, phi: Float, y: Float, disturbed: bool, w: Float) -> None:
         """One chunk, up to where it is no number any more."""
-        del disturbed
+        del disturbed, w
         if not self.alive:
             return
         samples = [np.ascontiguousarray(x, np.float32) for x in (phi, y)]
@@ -426,6 +490,8 @@ def build_library(folder: Path) -> ctypes.CDLL:
 def _player(native: Native, library: ctypes.CDLL, lane: Lane) -> _Ours | _Peer:
     if lane.kind in PEERS:
         return _Peer(library, lane)
+    if lane.kind == "refined":
+        return _Refined(lane)
     if lane.kind == "weak":
         return _WeakInFixedPoint(lane) if lane.core == "q31" else _WeakInFloat(lane)
     return _StrongInFixedPoint(native, lane) if lane.core == "q31" else _StrongInFloat(native, lane)
@@ -440,10 +506,10 @@ def measure(
 ) -> dict[str, Outcome]:
     """Outcomes of the lanes by label."""
     outcomes = {}
-    for sensing in dict.fromkeys(lane.sensing for lane in lanes):
-        mine = [lane for lane in lanes if lane.sensing == sensing]
+    for sensing, full in dict.fromkeys((lane.sensing, lane.full) for lane in lanes):
+        mine = [lane for lane in lanes if (lane.sensing, lane.full) == (sensing, full)]
         players = [_player(native, library, lane) for lane in mine]
-        signals = Signals(library, disturbance, ticks, sensing)
+        signals = Signals(library, disturbance, ticks, sensing, full)
         compared = False
         tick = 0
         for phi, y in signals.chunks():
@@ -452,7 +518,8 @@ def measure(
                     one.compare(signals.w(signals.first - 1), at_end=False)
                 compared = True
             for one in players:
-                one.run(phi, y, disturbed=signals.first < tick + len(phi) and tick < signals.last)
+                disturbed = signals.first < tick + len(phi) and tick < signals.last
+                one.run(phi, y, disturbed, signals.w_at(tick + np.arange(len(phi))))
             tick += len(phi)
         for lane, one in zip(mine, players, strict=True):
             one.compare(signals.w(ticks), at_end=True)
@@ -464,7 +531,7 @@ def weak_bias(library: ctypes.CDLL) -> Float:
     """Errors of w, d1, d2, relative, of the weak form after 100 s of exact samples of the standard rig."""
     player = _WeakInFloat(Lane("weak", 0.0))
     for phi, y in Signals(library, Disturbance("perfect", ""), 5 * CHUNK, EXACT).chunks():
-        player.run(phi, y, disturbed=False)
+        player.run(phi, y, False, np.zeros(0))
     return np.asarray(np.abs(player.look()[0] / np.array(STANDARD_PENDULUM.linear[:3]) - 1))
 
 
@@ -475,6 +542,6 @@ def filter_bias(native: Native, library: ctypes.CDLL, change: float, drive: tupl
     signals = Signals(library, Disturbance("step", "", change=change, drive=drive), 5 * CHUNK, lane.sensing)
     player = _StrongInFloat(native, lane)
     for phi, y in list(signals.chunks())[1:]:
-        player.run(phi, y, disturbed=False)
+        player.run(phi, y, False, np.zeros(0))
     truth = np.array([signals.w(signals.ticks), *STANDARD_PENDULUM.linear[1:3]])
     return np.asarray(np.abs(player.look()[0] / truth - 1))

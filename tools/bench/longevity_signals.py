@@ -166,6 +166,7 @@ class Signals:
     disturbance: Disturbance
     ticks: int
     sensing: Sensing
+    full: bool = False  # equations of any angle; else linear
 
     def __post_init__(self) -> None:
         self.first = int(BEFORE * self.ticks)
@@ -196,9 +197,10 @@ class Signals:
 
     def w(self, tick: float) -> float:
         """The truth at this tick [1/s^2]."""
-        return float(self._w(np.array([tick]))[0])
+        return float(self.w_at(np.array([tick]))[0])
 
-    def _w(self, tick: npt.NDArray[np.int64] | Float) -> Float:
+    def w_at(self, tick: npt.NDArray[np.int64] | Float) -> Float:
+        """The truth at these ticks [1/s^2]."""
         w = float(STANDARD_PENDULUM.linear[0])
         change = self.disturbance.change
         if self.disturbance.kind == "step":
@@ -212,10 +214,11 @@ class Signals:
         """Moves `state` on; phi and y at the ticks."""
         half = np.arange(2 * len(tick) + 1) / 2 + tick[0]
         y, u = self._drive(half)
-        phi, w = np.empty(len(tick)), self._w(tick)
+        phi, w = np.empty(len(tick)), self.w_at(tick)
         p = np.ascontiguousarray(STANDARD_PENDULUM.linear[1:3])
         arrays = [ctypes.c_void_p(a.ctypes.data) for a in (state, p, w, u, phi)]
-        self.library.longevity_motion(arrays[0], ctypes.c_uint32(len(tick)), ctypes.c_double(1 / RATE_HZ), *arrays[1:])
+        given = ctypes.c_uint32(len(tick)), ctypes.c_double(1 / RATE_HZ)
+        self.library.longevity_motion(ctypes.c_bool(self.full), arrays[0], *given, *arrays[1:])
         return phi, y[:-1:2]
 
     def _drive(self, tick: Float) -> tuple[Float, Float]:

@@ -153,7 +153,7 @@ def _cell(lane: Lane, one: Outcome, ticks: int) -> str:
         return f"{abs(one.error_after):.2g} %" if abs(one.error_after) < 100 else "> 100 %"
     if one.not_finite or one.singular:
         return "NOT FINITE" if one.not_finite else "SINGULAR"
-    error = f"{abs(one.error_after):.2g} %"
+    error = f"{abs(one.error_after):.2g} %" + (f", {one.far} of {one.published} far" if one.far else "")
     if one.told == Reason.UPDATED.text:
         return error if one.errors <= BACK else f"{error}, **{one.errors:.1f} s.e.**"
     return f"{error}, {'alarm' if one.told == Reason.MISFIT.text else one.told}"

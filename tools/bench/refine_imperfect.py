@@ -25,6 +25,7 @@ HEADER = (
     "rad",
     "imperfection",
     "published",
+    "of the time %",
     "error / s.e. at the end: RMS",
     "largest ever",
     "error at the end %: median",
@@ -51,6 +52,7 @@ class Fault:
     backlash : of the encoder's gear [LSB]
     eccentricity : of its disc [rad]
     gain : relative error of y's scale, which is as large as the rig file expects
+    wild : single samples of phi or y that are off, so many of 10^5, by so many LSB
     disturbed : outliers, missing and stuck samples of both sensors and jumps of the encoder's zero, a few a minute
     """
 
@@ -60,6 +62,7 @@ class Fault:
     eccentricity: float = 0.0
     gain: float = 0.0
     disturbed: bool = False
+    wild: tuple[str, int, float] | None = None
     duration: float = 40.0
 
     @property
@@ -72,6 +75,8 @@ class Fault:
             ("gain of y off by {:g}", self.gain),
         )
         said = [text.format(value) for text, value in parts if value]
+        if self.wild:
+            said.append("{1} of 10^5 samples of {0} off by {2:g} LSB".format(*self.wild))
         return ", ".join(said + ["disturbed"] * self.disturbed) or "none"
 
 
@@ -81,6 +86,8 @@ _KINDS: tuple[dict[str, Any], ...] = (
     *({"backlash": width} for width in (0.5, 2.0, 8.0)),
     *({"eccentricity": width} for width in (1e-4, 1e-3)),
     {"gain": 0.003},
+    *({"wild": ("phi", *wild)} for wild in ((10, 50), (10, 5000), (100, 5), (100, 50), (100, 5000))),
+    *({"wild": ("y", *wild)} for wild in ((10, 5000), (100, 50), (100, 5000))),
     {"disturbed": True, "duration": 120.0},
 )
 FAULTS = tuple(Fault(angle, **kind) for angle in (0.1, 0.3) for kind in _KINDS)
@@ -106,6 +113,14 @@ def _disturb(phi: Float, y: Float, random: np.random.Generator) -> None:
                 y[at] += 1e-3
 
 
+def _make_wild(phi: Float, y: Float, wild: tuple[str, int, float], random: np.random.Generator) -> None:
+    """In place."""
+    name, part, size = wild
+    signal, lsb = (phi, _LSB) if name == "phi" else (y, standard_sensors(BITS).y_lsb)
+    hit = random.random(len(signal)) < part / 1e5
+    signal += hit * random.choice([-1.0, 1.0], len(signal)) * size * lsb
+
+
 @lru_cache(2)
 def _truth(angle: float, dry: float, duration: float) -> tuple[Float, Float]:
     """The exact angle and pivot."""
@@ -129,11 +144,13 @@ class Published:
     ----------
     error, se : relative [publications, 3]
     clash : of the last one
+    available : part of the run's ticks at which a refined estimate stood
     """
 
     error: Float
     se: Float
     clash: float
+    available: float
 
     @property
     def confidently_wrong(self) -> bool:
@@ -152,20 +169,26 @@ def run_fault(fault: Fault, seed: int) -> Published:
     phi, y = standard_sensors(BITS).measure(exact, (1 + fault.gain) * pivot, seed)
     if fault.disturbed:
         _disturb(phi, y, np.random.default_rng([seed, 7]))
+    if fault.wild:
+        _make_wild(phi, y, fault.wild, np.random.default_rng([seed, 11]))
     about = refine_rig(RATE_HZ, STANDARD_PENDULUM.l1, TRUTH, sample_sd(BITS), y_gain_sd=fault.gain)
     gain_sd = np.asarray(about.gain_sd, np.float32)
     identifier = engine_of(BITS).identifier(standard_start(seed), gain_sd=gain_sd)
     found = identifier.run_both(np.stack([y, phi], axis=1))
     new = np.flatnonzero(np.any(np.diff(found.r, axis=0, prepend=0.0) != 0, axis=1) & (found.r[:, 0] > 0))
     return Published(
-        found.r[new, :3] / TRUTH - 1, found.se[new, :3] / TRUTH, float(identifier.refinement.estimate.clash)
+        found.r[new, :3] / TRUTH - 1,
+        found.se[new, :3] / TRUTH,
+        float(identifier.refinement.estimate.clash),
+        float(np.mean(found.r[:, 0] > 0)),
     )
 
 
 def row_of(fault: Fault, runs: Sequence[Published]) -> tuple[str, ...]:
     """Cells as in HEADER."""
     done = [one for one in runs if len(one.error)]
-    head = f"{fault.angle:g}", fault.label, f"{len(done)} of {len(runs)}"
+    available = np.mean([one.available for one in runs])
+    head = f"{fault.angle:g}", fault.label, f"{len(done)} of {len(runs)}", f"{100 * available:.0f}"
     if not done:
         return (*head, *("-",) * 5, "0")
     ends = np.array([one.error[-1] / one.se[-1] for one in done])

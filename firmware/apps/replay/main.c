@@ -15,7 +15,9 @@
 
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
-#define COUNT(tick, channel) ((int16_t)pgm_read_word(&replay_samples[tick][channel]))
+#define COUNT(tick, channel)                                                                                           \
+    ((REPLAY_COUNT)((sizeof(REPLAY_COUNT) == 2u) ? pgm_read_word(&replay_samples[tick][channel])                       \
+                                                 : pgm_read_dword(&replay_samples[tick][channel])))
 #else
 #define COUNT(tick, channel) (replay_samples[tick][channel])
 #endif
@@ -45,9 +47,9 @@ static REPLAY_SAMPLE sample_of(REPLAY_COUNT count, REPLAY_SAMPLE lsb)
 #endif
 
 typedef struct {
-    uint64_t total; /* counts of pvid_port_instructions */
-    uint32_t longest;
-    uint32_t ticks;
+    uint64_t total;   /* counts of pvid_port_instructions, from REPLAY_MEASURE_FROM on */
+    uint32_t ticks;   /* counted in it */
+    uint32_t longest; /* of all ticks */
 } cost;
 
 /* Counts that measuring itself takes: two readings in a row. */
@@ -55,13 +57,6 @@ static uint32_t overhead(void)
 {
     const uint32_t before = pvid_port_instructions();
     return pvid_port_instructions() - before;
-}
-
-static void add(cost *self, uint32_t counts)
-{
-    self->total += counts;
-    self->ticks++;
-    self->longest = (counts > self->longest) ? counts : self->longest;
 }
 
 static uint32_t play(cost *whole)
@@ -77,8 +72,10 @@ static uint32_t play(cost *whole)
         const pvid_reason reason = REPLAY_STEP(&identifier, sample);
         const uint32_t counts = pvid_port_instructions() - before - reading;
         if (tick >= REPLAY_MEASURE_FROM) {
-            add(whole, counts);
+            whole->total += counts;
+            whole->ticks++;
         }
+        whole->longest = (counts > whole->longest) ? counts : whole->longest;
         hash = REPLAY_HASH(hash, &identifier.estimator, reason);
         if (((tick + 1u) % REPLAY_REPORT_EVERY) == 0u) {
             report_hash_at(tick + 1u, hash);

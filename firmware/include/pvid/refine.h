@@ -9,6 +9,7 @@
  *   - Cholesky eliminates the start. The information on the parameters is added to a square-root triangle, which is
  *     kept from block to block and forgets (forgetting_s).
  *   - Search: short blocks that grow, with the weak form's estimate as prior, until one fits. Then track.
+ *   - A single wild sample (interference, a flipped bit) is left out of the block before (outlier_gate).
  *   - A block is accepted if its residuals, its clash with the past and its last step are small enough, relative to the
  *     best of the last blocks. After two refused blocks in a row the search begins again.
  *
@@ -49,7 +50,8 @@ extern "C" {
 #ifndef PVID_REFINE_HALF
 #define PVID_REFINE_HALF 12
 #endif
-#define PVID_REFINE_LINE (2 * ((2 * PVID_REFINE_HALF) + 1))
+#define PVID_REFINE_LATE 3 /* steps until the gate of wild samples has judged one */
+#define PVID_REFINE_LINE (2 * ((2 * PVID_REFINE_HALF) + 1 + PVID_REFINE_LATE))
 
 /* An input or an output of the model. */
 typedef struct {
@@ -80,16 +82,18 @@ typedef struct pvid_refine_config_f32 {
     float state_limit[PVID_REFINE_ORDER *
                       PVID_REFINE_COORDINATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
     float forgetting_s;                         /* time constant of the triangle [s], > 0; 0: it does not forget */
-    float gate;       /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */
-    float chi_max;    /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
-    float clash_max;  /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
-    float step_max;   /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
-    float step_limit; /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 0.9 at most;
-                         recommended: 2 */
-    float se_max;     /* largest relative standard error of a published estimate, > 0 */
-    float distance;   /* relative distance from the weak form's estimate that the bias of its equations explains, >= 0.
-                         0: the weak form has the same equations; an estimate is then published only if the geometric
-                         mean of its standard errors is below that of the weak form */
+    float outlier_gate; /* means of `ratio` samples of an output, or of an input of order 2, that stand out by more than
+                           this multiple of the usual are replaced, 2..1e3; 0: no gate; recommended: 4 */
+    float gate;         /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */
+    float chi_max;      /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
+    float clash_max;    /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
+    float step_max;     /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
+    float step_limit;   /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 0.9 at most;
+                           recommended: 2 */
+    float se_max;       /* largest relative standard error of a published estimate, > 0 */
+    float distance; /* relative distance from the weak form's estimate that the bias of its equations explains, >= 0.
+                       0: the weak form has the same equations; an estimate is then published only if the geometric
+                       mean of its standard errors is below that of the weak form */
 } pvid_refine_config_f32;
 
 /* An estimate; all numbers are finite. */

@@ -67,8 +67,9 @@ static uint32_t signals_of(uint32_t hash, const pvid_refine_signal_f32 signal[])
 uint32_t pvid_fingerprint_refine_f32(uint32_t hash, const pvid_refine_config_f32 *config)
 {
     const uint8_t small[] = {config->ratio, config->passes, config->most_passes, config->jobs, config->rests};
-    const float limits[] = {config->forgetting_s, config->gate,       config->chi_max, config->clash_max,
-                            config->step_max,     config->step_limit, config->se_max,  config->distance};
+    const float limits[] = {config->forgetting_s, config->outlier_gate, config->gate,
+                            config->chi_max,      config->clash_max,    config->step_max,
+                            config->step_limit,   config->se_max,       config->distance};
     uint32_t running = pvid_fingerprint_float(hash, config->sample_rate_hz);
     running = pvid_fingerprint_bytes(running, small, sizeof small);
     running = pvid_fingerprint_floats(running, config->second, (config->second != NULL) ? (PVID_REFINE_HALF + 1) : 0);

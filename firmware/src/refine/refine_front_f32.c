@@ -2,7 +2,12 @@
 
 /* Means x of `ratio` samples, of an input that is held from tick to tick of its means about the ticks; x - droop (x_-1
  * - 2 x + x_+1): the mean's droop undone to second order (the weights undo the rest). Second derivatives: w_0 x + sum_i
- * w_i (x_-i + x_+i), i = 1..half. */
+ * w_i (x_-i + x_+i), i = 1..half.
+ *
+ * Gate of wild samples: a mean that is off by s makes the fourth differences s (1, -4, 6, -4, 1); with 6 s beyond
+ * outlier_gate times the usual (the largest of the period before) and its neighbours opposite and more than PART of it,
+ * the mean is that of a wild sample. A jump makes 1, -3, 3, -1 and a kink 1, -2, 1: these stay, and raise the usual. An
+ * output is missing then; of an input s is taken off, the rest is the cubic through the neighbours. */
 #include "refine/refine_front_f32.h"
 
 #include <stddef.h>
@@ -13,7 +18,11 @@
 
 #define INPUTS PVID_REFINE_INPUTS
 #define SIGNALS PVID_REFINE_SIGNALS
-#define LENGTH ((2 * PVID_REFINE_HALF) + 1) /* of a line */
+#define TAPS ((2 * PVID_REFINE_HALF) + 1) /* of the filter */
+#define LENGTH (TAPS + PVID_REFINE_LATE)  /* of a line */
+#define PERIOD 64u                        /* entries */
+#define PART 0.58f                        /* between a kink's 1/2 and 2/3 */
+#define LARGEST 3.4e38f
 #define FULL_SCALE 32767.0f
 #define MASK ((uint32_t)PVID_REFINE_RING - 1u)
 
@@ -21,15 +30,16 @@ PVID_COLD void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvi
 {
     const float ratio = (float)config->ratio;
     self->share = 1.0f / ratio;
-    self->behind = 0;
+    self->behind = PVID_REFINE_LATE;
     for (size_t i = 0; i < SIGNALS; i++) {
         const pvid_refine_signal_f32 *signal = &config->signal[i];
         const float steps = 1.0f / (ratio * ratio); /* the droop of a held input's own steps stays */
         self->droop[i] = ((signal->source == (uint8_t)PVID_SIGNAL_HELD) ? (1.0f + steps) : (1.0f - steps)) / 24.0f;
         self->sample[i] = signal->sample;
+        self->derived[i] = signal->order == 2u;
         self->to_counts[i] = signal->scale * (FULL_SCALE / signal->range);
         self->from_counts[i] = signal->range / FULL_SCALE;
-        self->behind = (signal->order == 2u) ? (uint8_t)PVID_REFINE_HALF : self->behind;
+        self->behind = self->derived[i] ? (uint8_t)(PVID_REFINE_HALF + PVID_REFINE_LATE) : self->behind;
     }
     pvid_refine_front_reset_f32(self, config);
 }
@@ -41,13 +51,19 @@ PVID_COLD void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pv
     self->referred = false;
     self->place = 0;
     self->next = 0;
+    self->postponed = false;
     memset(self->sum, 0, sizeof self->sum);
     memset(self->rest, 0, sizeof self->rest);
+    memset(self->past, 0, sizeof self->past);
+    for (size_t i = 0; i < SIGNALS; i++) {
+        self->peak[i] = LARGEST;
+        self->usual[i] = LARGEST;
+    }
 }
 
 uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self)
 {
-    return self->behind;
+    return (uint32_t)self->behind - PVID_REFINE_LATE;
 }
 
 uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)
@@ -55,21 +71,28 @@ uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)
     return (uint32_t)PVID_REFINE_RING - self->behind;
 }
 
+/* Sizes of floats by their bits, which order as they do; NaN is the largest. */
+#define SIZE 0x7FFFFFFFu
+#define SIGN 0x80000000u
+#define HALF_BITS 0x3F000000u       /* 0.5 */
+#define FULL_SCALE_BITS 0x46FFFE00u /* 32767 */
+
 /* x and what rounding left of the entry before, rounded to the nearest count: the errors of neighbours cancel for slow
  * signals. INT16_MIN if it is not finite or beyond full scale. */
 static int16_t counts(float *rest, float x)
 {
     const float whole = x + *rest;
-    if (!((whole > -FULL_SCALE) && (whole < FULL_SCALE))) {
+    const uint32_t bits = pvid_bits_f32(whole);
+    if ((bits & SIZE) >= FULL_SCALE_BITS) {
         *rest = 0.0f;
         return INT16_MIN;
     }
-    const int16_t rounded = (int16_t)(int32_t)((whole < 0.0f) ? (whole - 0.5f) : (whole + 0.5f));
+    const int16_t rounded = (int16_t)(int32_t)(whole + pvid_from_bits_f32((bits & SIGN) | HALF_BITS));
     *rest = whole - (float)rounded;
     return rounded;
 }
 
-/* The second derivative in the middle of a line. */
+/* The second derivative in the middle of the oldest means of a line. */
 static float second_derivative(const float line[], const float weights[])
 {
     float sum = weights[0] * line[PVID_REFINE_HALF];
@@ -83,13 +106,13 @@ static float second_derivative(const float line[], const float weights[])
 /* A mean with its droop undone, of the entry `next`. */
 static void enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, size_t signal, float x)
 {
-    if (config->signal[signal].order == 2u) {
+    if (self->derived[signal]) {
         float *newest = &self->line[signal][self->place];
         newest[0] = x;
         newest[LENGTH] = x;
         if (self->next >= (uint32_t)(LENGTH - 1)) {
             const float d = second_derivative(&newest[1], config->second);
-            self->ring[(self->next - PVID_REFINE_HALF) & MASK][signal] =
+            self->ring[(self->next - (PVID_REFINE_HALF + PVID_REFINE_LATE)) & MASK][signal] =
                 counts(&self->rest[signal], d * self->to_counts[signal]);
         }
     } else {
@@ -110,6 +133,80 @@ static void about_the_ticks(pvid_refine_front_f32 *self, const pvid_refine_confi
     }
 }
 
+static float size_of(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* Takes a wild mean out, that of the last entry but one: what it put into three entries. */
+static void leave_out(pvid_refine_front_f32 *self, size_t signal, float off)
+{
+    const float neighbour = -(self->droop[signal] * off);
+    const float part[3] = {neighbour, off - (2.0f * neighbour), neighbour};
+    for (uint32_t back = 1; back <= 3u; back++) {
+        if (self->derived[signal]) {
+            const uint32_t place =
+                (uint32_t)self->place + ((uint32_t)self->place < back ? (uint32_t)LENGTH : 0u) - back;
+            self->line[signal][place] -= part[back - 1u];
+            self->line[signal][place + LENGTH] = self->line[signal][place];
+        } else {
+            self->ring[(self->next - back) & MASK][signal] = INT16_MIN;
+        }
+    }
+}
+
+/* Whether a difference is opposite to one of that size, and a wild mean's neighbour. */
+static bool is_beside(float opposite, float size)
+{
+    return (opposite > (PART * size)) && (opposite < size);
+}
+
+/* A fourth difference beyond the period's others: the one before it may be a wild mean's, by whose error the mean is
+ * then off. One beyond the limit that is none adds to the usual ones when it is past. */
+PVID_COLD static float judge(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, size_t signal,
+                             float newest)
+{
+    const float *past = self->past[signal];
+    const float limit = config->outlier_gate * self->usual[signal];
+    const float size = size_of(past[4]);
+    const float sign = (past[4] < 0.0f) ? 1.0f : -1.0f;
+    float off = 0.0f;
+    if (size_of(newest) <= limit) {
+        self->peak[signal] = size_of(newest);
+    }
+    if (size > limit) {
+        if (is_beside(sign * newest, size) && is_beside(sign * past[5], size)) {
+            off = past[4] * (1.0f / 6.0f);
+            leave_out(self, signal, off);
+        } else if ((size > size_of(newest)) && (size > size_of(past[5])) && (size > self->peak[signal])) {
+            self->peak[signal] = size;
+        } else {
+            /* a larger one is beside it */
+        }
+    }
+    return off;
+}
+
+/* The largest fourth differences of a period are the usual ones of the next. A period lasts on while a mean may be
+ * wild, but not twice as long. */
+PVID_COLD static void end_period(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config)
+{
+    for (size_t i = 0; i < SIGNALS; i++) {
+        const bool large = size_of(self->past[i][4]) > (config->outlier_gate * self->usual[i]);
+        if (large && !self->postponed) {
+            self->postponed = true;
+            return;
+        }
+    }
+    self->postponed = false;
+    for (size_t i = 0; i < SIGNALS; i++) {
+        if ((config->outlier_gate > 0.0f) && ((i >= (size_t)INPUTS) || self->derived[i])) {
+            self->usual[i] = self->peak[i];
+            self->peak[i] = 0.0f;
+        }
+    }
+}
+
 pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
                                                   const float sample[])
 {
@@ -121,13 +218,27 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
         }
     }
     for (size_t i = 0; i < SIGNALS; i++) {
+        float *past = self->past[i];
         const float x = self->sum[i] * self->share;
-        const float middle = self->mean[0][i];
-        if (known) {
-            enter(self, config, i, middle - (self->droop[i] * ((self->mean[1][i] - (2.0f * middle)) + x)));
+        const float middle = past[0];
+        const float first = x - middle;
+        const float second = first - past[1];
+        float third = second - past[2];
+        float fourth = third - past[3];
+        if ((pvid_bits_f32(fourth) & SIZE) > pvid_bits_f32(self->peak[i])) {
+            const float off = judge(self, config, i, fourth);
+            third += off;
+            fourth += 4.0f * off;
         }
-        self->mean[1][i] = middle;
-        self->mean[0][i] = x;
+        if (known) {
+            enter(self, config, i, middle - (self->droop[i] * second));
+        }
+        past[0] = x;
+        past[1] = first;
+        past[2] = second;
+        past[3] = third;
+        past[5] = past[4];
+        past[4] = fourth;
         self->sum[i] = 0.0f;
     }
     self->wait = config->ratio;
@@ -137,6 +248,9 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
     }
     self->next++;
     self->place = (uint16_t)((self->place == (uint16_t)(LENGTH - 1)) ? 0u : (self->place + 1u));
+    if ((self->next & (PERIOD - 1u)) == 0u) {
+        end_period(self, config);
+    }
     return PVID_REFINE_ENTERED;
 }
 
@@ -145,7 +259,7 @@ PVID_COLD void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pv
 {
     for (size_t i = 0; i < INPUTS; i++) {
         const float x = sample[config->signal[i].sample];
-        self->reference[i] = (config->signal[i].order == 2u) ? x : 0.0f;
+        self->reference[i] = self->derived[i] ? x : 0.0f;
         self->held[i] = x - self->reference[i];
     }
     self->referred = true;

@@ -70,7 +70,9 @@ static pvid_status sizes_are_valid(const pvid_refine_config_f32 *config)
 
 static pvid_status limits_are_valid(const pvid_refine_config_f32 *config)
 {
-    if (!pvid_within_f32(config->gate, 0.0f, 1.0e3f)) {
+    const bool gate =
+        pvid_within_f32(config->outlier_gate, 2.0f, 1.0e3f) || pvid_within_f32(config->outlier_gate, 0.0f, 0.0f);
+    if (!gate || !pvid_within_f32(config->gate, 0.0f, 1.0e3f)) {
         return PVID_BAD_GATE_SIGMAS;
     }
     if (!pvid_within_f32(config->chi_max, 1.0f, 1.0e6f) || !pvid_within_f32(config->clash_max, 1.0f, 1.0e6f)) {

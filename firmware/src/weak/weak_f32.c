@@ -450,12 +450,8 @@ PVID_COLD static pvid_reason odd_tick(pvid_weak_f32 *self, const float sample[])
 }
 
 /* A tick of the weak form. */
-static inline pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
+PVID_ALWAYS_INLINE pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
 {
-    if ((self == NULL) || (sample == NULL)) {
-        PVID_ASSERT(false);
-        return PVID_NOT_READY;
-    }
     if (!pvid_weak_front_fits_f32(&self->front, self->samples, sample)) {
         return odd_tick(self, sample);
     }
@@ -463,22 +459,27 @@ static inline pvid_reason weak_tick(pvid_weak_f32 *self, const float sample[])
     return follow(self, sample);
 }
 
+/* Reasons of a tick with a new estimate for the second stage. */
+#define RENEWING ((1uL << PVID_UPDATED) | (1uL << PVID_MISFIT) | (1uL << PVID_HELD_UNCERTAIN))
+
 /* A tick of both stages: the second one knows at which the first one has more to do than to take a sample. */
 PVID_SELDOM static pvid_reason both_ticks(pvid_weak_f32 *self, const float sample[])
 {
     self->busy = false;
     const pvid_reason reason = weak_tick(self, sample);
-    const bool renewed = (reason == PVID_UPDATED) || (reason == PVID_MISFIT) || (reason == PVID_HELD_UNCERTAIN);
-    if (sample != NULL) {
-        (void)self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL,
-                                        self->busy);
-    }
+    const bool renewed = ((RENEWING >> (uint32_t)reason) & 1u) != 0u;
+    (void)self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL,
+                                    self->busy);
     return reason;
 }
 
 pvid_reason pvid_weak_step_f32(pvid_weak_f32 *self, const float sample[])
 {
-    return ((self != NULL) && refines(self)) ? both_ticks(self, sample) : weak_tick(self, sample);
+    if ((self == NULL) || (sample == NULL)) {
+        PVID_ASSERT(false);
+        return PVID_NOT_READY;
+    }
+    return refines(self) ? both_ticks(self, sample) : weak_tick(self, sample);
 }
 
 const pvid_estimate_f32 *pvid_weak_candidate_f32(const pvid_weak_f32 *self)

@@ -5,8 +5,9 @@
 #include "pvid/detail/publication_mark.h"
 #include "pvid/refine.h"
 
-#define PVID_REFINE_AB 7  /* order of the Adams-Bashforth formula */
-#define PVID_REFINE_SUB 4 /* steps of the motion in a big step: of the columns and of a row of each output */
+#define PVID_REFINE_AB 7   /* order of the Adams-Bashforth formula */
+#define PVID_REFINE_SUB 4  /* steps of the motion in a big step: of the columns and of a row of each output */
+#define PVID_REFINE_PAST 6 /* of the differences of a signal's means */
 #define PVID_REFINE_SIGNALS (PVID_REFINE_INPUTS + PVID_REFINE_OUTPUTS)
 #define PVID_REFINE_STATES (PVID_REFINE_ORDER * PVID_REFINE_COORDINATES)
 #define PVID_REFINE_COLUMNS (PVID_REFINE_STATES + PVID_REFINE_MOVING)                      /* that are integrated */
@@ -25,9 +26,11 @@
  * 32767. The derivatives are behind by `half` entries. */
 typedef struct {
     uint8_t wait;                                        /* samples that the block needs yet */
-    uint8_t means;                                       /* since the restart, up to 3 */
+    uint8_t means;                                       /* since the restart, up to 2 */
     bool referred;                                       /* there is a first sample */
+    bool postponed;                                      /* the end of the present period of `peak` */
     uint8_t sample[PVID_REFINE_SIGNALS];                 /* places in the argument of step */
+    bool derived[PVID_REFINE_SIGNALS];                   /* of order 2 */
     uint8_t behind;                                      /* entries by which the slowest signal is behind */
     uint16_t place;                                      /* of the newest entry of `line` */
     uint32_t next;                                       /* entry of the ring that is written next */
@@ -39,7 +42,10 @@ typedef struct {
     float rest[PVID_REFINE_SIGNALS];                     /* what rounding left of the last entry [counts] */
     float reference[PVID_REFINE_INPUTS];                 /* the first sample since the restart */
     float held[PVID_REFINE_INPUTS];                      /* the last sample of the block before, less the reference */
-    float mean[2][PVID_REFINE_SIGNALS];                  /* the last two means, latest first */
+    float past[PVID_REFINE_SIGNALS][PVID_REFINE_PAST];   /* the last mean, its differences of orders 1 to 4, the
+                                                            fourth difference before */
+    float peak[PVID_REFINE_SIGNALS];                     /* largest fourth difference of the present period */
+    float usual[PVID_REFINE_SIGNALS];                    /* of the period before */
     float line[PVID_REFINE_INPUTS][PVID_REFINE_LINE];    /* means of inputs of order 2, circular, twice */
     int16_t ring[PVID_REFINE_RING][PVID_REFINE_SIGNALS]; /* INT16_MIN: missing or beyond its range */
 } pvid_refine_front_f32;

@@ -70,6 +70,21 @@ class Board:
         return [*command, "-icount", "shift=8,sleep=off", "-semihosting-config", "enable=on,target=native"]
 
     @property
+    def has_fpu(self) -> bool:
+        """Whether float32 is computed by the processor itself."""
+        return "F" in self.core
+
+    @property
+    def sample_bytes(self) -> int:
+        """Room for a run in a replay image: half of the code's memory; on an AVR an array has at most 32 kB."""
+        if self.toolchain == "avr":
+            return 2**15 - 1
+        text = (ROOT / "firmware" / "ports" / "boards" / f"{self.name}.cmake").read_text(encoding="utf-8")
+        found = re.search(r"\bcode_bytes=(\d+)([KM])\b", text)
+        assert found is not None
+        return int(found[1]) * {"K": 2**10, "M": 2**20}[found[2]] // 2
+
+    @property
     def missing(self) -> list[str]:
         """Commands that this machine lacks to build for the board and run it."""
         return [tool for tool in (self.compiler, self.emulator) if shutil.which(tool) is None]
@@ -141,6 +156,8 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
                 if any(full):
                     said = ", ".join(sorted({f"{one[1]} lacks {one[2]} bytes" for one in full if one}))
                     raise PvidError(f"{target.name}: the image does not fit: {said}")
+                if any(re.search(r"section `\.\w+' is not within region `data'", line) for line in lines):
+                    raise PvidError(f"{target.name}: the image does not fit: its variables exceed the RAM")
                 errors = [line for line in lines if re.search(r"error|undefined|overflowed|CMake Error", line)]
                 raise PvidError(f"{target.name}: the build failed: {' '.join((errors or lines or ['no output'])[:2])}")
     return tree

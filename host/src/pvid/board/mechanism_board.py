@@ -372,7 +372,7 @@ def _refine_of_rig_file(rig: RigFile, compiled: CompiledModel, config: WeakConfi
         y_gain_sd=rig.sensor.y_gain_sd,
         samples=("y", "phi"),
     )
-    return refine_config(about, compiled.following.forgetting_s)
+    return refine_config(about, compiled.following.forgetting_s, compiled.following.outlier_gate)
 
 
 def _refine_header(settings: RefineConfig) -> str:

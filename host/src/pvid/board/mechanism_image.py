@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -72,6 +72,25 @@ class MechanismRun:
         values = self.counts.astype(np.float32) * self.lsb
         return np.where(self.counts == MISSING, np.float32(np.nan), values).astype(np.float32, copy=False)
 
+    def shortened(self, ticks: int) -> MechanismRun:
+        """Its first ticks."""
+        design = self.config.design
+        start = measured_from(self.config.ticks_needed, design.hop * design.decimation, ticks)
+        return replace(self, counts=self.counts[:ticks], measure_from=start)
+
+
+def run_of_samples(compiled: CompiledModel, config: WeakConfig, samples: Float32) -> MechanismRun:
+    """Samples [ticks, samples] in counts: of the sensor, or where it has no resolution, of its largest value."""
+    resolution = {one.name: one.resolution for one in compiled.signals}
+    largest = np.abs(samples).max(axis=0)
+    steps = [
+        resolution[one] or top / _COUNTS or 1.0
+        for one, top in zip(config.design.model.sample_names, largest, strict=True)
+    ]
+    lsb = np.asarray(steps, np.float32)
+    counts = np.rint(samples.astype(np.float64) / lsb).astype(np.int32)
+    return MechanismRun(compiled, config, counts, lsb, 0).shortened(len(counts))
+
 
 def long_run(first: int, period: int, available: int) -> int:
     """Ticks of a run to count in: the first window, those that have several steps of p, and LONG_PERIODS half windows
@@ -104,14 +123,7 @@ def mechanism_run(name: str, ticks: int | None = None, *, long: bool = False) ->
         wanted = long_run(config.ticks_needed, period, len(samples))
     if len(samples) < wanted:
         raise PvidError(f"the run of {name} has {len(samples)} samples, too few for {wanted}")
-    resolution = {one.name: one.resolution for one in compiled.signals}
-    largest = np.abs(samples).max(axis=0)
-    steps = [
-        resolution[one] or top / _COUNTS for one, top in zip(config.design.model.sample_names, largest, strict=True)
-    ]
-    lsb = np.asarray(steps, np.float32)
-    counts = np.rint(samples[:wanted].astype(np.float64) / lsb).astype(np.int32)
-    return MechanismRun(compiled, config, counts, lsb, measured_from(config.ticks_needed, period, wanted))
+    return run_of_samples(compiled, config, samples).shortened(wanted)
 
 
 def native_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
@@ -191,11 +203,16 @@ def build_mechanism_image(target: Board, run: MechanismRun) -> tuple[Path, Path]
     -------
     The image, and the tree it was built in.
     """
+    refuse_float_on_avr(target)
+    return build_with(target, f"{run.name}-weak-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32")
+
+
+def refuse_float_on_avr(target: Board) -> None:
+    """PvidError for a board on which float32 is another one."""
     if target.toolchain == "avr":
         raise PvidError(
             f"{target.name}: float32 has no bits of the twin on an AVR: its division differs at the extremes"
         )
-    return build_with(target, f"{run.name}-weak-f32-{len(run.counts)}", files_of(run), fitted_sizes(run.config), "f32")
 
 
 def build_with(
@@ -207,6 +224,7 @@ def build_with(
     room: str = "weak",
     *,
     refined: bool = False,
+    choices: Mapping[str, str] | None = None,
 ) -> tuple[Path, Path]:
     """The same from generated files: name -> text.
 
@@ -214,6 +232,7 @@ def build_with(
     ----------
     room : of the core, of the form
     refined : the files of the second stage are among them
+    choices : further variables of CMake
     """
     stamp = zlib.crc32("".join(files.values()).encode())
     whole = f"{name}-{stamp:08x}"
@@ -226,6 +245,6 @@ def build_with(
     }
     if refined:
         options["PVID_REFINE_MODEL"] = str(folder)
-    options |= {macro: str(size) for macro, size in smallest(sizes).items()}
+    options |= {macro: str(size) for macro, size in smallest(sizes).items()} | dict(choices or {})
     tree = build(target, BUILD / f"{target.name}-{whole}", options)
     return tree / "apps" / "replay" / "replay.elf", tree

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -44,6 +44,17 @@ class FixedRun:
         """Of the mechanism, in C."""
         return self.engine.name
 
+    def shortened(self, ticks: int) -> FixedRun:
+        """Its first ticks."""
+        design = self.engine.config.design
+        start = measured_from(self.engine.ticks_needed, design.hop * design.decimation, ticks)
+        return replace(self, counts=self.counts[:ticks], measure_from=start)
+
+    @property
+    def count_bytes(self) -> int:
+        """Of a count in the image."""
+        return 2 if np.abs(self.counts).max() <= np.iinfo(np.int16).max else 4
+
     @property
     def sizes(self) -> dict[str, int]:
         """Of the core's arrays."""
@@ -68,7 +79,7 @@ def fixed_run(name: str, ticks: int | None = None, *, long: bool = False) -> Fix
         wanted = long_run(engine.ticks_needed, period, len(counts))
     if len(counts) < wanted:
         raise PvidError(f"the run of {name} has {len(counts)} samples, too few for {wanted}")
-    return FixedRun(engine, counts[:wanted], measured_from(engine.ticks_needed, period, wanted))
+    return FixedRun(engine, counts, 0).shortened(wanted)
 
 
 def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
@@ -86,7 +97,7 @@ def twin_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
 def header(run: FixedRun) -> str:
     """replay_run.h."""
     samples = run.counts.shape[1]
-    count = "int16_t" if np.abs(run.counts).max() <= np.iinfo(np.int16).max else "int32_t"
+    count = f"int{8 * run.count_bytes}_t"
     rows = ["    {" + ", ".join(map(str, row)) + "}," for row in run.counts.tolist()]
     return "\n".join(
         [

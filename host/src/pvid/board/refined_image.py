@@ -9,7 +9,14 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
-from pvid.board.mechanism_image import MADE_BY, MechanismRun, build_with, files_of, mechanism_run
+from pvid.board.mechanism_image import (
+    MADE_BY,
+    MechanismRun,
+    build_with,
+    files_of,
+    measured_from,
+    mechanism_run,
+)
 from pvid.codegen import files_refine, files_refine_design
 from pvid.codegen.build import refine_functions
 from pvid.codegen.fitted_sizes import fitted_sizes
@@ -52,24 +59,31 @@ def refined_run(name: str, ticks: int, **changes: object) -> RefinedRun:
     return RefinedRun(run, made, replace(settings, **changes))  # type: ignore[arg-type]
 
 
+def light_work(board: Board) -> dict[str, int]:
+    """Settings of the refinement with which the longest tick is short: without a floating point unit a tick has one
+    job, and ticks in which the weak form is busy have none."""
+    return {"jobs": 3 if board.has_fpu else 1, "rests": 255}
+
+
 def refined_pendulum(ticks: int, board: Board) -> RefinedRun:
     """The pendulum's standard rig with its full equations and 14 bits, on which the refinement finds its track; the
-    ticks behind the first window in which it is published count in the mean. Without a floating point unit a tick has
-    one job of the refinement.
+    ticks of the steady state count in the mean, as in mechanism_run, behind the first window in which it is published.
 
     Raises
     ------
     PvidError
         Where it is not published within `ticks`.
     """
-    run = refined_run(DEFAULT, ticks, jobs=3 if board.core.endswith("F") else 1, rests=255)
+    run = refined_run(DEFAULT, ticks, **light_work(board))
     measured = full_pendulum((ticks + 1) / 1000.0)
     samples = np.stack([measured[one] for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
     run = replace(run, weak=replace(run.weak, counts=np.rint(samples / run.weak.lsb).astype(np.int32)))
     published = np.flatnonzero(run.native().run_both(run.weak.samples).told == Reason.UPDATED)
     if not len(published):
         raise PvidError(f"no refined estimate is published within {ticks} ticks")
-    return replace(run, weak=replace(run.weak, measure_from=int(published[0])))
+    config = run.weak.config
+    steady = measured_from(config.ticks_needed, config.design.hop * config.design.decimation, ticks)
+    return replace(run, weak=replace(run.weak, measure_from=max(int(published[0]), steady)))
 
 
 def header(run: RefinedRun, text: str) -> str:

@@ -304,9 +304,21 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
 
 
 def play(target: Board, image: Path, timeout: float) -> ReplayReport:
-    """Runs a replay image in its board's emulator and reads its report; `timeout` [s] as in `board.boards.run`."""
+    """Runs a replay image in its board's emulator and reads its report; `timeout` [s] as in `board.boards.run`.
+
+    Raises
+    ------
+    PvidError
+        When the image fails; of a stack that grows into the variables, which nothing on an AVR detects, a sentence of
+        its own.
+    """
     outcome = run_image(target, image, timeout)
+    full = f"{target.name}: the image does not fit: its stack exceeds the RAM"
+    if "out of ram" in outcome.text + outcome.complaints:  # simavr's words
+        raise PvidError(full)
     report = parse_report(outcome.text)
+    if report.stack_used >= report.stack_size:
+        raise PvidError(full)
     if outcome.exit_code != 0:
         raise PvidError(f"{target.name}: the image ended with exit code {outcome.exit_code}")
     return report

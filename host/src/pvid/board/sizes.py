@@ -21,7 +21,7 @@ from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.forms import FORMS
 
 TICKS = 5000
-REFINED_TICKS = 16_000  # the refinement finds its track in the first 6 600
+REFINED_TICKS = 21_000  # the refinement finds its track in the first 6 600; the last 16 half windows count
 TIMEOUT_S = 300.0
 ALLOWANCE = 1.02
 
@@ -124,11 +124,11 @@ def measure(configuration: Configuration) -> tuple[Footprint, ReplayReport]:
     PvidError
         When a compiler or emulator is missing, or the image fails.
     """
-    return _measured(configuration, _BUILT[configuration.form](configuration))
+    return measured(configuration.board, _BUILT[configuration.form](configuration))
 
 
 @dataclass(frozen=True)
-class _Built:
+class BuiltImage:
     """An image with what is counted in it.
 
     image, tree: the file, and where it was built; code, tables, state: (section, origin) of the core's code and
@@ -142,22 +142,22 @@ class _Built:
     state: tuple[tuple[str, str], ...] = ()
 
 
-def _strong(configuration: Configuration) -> _Built:
+def _strong(configuration: Configuration) -> BuiltImage:
     run = standard_run(TICKS, configuration.core)
     tables = r"\.(s?rodata|progmem\.data)\.replay_(config_)?weights$"
-    return _Built(*build_image(configuration.board, run), ((CODE, CORE),), ((tables, "replay"),))
+    return BuiltImage(*build_image(configuration.board, run), ((CODE, CORE),), ((tables, "replay"),))
 
 
-def _weak(configuration: Configuration) -> _Built:
+def _weak(configuration: Configuration) -> BuiltImage:
     """Of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
     made = engine_image(configuration.board, configuration.model, ENGINE_CORES[configuration.core].name)
-    return _engine(made.image, made.tree, made.name)
+    return built_engine(made.image, made.tree, made.name)
 
 
-def _engine(image: Path, tree: Path, name: str) -> _Built:
+def built_engine(image: Path, tree: Path, name: str) -> BuiltImage:
     """An image of the weak engine with the mechanism called `name` in C."""
     tables = rf"\.(s?rodata|progmem\.data|progmem\d?\.data)\.({name}_|replay_refine_config)"
-    return _Built(
+    return BuiltImage(
         image,
         tree,
         ((CODE, CORE), (r"\.text", _MODEL)),
@@ -172,19 +172,25 @@ def refined_replay(board: Board) -> RefinedRun:
     return refined_pendulum(REFINED_TICKS, board)
 
 
-def _refined(configuration: Configuration) -> _Built:
+def _refined(configuration: Configuration) -> BuiltImage:
     run = refined_replay(configuration.board)
-    return _engine(*build_refined_image(configuration.board, run), run.weak.name)
+    return built_engine(*build_refined_image(configuration.board, run), run.weak.name)
 
 
-_BUILT: dict[str, Callable[[Configuration], _Built]] = {
+_BUILT: dict[str, Callable[[Configuration], BuiltImage]] = {
     **dict(zip(FORMS, (_weak, _strong), strict=True)),
     REFINED: _refined,
 }
 
 
-def _measured(configuration: Configuration, built: _Built) -> tuple[Footprint, ReplayReport]:
-    board = configuration.board
+def measured(board: Board, built: BuiltImage) -> tuple[Footprint, ReplayReport]:
+    """Runs an image and counts what is in it.
+
+    Raises
+    ------
+    PvidError
+        When the emulator is missing, or the image fails.
+    """
     map_text = built.image.with_suffix(".map").read_text(encoding="utf-8")
     report = play(board, built.image, TIMEOUT_S)
     footprint = Footprint(
@@ -218,16 +224,23 @@ def as_json(footprints: Mapping[Configuration, Footprint]) -> list[dict[str, obj
             "model": one.model,
             "form": one.form,
             "core": one.core,
-            "text": found.text + found.arithmetic,
-            "tables": found.tables,
-            "data": found.data,
-            "state": found.bss,
-            "stack_bound": found.stack_bound,
-            "mean": found.mean,
-            "longest": found.longest,
+            **figures_of(found),
         }
         for one, found in footprints.items()
     ]
+
+
+def figures_of(found: Footprint) -> dict[str, int]:
+    """In an object of `sizes --json`."""
+    return {
+        "text": found.text + found.arithmetic,
+        "tables": found.tables,
+        "data": found.data,
+        "state": found.bss,
+        "stack_bound": found.stack_bound,
+        "mean": found.mean,
+        "longest": found.longest,
+    }
 
 
 def table_rows(footprints: dict[Configuration, Footprint]) -> list[tuple[str, ...]]:

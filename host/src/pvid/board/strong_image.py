@@ -7,7 +7,7 @@ import numpy as np
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.compare_on import Outcome
-from pvid.board.mechanism_image import build_with
+from pvid.board.mechanism_image import build_with, refuse_float_on_avr
 from pvid.board.replay_image import REPORT_EVERY, ReplayReport, play
 from pvid.codegen import files_strong_design
 from pvid.codegen.strong_library import sizes_of_strong, strong_texts
@@ -114,6 +114,5 @@ def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:
 def _board(target: str) -> Board:
     if target not in BOARDS:
         raise PvidError(f"{target} is no emulated board: the strong form is compared on {', '.join(BOARDS)}")
-    if BOARDS[target].toolchain == "avr":
-        raise PvidError(f"{target}: float32 has no bits of the twin on an AVR: its division differs at the extremes")
+    refuse_float_on_avr(BOARDS[target])
     return BOARDS[target]

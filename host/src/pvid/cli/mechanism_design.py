@@ -4,35 +4,128 @@ from __future__ import annotations
 
 import json
 import sys
+from typing import TYPE_CHECKING
 
 import click
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.console import DONE, NOTHING_IDENTIFIED, write_stderr
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
+from pvid.run.engine_design import Run
 from pvid.run.mechanism_design import EngineReport, designs_tried, report_for_recording, report_for_rig
+from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.refine import RefineConfig
+
+if TYPE_CHECKING:
+    from pvid.board.design_cost import Asked, Cost
 
 _SHOWN = 12  # designs of a table
 
 
-def print_design(model: CompiledModel, recording: Recording | None, *, as_json: bool) -> int:
-    """The engine's design for a recording, or for the simulated rig, and its predicted errors.
+def print_design(
+    model: CompiledModel,
+    recording: Recording | None,
+    asked: Asked | None = None,
+    motion: Run | None = None,
+    *,
+    as_json: bool,
+) -> int:
+    """The engine's design for a recording, or for the simulated rig, its predicted errors, and its cost on a board.
+
+    Parameters
+    ----------
+    asked : the costs to measure; None: none
+    motion : that the board replays, where it is not that of the recording
 
     Returns
     -------
     The exit code.
     """
     report = report_for_rig(model) if recording is None else report_for_recording(model, recording)
-    if as_json:
-        click.echo(json.dumps(report.as_json()))
-    else:
+    if not as_json:
         _print_report(report)
+    costs = [] if asked is None else _measured(asked, model, recording, motion)
+    if not all(one.equal for one in costs):
+        write_stderr(f"pvid: {costs[0].asked.board.name}: its hashes are not those of this computer")
+        return DIFFERENT
+    if as_json:
+        click.echo(json.dumps(report.as_json() | ({"cost": [one.as_json() for one in costs]} if asked else {})))
+    elif costs:
+        _print_costs(costs)
     return DONE if report.chosen.known else NOTHING_IDENTIFIED
+
+
+def _measured(asked: Asked, model: CompiledModel, recording: Recording | None, motion: Run | None) -> list[Cost]:
+    """The costs on a board; why there is no second stage, and what is wrong with a cost, on standard error."""
+    from pvid.board.design_cost import CostedDesign
+
+    if recording is None:
+        design = CostedDesign.of_shipped_rig(asked, model)
+    else:
+        design = CostedDesign.of_recording(asked, model, recording, motion)
+    if design.no_refinement is not None:
+        write_stderr(f"pvid: no refinement in C: {design.no_refinement}")
+    images: list[RefineConfig | None] = design.images(asked)
+    costs: list[Cost] = []
+    with progress_bar(f"measuring on {asked.board.name}", len(images)) as advance:
+        for refine in images:
+            try:
+                costs.append(design.cost(asked, refine))
+            except PvidError as error:
+                if refine is None:
+                    raise
+                write_stderr(f"pvid: {_stages(refine)}: {error}")
+            advance(len(costs))
+    return costs
+
+
+def _print_costs(costs: list[Cost]) -> None:
+    asked, rate = costs[0].asked, costs[0].sample_rate
+    unit = "clock cycles" if asked.board.toolchain == "avr" else "instructions"
+    title = f"{asked.board.name} ({asked.board.core}), {ENGINE_CORES[asked.core].words}: {unit} of a tick, and bytes"
+    table = Table(title=title)
+    figures = ("mean", "longest") if asked.clock_mhz is None else ("mean", "%", "longest", "%")
+    for heading in ("", *figures, "state", "stack", "code", "tables", "first s", "replayed s"):
+        table.add_column(heading, justify="right" if heading else "left")
+    for one in costs:
+        found = one.footprint
+        counts = [str(found.mean), str(found.longest)]
+        shares = [f"{100 * share:.3g}" for share in one.shares or ()]
+        table.add_row(
+            _stages(one.refine),
+            *(cell for pair in zip(counts, shares, strict=True) for cell in pair) if shares else counts,
+            str(found.data + found.bss),
+            str(found.stack_bound),
+            str(found.text + found.arithmetic),
+            str(found.tables),
+            "-" if one.first_s is None else f"{one.first_s:.3g}",
+            f"{one.ticks / one.sample_rate:.3g}",
+        )
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    click.echo("RAM: state and stack; flash: code and tables; longest: of all replayed ticks; first: estimate")
+    if asked.clock_mhz is not None:
+        what = "" if asked.board.toolchain == "avr" else ", one instruction a cycle"
+        click.echo(f"%: of the {1000 / rate:.3g} ms between samples at {asked.clock_mhz:g} MHz{what}")
+    for one in costs:
+        if one.shares is not None and one.shares[1] > 1:
+            write_stderr(
+                f"pvid: warning: {_stages(one.refine)}: the longest tick takes longer than from sample to sample"
+            )
+        if one.first_s is None:
+            write_stderr(
+                f"pvid: warning: {_stages(one.refine)}: no estimate within the replayed {one.ticks / rate:.3g} s"
+            )
+
+
+def _stages(refine: RefineConfig | None) -> str:
+    """In words, with the settings of the second stage that decide about the longest tick."""
+    return "weak form" if refine is None else f"both, jobs {refine.jobs}, rests {refine.rests}"
 
 
 def _print_report(report: EngineReport) -> None:

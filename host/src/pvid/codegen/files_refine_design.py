@@ -63,7 +63,7 @@ def tables(settings: RefineConfig, name: str) -> list[str]:
         **{
             one: number(getattr(settings, one))
             for one in (
-                *("forgetting_s", "gate", "chi_max", "clash_max", "step_max", "step_limit"),
+                *("forgetting_s", "outlier_gate", "gate", "chi_max", "clash_max", "step_max", "step_limit"),
                 *("se_max", "distance"),
             )
         },

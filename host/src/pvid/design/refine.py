@@ -24,7 +24,7 @@ _TICKS, _MORE_TICKS = 3, 50  # of a pass for each big step, three jobs a tick, a
 _SPARE = 16  # entries of the ring
 
 
-def refine_config(rig: RefineRig, forgetting_s: float = 0.0) -> RefineConfig:
+def refine_config(rig: RefineRig, forgetting_s: float = 0.0, outlier_gate: float = 4.0) -> RefineConfig:
     """The settings that evidence recommends.
 
     Raises
@@ -60,6 +60,7 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0) -> RefineConfig:
         gain_sd=_as_float32(rig.gain_sd),
         state_limit=_as_float32(rig.state_limit),
         forgetting_s=forgetting_s,
+        outlier_gate=outlier_gate,
         rests=rig.rests,
     )
 

@@ -188,7 +188,8 @@ class Following:
     Attributes
     ----------
     forgetting_s : time constant of forgetting [s]; 0: none
-    outlier_gate : windows whose residuals exceed this multiple of the usual are rejected; 0: none is
+    outlier_gate : windows whose residuals exceed this multiple of the usual are rejected, and before the refinement
+        single samples that do; 0: none is
     outlier_patience_s : the gate accepts a changed mechanism after this time [s], 0: never; None: as `patience_s`
     dead_zone : p stays while it is within this many standard errors of the solution of all data; 0: no dead zone
     """

@@ -131,7 +131,7 @@ def refine_settings(
         gain_sd=(0.0,) * len(made.parameters),
         state_limit=_state_limit(made, run, rate),
     )
-    settings = refine_config(rig, model.following.forgetting_s)
+    settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
 
 

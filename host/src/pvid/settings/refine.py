@@ -54,6 +54,7 @@ class RefineConfig:
     jobs : of a pass in one tick: 1 without a floating point unit
     rests : ticks in a row, at most, without jobs because the weak form is busy
     forgetting_s : time constant; 0: none
+    outlier_gate : means of samples that stand out by more than this multiple of the usual are left out; 0: no gate
     gate, chi_max, clash_max, step_max, step_limit, se_max, distance : limits
     """
 
@@ -72,6 +73,7 @@ class RefineConfig:
     jobs: int = 3
     rests: int = 1
     forgetting_s: float = 0.0
+    outlier_gate: float = 4.0
     gate: float = 8.0
     chi_max: float = 3.0
     clash_max: float = 25.0

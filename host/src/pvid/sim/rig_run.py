@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pvid.base.errors import PvidError
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.sim.pendulum import Pendulum, Sensors, Tone, simulate
+from pvid.sim.pendulum import Pendulum, Sensors, Tone, Truth, simulate
 
 # White noise of the sensors beside their rounding [LSB]: that of the standard rig (theory.md 6). The rig file holds
 # resolutions only.
@@ -20,8 +20,14 @@ def sensors_of(rig: RigFile) -> Sensors:
     return Sensors(phi_lsb=sensor.phi_lsb, phi_noise_lsb=PHI_NOISE_LSB, y_lsb=sensor.y_lsb, y_noise_lsb=Y_NOISE_LSB)
 
 
-def simulated_run(rig: RigFile, tones: Sequence[Tone], release: tuple[float, float], duration: float) -> Run:
-    """A run of `duration` [s] of the nominal rig with linear equations, driven by tones and released at rest.
+def simulated_run(
+    rig: RigFile, tones: Sequence[Tone], release: tuple[float, float], duration: float, truth: Truth = "linear"
+) -> Run:
+    """A run of `duration` [s] of the nominal rig, driven by tones and released at rest.
+
+    Parameters
+    ----------
+    truth : of pvid.sim.pendulum.simulate
 
     Raises
     ------
@@ -32,4 +38,4 @@ def simulated_run(rig: RigFile, tones: Sequence[Tone], release: tuple[float, flo
         raise PvidError("phi_lsb is 0 in the rig file: errors can be predicted for an encoder with a resolution only")
     if rig.sample_rate is None:
         raise PvidError("sample_rate is required in the rig file to predict errors")
-    return simulate(Pendulum.nominal(rig), tones, sensors_of(rig), rig.sample_rate, duration, release).run
+    return simulate(Pendulum.nominal(rig), tones, sensors_of(rig), rig.sample_rate, duration, release, truth).run

@@ -15,6 +15,10 @@ _F = np.float32
 _FULL_SCALE = _F(32767)
 _MISSING = -32768
 RING = 512
+_LATE = 3  # PVID_REFINE_LATE
+_PERIOD = 64
+_PART = _F(0.58)
+_LARGEST = _F(3.4e38)
 
 
 class Entry(Enum):
@@ -42,9 +46,10 @@ class Front:
         self.sample = [one.sample for one in signals]
         self.second = None if config.second is None else np.asarray(config.second, _F)
         self.half = 0 if self.second is None else len(self.second) - 1
-        self.behind = self.half if any(self.derived) else 0
+        self.behind = _LATE + (self.half if any(self.derived) else 0)
+        self.gate = _F(config.outlier_gate)
+        self.gated = [config.outlier_gate > 0 and (one.order == 2 or i >= self.inputs) for i, one in enumerate(signals)]
         self.ring = np.zeros((RING, len(signals)), np.int16)
-        self.mean = np.zeros((2, len(signals)), _F)
         self.reset()
 
     def reset(self) -> None:
@@ -54,6 +59,11 @@ class Front:
         self.rest = np.zeros(len(self.sample), _F)
         self.held = np.zeros(len(self.sample), _F)
         self.line: list[list[np.float32]] = [[] for _ in self.sample]
+        self.difference = np.zeros((4, len(self.sample)), _F)  # the last mean and its differences of orders 1 to 3
+        self.fourth = np.zeros((2, len(self.sample)), _F)  # the last two fourth differences, latest first
+        self.peak = np.full(len(self.sample), _LARGEST, _F)
+        self.usual = self.peak.copy()
+        self.postponed = False
 
     @property
     def end(self) -> int:
@@ -63,7 +73,7 @@ class Front:
     @property
     def first(self) -> int:
         """First entry that a block may begin at."""
-        return self.behind
+        return self.behind - _LATE
 
     @property
     def room(self) -> int:
@@ -76,6 +86,40 @@ class Front:
         for i in range(1, self.half + 1):
             total = total + self.second[i] * (line[self.half - i] + line[self.half + i])
         return _F(total)
+
+    def _leave_out(self, signal: int, off: np.float32) -> None:
+        """Takes a wild mean out: that of the last entry but one."""
+        beside = -(self.droop[signal] * off)
+        for back, part in enumerate((beside, off - _F(2) * beside, beside), start=1):
+            if self.derived[signal]:
+                self.line[signal][-back] = self.line[signal][-back] - part
+            else:
+                self.ring[(self.next - back) % RING, signal] = _MISSING
+
+    def _judge(self, signal: int, newest: np.float32) -> np.float32:
+        """By how much the mean is off to which the last fourth difference belongs."""
+        middle, before = self.fourth[:, signal]
+        limit, size = self.gate * self.usual[signal], np.abs(middle)
+        if np.abs(newest) <= limit:
+            self.peak[signal] = np.abs(newest)
+        if not size > limit:
+            return _F(0)
+        opposite = [-one if middle > 0 else one for one in (newest, before)]
+        if all(_PART * size < one < size for one in opposite):
+            off = middle * _F(1 / 6)
+            self._leave_out(signal, off)
+            return _F(off)
+        if size > np.abs(newest) and size > np.abs(before) and size > self.peak[signal]:
+            self.peak[signal] = size
+        return _F(0)
+
+    def _end_period(self) -> None:
+        if not self.postponed and np.any(np.abs(self.fourth[0]) > self.gate * self.usual):
+            self.postponed = True
+            return
+        self.postponed = False
+        for signal in np.flatnonzero(self.gated):
+            self.usual[signal], self.peak[signal] = self.peak[signal], 0
 
     def _counts(self, signal: int, x: np.float32) -> int:
         """x in counts and what rounding left of the entry before, rounded to the nearest one; _MISSING if it is not
@@ -92,9 +136,10 @@ class Front:
         if self.derived[signal]:
             line = self.line[signal]
             line.append(x)
-            if len(line) > 2 * self.half:
-                del line[: len(line) - 2 * self.half - 1]
-                place = (self.next - self.half) % RING
+            if len(line) > 2 * self.half + 1 + _LATE:
+                del line[: len(line) - 2 * self.half - 1 - _LATE]
+            if len(line) == 2 * self.half + 1 + _LATE:
+                place = (self.next - self.half - _LATE) % RING
                 self.ring[place, signal] = self._counts(signal, self._second_derivative(line))
         else:
             self.ring[self.next % RING, signal] = self._counts(signal, x)
@@ -106,18 +151,28 @@ class Front:
             return Entry.BROKEN
         known = self.means >= 2
         x = self.sum * self.share
-        middle = self.mean[0].copy()
-        if known:
-            undone = middle - self.droop * ((self.mean[1] - _F(2) * middle) + x)
-            for signal, value in enumerate(undone):
-                self._enter(signal, value)
-        self.mean[1], self.mean[0] = middle, x
+        middle = self.difference[0].copy()
+        first = x - middle
+        second = first - self.difference[1]
+        third = second - self.difference[2]
+        fourth = third - self.difference[3]
+        for signal in range(len(x)):
+            if np.abs(fourth[signal]) > self.peak[signal]:
+                off = self._judge(signal, fourth[signal])
+                third[signal] += off
+                fourth[signal] += _F(4) * off
+            if known:
+                self._enter(signal, middle[signal] - self.droop[signal] * second[signal])
+        self.difference = np.stack([x, first, second, third])
+        self.fourth = np.stack([fourth, self.fourth[0]])
         self.sum = np.zeros_like(self.sum)
         self.wait = self.config.ratio
         if not known:
             self.means += 1
             return Entry.NOTHING
         self.next += 1
+        if self.next % _PERIOD == 0:
+            self._end_period()
         return Entry.ENTERED
 
     def step(self, sample: Float32) -> Entry:

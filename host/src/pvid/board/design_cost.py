@@ -1,0 +1,276 @@
+"""What a design costs on an emulated board, before one is flashed: its replay image with a run of the rig, measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.board.boards import BOARDS, Board
+from pvid.board.mechanism_board import refuse_unrefined
+from pvid.board.mechanism_image import build_mechanism_image, long_run, refuse_float_on_avr, run_of_samples
+from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image
+from pvid.board.refined_image import RefinedRun, build_refined_image, light_work
+from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_engine, figures_of, measured
+from pvid.codegen.build import refine_functions, refine_refusal
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.model.compiled import CompiledModel
+from pvid.rig.run import Recording
+from pvid.run.engine_design import (
+    Run,
+    config_for_recording,
+    config_for_rig_like_the_shipped,
+    samples_of,
+    simulated_run_of,
+)
+from pvid.run.engine_design_q31 import FixedEngine, engine_for_recording, engine_for_rig_like_the_shipped
+from pvid.run.refine_design import full_motion_of, refine_design, refine_for_simulated_rig
+from pvid.settings.engine_cores import FLOAT
+from pvid.settings.enums import Core, Reason
+from pvid.settings.refine import BIG_STEP, RefineConfig
+from pvid.settings.weak import WeakConfig
+
+MOST_TICKS = 40_000  # that are replayed
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Which costs.
+
+    Attributes
+    ----------
+    board : an emulated one
+    core : arithmetic of the weak form
+    refined : both stages as well
+    clock_mhz : of the user's board; None: not given
+    """
+
+    board: Board
+    core: Core = FLOAT.name
+    refined: bool = False
+    clock_mhz: float | None = None
+
+    @classmethod
+    def of(cls, target: str, core: Core, *, refined: bool, clock_mhz: float | None) -> Asked:
+        """PvidError where there is no such board, or it does not have these."""
+        if target not in BOARDS:
+            raise PvidError(f"{target} is no emulated board: the cost is measured on {', '.join(BOARDS)}")
+        if refined:
+            refuse_unrefined(core)
+        if core == FLOAT.name:
+            refuse_float_on_avr(BOARDS[target])
+        return cls(BOARDS[target], core, refined, clock_mhz)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of the weak form, or of both stages.
+
+    Attributes
+    ----------
+    asked : what was measured
+    model : of the mechanism, in C
+    footprint : mean of the ticks in whole half windows, or behind the first refined estimate; the longest of all ticks
+    ticks : that were replayed
+    sample_rate : [Hz]
+    first_s : time of the first published estimate; of both stages, of the refined one [s]; None: none was replayed
+    equal : whether every hash that the board reported is that of the C core on this machine
+    refine : settings of the second stage; None: without
+    """
+
+    asked: Asked
+    model: str
+    footprint: Footprint
+    ticks: int
+    sample_rate: float
+    first_s: float | None
+    equal: bool
+    refine: RefineConfig | None = None
+
+    @property
+    def shares(self) -> tuple[float, float] | None:
+        """Mean and longest tick as parts of the time between samples, one instruction a cycle; None: no clock."""
+        if self.asked.clock_mhz is None:
+            return None
+        cycles = 1e6 * self.asked.clock_mhz / self.sample_rate
+        return self.footprint.mean / cycles, self.footprint.longest / cycles
+
+    def as_json(self) -> dict[str, Any]:
+        """An entry of `cost` of `design --on --json`: as of `sizes --json`, and how it was measured."""
+        own = self.refine
+        shares = {} if self.shares is None else dict(zip(("mean_share", "longest_share"), self.shares, strict=True))
+        return {
+            "target": self.asked.board.name,
+            "model": self.model,
+            "form": WEAK if own is None else REFINED,
+            "core": self.asked.core,
+            **figures_of(self.footprint),
+            **({} if own is None else {"jobs": own.jobs, "rests": own.rests}),
+            "ticks": self.ticks,
+            "first_s": self.first_s,
+            **shares,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class CostedDesign:
+    """A design for a rig with a run of it.
+
+    Attributes
+    ----------
+    compiled : the mechanism
+    engine : its weak form
+    run : name of each signal -> samples
+    refine : settings of the second stage, as `model build` prints them; None: without
+    no_refinement : why there are none, where they are asked for
+    """
+
+    compiled: CompiledModel
+    engine: WeakConfig | FixedEngine
+    run: Run
+    refine: RefineConfig | None = None
+    no_refinement: str | None = None
+
+    @classmethod
+    def of_recording(
+        cls, asked: Asked, compiled: CompiledModel, recording: Recording, motion: Run | None = None
+    ) -> CostedDesign:
+        """That which `model build --run` prints.
+
+        Parameters
+        ----------
+        motion : that is replayed, where it is not that of the recording
+
+        Raises
+        ------
+        PvidError
+            Where the engine does not have what the model needs.
+        """
+        run = recording.signals if motion is None else motion
+        if asked.core != FLOAT.name:
+            return cls(compiled, engine_for_recording(compiled, recording), run)
+        config = config_for_recording(compiled, recording)
+        return cls(compiled, config, run)._with_refinement(asked, lambda: refine_design(compiled, config, run))
+
+    @classmethod
+    def of_shipped_rig(cls, asked: Asked, compiled: CompiledModel) -> CostedDesign:
+        """That of a shipped mechanism's simulated rig; raises as of_recording."""
+        if asked.core != FLOAT.name:
+            return cls(compiled, engine_for_rig_like_the_shipped(compiled), simulated_run_of(compiled)[0])
+        config = config_for_rig_like_the_shipped(compiled)
+        run = full_motion_of(compiled) if asked.refined else simulated_run_of(compiled)[0]
+        return cls(compiled, config, run)._with_refinement(asked, lambda: refine_for_simulated_rig(compiled, config))
+
+    def _with_refinement(self, asked: Asked, made: Callable[[], RefineConfig]) -> CostedDesign:
+        if not asked.refined:
+            return self
+        reason = refine_refusal(self.compiled)
+        if reason is None:
+            try:
+                return replace(self, refine=made())
+            except PvidError as error:
+                reason = str(error)
+        return replace(self, no_refinement=reason)
+
+    def images(self, asked: Asked) -> list[RefineConfig | None]:
+        """Settings of the second stage of each image: the weak form alone, then those of `model build`, then those
+        with a short longest tick."""
+        if self.refine is None:
+            return [None]
+        light = replace(self.refine, **light_work(asked.board))  # type: ignore[arg-type]
+        return [None, self.refine, *([] if _work(light) == _work(self.refine) else [light])]
+
+    def cost(self, asked: Asked, refine: RefineConfig | None) -> Cost:
+        """Builds an image, replays the run on the board and on this machine.
+
+        Raises
+        ------
+        PvidError
+            When a compiler or the emulator is missing, or the image does not fit or fails.
+        """
+        if isinstance(self.engine, FixedEngine):
+            return _in_fixed_point(asked, self.engine, self.run)
+        return _in_float(asked, self.compiled, self.engine, self.run, refine)
+
+
+def _work(refine: RefineConfig) -> tuple[int, int]:
+    return refine.jobs, refine.rests
+
+
+def _in_float(
+    asked: Asked, compiled: CompiledModel, config: WeakConfig, signals: Run, refine: RefineConfig | None
+) -> Cost:
+    samples = samples_of(config, signals)
+    run = run_of_samples(compiled, config, samples[: _most_ticks(asked.board, 4 * samples.shape[1])])
+    rate, period = config.sample_rate, config.design.hop * config.design.decimation
+    if refine is None:
+        record = weak_native(compiled, config.design).identifier_of(config).run_samples(run.samples, sums=False)
+        first = _first(record.reason)
+        run = run.shortened(_enough(first, config.ticks_needed, period, len(run.counts)))
+        built = built_engine(*build_mechanism_image(asked.board, run), run.name)
+        return _measured(asked, run.name, built, record.hash, first, rate)
+    both = RefinedRun(run, refine_functions(compiled), refine)
+    record_of_both = both.native().run_both(run.samples)
+    first = _first(record_of_both.told)
+    block = refine.block * BIG_STEP * refine.ratio
+    run = run.shortened(_enough(first, config.ticks_needed, block, len(run.counts)))
+    both = replace(both, weak=run if first is None else replace(run, measure_from=first))
+    built = built_engine(*build_refined_image(asked.board, both), run.name)
+    return _measured(asked, run.name, built, record_of_both.hash, first, rate, refine)
+
+
+def _in_fixed_point(asked: Asked, engine: FixedEngine, signals: Run) -> Cost:
+    counts = engine.counts_of(signals)
+    run = FixedRun(engine, counts, 0)
+    run = replace(run, counts=counts[: _most_ticks(asked.board, run.count_bytes * counts.shape[1])])
+    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    record = identifier.run_samples(run.counts, sums=False)
+    first = _first(record.reason)
+    period = engine.config.design.hop * engine.config.design.decimation
+    run = run.shortened(_enough(first, engine.ticks_needed, period, len(run.counts)))
+    built = built_engine(*build_fixed_image(asked.board, run), run.name)
+    return _measured(asked, run.name, built, record.hash, first, engine.sample_rate)
+
+
+def _most_ticks(board: Board, bytes_a_tick: int) -> int:
+    return min(MOST_TICKS, board.sample_bytes // bytes_a_tick)
+
+
+def _first(reason: npt.NDArray[np.uint8]) -> int | None:
+    """The first tick with an estimate."""
+    found = np.flatnonzero(np.isin(reason, (Reason.UPDATED, Reason.MISFIT)))
+    return int(found[0]) if len(found) else None
+
+
+def _enough(first: int | None, ticks_needed: int, period: int, ticks: int) -> int:
+    """Ticks to replay: up to the steady state behind the first estimate, as far as the run goes; without an estimate
+    the whole run."""
+    return ticks if first is None else long_run(max(first + 1, ticks_needed), period, ticks)
+
+
+def _measured(
+    asked: Asked,
+    model: str,
+    built: BuiltImage,
+    hashes: npt.NDArray[np.uint32],
+    first: int | None,
+    rate: float,
+    refine: RefineConfig | None = None,
+) -> Cost:
+    footprint, report = measured(asked.board, built)
+    reported = {**report.hashes, report.ticks: report.hash}
+    return Cost(
+        asked,
+        model,
+        footprint,
+        report.ticks,
+        rate,
+        None if first is None else (first + 1) / rate,
+        all(hashed == int(hashes[tick - 1]) for tick, hashed in reported.items()),
+        refine,
+    )

@@ -1,0 +1,76 @@
+"""What the choices of a build of the weak form give: bytes and instructions on the pendulum's shipped rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from pvid.board import mechanism_image, mechanism_image_q31
+from pvid.board.boards import BOARDS
+from pvid.board.mechanism_image import build_with, mechanism_run
+from pvid.board.mechanism_image_q31 import fixed_run
+from pvid.board.sizes import Footprint, built_engine, measured
+from pvid.codegen.fitted_sizes import fitted_sizes
+from pvid.models.registry import DEFAULT
+from pvid.settings.enums import Core
+
+HEADER = ("choice", "text", "state", "mean", "longest")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A build: its sizes beside those that `pvid model build` prints, and variables of CMake."""
+
+    title: str
+    core: Core = "f32"
+    sizes: Mapping[str, int] = field(default_factory=dict)
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def board(self) -> str:
+        """On which it is measured."""
+        return "mps2-an386" if self.core == "f32" else "microbit"
+
+
+_PARTS = {f"PVID_{one}": 1 for one in ("REFINEMENT", "DEAD_ZONE", "FEEDBACK", "NEGLECTED")}
+_SELDOM = {"PVID_SELDOM_OPTIONS": "-Os"}
+_SMALL = {"CMAKE_BUILD_TYPE": "MinSizeRel"}
+CHOICES = (
+    Choice(
+        "float32, Cortex-M4F, nothing chosen but the loops",
+        sizes=_PARTS | {"PVID_CHECK_TABLES": 1, "PVID_MAX_WINDOWS": 1},
+    ),
+    Choice(
+        "the window's sums in the place of the older half's: `PVID_MAX_WINDOWS=0`",
+        sizes=_PARTS | {"PVID_CHECK_TABLES": 1},
+    ),
+    Choice("and no check of the printed tables: `PVID_CHECK_TABLES=0`", sizes=_PARTS),
+    Choice("and no second stage, no dead zone, no law with g < 1, no neglected terms: what `pvid model build` prints"),
+    Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", options=_SELDOM),
+    Choice("or all of it with `-Os` (`MinSizeRel`)", options=_SMALL),
+    Choice("fixed point, Cortex-M0, as printed", "q31"),
+    Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", "q31", options=_SELDOM),
+    Choice("or all of it with `-Os`", "q31", options=_SMALL),
+)
+
+
+def footprint_of(choice: Choice, place: int) -> Footprint:
+    """Builds and plays it."""
+    board = BOARDS[choice.board]
+    if choice.core == "f32":
+        run = mechanism_run(DEFAULT, long=True)
+        name, files, fitted = run.name, mechanism_image.files_of(run), fitted_sizes(run.config)
+    else:
+        fixed = fixed_run(DEFAULT, long=True)
+        name, files, fitted = fixed.name, mechanism_image_q31.files_of(fixed), fixed.sizes
+    sizes = fitted | dict(choice.sizes)
+    image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=choice.options)
+    return measured(board, built_engine(image, tree, name))[0]
+
+
+def rows_of(progress: Callable[[int], None] = lambda _: None) -> Iterator[tuple[str, ...]]:
+    """All rows."""
+    for place, choice in enumerate(CHOICES):
+        progress(place)
+        found = footprint_of(choice, place)
+        yield choice.title, *map(str, (found.text, found.bss, found.mean, found.longest))
