@@ -37,8 +37,10 @@ PVID_COLD static void change_unit(pvid_weak_scores_q31 *self, size_t n_p, size_t
     for (size_t b = 0; b < n_p; b++) {
         for (size_t c = b; c < n_p; c++) {
             const int32_t shift = ((b == a) ? up : 0) + ((c == a) ? up : 0);
-            pair->same = shifted(pair->same, shift, MEAN_MAX);
-            pair->neighbour = shifted(pair->neighbour, shift, MEAN_MAX);
+            if (shift != 0) {
+                pair->same = shifted(pair->same, shift, MEAN_MAX);
+                pair->neighbour = shifted(pair->neighbour, shift, MEAN_MAX);
+            }
             pair++;
         }
     }
