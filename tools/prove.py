@@ -352,6 +352,13 @@ PROOFS = (
         ("-eva-auto-loop-unroll", "1100", "-eva-min-loop-unroll", "13"),
     ),
     Proof(
+        "weak_scores_q31",
+        "any score on top of any scores and their means; standard errors by any such means and any inverse",
+        ("src/weak/scores_q31.c", "src/solve/assess_q31.c", "src/number/integer_q31.c"),
+        ("-eva-min-loop-unroll", "80"),
+        taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_root_of_q31"),
+    ),
+    Proof(
         "weak_front_q31",
         "the weak engine's front end, the pendulum's design: any counts within full scale, three times round the line",
         ("src/number/integer_q31.c",),

@@ -10,7 +10,7 @@ static void any_assessment(const pvid_model_q31 *model)
     pvid_estimator_solve_q31 solve;
     pvid_estimate_q31 estimate;
     any_state(model, &estimator);
-    pvid_estimator_begin_assessment_q31(&estimator, &solve, &estimate);
+    pvid_estimator_begin_assessment_q31(&estimator, &solve);
     while (!pvid_estimator_assess_advance_q31(&estimator, &solve, &estimate)) {
     }
     for (size_t a = 0; a < model->n_p; a++) {

@@ -30,6 +30,9 @@ static void any_solve(const pvid_model_q31 *model, bool ends_group, bool has_fal
         /*@ assert -0x40000000 <= estimator.mantissa[i] <= 0x40000000; */
         /*@ assert -2000 <= estimator.shift[i] <= 2000; */
     }
+    for (size_t i = 0; i < model->n_theta; i++) {
+        /*@ assert -0x3000000000000000 <= estimator.fresh[i] <= 0x3000000000000000; */
+    }
     for (size_t i = 0; i < estimator.information.n_sums; i++) {
         /*@ assert -0x4000000000000000 <= estimator.information.sums[i] <= 0x4000000000000000; */
     }

@@ -20,7 +20,7 @@ static void any_group(const pvid_model_q31 *model)
         sums.sums[i] = any_i64(-SUM_BOUND, SUM_BOUND);
     }
     for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
-        fresh[i] = any_i64(-SUM_BOUND, SUM_BOUND);
+        fresh[i] = any_i64(-2 * SUM_BOUND, 2 * SUM_BOUND);
     }
     sums.exponent = (uint8_t)any_u32(0, 40);
     sums.age = (uint16_t)any_u32(0, sums.block - 1u);
@@ -32,8 +32,7 @@ static void any_group(const pvid_model_q31 *model)
             for (size_t i = 0; i < PVID_MAX_THETA_Q31; i++) {
                 n[i] = any_i32(-PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31);
             }
-            pvid_information_add_q31(&sums, &block, n, any_i32(-PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31),
-                                     any_bool() ? fresh : NULL);
+            pvid_information_add_q31(&sums, &block, n, any_i32(-PVID_ROW_LIMIT_Q31, PVID_ROW_LIMIT_Q31), fresh);
         }
     }
     for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
@@ -42,6 +41,9 @@ static void any_group(const pvid_model_q31 *model)
     const int32_t factor = any_i32(1, INT32_MAX);
     for (size_t part = 0; part < PVID_INFORMATION_END_PARTS; part++) {
         pvid_information_fade_q31(&sums, part, factor);
+    }
+    for (size_t i = 0; i < sums.n_theta; i++) {
+        /*@ assert -0x2000000000000000 <= fresh[i] <= 0x2000000000000000; */
     }
     for (size_t i = 0; i < sums.n_sums; i++) {
         /*@ assert -0x4000000000000000 <= sums.sums[i] <= 0x4000000000000000; */

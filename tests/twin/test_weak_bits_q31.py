@@ -18,6 +18,7 @@ from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak_q31 import row_formats
 from pvid.twin.q31.elementary import tanh
 from pvid.twin.q31.integer import Int
+from pvid.twin.record import Reasons, Recorder
 from pvid.twin.weak_q31 import WeakTwinQ31
 
 Frozen = npt.NDArray[np.uint8]
@@ -47,7 +48,15 @@ def assert_equal(
     assert status == Status.OK
     twin = WeakTwinQ31(config, one.parameters.model)
     twin.frozen = None if frozen is None else frozen.astype(np.bool_)
-    wanted = twin.run(readings).lane()
+    recorder = Recorder(twin.estimator, readings.shape[1], True, None, twin.trust)
+    of_ticks: list[Array] = []
+
+    def after(tick: int, reasons: Reasons) -> None:
+        recorder(tick, reasons)
+        of_ticks.append(twin.trust.estimate["se"][0, : one.parameters.model.n_p].copy())
+
+    wanted = recorder.finished(twin.follow(readings.T, after)).lane()
+    assert np.array_equal(found.published_se, np.array(of_ticks)), "published_se"
     for name in ("reason", "p", "sums", "exponent", "published"):
         assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
     return found.reason, found.p[-1]
@@ -79,6 +88,14 @@ def test_hostile_readings_have_the_bits_of_the_twin(one: Rig, core: Core) -> Non
     )
     reasons, _ = assert_equal(one, core, config, readings, frozen)
     assert np.sum(reasons == Reason.REJECTED_SATURATED) >= 2
+
+
+@pytest.mark.parametrize("law", [{"divider": 3}, {"gain": 2**29, "divider": 2}, {"gain": 0}, {"forgetting_groups": 4}])
+def test_other_laws_have_the_bits_of_the_twin(core: Core, law: dict[str, int]) -> None:
+    """Their scores are those of several windows, or weigh as much as forgetting leaves."""
+    one = rig("dc_motor", TICKS)
+    config = replace(one.config, estimator=replace(one.config.estimator, **law))
+    assert_equal(one, core, config, one.counts)
 
 
 def test_soft_signs_have_the_bits_of_the_twin_and_are_tanh(core: Core) -> None:

@@ -183,12 +183,12 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
     return windows;
 }
 
-int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
-             uint8_t exponent[], uint8_t reason[], unsigned ticks);
+int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int32_t se[],
+             int64_t sums[], uint8_t exponent[], uint8_t reason[], unsigned ticks);
 
 /* The state after every tick; returns the status of init. */
-int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int64_t sums[],
-             uint8_t exponent[], uint8_t reason[], unsigned ticks)
+int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int32_t se[],
+             int64_t sums[], uint8_t exponent[], uint8_t reason[], unsigned ticks)
 {
     static pvid_weak_q31 self;
     const size_t samples = rig_design_q31.model->samples;
@@ -200,6 +200,7 @@ int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int3
         const size_t n_p = self.estimator.model->n_p;
         memcpy(&p[k * n_p], self.estimator.p, n_p * sizeof p[0]);
         memcpy(&published[k * n_p], pvid_weak_estimate_q31(&self)->p, n_p * sizeof p[0]);
+        memcpy(&se[k * n_p], pvid_weak_estimate_q31(&self)->se, n_p * sizeof se[0]);
         memcpy(&sums[k * information->n_sums], information->sums, information->n_sums * sizeof sums[0]);
         exponent[k] = information->exponent;
     }
@@ -367,8 +368,10 @@ class Core:
             reason=np.zeros(ticks, np.uint8),
             exponent=np.zeros(ticks, np.uint8),
             published=np.zeros((ticks, model.n_p), np.int32),
+            published_se=np.zeros((ticks, model.n_p), np.int32),
         )
-        arrays = (given, still, record.p, record.published, record.sums, record.exponent, record.reason)
+        published = (record.published, record.published_se)
+        arrays = (given, still, record.p, *published, record.sums, record.exponent, record.reason)
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
         status = self.library(one, config).identify(*pointers, ticks)
         return int(status), record

@@ -185,7 +185,7 @@ static void a_solve_in_stages_is_the_solve_at_once(void **state)
     stages = 0;
     static pvid_estimate_q31 in_stages;
     static pvid_estimate_q31 at_once;
-    pvid_estimator_begin_assessment_q31(&other, &solve, &in_stages);
+    pvid_estimator_begin_assessment_q31(&other, &solve);
     do {
         stages++;
     } while (!pvid_estimator_assess_advance_q31(&other, &solve, &in_stages));

@@ -104,9 +104,9 @@ uint16_t pvid_estimator_stages_q31(const pvid_estimator_q31 *self, bool ends_gro
 /* Standard errors, kappa and residual of the present p, as pvid_estimator_assess_f32. Changes nothing. */
 void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31 *estimate);
 
-/* The same in stages: begin_assessment, then assess_advance until it returns true. */
-void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
-                                         pvid_estimate_q31 *estimate);
+/* The same in stages: begin_assessment, then assess_advance until it returns true. `estimate` may be
+ * &solve->matrix.estimate. */
+void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve);
 bool pvid_estimator_assess_advance_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
                                        pvid_estimate_q31 *estimate);
 uint16_t pvid_estimator_assessment_stages_q31(const pvid_estimator_q31 *self);

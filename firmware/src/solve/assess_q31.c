@@ -1,8 +1,6 @@
 /* Accuracy of p: standard errors, misfit, residual. */
 #include "solve/assess_q31.h"
 
-#define UNIT_BITS (PVID_RHS_BITS - 1)
-
 pvid_scaled_q31 pvid_assess_row_variance_q31(const pvid_solve_settings_q31 *settings, int32_t exponent)
 {
     return pvid_scaled_of_q31((int64_t)settings->row_sd * settings->row_sd, -2 * (PVID_ROW_SD_BITS + exponent));
@@ -83,7 +81,7 @@ void pvid_assess_invert_q31(const pvid_cholesky_q31 *factor, size_t a, pvid_inve
     }
     int32_t unit[PVID_MAX_P] = {0};
     int64_t square = 0;
-    unit[a] = (int32_t)1 << UNIT_BITS;
+    unit[a] = (int32_t)1 << PVID_UNIT_BITS;
     pvid_cholesky_lower_q31(factor, unit, inverse->column[a]);
     for (size_t i = 0; i < factor->n; i++) {
         square += pvid_square_q31(inverse->column[a][i]);
@@ -100,6 +98,12 @@ static int32_t part_of(int64_t x, int32_t a, int32_t b)
     return (int32_t)((x < 0) ? -clamped : clamped);
 }
 
+int32_t pvid_assess_error_q31(const pvid_system_q31 *system, pvid_root_q31 own, size_t a, pvid_root_q31 wide)
+{
+    const int32_t shift = ((system->f[a] + system->g[a]) - (wide.e + own.e)) + 31 + PVID_UNIT_BITS;
+    return (int32_t)pvid_clamp_q31(pvid_scale_q31((int64_t)wide.r * own.r, shift), INT32_MAX);
+}
+
 void pvid_assess_errors_q31(const pvid_system_q31 *system, const pvid_solve_settings_q31 *settings,
                             const pvid_inverse_q31 *inverse, size_t a, pvid_estimate_q31 *estimate)
 {
@@ -109,8 +113,7 @@ void pvid_assess_errors_q31(const pvid_system_q31 *system, const pvid_solve_sett
         return;
     }
     const pvid_root_q31 own = inverse->root[a];
-    const int32_t shift = ((system->f[a] + system->g[a]) - (inverse->wide.e + own.e)) + 31 + UNIT_BITS;
-    estimate->se[a] = (int32_t)pvid_clamp_q31(pvid_scale_q31((int64_t)inverse->wide.r * own.r, shift), INT32_MAX);
+    estimate->se[a] = pvid_assess_error_q31(system, own, a, inverse->wide);
     for (size_t b = 0; b < a; b++) {
         int64_t sum = 0;
         for (size_t i = 0; i < system->factor.n; i++) {

@@ -159,16 +159,14 @@ pvid_reason pvid_estimator_add_to_b_q31(pvid_estimator_q31 *self, const pvid_sca
         return PVID_NOT_READY;
     }
     const size_t n = self->model->n_theta;
-    const bool is_rate = self->settings.gain < PVID_ONE_Q30;
     int64_t *b = &self->information.sums[((size_t)self->information.n_sums - 2u) - n];
     int64_t added[PVID_MAX_THETA_Q31];
     bool fits = true;
     for (size_t i = 0; i < n; i++) {
         const int64_t exact = pvid_scaled_fixed_q31(g[i], -2 * (int32_t)self->information.exponent);
         added[i] = pvid_clamp_q31(exact, PVID_CLAMP_LIMIT);
-        const int64_t fresh = is_rate ? self->fresh[i] : 0;
         fits = fits && (pvid_magnitude_q31(b[i] + added[i]) <= (uint64_t)PVID_CLAMP_LIMIT) &&
-               (pvid_magnitude_q31(fresh + added[i]) <= (uint64_t)PVID_CLAMP_LIMIT);
+               (pvid_magnitude_q31(self->fresh[i] + added[i]) <= (uint64_t)PVID_CLAMP_LIMIT);
     }
     if (!fits) {
         pvid_count_up(&self->counters.rejected_saturated);
@@ -176,9 +174,7 @@ pvid_reason pvid_estimator_add_to_b_q31(pvid_estimator_q31 *self, const pvid_sca
     }
     for (size_t i = 0; i < n; i++) {
         b[i] += added[i];
-        if (is_rate) {
-            self->fresh[i] += added[i];
-        }
+        self->fresh[i] += added[i];
     }
     return PVID_ACCUMULATED;
 }
@@ -221,7 +217,7 @@ void pvid_estimator_assess_q31(const pvid_estimator_q31 *self, pvid_estimate_q31
         return;
     }
     pvid_estimator_solve_q31 solve;
-    pvid_estimator_begin_assessment_q31(self, &solve, estimate);
+    pvid_estimator_begin_assessment_q31(self, &solve);
     bool done = false;
     for (uint16_t left = pvid_estimator_assessment_stages_q31(self); (left > 0u) && !done; left--) {
         done = pvid_estimator_assess_advance_q31(self, &solve, estimate);

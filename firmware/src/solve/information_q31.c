@@ -80,9 +80,7 @@ void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *bloc
     for (size_t i = 0; i < n_own; i++) {
         const int64_t product = pvid_short_product_q31(row[i], error);
         sum[i] += product;
-        if (fresh != NULL) {
-            fresh[block->first + i] += product;
-        }
+        fresh[block->first + i] += product;
     }
     tail[0] = pvid_clamp_q31(tail[0] + pvid_short_square_q31(error), RESIDUAL_MAX);
     tail[1] += (int64_t)self->row_weight;
@@ -155,6 +153,9 @@ void pvid_information_end_group_q31(pvid_information_q31 *self, const pvid_model
     forget(self, half, self->n_sums);
     self->age = (uint16_t)((self->age < self->block) ? self->age : 0u);
     rescale(self, model, fresh);
+    for (size_t i = 0; i < self->n_theta; i++) { /* of more groups than the sums may remember */
+        fresh[i] = pvid_clamp_q31(fresh[i], 2 * PVID_SUM_LIMIT);
+    }
 }
 
 void pvid_information_fade_q31(pvid_information_q31 *self, size_t part, int32_t factor)

@@ -27,12 +27,13 @@ int32_t pvid_information_retention_q31(uint32_t forgetting_groups, uint16_t *blo
 void pvid_information_init_q31(pvid_information_q31 *self, const pvid_model_q31 *model, uint32_t forgetting_groups,
                                uint32_t row_weight);
 
-/* Adds a row (N, e) of the kind with this block, within PVID_ROW_LIMIT_Q31; fresh[n_theta] += N e too, unless NULL. */
+/* Adds a row (N, e) of the kind with this block, within PVID_ROW_LIMIT_Q31; fresh[n_theta] += N e too. */
 void pvid_information_add_q31(pvid_information_q31 *self, const pvid_block *block, const int32_t n[], int32_t e,
                               int64_t fresh[]);
 
 /* Ends a group of rows: forgets when it is time to, and keeps the sums of squares below PVID_SUM_LIMIT and, as far as
- * they were divided before, above 2^54. fresh[n_theta] follows. Call it for part = 0, 1.. of the work. */
+ * they were divided before, above 2^54. fresh[n_theta] follows, within twice that. Call it for part = 0, 1.. of the
+ * work. */
 #define PVID_INFORMATION_END_PARTS 2u
 void pvid_information_end_group_q31(pvid_information_q31 *self, const pvid_model_q31 *model, size_t part,
                                     int64_t fresh[]);

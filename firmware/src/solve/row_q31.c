@@ -68,8 +68,7 @@ void pvid_estimator_add_row_q31(pvid_estimator_q31 *self, const pvid_block *bloc
 {
     self->group_rss = pvid_clamp_q31(self->group_rss + square, PVID_WIDE);
     self->group_weight = pvid_clamp_q31(self->group_weight + self->information.row_weight, PVID_WIDE);
-    pvid_information_add_q31(&self->information, block, n, e,
-                             (self->settings.gain < PVID_ONE_Q30) ? self->fresh : NULL);
+    pvid_information_add_q31(&self->information, block, n, e, self->fresh);
     pvid_count_up(&self->counters.rows);
 }
 

@@ -42,7 +42,30 @@ static size_t matrix_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
     if (row == 0u) {
         pvid_system_exponents_q31(&self->information, self->model, solve->h);
     }
-    return pvid_system_scale_rows_q31(&self->information, self->model, solve->h, row, solve->m);
+    return pvid_system_scale_rows_q31(&self->information, self->model, solve->h, row, solve->matrix.m);
+}
+
+/* The score of the rows since the last solve, in units of rows that are not divided by 4^exponent. */
+PVID_COLD static void project_fresh(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
+{
+    const pvid_model_q31 *model = self->model;
+    int32_t force[PVID_MAX_THETA_Q31];
+    int32_t largest = INT32_MIN;
+    for (size_t i = 0; i < model->n_theta; i++) {
+        const int32_t length = pvid_length_q31(self->fresh[i]) - solve->h[i];
+        largest = (length > largest) ? length : largest;
+    }
+    largest -= 30;
+    for (size_t i = 0; i < model->n_theta; i++) {
+        force[i] = (int32_t)pvid_clamp_q31(pvid_scale_q31(self->fresh[i], largest + solve->h[i]), PVID_ONE_Q30);
+    }
+    for (size_t a = 0; a < model->n_p; a++) {
+        solve->score[a] = 0;
+        solve->score_exponent[a] = solve->now.system.f[a] + largest + 32 + (2 * (int32_t)self->information.exponent);
+    }
+    for (size_t k = 0; k < model->n_c; k++) {
+        solve->score[model->c_column[k]] += pvid_upper_product_q31(solve->part.early.c[k], force[model->c_row[k]]);
+    }
 }
 
 /* Right-hand side of the step by rows of C, g b + (1 - g) sum N e since the last solve, scaled as these rows. */
@@ -51,6 +74,9 @@ static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solv
     const size_t n = self->model->n_theta;
     const int64_t *b = pvid_b_of_q31(&self->information);
     int64_t force[PVID_MAX_THETA_Q31];
+    if (solve->ends_group) {
+        project_fresh(self, solve);
+    }
     for (size_t i = 0; i < n; i++) {
         int64_t driving = b[i];
         if (solve->gain == 0) {
@@ -68,7 +94,8 @@ static void scale_force(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solv
 static void project_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     int64_t *row = solve->now.system.s[solve->index];
-    solve->start = (uint8_t)pvid_system_project_q31(self->model, solve->m, solve->part.early.c, solve->start, row);
+    solve->start =
+        (uint8_t)pvid_system_project_q31(self->model, solve->matrix.m, solve->part.early.c, solve->start, row);
 }
 
 /* Parts of a stage that factors: one prepares the matrix, then the parameters are eliminated, from the last, a few at a
@@ -193,7 +220,7 @@ PVID_ALWAYS_INLINE void solve_stage(const pvid_estimator_q31 *self, pvid_estimat
         solve_for(model, solve, solve->part.early.force, rhs, x) + solve->part.early.force_exponent;
     for (size_t a = 0; a < model->n_p; a++) {
         const int32_t shift = ((solve->now.system.f[a] + solve->now.system.g[a]) - exponent) + PVID_S_BITS + 30;
-        solve->dp[a] = pvid_clamp_q31(pvid_scale_q31(x[a], shift), STEP_MAX);
+        solve->part.dp[a] = pvid_clamp_q31(pvid_scale_q31(x[a], shift), STEP_MAX);
     }
 }
 
@@ -201,7 +228,7 @@ PVID_ALWAYS_INLINE void solve_stage(const pvid_estimator_q31 *self, pvid_estimat
 static void take_step(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     pvid_solution_q31 solution = {.p = solve->now.step.p};
-    pvid_step_take_q31(&self->settings, self->p, solve->dp, &solution);
+    pvid_step_take_q31(&self->settings, self->p, solve->part.dp, &solution);
     pvid_count_step(&self->counters, solution.limited, solution.bounded);
     solve->size = solution.size;
 }
@@ -264,8 +291,8 @@ static size_t move_b_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_
         if (i >= (block.first + block.n)) {
             pvid_information_block_q31(self->model, i, &block);
         }
-        const int64_t sum =
-            row_times(block.n, &solve->m[block.moment], i - block.first, &solve->now.step.theta_step[block.first]);
+        const int64_t sum = row_times(block.n, &solve->matrix.m[block.moment], i - block.first,
+                                      &solve->now.step.theta_step[block.first]);
         solve->now.step.moved[i] =
             pvid_clamp_q31(pvid_scale_q31(sum, -(solve->h[i] + solve->now.step.step_exponent)), PVID_CLAMP_LIMIT);
     }
@@ -357,13 +384,10 @@ void pvid_estimator_begin_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q31
     }
 }
 
-void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve,
-                                         pvid_estimate_q31 *estimate)
+void pvid_estimator_begin_assessment_q31(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve)
 {
     reset_solve(self, solve);
     solve->judging = true;
-    memset(estimate, 0, sizeof *estimate);
-    memcpy(estimate->p, self->p, sizeof estimate->p);
 }
 
 /* The stage after a stage. */
@@ -465,6 +489,8 @@ bool pvid_estimator_advance_q31(pvid_estimator_q31 *self, pvid_estimator_solve_q
 static void residual_stage(const pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve, pvid_estimate_q31 *estimate)
 {
     const pvid_residual_q31 residual = pvid_residual_of_q31(&self->information);
+    memset(estimate, 0, sizeof *estimate);
+    memcpy(estimate->p, self->p, sizeof estimate->p);
     pvid_assess_residual_q31(&residual, &self->settings, self->expected, &solve->variance, &solve->part.inverse.wide,
                              estimate);
 }

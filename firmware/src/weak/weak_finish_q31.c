@@ -6,12 +6,14 @@
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
+#include "number/unroll.h"
 #include "solve/row_q31.h"
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
 #include "weak/columns_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/noise_q31.h"
+#include "weak/scores_q31.h"
 #include "weak/steps.h"
 #include "weak/sums_q31.h"
 #include "weak/white_q31.h"
@@ -34,9 +36,11 @@ enum {
     STAGE_NOISE,    /* C, then bias and information by each entry of the noise table */
     STAGE_PULL,     /* what the noise takes from b */
     /* for the window */
-    STAGE_SOLVE,  /* `iterations` solves, several stages each */
-    STAGE_ASSESS, /* several stages */
-    STAGE_JUDGE,  /* trust_q31.h publishes the estimate or holds it */
+    STAGE_SOLVE,   /* `iterations` solves, several stages each */
+    STAGE_MEAN,    /* the score to the means; this and CLUSTER do nothing if no solve was due */
+    STAGE_ASSESS,  /* several stages */
+    STAGE_CLUSTER, /* standard errors of a few parameters from the scatter of the scores */
+    STAGE_JUDGE,   /* trust_q31.h publishes the estimate or holds it */
     STAGE_IDLE = PVID_WEAK_IDLE_Q31
 };
 
@@ -46,6 +50,8 @@ enum {
 #define UNITS_PER_STAGE 4u
 #define SHARES_PER_STAGE 1u
 #define RESIDUALS_PER_STAGE 4u
+#define FORMATS_PER_STAGE 2u
+#define CLUSTERS_PER_STAGE 2u
 
 /* Windows after which the noise and what whitens it are computed anew, and relative step of p behind which they are at
  * once: 2^-7, Q22. */
@@ -108,8 +114,17 @@ static void begin_kind(pvid_weak_finish_q31 *self)
     self->stage = self->known.renewed ? STAGE_WEIGH : STAGE_UNIT;
 }
 
+void pvid_weak_finish_skip_q31(pvid_weak_finish_q31 *self)
+{
+    self->alone = true;
+}
+
 void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self)
 {
+    if (self->alone) {
+        pvid_weak_scores_skip_q31(&self->scores);
+    }
+    self->alone = false;
     pvid_weak_known_q31 *known = &self->known;
     known->renewed = (known->age >= NOISE_WINDOWS) || (self->size > SMALL_STEP);
     known->age = (uint8_t)(known->renewed ? 1u : (known->age + 1u));
@@ -323,12 +338,16 @@ static bool project_stage(pvid_weak_q31 *self)
 static bool format_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    const size_t place = finish->index;
-    const size_t thetas = kind_of(self)->thetas;
-    const int32_t bits = (place < thetas) ? finish->n_bits[finish->theta + place] : finish->y_bits;
-    pvid_weak_columns_format_q31(&finish->work.rows.parts.columns, place, finish->live, self->design->functions, bits);
-    finish->index++;
-    return finish->index <= thetas;
+    const size_t columns = (size_t)kind_of(self)->thetas + 1u;
+    const size_t end = lesser((size_t)finish->index + FORMATS_PER_STAGE, columns);
+    for (size_t place = finish->index; place < end; place++) {
+        const bool is_y = (place + 1u) == columns;
+        const int32_t bits = is_y ? finish->y_bits : finish->n_bits[finish->theta + place];
+        pvid_weak_columns_format_q31(&finish->work.rows.parts.columns, place, finish->live, self->design->functions,
+                                     bits);
+    }
+    finish->index = (uint16_t)end;
+    return end < columns;
 }
 
 /* The columns of theta in row k of the kind. */
@@ -389,6 +408,7 @@ static bool passes(pvid_weak_q31 *self)
         pvid_gate_judge_q31(gate, variance_ratio_of(finish->expected, finish->rss, freedom_of(self)));
     if (verdict == PVID_GATE_OPENS) {
         pvid_trust_begin_anew_q31(&self->trust, &self->estimator);
+        memset(&finish->scores, 0, sizeof finish->scores);
     }
     return verdict != PVID_GATE_REJECTS;
 }
@@ -494,13 +514,51 @@ static bool solve_stage(pvid_weak_q31 *self)
     return true;
 }
 
-static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
+/* A window without rows has no score. */
+PVID_COLD static void mean_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
     const pvid_scaled_q31 ratio = variance_ratio_of(expected_of(self), finish->rss, finish->free);
+    finish->rss = pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS);
+    if (finish->rss == 0) {
+        pvid_weak_scores_skip_q31(&finish->scores);
+    } else if (finish->reason != PVID_ACCUMULATED) {
+        pvid_weak_scores_add_q31(&finish->scores, &self->estimator, &finish->work.solve, finish->rss);
+    } else {
+        /* no solve was due */
+    }
+}
+
+/* Rows of the windows between two solves. */
+static uint32_t rows_of(const pvid_weak_q31 *self)
+{
+    const pvid_weak_model_q31 *model = self->design->model;
+    uint32_t rows = 0;
+    for (size_t i = 0; i < model->kinds; i++) {
+        rows += (uint32_t)self->design->functions - model->kind[i].nuisances;
+    }
+    return rows * self->estimator.divider;
+}
+
+/* Returns whether there are more parameters. */
+PVID_COLD static bool cluster_stage(pvid_weak_q31 *self)
+{
+    pvid_weak_finish_q31 *finish = &self->finish;
+    const size_t n_p = self->estimator.model->n_p;
+    const size_t end = lesser((size_t)finish->index + CLUSTERS_PER_STAGE, n_p);
+    if ((finish->reason != PVID_ACCUMULATED) && finish->work.solve.now.system.factor.positive) {
+        pvid_weak_scores_widen_q31(&finish->scores, &self->estimator, &finish->work.solve, rows_of(self), finish->index,
+                                   end, &finish->work.solve.matrix.estimate);
+    }
+    finish->index = (uint16_t)end;
+    return end < n_p;
+}
+
+static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
+{
+    pvid_weak_finish_q31 *finish = &self->finish;
     *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
-                                   finish->work.solve.above_noise,
-                                   pvid_scaled_fixed_q31(ratio, PVID_VARIANCE_RATIO_BITS), &finish->candidate);
+                                   finish->work.solve.above_noise, finish->rss, &finish->work.solve.matrix.estimate);
 }
 
 /* ---- the order of the stages ---- */
@@ -517,6 +575,7 @@ static void end_kind(pvid_weak_q31 *self)
         finish->stage = STAGE_SOLVE;
         begin_solves(self);
     } else {
+        pvid_weak_scores_skip_q31(&finish->scores);
         finish->stage = STAGE_IDLE;
     }
 }
@@ -610,13 +669,24 @@ void pvid_weak_finish_step_q31(pvid_weak_q31 *self, pvid_reason *reason)
     switch (finish->stage) {
     case STAGE_SOLVE:
         if (!solve_stage(self)) {
-            finish->stage = STAGE_ASSESS;
-            pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve, &finish->candidate);
-            finish->work.solve.keeps_matrix = keeps_matrix(self);
+            finish->stage = STAGE_MEAN;
         }
         break;
+    case STAGE_MEAN:
+        mean_stage(self);
+        finish->stage = STAGE_ASSESS;
+        pvid_estimator_begin_assessment_q31(&self->estimator, &finish->work.solve);
+        finish->work.solve.keeps_matrix = keeps_matrix(self);
+        break;
     case STAGE_ASSESS:
-        if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->work.solve, &finish->candidate)) {
+        if (pvid_estimator_assess_advance_q31(&self->estimator, &finish->work.solve,
+                                              &finish->work.solve.matrix.estimate)) {
+            finish->stage = STAGE_CLUSTER;
+            finish->index = 0;
+        }
+        break;
+    case STAGE_CLUSTER:
+        if (!cluster_stage(self)) {
             finish->stage = STAGE_JUDGE;
         }
         break;
@@ -659,8 +729,9 @@ static uint32_t stages_of_kind(const pvid_weak_q31 *self, const pvid_weak_kind *
         self->finish.known.used
             ? ((uint32_t)pvid_weak_mirrors_q31(design) + stages_of(harmonics, SHARES_PER_STAGE) + 2u + design->n_noise)
             : 0u;
-    return noise + stages_of_columns(design) + (uint32_t)columns_of(kind) + (uint32_t)project + kind->thetas + 1u +
-           stages_of(rows, RESIDUALS_PER_STAGE) + PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
+    return noise + stages_of_columns(design) + (uint32_t)columns_of(kind) + (uint32_t)project +
+           stages_of((size_t)kind->thetas + 1u, FORMATS_PER_STAGE) + stages_of(rows, RESIDUALS_PER_STAGE) +
+           PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;
 }
 
 uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self)
@@ -676,7 +747,7 @@ uint32_t pvid_weak_finish_columns_q31(const pvid_weak_q31 *self)
 uint32_t pvid_weak_finish_stages_q31(const pvid_weak_q31 *self)
 {
     const pvid_weak_model_q31 *model = self->design->model;
-    uint32_t stages = 1;
+    uint32_t stages = 2u + stages_of(self->estimator.model->n_p, CLUSTERS_PER_STAGE); /* MEAN, JUDGE */
     for (size_t i = 0; i < model->kinds; i++) {
         stages += stages_of_kind(self, &model->kind[i]);
     }

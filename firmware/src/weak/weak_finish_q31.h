@@ -14,8 +14,11 @@ pvid_status pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self, const pvid_wea
 /* Begins a window at the estimator's present p. */
 void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self);
 
+/* The next window has no neighbour before it: windows have been dropped or restarted. */
+void pvid_weak_finish_skip_q31(pvid_weak_finish_q31 *self);
+
 /* The stage behind the last one. */
-#define PVID_WEAK_IDLE_Q31 18u
+#define PVID_WEAK_IDLE_Q31 20u
 
 /* Whether a window is being processed. */
 static inline bool pvid_weak_finish_is_busy_q31(const pvid_weak_finish_q31 *self)

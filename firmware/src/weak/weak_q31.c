@@ -43,6 +43,7 @@ static void rest(pvid_weak_q31 *self)
 static void restart(pvid_weak_q31 *self)
 {
     pvid_weak_collect_reset_q31(&self->collect);
+    pvid_weak_finish_skip_q31(&self->finish);
     self->warm = false;
     rest(self);
 }
@@ -155,9 +156,11 @@ static pvid_reason hand_over(pvid_weak_q31 *self)
 {
     self->warm = true;
     if (self->frozen) {
+        pvid_weak_finish_skip_q31(&self->finish);
         return PVID_HELD_FROZEN;
     }
     if (!self->driven) {
+        pvid_weak_finish_skip_q31(&self->finish);
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }

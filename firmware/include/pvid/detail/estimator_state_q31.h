@@ -53,7 +53,7 @@ struct pvid_estimator_q31 {
     int64_t theta[PVID_MAX_THETA_Q31];    /* f(p) */
     int32_t mantissa[PVID_MAX_THETA_Q31]; /* of theta, 30 bits, */
     int16_t shift[PVID_MAX_THETA_Q31];    /* right shift of N_i mantissa_i to units of Y */
-    int64_t fresh[PVID_MAX_THETA_Q31];    /* sum N e since the last solve; only while g < 1 */
+    int64_t fresh[PVID_MAX_THETA_Q31];    /* sum N e since the last solve */
     int16_t align[PVID_MAX_THETA_Q31];    /* N_i theta_i 2^-align is in units of Y */
     int16_t theta_bits[PVID_MAX_THETA_Q31];
     int16_t c_exponent[PVID_MAX_C_Q31]; /* C_k 2^c_exponent: units of Y per N and p */
@@ -120,12 +120,19 @@ typedef struct {
     int64_t moved[PVID_MAX_THETA_Q31];
 } pvid_solve_step_q31;
 
-/* What a solve or an assessment needs early, and an assessment later.
+/* What a solve or an assessment needs early, a solve and an assessment later.
  * MISRA deviation: 19.2; what a stage reads, a stage of the same part has written. Likewise the next one. */
 typedef union {
     pvid_solve_force_q31 early;
+    int64_t dp[PVID_MAX_P];
     pvid_inverse_q31 inverse;
 } pvid_solve_parts_q31;
+
+/* M, until S is made of it in an assessment, whose result then may have its place. */
+typedef union {
+    int32_t m[PVID_MAX_MOMENTS_Q31]; /* M_ij = m_ij 2^(h_i + h_j) */
+    pvid_estimate_q31 estimate;
+} pvid_solve_matrix_q31;
 
 /* What they need of the system, and a solve behind it. */
 typedef union {
@@ -151,11 +158,12 @@ struct pvid_estimator_solve_q31 {
     int64_t group_rss;            /* sum of e^2 of the group's rows, each at the p of its tick */
     pvid_scaled_q31 variance;     /* of a row, divided by 4^exponent as the sums are */
     int32_t gain;
-    int32_t m[PVID_MAX_MOMENTS_Q31]; /* M_ij = m_ij 2^(h_i + h_j) */
+    pvid_solve_matrix_q31 matrix;
     int16_t h[PVID_MAX_THETA_Q31];
     pvid_solve_parts_q31 part;
     pvid_solve_equations_q31 now;
-    int64_t dp[PVID_MAX_P];
+    int32_t score[PVID_MAX_P]; /* of a solve that ends a group: C^T sum N e since the last such, times 2^-exponent */
+    int32_t score_exponent[PVID_MAX_P];
 };
 
 #endif

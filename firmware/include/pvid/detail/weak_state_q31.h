@@ -141,33 +141,54 @@ typedef struct {
     pvid_scaled_q31 pull[PVID_MAX_THETA_Q31]; /* what it takes from b in a window, in units of b */
 } pvid_weak_known_q31;
 
+/* Products of two parameters. */
+#define PVID_WEAK_PAIRS_Q31 ((PVID_MAX_P * (PVID_MAX_P + 1)) / 2)
+
+/* Mean products of two scores: of one window, and of neighbours both ways. */
+typedef struct {
+    int32_t same;
+    int32_t neighbour;
+} pvid_weak_pair_q31;
+
+/* The scores C^T (sum N e) of windows, or of all windows between two solves: that of p[a] is an integer within 2^13
+ * times 2^unit[a]. */
+typedef struct {
+    uint16_t windows; /* in the means */
+    bool known;       /* the window before has a score */
+    int16_t unit[PVID_MAX_P];
+    int16_t before[PVID_MAX_P];
+    int32_t residual;                             /* mean of their variance ratios, Q12 */
+    pvid_weak_pair_q31 pair[PVID_WEAK_PAIRS_Q31]; /* upper triangle, row by row */
+} pvid_weak_scores_q31;
+
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
     uint8_t stage;
     uint8_t kind;
-    uint8_t theta;                     /* first one of the kind */
-    uint8_t used;                      /* kinds whose rows have been added */
-    uint8_t live;                      /* nuisances of the kind that are projected out */
-    uint8_t iteration;                 /* solves done for this window */
-    uint8_t part;                      /* of a column's stages */
-    uint8_t exponent;                  /* of the sums before the solves */
-    bool kept;                         /* the present nuisance is */
-    bool saturated;                    /* a row of the kind does not fit: none of them is used */
-    bool rejected;                     /* by the gate: no row of the kind is used */
-    uint16_t index;                    /* within the stage */
-    uint16_t free;                     /* rows less nuisances of the kinds that were added */
-    pvid_reason reason;                /* of the last solve, then of the window */
-    int64_t size;                      /* of the last step, relative, Q22 */
-    int64_t rss;                       /* of the kind's rows before the steps */
-    int32_t fade_factor;               /* factor on the sums before this window's rows, Q31; 0: none */
-    pvid_scaled_q31 expected;          /* variance of a row */
+    uint8_t theta;            /* first one of the kind */
+    uint8_t used;             /* kinds whose rows have been added */
+    uint8_t live;             /* nuisances of the kind that are projected out */
+    uint8_t iteration;        /* solves done for this window */
+    uint8_t part;             /* of a column's stages */
+    uint8_t exponent;         /* of the sums before the solves */
+    bool kept;                /* the present nuisance is */
+    bool saturated;           /* a row of the kind does not fit: none of them is used */
+    bool rejected;            /* by the gate: no row of the kind is used */
+    bool alone;               /* the next window has no neighbour before it */
+    uint16_t index;           /* within the stage */
+    uint16_t free;            /* rows less nuisances of the kinds that were added */
+    pvid_reason reason;       /* of the last solve, then of the window */
+    int64_t size;             /* of the last step, relative, Q22 */
+    int64_t rss;              /* of the kind's rows before the steps; from MEAN on the window's variance ratio */
+    int32_t fade_factor;      /* factor on the sums before this window's rows, Q31; 0: none */
+    pvid_scaled_q31 expected; /* variance of a row */
     int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
     int8_t y_bits;
     pvid_gate_q31 gate[PVID_MAX_KINDS];
     pvid_weak_known_q31 known;
     pvid_weak_white_q31 white[PVID_MAX_KINDS]; /* at the p of one of the last windows */
+    pvid_weak_scores_q31 scores;
     pvid_weak_work_q31 work;
-    pvid_estimate_q31 candidate; /* the assessed estimate, published if it is trusted */
 } pvid_weak_finish_q31;
 
 /* Only the functions of weak_q31.h write to it. */

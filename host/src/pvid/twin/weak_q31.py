@@ -20,6 +20,7 @@ from pvid.twin.q31.model import ModelQ31
 from pvid.twin.q31.scaled import scaled
 from pvid.twin.q31.trust import TrustQ31
 from pvid.twin.q31.weak_collect import Schedule, Tick, collect
+from pvid.twin.q31.weak_scores import Scores
 from pvid.twin.record import After, Mask, Reasons, Recorder, TwinRecord
 
 _GATE_MEMORY = 4
@@ -41,6 +42,7 @@ class WeakTwinQ31:
         self.gates = [GateQ31(config.gate, _GATE_MEMORY, floor) for _ in design.model.kind]
         self.iterations = 1 if self.estimator.is_rate else config.iterations
         self.noise = weak_finish.NoiseOfWindows(design, self.estimator, config.compensation)
+        self.scores = Scores(model.n_p, self.estimator.lanes)
         stages = weak_finish.number_of_stages(design, self.iterations, self.estimator, self.noise.is_used)
         self.stages_per_tick = -(-stages // Schedule.of(design).free_ticks)
         self.frozen: Mask | None = None
@@ -64,6 +66,7 @@ class WeakTwinQ31:
 
     def _take(self, window: Int | Reason) -> Reasons | Work:
         if isinstance(window, Reason):
+            self.scores.alone = True
             self.estimator.counters["held_not_excited"] += window is Reason.HELD_NOT_EXCITED
             return np.full(self.estimator.lanes, window, np.uint8)
         own = self.config.estimator
@@ -76,9 +79,11 @@ class WeakTwinQ31:
             self.gates,
             (own.n_bits, own.y_bits),
             self.noise,
+            self.scores,
         )
 
     def _reject(self) -> Reason:
+        self.scores.alone = True
         self.estimator.counters["rejected_saturated"] += 1
         return Reason.REJECTED_SATURATED
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -92,7 +93,22 @@ def equilibrated_system(s: Int) -> tuple[Int, Int]:
     return clamp(scale(s, g[:, None] + g[None]), ONE), g
 
 
-def assess_errors(out: npt.NDArray[np.void], s: Int, f: Int, start_sd: Int, root: Int, root_e: Int) -> None:
+class Inverse(NamedTuple):
+    """Roots of the diagonal of the inverse that standard errors are made of, r 2^e [n_p, lanes].
+
+    ok : lanes in which there is one
+    """
+
+    r: Int
+    e: Int
+    ok: Mask
+
+    def error(self, a: int, root: Int, root_e: Int) -> Int:
+        """Of p[a], for the root of a variance."""
+        return clamp(scale(root * self.r[a], -(root_e + self.e[a])), 2**31 - 1)
+
+
+def assess_errors(out: npt.NDArray[np.void], s: Int, f: Int, start_sd: Int, root: Int, root_e: Int) -> Inverse:
     """kappa, least pivot, standard errors and correlations of estimates [lanes].
 
     From the upper triangle of S [n_p, n_p, lanes] in units of 2^(f_a + f_b + 32), to which it adds the start's
@@ -112,9 +128,10 @@ def assess_errors(out: npt.NDArray[np.void], s: Int, f: Int, start_sd: Int, root
         units[a][a] = 1 << UNIT_BITS
     columns = [cholesky.lower_solve(factor, unit) for unit in units]
     roots = [root_of(np.maximum(np.sum(column * column, axis=0), 1), integers(0)) for column in columns]
+    below = f + g + 31 + UNIT_BITS
+    inverse = Inverse(np.stack([r for r, _ in roots]), np.stack([e for _, e in roots]) - below, factor.ok)
     for a, (r, e) in enumerate(roots):
-        se = clamp(scale(root * r, f[a] + g[a] - (root_e + e) + 31 + UNIT_BITS), 2**31 - 1)
-        out["se"][:, a] = np.where(factor.ok, se, start_sd[a])
+        out["se"][:, a] = np.where(factor.ok, inverse.error(a, root, root_e), start_sd[a])
         out["correlation"][:, a, a] = ONE
         for b in range(a):
             r_b, e_b = roots[b]
@@ -122,10 +139,14 @@ def assess_errors(out: npt.NDArray[np.void], s: Int, f: Int, start_sd: Int, root
             part = np.sign(x) * np.minimum(((np.abs(x) // r) << 30) // r_b, ONE)
             out["correlation"][:, a, b] = np.where(factor.ok, part, 0)
             out["correlation"][:, b, a] = out["correlation"][:, a, b]
+    return inverse
 
 
 class EstimatorQ31:
     """pvid_estimator_q31 in every lane; all lanes share model, formats, divider and whether the law is a rate.
+
+    score : of the last solve that ended a group, of fewer than 30 digits
+    inverse : of the last assessment
 
     p int64 [n_p, lanes]; sums int64 [n_sums, lanes]: M, b, rr times 4^-exponent, weight in Q16.
     """
@@ -280,10 +301,9 @@ class EstimatorQ31:
         sums[-2] = np.minimum(sums[-2] + e * e, 3 * SUM_LIMIT)
         sums[-1] += weight
         self.sums = sums
-        if self.is_rate:
-            fresh = self.fresh.copy()
-            fresh[block] += row * e
-            self.fresh = fresh
+        fresh = self.fresh.copy()
+        fresh[block] += row * e
+        self.fresh = fresh
         reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
         self.counters["rows"] += fits
@@ -295,9 +315,8 @@ class EstimatorQ31:
         added = clamp(g.shifted(-2 * self.exponent).fixed(0), HELD_LIMIT)
         places = slice(self.model.moments, -2)
         fits = (np.abs(self.sums[places] + added) <= HELD_LIMIT).all(axis=0)
-        if self.is_rate:
-            fits = fits & (np.abs(self.fresh + added) <= HELD_LIMIT).all(axis=0)
-            self.fresh = np.where(fits, self.fresh + added, self.fresh)
+        fits = fits & (np.abs(self.fresh + added) <= HELD_LIMIT).all(axis=0)
+        self.fresh = np.where(fits, self.fresh + added, self.fresh)
         self.sums[places] = np.where(fits, self.sums[places] + added, self.sums[places])
         reason = np.full(self.lanes, Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
@@ -326,7 +345,7 @@ class EstimatorQ31:
                 self.phase = 0
             for _ in range(self._stages_before_commit()):
                 yield None
-            reason = self._commit(fallback)
+            reason = self._commit(fallback, ends_group)
             yield None if ends_group else reason
         if ends_group:
             self._forget(slice(0, self.model.n_sums // 2))
@@ -390,12 +409,12 @@ class EstimatorQ31:
         largest = np.maximum(self.sums[self._diagonal].max(axis=0), self.sums[-2])
         high = largest > SUM_LIMIT
         low = (largest < SUM_LOW) & (self.exponent > 0)
-        if not (high | low).any():
-            return
-        change = np.where(high, 2, np.where(low, -2, 0))
-        self.sums[:-1] = scale(self.sums[:-1], change)
-        self.fresh = scale(self.fresh, change)
-        self.exponent = self.exponent + change // 2
+        if (high | low).any():
+            change = np.where(high, 2, np.where(low, -2, 0))
+            self.sums[:-1] = scale(self.sums[:-1], change)
+            self.fresh = scale(self.fresh, change)
+            self.exponent = self.exponent + change // 2
+        self.fresh = clamp(self.fresh, HELD_LIMIT)
 
     def _matrix(self, sums: Int) -> Int:
         n = self.model.n_theta
@@ -455,7 +474,7 @@ class EstimatorQ31:
         """(c, f): C_ka = c_k 2^f_a."""
         return self._jacobian(np.zeros((self.model.n_theta, self.lanes), np.int64))
 
-    def _commit(self, fallback: tuple[Mask, Int] | None) -> Reasons:
+    def _commit(self, fallback: tuple[Mask, Int] | None, ends_group: bool) -> Reasons:
         model = self.model
         m, h = self._equilibrated()
         c, f = self._jacobian(h)
@@ -475,6 +494,8 @@ class EstimatorQ31:
         b = self.sums[model.moments : model.moments + model.n_theta]
         in_dead_zone = (reason == Reason.UPDATED) & self._at_rest(factor, c, scale(b, h), g)
         force, force_h = cholesky.to_block(scale(self._driving(b), h), 30)
+        if ends_group:
+            self.score = self._score(c, f, h)
         self.fresh[:] = 0
         _, x, x_h = self._solve_for(factor, c, force, g)
         dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
@@ -486,6 +507,13 @@ class EstimatorQ31:
             falls_back = ~steps & fallback[0]
             p = np.where(falls_back, fallback[1], p)
         return self._follow(p, m, h, b, reason, falls_back, in_dead_zone)
+
+    def _score(self, c: Int, f: Int, h: Int) -> Scaled:
+        """C^T sum N e since the last solve [n_p, lanes]."""
+        largest = np.max(length(self.fresh) - h, axis=0) - 30
+        force = scale(self.fresh, largest + h)
+        onto = [upper_product(c[own], force[self._c_row[own]]).sum(axis=0) for own in self._columns]
+        return Scaled(np.stack(onto), f + largest + 32 + 2 * self.exponent)
 
     def _solve_for(self, factor: cholesky.Factor, c: Int, force: Int, g: Int) -> tuple[Int, Int, Int]:
         """(rhs, x, h): C^T force, scaled as the rows of q, and its solution x 2^h."""
@@ -610,5 +638,6 @@ class EstimatorQ31:
         c, f = self._jacobian(h)
         s = self._project(c, m)
         above_noise = self._above_noise(s, f, variance)
-        assess_errors(out, s, f, self.start_sd, *root_of(*variance.times(scaled(self.correlation, -16))))
+        wide = root_of(*variance.times(scaled(self.correlation, -16)))
+        self.inverse = assess_errors(out, s, f, self.start_sd, *wide)
         return out, above_noise

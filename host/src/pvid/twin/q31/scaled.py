@@ -47,6 +47,11 @@ class Scaled(NamedTuple):
         """Times 2^exponent."""
         return Scaled(self.m, self.e + integers(exponent))
 
+    def packed(self) -> Scaled:
+        """What is left of it in one word: 20 bits, and an exponent within +-1000."""
+        m = np.where(self.e < -1000, 0, (self.m >> 11) << 11)
+        return Scaled(m, np.where(m == 0, -1024, np.minimum(self.e, 1000)))
+
     def fixed(self, bits: npt.ArrayLike) -> Int:
         """As integers of `bits` bits after the point, saturated."""
         return scale(self.m, -(self.e + integers(bits)))

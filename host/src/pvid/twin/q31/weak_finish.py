@@ -18,6 +18,7 @@ from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
 from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.trust import TrustQ31
 from pvid.twin.q31.weak_collect import Schedule
+from pvid.twin.q31.weak_scores import Scores
 from pvid.twin.record import Mask, of_all_lanes
 
 _ENTRIES_PER_STAGE = 4
@@ -26,6 +27,8 @@ _ROOTS_PER_STAGE = 4
 _UNITS_PER_STAGE = 4
 _RESIDUALS_PER_STAGE = 4
 _SHARES_PER_STAGE = 1
+_FORMATS_PER_STAGE = 2
+_CLUSTERS_PER_STAGE = 2
 _NOISE_WINDOWS = 16
 _END_PARTS = 2
 _VARIANCE_RATIO_BITS = 24
@@ -63,8 +66,7 @@ def _stages_before_gate(design: WeakDesignQ31, kind: WeakKind, live: int = 0) ->
         + harmonics
         + kind.columns
         + project
-        + kind.thetas
-        + 1
+        + _parts(kind.thetas + 1, _FORMATS_PER_STAGE)
         + _parts(design.functions - live, _RESIDUALS_PER_STAGE)
     )
 
@@ -86,7 +88,7 @@ def number_of_stages(design: WeakDesignQ31, iterations: int, estimator: Estimato
     """Of a window, at most."""
     rows = sum(_stages_of_kind(design, kind, uses_noise) for kind in design.model.kind)
     solves = estimator.solve_stages(True) + (iterations - 1) * estimator.solve_stages(False)
-    return rows + solves + estimator.assessment_stages + 1
+    return rows + solves + estimator.assessment_stages + 2 + _parts(estimator.model.n_p, _CLUSTERS_PER_STAGE)
 
 
 def _rows(made: weak_white.Columns, first: int, n_bits: Sequence[int], y_bits: int) -> tuple[Int, Int]:
@@ -164,6 +166,7 @@ def stages(
     gates: Sequence[GateQ31],
     formats: tuple[Sequence[int], int],
     noise: NoiseOfWindows,
+    scores: Scores,
 ) -> Work:
     """Processes a window, S_h [channels, H + 1, 2]; yields the reason to report [lanes], or None, after each stage.
 
@@ -208,6 +211,7 @@ def stages(
                 continue
             if of_all_lanes(opens):
                 trust.begin_anew()
+                scores.begin_anew()
         yield None
         if used:
             yield None
@@ -224,6 +228,7 @@ def stages(
         used += 1
         free = free + freedom
     if not used:
+        scores.skip()
         return
     sensors = known.expected(expected, len(design.model.kind))
     estimator.set_expected(sensors)
@@ -237,8 +242,12 @@ def stages(
         if not estimator.was_due:
             break
     size = noise.size = estimator.size
-    for _ in range(estimator.assessment_stages):
+    ratio = _ratio(estimator.group_rss, free, sensors).fixed(_VARIANCE_RATIO_BITS)
+    scores.add(estimator, ratio)
+    for _ in range(1 + estimator.assessment_stages + _parts(estimator.model.n_p, _CLUSTERS_PER_STAGE)):
         yield None
     candidate, above_noise = estimator.judged()
-    ratio = _ratio(estimator.group_rss, free, sensors).fixed(_VARIANCE_RATIO_BITS)
+    if estimator.was_due:
+        rows = estimator.divider * sum(design.functions - kind.nuisances for kind in design.model.kind)
+        scores.widen(candidate, estimator, rows)
     yield trust.judge(reason, size, above_noise, ratio, candidate)

@@ -53,12 +53,6 @@ def shares(white: White, design: WeakDesignQ31) -> list[Scaled]:
     return found
 
 
-def _packed(x: Scaled) -> Scaled:
-    """What is left of a number in one word."""
-    m = np.where(x.e < -1000, 0, (x.m >> 11) << 11)
-    return Scaled(m, np.where(m == 0, -1024, np.minimum(x.e, 1000)))
-
-
 class Known:
     """pvid_weak_known_q31: of the window in which it was computed last."""
 
@@ -128,7 +122,7 @@ class Known:
                 twice = int(a != b and i == j)
                 x = part.times(scaled(c[at], f[j] + twice))
                 place = (min(i, j), max(i, j))
-                table[place] = _packed(table[place].plus(x))
+                table[place] = table[place].plus(x).packed()
 
     def expected(self, row: Scaled, kinds: int) -> Scaled:
         """Variance of a row by the sensors' noise alone, of `row` in all."""
