@@ -96,9 +96,13 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
     boards = set()
     for configuration, (_, report) in measured.items():
         if (configuration.form, configuration.core) == (form, core):
-            refined = form == sizes.REFINED
-            assert_same_hashes(report, refined_hashes(configuration.board) if refined else expected_hashes(form, core))
-            boards.add(configuration.board.name)
+            board = configuration.board
+            expected = refined_hashes(board) if form == sizes.REFINED else expected_hashes(form, core)
+            if board.toolchain == "avr":  # which plays less of the run
+                assert report.ticks > 5000
+                expected = expected[: report.ticks]
+            assert_same_hashes(report, expected)
+            boards.add(board.name)
     wanted = BOARDS if (form, core) == ON_ALL else FEW
     there = {one.board.name for one in sizes.CONFIGURATIONS if (one.form, one.core) == (form, core)}
     assert boards >= there.intersection(wanted)

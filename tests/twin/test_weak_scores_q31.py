@@ -73,7 +73,7 @@ def errors_of(scores: Scores, weight: int) -> Float:
 @pytest.mark.parametrize("least", [0.0, 0.05])
 @pytest.mark.parametrize("growth", [1.0, 1.01, 0.99])
 def test_errors_are_those_of_float64(least: float, growth: float) -> None:
-    """Of scores that are correlated from window to window and grow or fall by seven times; single ones are far larger."""
+    """Of scores correlated from window to window that grow or fall by seven times; single ones are far larger."""
     random = np.random.default_rng(2)
     scores, reference = Scores(N_P, 1), Reference(least)
     noise = random.normal(size=(201, N_P))
