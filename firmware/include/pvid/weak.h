@@ -144,7 +144,7 @@ typedef struct {
                                NULL: no check */
     bool compensation;      /* corrects the bias by the sensors' noise (errors in variables) */
     uint8_t iterations;     /* Gauss-Newton steps in each of the first eight windows, 1..PVID_MAX_ITERATIONS; then one.
-                               Recommended: 2; with 1 a start that is 50 % off needs two or three windows more */
+                               Recommended: 2; with 1 a start that is 50 % off needs three or four windows more */
     pvid_estimator_config_f32 estimator; /* row_sd 1: rows are in standard deviations. init sets model, update_rate_hz,
                                             row_weight and correlation */
     pvid_trust_config_f32 trust;         /* conditions of publication */
