@@ -283,6 +283,18 @@ def test_design_and_tune_show_the_engine_s_design_for_a_recording(recorded: dict
     assert f"{design['window_s']:.4g}" in tuned.stdout
 
 
+def test_tune_shows_how_far_each_design_is_from_the_refined_answer(recorded: dict[str, Path], tmp_path: Path) -> None:
+    run = recorded["rigid_body"]
+    tuned = pvid("tune", run, "--refine", "--figure", tmp_path / "tuned.png")
+    assert tuned.return_value == DONE and "pvid: refined over" in tuned.stderr
+    rows = [line for line in tuned.stdout.splitlines() if line.startswith("│")]
+    distances = [float(line.split("│")[-2]) for line in rows]
+    assert len(distances) > 4 and all(0.05 < one < 5 for one in distances)
+    assert (tmp_path / "tuned.png").stat().st_size > 10_000
+    with pytest.raises(PvidError, match="--figure is of the refinement: add --refine"):
+        pvid("tune", run, "--figure", tmp_path / "tuned.png")
+
+
 def test_design_of_a_shipped_rig_needs_no_run() -> None:
     done = pvid("design", "--model", "rigid_body")
     assert done.return_value == DONE and "Ixx [kg*m^2]" in done.stdout and "test functions: " in done.stdout

@@ -223,6 +223,23 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
     return DONE
 
 
+def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> MechanismAnswer:
+    """The refined answer of a recording, or that of the weak form; a sentence on standard error says which and why.
+
+    Parameters
+    ----------
+    figure : where the measured and the simulated signals are drawn
+    """
+    from pvid.cli.result import write_refined_figure
+    from pvid.run.refined_mechanism import refined_answer
+
+    answer, refined, text = refined_answer(identify_mechanism(recording, model))
+    write_stderr(f"pvid: {text}")
+    if figure is not None and refined is not None:
+        write_refined_figure(refined, figure)
+    return answer
+
+
 def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None, on: str | None) -> int:
     """Identifies by both stages in C and prints the refined estimate, or that of the first stage."""
     from pvid.run.refined_core import refined_in_c

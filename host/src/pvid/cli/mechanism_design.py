@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -18,6 +19,7 @@ from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
 from pvid.run.engine_design import Run
+from pvid.run.mechanism import MechanismAnswer
 from pvid.run.mechanism_design import EngineReport, designs_tried, report_for_recording, report_for_rig
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.refine import RefineConfig
@@ -141,8 +143,12 @@ def _print_report(report: EngineReport) -> None:
         write_stderr("pvid: the run does not determine every parameter with this design: see identify")
 
 
-def print_tuning(model: CompiledModel, recording: Recording) -> int:
+def print_tuning(model: CompiledModel, recording: Recording, reference: MechanismAnswer | None = None) -> int:
     """The designs that were tried on a recording, the best first, and the engine's own.
+
+    Parameters
+    ----------
+    reference : an answer from which the distance of each design's estimate is shown
 
     Returns
     -------
@@ -150,17 +156,26 @@ def print_tuning(model: CompiledModel, recording: Recording) -> int:
     """
     tried, engine = designs_tried(model, recording)
     table = Table(title=f"{model.title}: predicted errors, the geometric mean over the parameters")
-    for heading in ("", "window s", "functions", "decimation", "derivatives ms", "expected error %", "chi2"):
+    headings = ("", "window s", "functions", "decimation", "derivatives ms", "expected error %", "chi2")
+    for heading in headings if reference is None else (*headings, "distance / error"):
         table.add_column(heading, justify="right")
     for place, one in enumerate(tried[:_SHOWN]):
-        table.add_row("analysis" if place == 0 else "", *_cells(one))
-    table.add_row("C core", *_cells(engine))
+        table.add_row("analysis" if place == 0 else "", *_cells(one), *_distance(model, one, reference))
+    table.add_row("C core", *_cells(engine), *_distance(model, engine, reference))
     Console(width=None if sys.stdout.isatty() else 120).print(table)
     click.echo(
         f"{len(tried)} designs tried; identify chooses these by itself, model build {model.name} --run prints the C "
         "core's tables"
     )
     return DONE if engine.known else NOTHING_IDENTIFIED
+
+
+def _distance(model: CompiledModel, one: Scored, reference: MechanismAnswer | None) -> tuple[str, ...]:
+    """Of a design's estimate from the reference: RMS over the parameters, in its expected errors."""
+    if reference is None:
+        return ()
+    known = np.array([reference.values[name].value for name in model.p_names], float)
+    return (f"{float(np.sqrt(np.mean(((one.p - known) / one.error) ** 2))):.2g}",)
 
 
 def _cells(one: Scored) -> tuple[str, ...]:

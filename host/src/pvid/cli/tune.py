@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from pvid.cli.input import columns_option, rig_options
+from pvid.base.errors import PvidError
+from pvid.cli.input import FigurePath, columns_option, rig_options
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
 
@@ -16,17 +17,35 @@ from pvid.log.rig_settings import rig_for
 @click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
 @rig_options
 @columns_option
+@click.option(
+    "--refine",
+    is_flag=True,
+    help="Fit the full equations to the whole run, and show the distance of each design's estimate from that answer.",
+)
+@click.option("--figure", type=FigurePath(), help="With --refine: measured and simulated signals (png, svg, pdf).")
 def command(
-    run_path: Path, model: str | None, rig_path: Path | None, settings: tuple[str, ...], columns: str | None
+    run_path: Path,
+    model: str | None,
+    rig_path: Path | None,
+    settings: tuple[str, ...],
+    columns: str | None,
+    refine: bool,
+    figure: Path | None,
 ) -> int:
     """Shows the designs of the weak form that were tried for a recorded RUN, the best first: window, test functions,
     decimation, expected errors.
 
     `identify` chooses the best by itself on each run, so no file is written.
     """
-    from pvid.cli.mechanism import recording_of  # loads SymPy
+    from pvid.cli.mechanism import recording_of, refined_reference  # loads SymPy
     from pvid.cli.mechanism_design import print_tuning
+
+    if figure is not None and not refine:
+        raise PvidError("--figure is of the refinement: add --refine")
 
     described = mechanism_rig(run_path, rig_path, settings, model) or rig_for(run_path, rig_path, settings)
     recording, compiled = recording_of(run_path, described, columns)
-    return print_tuning(compiled, recording)
+    reference = refined_reference(compiled, recording, figure) if refine else None
+    if reference is not None and not reference.identified:
+        reference = None
+    return print_tuning(compiled, recording, reference)
