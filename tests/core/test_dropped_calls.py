@@ -31,7 +31,7 @@ def mistaken(options: list[str], source: str, folder: Path) -> set[str]:
                 found.add(within)
         dump.unlink()
     assembly = (folder / "out.s").read_text(encoding="utf-8")
-    return {name for name in found if not re.search(rf"\.globa?l\s+{name}\b", assembly)}
+    return {name for name in found if not re.search(rf"\.(?:global|globl)\s+{name}\b", assembly)}
 
 
 @pytest.mark.slow

@@ -12,6 +12,8 @@
 #include "weak/sums_q31.h"
 #include "weak/white_q31.h"
 
+#define UNIT ((int32_t)1 << 26) /* a length that reflections take */
+
 void pvid_weak_noise_leverage_q31(const pvid_weak_white_q31 *white, const pvid_weak_design_q31 *design, size_t place,
                                   int32_t u[], int32_t leverage[])
 {
@@ -21,14 +23,14 @@ void pvid_weak_noise_leverage_q31(const pvid_weak_white_q31 *white, const pvid_w
     const size_t first = is_sine ? white->cosines : 0u;
     const size_t n = is_sine ? (pvid_weak_sums_rows_q31(design) - white->cosines) : white->cosines;
     for (size_t i = 0; i < n; i++) {
-        u[i] = (i == k) ? PVID_ONE_Q30 : 0;
+        u[i] = (i == k) ? UNIT : 0;
     }
     for (size_t left = k + 1u; left > 0u; left--) {
         const size_t j = left - 1u;
         pvid_weak_mirror_q31(&white->mirror[j][first + j], n - j, &u[j]);
     }
     for (size_t i = 0; i < n; i++) {
-        const int32_t square = (int32_t)pvid_floor_shift_q31(pvid_short_square_q31(u[i]), 30);
+        const int32_t square = (int32_t)pvid_floor_shift_q31(pvid_short_square_q31(u[i]), 22);
         leverage[first + i] = ((k == 0u) ? 0 : leverage[first + i]) + square;
     }
 }

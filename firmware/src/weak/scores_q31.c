@@ -77,8 +77,8 @@ static int32_t weight_of(const pvid_weak_scores_q31 *self, const pvid_estimator_
     const pvid_information_q31 *information = &estimator->information;
     const uint32_t fading = (((uint32_t)1 << 31) - (uint32_t)information->retention) / information->block;
     const uint64_t least = (uint64_t)fading * estimator->divider;
-    const uint64_t newest = UINT32_MAX / ((uint32_t)self->windows + 2u);
-    return (int32_t)pvid_clamp_q31((int64_t)((newest > least) ? newest : least), INT32_MAX);
+    const uint32_t newest = UINT32_MAX / ((uint32_t)self->windows + 2u);
+    return (int32_t)pvid_clamp_q31((int64_t)(((uint64_t)newest > least) ? (uint64_t)newest : least), INT32_MAX);
 }
 
 PVID_COLD void pvid_weak_scores_add_q31(pvid_weak_scores_q31 *self, const pvid_estimator_q31 *estimator,
@@ -142,7 +142,7 @@ PVID_COLD void pvid_weak_scores_widen_q31(const pvid_weak_scores_q31 *self, cons
     const pvid_root_q31 *root = assessment->part.inverse.root;
     int32_t exponent[PVID_MAX_P];
     uint32_t down[PVID_MAX_P];
-    int32_t largest = INT32_MIN;
+    int32_t largest = INT16_MIN;
     for (size_t b = 0; b < n_p; b++) {
         exponent[b] = (root[b].e - (system->f[b] + system->g[b])) + self->unit[b];
         largest = (exponent[b] > largest) ? exponent[b] : largest;

@@ -101,7 +101,7 @@ typedef struct {
 
 /* While the noise of a kind's rows is computed anew, before and behind its columns. */
 typedef struct {
-    int32_t u[PVID_WEAK_ROWS_Q31];                /* a direction that the test functions leave out, Q30 */
+    int32_t u[PVID_WEAK_ROWS_Q31];                /* a direction that the test functions leave out, Q26 */
     int32_t leverage[PVID_WEAK_ROWS_Q31];         /* sum of the squares of all of them, Q30 */
     pvid_scaled_q31 weight[PVID_MAX_POWER];       /* c_j, variance at the power j of h^2 */
     pvid_scaled_q31 share[PVID_MAX_POWER];        /* Q_j */

@@ -13,6 +13,7 @@ from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.weak_white import White, mirrored
 
 _ONE = 1 << 30
+_UNIT = 1 << 26  # of a direction
 
 
 def number(x: int, like: Int) -> Scaled:
@@ -27,10 +28,10 @@ def leverages(white: White) -> Int:
         total = np.zeros_like(mirrors[0])
         for k in range(len(mirrors)):
             u = np.zeros_like(total)
-            u[k] = _ONE
+            u[k] = _UNIT
             for j in range(k, -1, -1):
                 u[j:] = mirrored(mirrors[j], u[j:])
-            total = total + ((u * u) >> 30)
+            total = total + ((u * u) >> 22)
         found.append(total)
     return np.concatenate(found)
 
