@@ -61,7 +61,7 @@ _CHEAP = 1.3  # growth of the others' standard errors up to which an extra is fr
 _TOLD = 9.0  # fall of the sum of squares from which it is free in any case
 _UNSURE = 0.05  # standard error of a logarithm from which friction is searched where residuals are no noise
 _ASKED = 1.3  # slow chi^2 from which options are tried
-_WORK = 6e8  # of one refinement: two minutes on a computer of 2020
+_WORK = 1.2e9  # of one refinement: three to four minutes
 _RIVAL = 3.0  # standard errors by which another dry friction may differ that explains the run as well
 _GAINED = 25.0  # fall of the sum of squares over chi^2 that an option needs
 
