@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from weak_rig import engine_rig
 
+from pvid.base.errors import PvidError
 from pvid.oracle.weak import rows
 from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.solve import batch
+from pvid.setup.weak import design_tables
 
 # In standard errors. The engine weighs the rows of its first windows at a poor p, the oracle all at the last one.
 CLOSE = 0.1
@@ -43,3 +46,10 @@ def test_the_engine_s_p_is_that_of_the_oracle(name: str, soft: bool, monkeypatch
         # The charge before the first step, two samples: the engine takes the current for that of the first step.
         close[-1] = 2 / rig.config.sample_rate * np.ptp(rig.samples[:3, 1]) * rig.truth[-2]
     assert (np.abs(record.p[-1] - fit.p) < close).all(), (record.p[-1] - fit.p) / se
+
+
+def test_an_error_of_the_equations_beyond_float32_is_refused_with_its_reason() -> None:
+    """At parameters far off it is so large; float32 would make it infinite, and the core call the design bad."""
+    rig = engine_rig("kapitza")
+    with pytest.raises(PvidError, match=r"variance of the equations' own error of 8e\+44 is beyond float32"):
+        design_tables(rig.config.design.model, rig.rows, rig.truth, [EquationError(8e44)] * rig.rows.kinds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from functools import cache
 
@@ -15,10 +16,11 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
+from pvid.run import refined_pendulum
 from pvid.run.answer import as_json, refinement_line
 from pvid.run.engine_identify import identify_by_engine
 from pvid.run.refined import GOOD, Cut, Prior
-from pvid.run.refined_identify import AGREE, BEARABLE, refined_identification
+from pvid.run.refined_identify import AGREE, BEARABLE, _judged, refined_identification
 from pvid.run.refined_kernel import PlayedKernel, kernel_of
 from pvid.run.refined_mechanism import refine_mechanism
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
@@ -228,6 +230,42 @@ def test_a_run_whose_halves_differ_has_no_answer() -> None:
     found = refined_identification(drifting, given, replace(weak, trusted_s=None))  # type: ignore[type-var, arg-type]
     assert not found.refinement.adopted and not found.identified
     assert found.refinement.outcome.halves_differ().max() > AGREE
+
+
+def test_another_friction_that_explains_the_run_as_well_is_a_reason_to_hold() -> None:
+    """Of two fits one in the valley of the other: the standard errors of either are those of its own place."""
+    given, weak = answers()
+    outcome = refined()
+    assert outcome.rivalry is None and replace(outcome, rivals=(outcome.found,)).rivalry is None
+    sd = np.sqrt(outcome.found.covariance[2, 2])
+    far = replace(outcome.found, r=outcome.found.r * np.where(np.arange(len(outcome.found.r)) == 2, 1 + 6 * sd, 1.0))
+    rivalled = replace(outcome, rivals=(outcome.found, far))
+    assert rivalled.rivals_differ()[2] == pytest.approx(6 / np.sqrt(2), rel=0.01)
+    adopted, text = _judged(rivalled, weak)  # type: ignore[arg-type]
+    assert not adopted and "another dry friction" in text
+    assert _judged(outcome, weak)[0]  # type: ignore[arg-type]
+
+
+def test_a_refinement_ends_where_its_budget_is_spent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By default at some minutes: without it a stiff guess of a long run takes half an hour."""
+    given, weak = answers()
+    monkeypatch.setattr(refined_pendulum, "_WORK", 1e5)
+    found = refined_identification(run_of(), given, replace(weak, trusted_s=None))  # type: ignore[type-var, arg-type]
+    assert not found.identified and not found.refinement.adopted
+    assert refined_pendulum.TOO_LONG in found.refinement.text
+
+
+def test_a_parameter_that_nothing_determines_has_no_finite_standard_error() -> None:
+    outcome = refined()
+    problem, found = outcome.problem, outcome.found
+    free = np.ones(problem.n, bool)
+    nothing = np.zeros_like(problem.used(found.cut))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        blind = problem.searched(
+            found.r, Prior(found.r, np.full(problem.n, np.inf), free), found.cut, found.starts, nothing, most=1
+        )
+    assert np.isinf(np.diag(blind.covariance)).all() and np.isinf(np.diag(blind.noise)).all()
 
 
 def test_a_run_that_is_too_short_says_so() -> None:

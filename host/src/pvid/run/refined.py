@@ -92,6 +92,19 @@ class Cut:
         return np.stack([values[first : first + self.samples] for first in self.first])
 
 
+@dataclass
+class Budget:
+    """Work that searches may still do: steps of the integration, each times the columns that are integrated; searches
+    share it, and stop where it is spent."""
+
+    left: float = np.inf
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether a search makes no more passes."""
+        return self.left <= 0
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """Quantities of one pass, for the tests of other implementations.
@@ -115,7 +128,8 @@ class Refined:
     Attributes
     ----------
     r : parameters and settings
-    covariance : of the steps of r [parameters, parameters], with the factor of chi^2 and of the scatter of the blocks
+    covariance : of the steps of r [parameters, parameters], with the factor of chi^2 and of the scatter of the blocks;
+        a variance is 0 where a parameter is not searched, inf where nothing determines it
     noise : the same from the sensors' noise alone
     chi2 : residual variance over that of the sensors
     slow_chi2 : of averages over about 16 ms, which an error of the equations raises first
@@ -142,8 +156,8 @@ class Refined:
 class Problem:
     """A run under a model."""
 
-    def __init__(self, kernel: RefinedKernel, measured: Measured) -> None:
-        self.kernel, self.measured = kernel, measured
+    def __init__(self, kernel: RefinedKernel, measured: Measured, budget: Budget | None = None) -> None:
+        self.kernel, self.measured, self.budget = kernel, measured, budget or Budget()
         self.n = len(kernel.made.parameters)
         self.log = np.array([one.log for one in kernel.made.parameters])
 
@@ -175,11 +189,17 @@ class Problem:
     def simulated(self, r: Float, cut: Cut, starts: Float) -> Float:
         """Readings [blocks, samples, outputs]."""
         m = self.measured
+        self._spend(cut, 1)
         return self.kernel.blocks(r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, False, m.coarse)[0]
+
+    def _spend(self, cut: Cut, columns: int) -> None:
+        steps = len(cut.first) * cut.samples * self.measured.sub / self.measured.coarse
+        self.budget.left -= steps * columns
 
     def block(self, r: Float, cut: Cut, starts: Float, use: Bool) -> Block | None:
         """One pass; None where the motion is no number."""
         m = self.measured
+        self._spend(cut, 1 + self.kernel.columns)
         z, jacobian, _ = self.kernel.blocks(
             r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, True, m.coarse
         )
@@ -209,11 +229,12 @@ class Problem:
     def searched(
         self, r: Float, prior: Prior, cut: Cut, starts: Float, use: Bool, move: bool = True, most: int = PASSES
     ) -> Refined:
-        """Gauss-Newton from r and these starts, at most so many passes; `move` False: of the starts alone."""
+        """Gauss-Newton from r and these starts, at most so many passes, and none where the budget is spent; `move`
+        False: of the starts alone."""
         free = np.flatnonzero(prior.free) if move else np.zeros(0, int)
         cost = self.cost(r, cut, starts, use, prior)
         converged, passes = False, 0
-        while passes < most:
+        while passes < most and not self.budget.is_spent:
             passes += 1
             found = self.block(r, cut, starts, use)
             if found is None:
@@ -321,12 +342,18 @@ class Problem:
         chi2 = float(np.sum(found.error**2)) / freedom / self.measured.grown
         slow = self._slow_chi2(found.error, use, len(cut.first) * states + len(free))
         inverse = np.linalg.pinv(triangle, rcond=1e-14)
-        information = inverse @ inverse.T
-        wide = max(1.0, chi2, slow) * information
-        grown = np.sqrt(np.maximum(self._scatter(found, free, information) / np.diag(wide), 1.0))
-        wide = wide * np.outer(grown, grown)
+        least = inverse @ inverse.T
+        wide = max(1.0, chi2, slow) * least
+        scatter, own = self._scatter(found, free, least), np.diag(wide)
+        # pinv leaves no variance where the run and the prior determine nothing beside the others
+        known = (own > 0) & np.isfinite(own) & np.isfinite(scatter)
+        grown = np.sqrt(np.maximum(scatter[known] / own[known], 1.0))
         covariance, noise = np.zeros((n, n)), np.zeros((n, n))
-        covariance[np.ix_(free, free)], noise[np.ix_(free, free)] = wide, information
+        determined = np.ix_(free[known], free[known])
+        covariance[determined] = wide[np.ix_(known, known)] * np.outer(grown, grown)
+        noise[determined] = least[np.ix_(known, known)]
+        unknown = free[~known]
+        covariance[unknown, unknown] = noise[unknown, unknown] = np.inf
         kept = count / max(np.isfinite(cut.rows(self.measured.z)).sum(), 1)
         return Refined(r, covariance, noise, chi2, slow, converged, passes, cut, starts, float(kept), cost)
 

@@ -17,7 +17,7 @@ from pvid.rig.sensor_steps import resolved
 from pvid.run.engine_identify import NO_CORE, held_if_wide
 from pvid.run.identify import Identification, largest_angle, parts_of
 from pvid.run.refined import GOOD
-from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
+from pvid.run.refined_pendulum import TOO_LONG, RefinedPendulum, refine_pendulum
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start
 
@@ -54,7 +54,7 @@ class RefinementVerdict:
             "chi2": None if found is None else found.chi2,
             "slow_chi2": None if found is None else found.slow_chi2,
             "blocks": None if found is None else len(found.cut.first),
-            "parameters": {name: {"value": value, "se": se} for name, (value, se) in extras.items() if se > 0},
+            "parameters": {name: {"value": value, "se": se} for name, (value, se) in extras.items() if 0 < se < np.inf},
         }
 
 
@@ -91,9 +91,12 @@ def _judged(outcome: RefinedPendulum, weak: Identification) -> tuple[bool, str]:
     stands = held_if_wide(weak).identified
     kept = "the weak form's answer stands" if stands else "nothing is identified"
     if not found.converged:
-        return False, f"the refinement did not converge: {kept}"
+        spent = outcome.problem.budget.is_spent
+        return False, f"{TOO_LONG}; {kept}" if spent else f"the refinement did not converge: {kept}"
     if not (se <= LARGEST_SE).all():
         return False, f"the refined parameters have a standard error of {100 * float(se.max()):.2g} %: {kept}"
+    if (rivalry := outcome.rivalry) is not None:
+        return False, f"{rivalry}: {kept}"
     residuals = f"slow residuals have {found.slow_chi2:.2g} times the variance of the noise"
     if stands and not found.slow_chi2 <= GOOD:
         return False, f"{residuals}: {kept}{_apart(outcome, weak)}"

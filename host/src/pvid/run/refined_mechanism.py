@@ -169,6 +169,8 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
     found = refined.found
     if not found.converged:
         return answer, refined, "the refinement did not converge: the weak form's answer stands"
+    if isinstance(refined, RefinedPendulum) and (rivalry := refined.rivalry) is not None:
+        return answer, refined, f"{rivalry}: the weak form's answer stands"
     better = isinstance(refined, RefinedMechanism) and _better(refined, weak.p, weak.se)
     if found.slow_chi2 > GOOD and not better:
         text = (

@@ -15,7 +15,19 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.refined import GOOD, Cut, Inputs, Measured, Prior, Problem, Refined, gated, refined, without_outliers
+from pvid.run.refined import (
+    GOOD,
+    Budget,
+    Cut,
+    Inputs,
+    Measured,
+    Prior,
+    Problem,
+    Refined,
+    gated,
+    refined,
+    without_outliers,
+)
 from pvid.run.refined_kernel import PLAY, PlayedKernel, kernel_of
 from pvid.setup.f32 import NOISE_LSB, row_sd_of
 
@@ -49,16 +61,29 @@ _CHEAP = 1.3  # growth of the others' standard errors up to which an extra is fr
 _TOLD = 9.0  # fall of the sum of squares from which it is free in any case
 _UNSURE = 0.05  # standard error of a logarithm from which friction is searched where residuals are no noise
 _ASKED = 1.3  # slow chi^2 from which options are tried
+_WORK = 1.2e9  # of one refinement: three to four minutes
+_RIVAL = 3.0  # standard errors by which another dry friction may differ that explains the run as well
 _GAINED = 25.0  # fall of the sum of squares over chi^2 that an option needs
+
+
+TOO_LONG = "the refinement needs too many steps: the run is long, or its guess has too fast a mode"
 
 
 @dataclass(frozen=True, eq=False)
 class RefinedPendulum:
-    """Outcome: `found` and the problem that it solves; `first` is the sample of the run that the problem starts at."""
+    """Outcome.
+
+    Attributes
+    ----------
+    problem, found : the fit and the problem that it solves
+    first : sample of the run that the problem starts at
+    rivals : fits with other dry friction that explain the run about as well as one in blocks before it
+    """
 
     problem: Problem
     found: Refined
     first: int
+    rivals: tuple[Refined, ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -86,7 +111,28 @@ class RefinedPendulum:
         if not all(np.isfinite(one.chi2) and one.converged for one in halves):
             return np.full(3, np.inf)
         both = np.sqrt(sum(np.diag(one.covariance)[:3] for one in halves))
+        if not np.isfinite(both).all():
+            return np.full(3, np.inf)
         return np.asarray(np.abs(problem.step_between(halves[0].r, halves[1].r)[:3]) / both)
+
+    @property
+    def rivalry(self) -> str | None:
+        """A clause where a rival's w, d1 or d2 differ by more than standard errors explain; None where none does."""
+        apart = float(self.rivals_differ().max())
+        if apart <= _RIVAL:
+            return None
+        return (
+            f"another dry friction explains the run about as well, with parameters that differ by {apart:.2g} standard "
+            "errors"
+        )
+
+    def rivals_differ(self) -> Float:
+        """By how many standard errors w, d1, d2 of the farthest rival differ [3]; 0 where there is none."""
+        own, apart = np.diag(self.found.covariance)[:3], np.zeros(3)
+        for one in self.rivals:
+            far = np.abs(self.problem.step_between(self.found.r, one.r)[:3])
+            apart = np.maximum(apart, far / np.sqrt(own + np.diag(one.covariance)[:3]))
+        return apart
 
     @property
     def extras(self) -> dict[str, tuple[float, float]]:
@@ -120,6 +166,7 @@ class _Search:
         self.rate = rate / self.mean
         middle = self.first + (self.mean - 1) / 2  # of the first average
         self._track = times - middle / rate, acceleration / rig.l1
+        self.budget = Budget(_WORK)
         self._problems: dict[tuple[str, ...], Problem] = {}
         self.short: list[tuple[float, dict[str, float]]] = []  # chi^2 and values of the shortest blocks, of each start
 
@@ -136,7 +183,8 @@ class _Search:
             kernel = kernel_of(compiled_of(DEFAULT), tuple(name for name in optional if name != PLAY))
             if PLAY in optional:
                 kernel = PlayedKernel(kernel, "rad")
-            self._problems[optional] = Problem(kernel, Measured(phi[:, None], sd, inputs, rate, sub, grown, coarse))
+            measured = Measured(phi[:, None], sd, inputs, rate, sub, grown, coarse)
+            self._problems[optional] = Problem(kernel, measured, self.budget)
         return self._problems[optional]
 
     def r(self, problem: Problem, values: Mapping[str, float]) -> Float:
@@ -203,7 +251,7 @@ def refine_pendulum(
     problem = search.problem()
     outcomes = _outcomes(search, problem, starts, sure)
     if not outcomes:
-        raise PvidError("the refinement finds no motion that is like the run's")
+        raise PvidError(TOO_LONG if search.budget.is_spent else "the refinement finds no motion that is like the run's")
     found = _likeliest(outcomes)
     slow = model.modes_hz(found.r[:3])[0]
     found, prior = _whole(search, problem, found, slow)
@@ -217,11 +265,12 @@ def refine_pendulum(
         about = reached[:1] if sure else [*search.nearest(), *reached, *starts][:_DRY_STARTS]
         problem, found = _with_friction(search, (problem, found), about)
         slow = model.modes_hz(found.r[:3])[0]
+    found, rivals = _with_rivals(search, problem, found)
     if found.slow_chi2 > _ASKED:
         found = _shorter(problem, search.prior(problem, found.r), found, search.lengths(slow, _SHORTER))
     elif found.converged:
         found = _longer(search, problem, found)
-    return RefinedPendulum(problem, found, search.first)
+    return RefinedPendulum(problem, found, search.first, rivals)
 
 
 def _outcomes(
@@ -235,6 +284,8 @@ def _outcomes(
     searched besides w, d1, d2 and the zero."""
     outcomes: list[Refined] = []
     for values in starts:
+        if search.budget.is_spent:
+            break
         found = _searched(search, problem, values, more)
         if found is None:
             continue
@@ -281,6 +332,30 @@ def _sharper(search: _Search, problem: Problem, prior: Prior, found: Refined) ->
             break
         found = again
     return _without_push(problem, prior, found)
+
+
+def _with_rivals(search: _Search, problem: Problem, found: Refined) -> tuple[Refined, tuple[Refined, ...]]:
+    """The best of the frictions that a search from the widest sign on leads through, and those that explain about as
+    much: the sum of squares has a flat valley where the mechanism is at rest for long."""
+    names = [one.name for one in problem.kernel.made.parameters]
+    if "f1" not in names or not np.isfinite(found.sum_of_squares):
+        return found, ()
+    prior = search.prior(problem, found.r)
+    prior = Prior(found.r, prior.sd, np.diag(found.covariance) > 0)
+    cut, use = found.cut, gated(problem, found) & problem.used(found.cut)
+    tried = [problem.searched(found.r, prior, cut, found.starts, use, most=_OPTION_PASSES)]
+    again = tried[0]
+    for share in _WIDTHS[:-1]:
+        r = search.with_width(problem, again.r, share)
+        again = problem.searched(r, prior, cut, again.starts, use, most=_OPTION_PASSES)
+        tried.append(again)
+    best = min(tried, key=lambda one: one.sum_of_squares)
+    best = problem.searched(best.r, prior, cut, best.starts, use)
+    best = _without_push(problem, prior, best)
+    if not best.converged or best.sum_of_squares > tried[0].sum_of_squares:
+        best = found if found.converged else tried[0]
+    most = best.sum_of_squares + _GAINED * max(best.chi2, best.slow_chi2, 1.0)
+    return best, tuple(one for one in tried if one.sum_of_squares < most)
 
 
 def _without_push(problem: Problem, prior: Prior, found: Refined) -> Refined:
@@ -340,7 +415,7 @@ def _longer(search: _Search, problem: Problem, found: Refined) -> Refined:
     grow by more than their own uncertainty."""
     total, dry = len(problem.measured.z), [one.name in _DRY for one in problem.kernel.made.parameters]
     best, least = found, _largest_error(found)
-    while len(found.cut.first) > 1:
+    while len(found.cut.first) > 1 and not search.budget.is_spent:
         prior = search.prior(problem, found.r)
         prior = Prior(prior.r, prior.sd, (np.diag(found.covariance) > 0) | dry)
         found = refined(problem, prior, [min(_LONGER * found.cut.samples, total)], before=found, most=_OPTION_PASSES)
@@ -382,7 +457,7 @@ def _searched(
         found = refined(problem, wide, [short], most=_SEARCH_PASSES)
         search.short.append((found.chi2, _values_of(problem)(found)))
         found = refined(problem, wide, [full], before=found, most=_SEARCH_PASSES)
-        while _is_vague(found) and len(found.cut.first) > 1:
+        while _is_vague(found) and len(found.cut.first) > 1 and not search.budget.is_spent:
             samples = min(_LONGER * found.cut.samples, total)
             found = refined(problem, wide, [samples], before=found, most=_SEARCH_PASSES)
     except (PvidError, np.linalg.LinAlgError):
@@ -398,7 +473,7 @@ def _with_options(
 ) -> tuple[Problem, Refined]:
     """With the optional extras that explain enough, beside those of `kept`: of each round the one that explains
     most."""
-    while found.slow_chi2 >= _ASKED:
+    while found.slow_chi2 >= _ASKED and not search.budget.is_spent:
         tried: list[tuple[Problem, Prior, Refined, tuple[str, ...]]] = []
         for optional in _OPTIONS:
             if optional[0] in kept or any(one.slow_chi2 < _ASKED for _, _, one, _ in tried):

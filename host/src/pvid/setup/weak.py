@@ -76,7 +76,7 @@ def design_tables(
         circle=circle_of(design.hop),
         noise=tuple(entry for kind in range(rows.kinds) for entry in _noise(rows, kind, p)),
         error_order=np.array([one.order for one in found], np.uint8),
-        error_variance=_as_float32([one.variance for one in found]),
+        error_variance=_as_float32([one.variance for one in found], "variance of the equations' own error"),
         sign_width=np.full(model.signs, design.soft if design.reversals == "soft" else 0.0, np.float32),
         overlap=float(np.float32(overlap_of(rows, p, found))),
     )
@@ -166,16 +166,16 @@ def config_of(
         sample_rate=sample_rate,
         design=design,
         estimator=EstimatorConfig(
-            start=_as_float32(p),
-            start_sd=_as_float32(start_sd),
-            lower=_as_float32([min(one.low, value) for one, value in zip(unknowns, p, strict=True)]),
-            upper=_as_float32([max(one.high, value) for one, value in zip(unknowns, p, strict=True)]),
+            start=_as_float32(p, "start"),
+            start_sd=_as_float32(start_sd, "standard deviation of the start"),
+            lower=_as_float32(_within_float32([min(one.low, x) for one, x in zip(unknowns, p, strict=True)])),
+            upper=_as_float32(_within_float32([max(one.high, x) for one, x in zip(unknowns, p, strict=True)])),
             row_sd=1.0,
             forgetting_s=following.forgetting_s,
             noise_margin=_NOISE_MARGIN,
             dead_zone=following.dead_zone,
         ),
-        range=None if run is None else _as_float32(_ranges(design.model, parameters.model, run)),
+        range=None if run is None else _as_float32(_ranges(design.model, parameters.model, run), "range of a sample"),
         drive_min=None if run is None else drive_min_of(design, parameters.model),
         trust=TrustConfig(),
         gate=GateConfig(following.outlier_gate, following.patience_s(hop_s)),
@@ -202,7 +202,18 @@ def drive_min_of(design: WeakDesign32, compiled: CompiledModel) -> npt.NDArray[n
     return _as_float32(least) if any(least) else None
 
 
-def _as_float32(values: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
-    out = np.ascontiguousarray(values, np.float32)
+def _within_float32(bounds: list[float]) -> Float:
+    """Bounds of which finite ones stay finite in float32."""
+    given, most = np.array(bounds), float(np.finfo(np.float32).max)
+    return np.where(np.isfinite(given), np.clip(given, -most, most), given)
+
+
+def _as_float32(values: object, what: str = "setting") -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    """Read-only; PvidError where a finite value is infinite in float32: of `what`, in the singular."""
+    given = np.asarray(values, np.float64)
+    beyond = given[np.isfinite(given) & (np.abs(given) > np.finfo(np.float32).max)]
+    if beyond.size:
+        raise PvidError(f"a {what} of {beyond[0]:.2g} is beyond float32: the equations do not fit the run")
+    out = np.ascontiguousarray(given, np.float32)
     out.setflags(write=False)
     return out
