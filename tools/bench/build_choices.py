@@ -33,6 +33,7 @@ class Choice:
 
 
 _PARTS = {f"PVID_{one}": 1 for one in ("REFINEMENT", "DEAD_ZONE", "FEEDBACK", "NEGLECTED")}
+_USUAL = {"CMAKE_BUILD_TYPE": "RelWithDebInfo", "PVID_SELDOM_OPTIONS": ""}
 _SELDOM = {"PVID_SELDOM_OPTIONS": "-Os"}
 _SMALL = {"CMAKE_BUILD_TYPE": "MinSizeRel"}
 CHOICES = (
@@ -64,7 +65,7 @@ def footprint_of(choice: Choice, place: int) -> Footprint:
         fixed = fixed_run(DEFAULT, long=True)
         name, files, fitted = fixed.name, mechanism_image_q31.files_of(fixed), fixed.sizes
     sizes = fitted | dict(choice.sizes)
-    image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=choice.options)
+    image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=_USUAL | dict(choice.options))
     return measured(board, built_engine(image, tree, name))[0]
 
 
