@@ -153,8 +153,7 @@ def share(cycles: int, clock_mhz: int) -> float:
 
 def same_bits(report: replay_image.ReplayReport, hashes: Hashes) -> bool:
     """Whether every running hash that the image reported is that of the core on this machine."""
-    reported = {**report.hashes, report.ticks: report.hash}
-    return len(hashes) == report.ticks and all(int(hashes[at - 1]) == found for at, found in reported.items())
+    return len(hashes) == report.ticks and report.differs_at(hashes) is None
 
 
 def play(machine: Path, image: Path) -> replay_image.ReplayReport:

@@ -25,8 +25,7 @@ TIMEOUT_S = 600.0
 
 def differs(report: ReplayReport, expected: npt.NDArray[np.uint32]) -> bool:
     """Whether a hash of the board is not that of the twin at the same tick, or the run ended early."""
-    of_board = report.hashes | {report.ticks: report.hash}
-    return report.ticks != len(expected) or any(int(expected[at - 1]) != hash_ for at, hash_ in of_board.items())
+    return report.ticks != len(expected) or report.differs_at(expected) is not None
 
 
 def played(board: Board, name: str, core: Core) -> tuple[ReplayReport, npt.NDArray[np.uint32]]:

@@ -38,6 +38,19 @@ void pvid_weak_sums_next_q31(pvid_weak_sums_q31 *self, const pvid_weak_design_q3
     }
 }
 
+#if !defined(__ARM_ARCH_6M__)
+/* A sum of four products, 2^-down of it rounded down. */
+static inline int32_t long_products(const int32_t factor[BLOCK], const int32_t *x, uint32_t down)
+{
+    int64_t sum = 0;
+    PVID_UNROLL
+    for (size_t j = 0; j < BLOCK; j++) {
+        sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
+    }
+    return (int32_t)pvid_floor_shift_q31(sum, down);
+}
+#endif
+
 /* A sum of four products of 16 by 29 bits, 2^-14 of it rounded down, which fits 32 bits. */
 static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
 {
@@ -53,12 +66,7 @@ static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
     }
     return high + pvid_floor_shift_32_q31(low, DOWN);
 #else
-    int64_t sum = 0;
-    PVID_UNROLL
-    for (size_t j = 0; j < BLOCK; j++) {
-        sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
-    }
-    return (int32_t)pvid_floor_shift_q31(sum, DOWN);
+    return long_products(factor, x, DOWN);
 #endif
 }
 
@@ -86,12 +94,7 @@ static inline int32_t fine_products(const int32_t factor[BLOCK], const int32_t *
     const int32_t below = (4 * first) + second + pvid_floor_shift_32_q31(low, 12);
     return (16 * high) + pvid_floor_shift_32_q31(below, 10);
 #else
-    int64_t sum = 0;
-    PVID_UNROLL
-    for (size_t j = 0; j < BLOCK; j++) {
-        sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
-    }
-    return (int32_t)pvid_floor_shift_q31(sum, FINE_DOWN);
+    return long_products(factor, x, FINE_DOWN);
 #endif
 }
 

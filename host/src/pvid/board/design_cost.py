@@ -263,7 +263,6 @@ def _measured(
     refine: RefineConfig | None = None,
 ) -> Cost:
     footprint, report = measured(asked.board, built)
-    reported = {**report.hashes, report.ticks: report.hash}
     return Cost(
         asked,
         model,
@@ -271,6 +270,6 @@ def _measured(
         report.ticks,
         rate,
         None if first is None else (first + 1) / rate,
-        all(hashed == int(hashes[tick - 1]) for tick, hashed in reported.items()),
+        report.differs_at(hashes) is None,
         refine,
     )

@@ -238,6 +238,11 @@ class ReplayReport:
     state_bytes: int
     estimator_bytes: int
 
+    def differs_at(self, hashes: npt.NDArray[np.uint32]) -> int | None:
+        """The first tick with another hash than that of `hashes` after it [ticks], or none there; None: all agree."""
+        reported = (*self.hashes.items(), (self.ticks, self.hash))
+        return next((at for at, found in reported if at > len(hashes) or found != int(hashes[at - 1])), None)
+
 
 def parse_report(text: str) -> ReplayReport:
     """Reads what the image printed.

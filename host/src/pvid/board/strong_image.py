@@ -91,10 +91,7 @@ def play_on_board(target: str, run: StrongComparison) -> ReplayReport:
 
 def differs_at(report: ReplayReport, run: StrongComparison) -> int | None:
     """The first tick whose hash is not that of this machine; None: there is none."""
-    apart = [at for at, hashed in report.hashes.items() if hashed != int(run.hashes[at - 1])]
-    if report.hash != run.found.core_hash:
-        apart.append(report.ticks)
-    return apart[0] if apart else None
+    return report.differs_at(run.hashes)
 
 
 def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:

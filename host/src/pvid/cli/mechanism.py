@@ -223,8 +223,9 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
     return DONE
 
 
-def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> MechanismAnswer:
-    """The refined answer of a recording, or that of the weak form; a sentence on standard error says which and why.
+def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> MechanismAnswer | None:
+    """The refined answer of a recording, or that of the weak form; None: neither identifies it. A sentence on standard
+    error says which and why.
 
     Parameters
     ----------
@@ -237,7 +238,7 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     write_stderr(f"pvid: {text}")
     if figure is not None and refined is not None:
         write_refined_figure(refined, figure)
-    return answer
+    return answer if answer.identified else None
 
 
 def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None, on: str | None) -> int:

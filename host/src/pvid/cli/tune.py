@@ -46,6 +46,4 @@ def command(
     described = mechanism_rig(run_path, rig_path, settings, model) or rig_for(run_path, rig_path, settings)
     recording, compiled = recording_of(run_path, described, columns)
     reference = refined_reference(compiled, recording, figure) if refine else None
-    if reference is not None and not reference.identified:
-        reference = None
     return print_tuning(compiled, recording, reference)

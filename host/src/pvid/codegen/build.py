@@ -40,6 +40,7 @@ from pvid.settings.weak import WeakConfig
 from pvid.setup.weak import with_soft_signs
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 
+COMPILE_OPTIONS = "-ffp-contract=off -fno-fast-math -fno-delete-null-pointer-checks"  # as PvidCompile.cmake
 _CMAKE = """\
 # {banner}
 #
@@ -60,7 +61,7 @@ target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
 target_link_libraries({name} PUBLIC pvid::pvid)
 set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
 if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
-  target_compile_options({name} PRIVATE -ffp-contract=off -fno-fast-math -fno-delete-null-pointer-checks)
+  target_compile_options({name} PRIVATE {options})
 endif()
 
 # {name}_strong.h, an identifier from derivatives of the signals: needs a pvid of larger sizes, which its header names.
@@ -175,6 +176,7 @@ def files_of(compiled: CompiledModel, command: str, options: Options | None = No
     sources = " ".join(one for one in files if one.endswith(".c") and one not in apart)
     fixed_weak = _CMAKE_Q31.format(name=name, upper=name.upper()) if chosen.fixed_weak else ""
     files["CMakeLists.txt"] = _CMAKE.format(
+        options=COMPILE_OPTIONS,
         banner="\n# ".join(banner(functions, command)),
         name=name,
         upper=name.upper(),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pvid.codegen.build import COMPILE_OPTIONS
 from pvid.deploy.deployment import Deployment, Files
 from pvid.deploy.example import example_files
-from pvid.deploy.library import COMPILE_OPTIONS, indented, library_files, licence, sources, under
+from pvid.deploy.library import indented, library_files, licence, sources, under
 from pvid.deploy.readme import readme
 
 _CMAKE = """\

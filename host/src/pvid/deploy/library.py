@@ -9,8 +9,6 @@ from pvid.deploy.core_files import core_files
 from pvid.deploy.deployment import Deployment, Files
 from pvid.deploy.identifier import identifier_files
 
-COMPILE_OPTIONS = "-ffp-contract=off -fno-fast-math -fno-delete-null-pointer-checks"  # as PvidCompile.cmake
-
 
 def library_files(deployment: Deployment, folder: str = "src") -> Files:
     """Everything that is compiled, in one folder that is the only include path."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 
 from pvid.base.version import __version__
+from pvid.codegen.build import COMPILE_OPTIONS
 from pvid.deploy.arduino import sketch
 from pvid.deploy.deployment import Deployment, Files
-from pvid.deploy.library import COMPILE_OPTIONS, library_files, licence
+from pvid.deploy.library import library_files, licence
 from pvid.deploy.memory import avr_note
 from pvid.deploy.readme import readme
 
