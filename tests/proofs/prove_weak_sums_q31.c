@@ -18,18 +18,18 @@ static pvid_weak_window_q31 window;
 /* The first entry of the blocks may then contain the channels of any step. */
 static void any_step(void)
 {
-    int32_t channel[PVID_MAX_CHANNELS];
+    pvid_weak_entry_q31 channel[PVID_MAX_CHANNELS][PVID_WEAK_BLOCK_Q31];
     int32_t jet[PVID_MAX_INPUTS];
     for (size_t i = 0; i < DESIGN->model->jets; i++) {
         jet[i] = any_i32(-engine_reach[i], engine_reach[i]);
     }
-    const pvid_weak_outcome outcome = pvid_weak_values_step_q31(&values, DESIGN, jet, channel);
+    const pvid_weak_outcome outcome = pvid_weak_values_step_q31(&values, DESIGN, jet, channel[0]);
     /*@ assert outcome != PVID_WEAK_BEYOND; */
     if (outcome == PVID_WEAK_CHANNELS) {
         for (size_t k = 0; k < pvid_weak_summed_q31(DESIGN->model); k++) {
-            /*@ assert -0x10000000 <= channel[k] <= 0x10000000; */
-            int32_t *place = &sums.block[0][0][k];
-            *place = any_bool() ? channel[k] : *place;
+            /*@ assert -0x10000000 <= channel[k][0] <= 0x10000000; */
+            int32_t *place = &sums.block[0][k][0];
+            *place = any_bool() ? channel[k][0] : *place;
         }
         pvid_weak_values_next_q31(&values, DESIGN->hop);
     }
@@ -51,8 +51,10 @@ void main(void)
     for (uint32_t step = 0; step < (uint32_t)DESIGN->hop + 4u; step++) {
         any_step();
     }
-    for (size_t j = 1; j < 2u * PVID_WEAK_BLOCK_Q31; j++) {
-        memcpy(sums.block[j / PVID_WEAK_BLOCK_Q31][j % PVID_WEAK_BLOCK_Q31], sums.block[0][0], sizeof sums.block[0][0]);
+    for (size_t k = 0; k < PVID_MAX_CHANNELS; k++) {
+        for (size_t j = 0; j < 2u * PVID_WEAK_BLOCK_Q31; j++) {
+            sums.block[j / PVID_WEAK_BLOCK_Q31][k][j % PVID_WEAK_BLOCK_Q31] = sums.block[0][k][0];
+        }
     }
     memcpy(values.edge[1], values.edge[0], sizeof values.edge[1]); /* the other half ends likewise */
     pvid_weak_sums_reset_q31(&sums);

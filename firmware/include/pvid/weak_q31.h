@@ -116,7 +116,7 @@ typedef struct {
     uint8_t functions;         /* K, 4..PVID_MAX_FUNCTIONS: the bell, then cosine and sine of each frequency */
     uint8_t power;             /* n of sin^n, even, at least 2 above the highest order of the terms, at most 8 */
     uint8_t decimation;        /* D, ticks a step, 1..PVID_MAX_DECIMATION */
-    uint8_t sum_shift;         /* of four steps' products 2^-14 (fine: 2^-22) before they are added, 0..30 */
+    uint8_t sum_shift;         /* of four steps' products 2^-14 (fine: 2^-22) before they are added, 1..16 */
     uint16_t hop;              /* steps of half a window, a multiple of 4; H < hop */
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
     const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */

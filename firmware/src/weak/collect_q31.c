@@ -71,7 +71,7 @@ pvid_weak_tick pvid_weak_collect_end_q31(pvid_weak_collect_q31 *self)
     const uint16_t index = self->values.index;
     int32_t jet[PVID_MAX_INPUTS];
     if (pvid_weak_front_step_q31(&self->front, design, jet)) {
-        int32_t *place = pvid_weak_sums_place_q31(&self->sums, index);
+        pvid_weak_entry_q31 *place = pvid_weak_sums_place_q31(&self->sums, index);
         const pvid_weak_outcome outcome = pvid_weak_values_step_q31(&self->values, design, jet, place);
         if (outcome == PVID_WEAK_BEYOND) {
             pvid_weak_collect_reset_q31(self);

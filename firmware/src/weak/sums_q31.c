@@ -38,54 +38,61 @@ void pvid_weak_sums_next_q31(pvid_weak_sums_q31 *self, const pvid_weak_design_q3
     }
 }
 
-#if !defined(__ARM_ARCH_6M__)
-/* A sum of four products, 2^-down of it rounded down. */
-static inline int32_t long_products(const int32_t factor[BLOCK], const int32_t *x, uint32_t down)
+/* x 2^-s rounded half up, s >= 1. */
+static inline int32_t rounded(int32_t x, uint32_t s)
 {
-    int64_t sum = 0;
-    PVID_UNROLL
-    for (size_t j = 0; j < BLOCK; j++) {
-        sum += (int64_t)factor[j] * x[j * PVID_MAX_CHANNELS];
-    }
-    return (int32_t)pvid_floor_shift_q31(sum, down);
+    return pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(x, s - 1u) + 1, 1);
 }
-#endif
 
-/* A sum of four products of 16 by 29 bits, 2^-14 of it rounded down, which fits 32 bits. */
-static inline int32_t products(const int32_t factor[BLOCK], const int32_t *x)
-{
 #if defined(__ARM_ARCH_6M__)
-    /* without a long multiplication: x is high 2^14 + low; four products of each fit 32 bits */
-    int32_t high = 0;
+#define OFFSET 16384 /* of an entry's upper half: 2^14 */
+
+/* The sum of four products of 16 by 29 bits without its last 14 bits and with `start`, all of which fits 32 bits, as
+ * four products of lower halves do. start: what the entries' offset takes away, and half a unit of the result. One sum
+ * after the other: both at once need more registers than there are. */
+static inline int32_t products(const int32_t factor[BLOCK], const pvid_weak_entry_q31 x[BLOCK], int32_t start)
+{
     int32_t low = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
-        const int32_t one = x[j * PVID_MAX_CHANNELS];
-        high += factor[j] * pvid_floor_shift_32_q31(one, DOWN);
-        low += factor[j] * (int32_t)((uint32_t)one & 0x3FFFu);
+        low += factor[j] * (int32_t)x[j].low;
     }
-    return high + pvid_floor_shift_32_q31(low, DOWN);
-#else
-    return long_products(factor, x, DOWN);
-#endif
+    int32_t sum = pvid_floor_shift_32_q31(low, PVID_WEAK_ENTRY_BITS_Q31) + start;
+    PVID_UNROLL
+    for (size_t j = 0; j < BLOCK; j++) {
+        sum += factor[j] * (int32_t)x[j].high;
+    }
+    return sum;
 }
 
-/* The same of 24 by 29 bits and 2^-22. */
-static inline int32_t fine_products(const int32_t factor[BLOCK], const int32_t *x)
+/* Adds the products with four factors to one part of the sums of all channels, 2^-(14 + shift) of them rounded half up.
+ */
+static inline void add_products(const int32_t factor[BLOCK], const pvid_weak_entry_q31 *x, size_t channels,
+                                uint32_t shift, int32_t *sum)
 {
-#if defined(__ARM_ARCH_6M__)
-    /* a factor is high 2^12 + low, x is high 2^14 + low; four products of each fit 32 bits */
+    const int32_t offset = ((factor[0] + factor[1]) + (factor[2] + factor[3])) * OFFSET;
+    const int32_t start = ((int32_t)1 << (shift - 1u)) - offset;
+    for (size_t left = channels; left > 0u; left--) {
+        *sum += pvid_floor_shift_32_q31(products(factor, x, start), shift);
+        sum += 2;
+        x = &x[BLOCK];
+    }
+}
+
+/* A sum of four products of 24 by 29 bits, 2^-22 of it rounded down, which fits 32 bits. */
+static inline int32_t fine_products(const int32_t factor[BLOCK], const pvid_weak_entry_q31 x[BLOCK])
+{
+    /* a factor is high 2^12 + low; four products of each fit 32 bits */
     int32_t high = 0;
     int32_t first = 0;
     int32_t second = 0;
     int32_t low = 0;
     PVID_UNROLL
     for (size_t j = 0; j < BLOCK; j++) {
-        const int32_t one = x[j * PVID_MAX_CHANNELS];
         const int32_t factor_high = pvid_floor_shift_32_q31(factor[j], 12);
         const int32_t factor_low = (int32_t)((uint32_t)factor[j] & 0xFFFu);
-        const int32_t x_high = pvid_floor_shift_32_q31(one, 14);
-        const int32_t x_low = (int32_t)((uint32_t)one & 0x3FFFu);
+        const int32_t x_high = (int32_t)x[j].high - OFFSET;
+        const int32_t x_low = (int32_t)x[j].low;
         high += factor_high * x_high;
         first += factor_low * x_high;
         second += factor_high * x_low;
@@ -93,37 +100,58 @@ static inline int32_t fine_products(const int32_t factor[BLOCK], const int32_t *
     }
     const int32_t below = (4 * first) + second + pvid_floor_shift_32_q31(low, 12);
     return (16 * high) + pvid_floor_shift_32_q31(below, 10);
+}
 #else
-    return long_products(factor, x, FINE_DOWN);
-#endif
-}
-
-/* x 2^-s rounded half up, s >= 1. */
-static inline int32_t rounded(int32_t x, uint32_t s)
+/* A sum of four products, 2^-down of it rounded down, which fits 32 bits. */
+static inline int32_t long_products(const int32_t factor[BLOCK], const pvid_weak_entry_q31 x[BLOCK], uint32_t down)
 {
-    return pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(x, s - 1u) + 1, 1);
+    int64_t sum = 0;
+    PVID_UNROLL
+    for (size_t j = 0; j < BLOCK; j++) {
+        sum += (int64_t)factor[j] * x[j];
+    }
+    return (int32_t)pvid_floor_shift_q31(sum, down);
 }
 
-/* Adds the products with four factors to one part of the sums of all channels, 2^-shift of them rounded half up: what
- * is lost must not have a mean. */
-static void add_products(const PVID_TABLE int32_t *factor, size_t h, const int32_t *x, size_t channels,
-                         const pvid_weak_design_q31 *design, int32_t *sum)
+/* Adds the products with four factors to one part of the sums of all channels, 2^-(14 + shift) of them rounded half up.
+ */
+static inline void add_products(const int32_t factor[BLOCK], const pvid_weak_entry_q31 *x, size_t channels,
+                                uint32_t shift, int32_t *sum)
+{
+    for (size_t left = channels; left > 0u; left--) {
+        *sum += rounded(long_products(factor, x, DOWN), shift);
+        sum += 2;
+        x = &x[BLOCK];
+    }
+}
+
+static inline int32_t fine_products(const int32_t factor[BLOCK], const pvid_weak_entry_q31 x[BLOCK])
+{
+    return long_products(factor, x, FINE_DOWN);
+}
+#endif
+
+/* The same of factors of 24 bits, 2^-(22 + shift). */
+static inline void add_fine_products(const int32_t factor[BLOCK], const pvid_weak_entry_q31 *x, size_t channels,
+                                     uint32_t shift, int32_t *sum)
+{
+    for (size_t left = channels; left > 0u; left--) {
+        *sum += rounded(fine_products(factor, x), shift);
+        sum += 2;
+        x = &x[BLOCK];
+    }
+}
+
+/* Adds the products with every h-th factor to one part of the sums of all channels. Rounded, not cut off: what is lost
+ * must not have a mean. */
+static void add_part(const PVID_TABLE int32_t *factor, size_t h, const pvid_weak_entry_q31 *x, size_t channels,
+                     const pvid_weak_design_q31 *design, int32_t *sum)
 {
     const int32_t c[BLOCK] = {factor[0], factor[h], factor[2u * h], factor[3u * h]};
-    const int32_t *end = &x[channels];
-    const uint32_t shift = design->sum_shift;
     if (design->fine) {
-        while (x != end) {
-            *sum += rounded(fine_products(c, x), shift);
-            sum += 2;
-            x++;
-        }
-        return;
-    }
-    while (x != end) {
-        *sum += rounded(products(c, x), shift);
-        sum += 2;
-        x++;
+        add_fine_products(c, x, channels, design->sum_shift, sum);
+    } else {
+        add_products(c, x, channels, design->sum_shift, sum);
     }
 }
 
@@ -133,15 +161,15 @@ static void add_block(pvid_weak_sums_q31 *self, const pvid_weak_design_q31 *desi
 {
     const size_t summed = PVID_COUNT(PVID_EXACT_CHANNELS, pvid_weak_summed_q31(design->model));
     const size_t turn = 2u * (size_t)design->hop;
-    const int32_t *x = &self->block[PVID_MAX_BLOCKS - 1u - self->filling][0][0];
+    const pvid_weak_entry_q31 *x = &self->block[PVID_MAX_BLOCKS - 1u - self->filling][0][0];
     int32_t (*sum)[2] = self->sum[self->target][h];
     const PVID_TABLE int32_t *cosine = &design->circle[self->angle];
     if (self->start == 0u) {
         memset(sum, 0, summed * sizeof sum[0]);
     }
-    add_products(cosine, h, x, summed, design, &sum[0][RE]);
+    add_part(cosine, h, x, summed, design, &sum[0][RE]);
     if (h > 0u) {
-        add_products(&cosine[turn - (turn / 4u)], h, x, summed, design, &sum[0][IM]);
+        add_part(&cosine[turn - (turn / 4u)], h, x, summed, design, &sum[0][IM]);
     }
     const size_t next = (size_t)self->angle + self->start;
     self->angle = (uint16_t)((next >= turn) ? (next - turn) : next);

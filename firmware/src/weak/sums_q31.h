@@ -27,10 +27,10 @@ static inline int32_t (*pvid_weak_window_sums_q31(pvid_weak_sums_q31 *sums, pvid
 /* No block, no half. */
 void pvid_weak_sums_reset_q31(pvid_weak_sums_q31 *self);
 
-/* Where the channels of the next step go: step `index` of a half. */
-static inline int32_t *pvid_weak_sums_place_q31(pvid_weak_sums_q31 *self, uint16_t index)
+/* Where the first channel of the next step goes: step `index` of a half. */
+static inline pvid_weak_entry_q31 *pvid_weak_sums_place_q31(pvid_weak_sums_q31 *self, uint16_t index)
 {
-    return self->block[self->filling][index % (uint16_t)PVID_WEAK_BLOCK_Q31];
+    return &self->block[self->filling][0][index % (uint16_t)PVID_WEAK_BLOCK_Q31];
 }
 
 /* After they are written. A full block begins to be added; the one before it must be done. A half behind another one

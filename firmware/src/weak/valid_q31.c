@@ -17,7 +17,8 @@
 #define EXPONENT_MAX 8192 /* of a factor */
 #define PLACES 32u        /* of shifts of an int32 */
 #define MOST_UP 30u
-#define LEAST_SHIFT 2u /* of an integral's end */
+#define MOST_SUM_SHIFT 16u /* half a unit of what is left is then below what four products leave free: 2^16 */
+#define LEAST_SHIFT 2u     /* of an integral's end */
 
 static bool counts_fit(const pvid_weak_model_q31 *model)
 {
@@ -180,7 +181,7 @@ static bool shifts_are_valid(const pvid_weak_design_q31 *design)
     const pvid_weak_model_q31 *model = design->model;
     /* products of hop steps of 29 bits, and one off for each block, fit 30 bits */
     const int64_t sums = (int64_t)design->hop * ((int64_t)1 << 29);
-    bool valid = (design->sum_shift >= 1u) && (design->sum_shift <= MOST_UP) &&
+    bool valid = (design->sum_shift >= 1u) && (design->sum_shift <= MOST_SUM_SHIFT) &&
                  ((pvid_floor_shift_q31(sums, design->sum_shift) + design->hop) < PVID_ONE_Q30);
     for (size_t i = 0; i < model->channels; i++) {
         const pvid_weak_format_q31 *one = &design->format[i];

@@ -138,7 +138,26 @@ static inline int32_t integral_of(const pvid_weak_values_q31 *self, const pvid_w
     return first ? self->once[i] : self->twice[i];
 }
 
-static void write_channels(const pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, int32_t channel[])
+/* A value, |value| <= 2^30, or the nearest within +-2^28. */
+static inline pvid_weak_entry_q31 entry_of(int32_t value)
+{
+    const int32_t most = 2 * PVID_WEAK_LIMIT_Q31;
+    int32_t above = value + PVID_WEAK_LIMIT_Q31; /* 0..2^29 */
+    if ((uint32_t)above > (uint32_t)most) {
+        above = (value < 0) ? 0 : most;
+    }
+#if defined(__ARM_ARCH_6M__)
+    const uint32_t both = (uint32_t)above;
+    const pvid_weak_entry_q31 entry = {(uint16_t)(both & (((uint32_t)1 << PVID_WEAK_ENTRY_BITS_Q31) - 1u)),
+                                       (uint16_t)(both >> PVID_WEAK_ENTRY_BITS_Q31)};
+    return entry;
+#else
+    return above - PVID_WEAK_LIMIT_Q31;
+#endif
+}
+
+static void write_channels(const pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design,
+                           pvid_weak_entry_q31 channel[])
 {
     const size_t summed = PVID_COUNT(PVID_EXACT_CHANNELS, pvid_weak_summed_q31(design->model));
     for (size_t k = 0; k < summed; k++) {
@@ -149,13 +168,12 @@ static void write_channels(const pvid_weak_values_q31 *self, const pvid_weak_des
             value = pvid_upper_product_q31(value, integral_of(self, one, format->lift));
         }
         value = pvid_floor_shift_32_q31(pvid_floor_shift_32_q31(value, (uint32_t)format->value - 1u) + 1, 1);
-        channel[k] = (value > PVID_WEAK_LIMIT_Q31) ? PVID_WEAK_LIMIT_Q31
-                                                   : ((value < -PVID_WEAK_LIMIT_Q31) ? -PVID_WEAK_LIMIT_Q31 : value);
+        channel[k * (size_t)PVID_WEAK_BLOCK_Q31] = entry_of(value);
     }
 }
 
 pvid_weak_outcome pvid_weak_values_step_q31(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design,
-                                            const int32_t jet[], int32_t channel[])
+                                            const int32_t jet[], pvid_weak_entry_q31 channel[])
 {
     const pvid_weak_model_q31 *model = design->model;
     int32_t newest[2 * PVID_MAX_INTEGRANDS]; /* `prepare` and `values` write all that is read */

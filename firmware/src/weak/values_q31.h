@@ -27,10 +27,11 @@ void pvid_weak_values_init_q31(pvid_weak_values_q31 *self, uint16_t lead);
 /* After missing samples: the runs are kept. */
 void pvid_weak_values_reset_q31(pvid_weak_values_q31 *self);
 
-/* Takes the jets of the next step, and writes the channels of step self->index of its half self->half. At the first
- * step of a half, self->edge of the half before is complete. pvid_weak_values_next_q31 then moves on. */
+/* Takes the jets of the next step, and writes the channels of step self->index of its half self->half, each
+ * PVID_WEAK_BLOCK_Q31 places behind the one before. At the first step of a half, self->edge of the half before is
+ * complete. pvid_weak_values_next_q31 then moves on. */
 pvid_weak_outcome pvid_weak_values_step_q31(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design,
-                                            const int32_t jet[], int32_t channel[]);
+                                            const int32_t jet[], pvid_weak_entry_q31 channel[]);
 
 /* To the next step. */
 void pvid_weak_values_next_q31(pvid_weak_values_q31 *self, uint16_t hop);

@@ -20,8 +20,8 @@ typedef struct {
     uint16_t missing;                    /* outputs until there is a step, this one included */
     uint16_t head;                       /* place of the next output */
     const int32_t *offset;               /* of the configuration */
-    int32_t before[3][PVID_MAX_SAMPLES]; /* counts of the last three ticks, latest first */
     int32_t line[PVID_MAX_RING];         /* [signals][2] sums, [signals] of the block before, 2 [2 half + 1][signals] */
+    int32_t before[3][PVID_MAX_SAMPLES]; /* counts of the last three ticks, latest first */
 } pvid_weak_front_q31;
 
 /* From the jets of a step to the channels of the second one before it. */
@@ -43,6 +43,18 @@ typedef struct {
     bool ran;                                /* there was a step: the runs have begun */
 } pvid_weak_values_q31;
 
+/* A channel at a step. A core without a long multiplication takes it in halves, which it loads without a shift: the
+ * value is (high - 2^14) 2^14 + low. */
+#if defined(__ARM_ARCH_6M__)
+#define PVID_WEAK_ENTRY_BITS_Q31 14u
+typedef struct {
+    uint16_t low;
+    uint16_t high;
+} pvid_weak_entry_q31;
+#else
+typedef int32_t pvid_weak_entry_q31;
+#endif
+
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
 typedef struct {
     uint8_t filling; /* block that fills */
@@ -53,7 +65,7 @@ typedef struct {
     uint8_t halves;  /* complete since the restart, 0..2 */
     uint16_t start;  /* of its first step in its half */
     uint16_t angle;  /* of the next harmonic at this step */
-    int32_t block[PVID_MAX_BLOCKS][PVID_WEAK_BLOCK_Q31][PVID_MAX_CHANNELS];
+    pvid_weak_entry_q31 block[PVID_MAX_BLOCKS][PVID_MAX_CHANNELS][PVID_WEAK_BLOCK_Q31];
     int32_t sum[2][PVID_MAX_HARMONICS][PVID_MAX_CHANNELS][2]; /* A_h and B_h, real and imaginary part */
 } pvid_weak_sums_q31;
 
