@@ -135,7 +135,8 @@ static bool all_rows_agree(const pvid_trust_q31 *self, const pvid_estimator_q31 
 {
     const uint32_t n_p = estimator->model->n_p;
     const uint32_t freedom = (candidate->weight > n_p) ? (candidate->weight - n_p) : 1u;
-    const int64_t root = (int64_t)pvid_square_root_q31(((uint64_t)1 << 33) / freedom); /* of 2 / freedom, Q16 */
+    const uint64_t square = pvid_quotient_q31((uint64_t)1 << 33, freedom); /* 2 / freedom, Q32 */
+    const int64_t root = (int64_t)pvid_square_root_q31(square);
     const int64_t chance = pvid_clamp_q31(root, CHANCE_MAX);
     const int64_t limit = (int64_t)self->config.misfit_max * (((int64_t)1 << 16) + (3 * chance)); /* Q32 */
     return ((int64_t)candidate->misfit * ((int64_t)1 << 16)) <= limit;
@@ -149,7 +150,8 @@ static int64_t largest_error(const pvid_estimator_q31 *estimator, const pvid_est
     int64_t most = 0;
     for (size_t a = 0; a < estimator->model->n_p; a++) {
         if (pvid_is_positive_q31(estimator->model, a)) {
-            const int64_t relative = ((int64_t)candidate->se[a] << ERROR_BITS) / candidate->p[a];
+            const uint64_t error = (uint64_t)candidate->se[a] << ERROR_BITS;
+            const int64_t relative = (int64_t)pvid_quotient_q31(error, (uint32_t)candidate->p[a]);
             most = (relative > most) ? relative : most;
         }
     }

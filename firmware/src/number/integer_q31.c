@@ -104,10 +104,13 @@ uint32_t pvid_square_root_q31(uint64_t x)
     const uint32_t half = (rest << 15) | (low >> 17);
     const uint32_t quotient = half / upper;
     const uint32_t left = half - (quotient * upper);
-    const uint64_t square = (uint64_t)quotient * quotient;
     const uint64_t remains = ((uint64_t)left << 17) | (low & 0x1FFFFu);
-    const uint32_t lower = ((quotient > 0u) && (square > remains)) ? (quotient - 1u) : quotient;
-    const uint32_t root = (upper << 16) | ((lower < 0xFFFFu) ? lower : 0xFFFFu);
+    uint32_t lower = 0xFFFF; /* also of a quotient of 2^16 */
+    if (quotient <= 0xFFFFu) {
+        const uint32_t square = quotient * quotient;
+        lower = ((quotient > 0u) && (square > remains)) ? (quotient - 1u) : quotient;
+    }
+    const uint32_t root = (upper << 16) | lower;
     return root >> up;
 }
 

@@ -101,7 +101,7 @@ static int32_t part_of(int64_t x, int32_t a, int32_t b)
 int32_t pvid_assess_error_q31(const pvid_system_q31 *system, pvid_root_q31 own, size_t a, pvid_root_q31 wide)
 {
     const int32_t shift = ((system->f[a] + system->g[a]) - (wide.e + own.e)) + 31 + PVID_UNIT_BITS;
-    return (int32_t)pvid_clamp_q31(pvid_scale_q31((int64_t)wide.r * own.r, shift), INT32_MAX);
+    return (int32_t)pvid_clamp_q31(pvid_scale_q31(pvid_product_q31(wide.r, own.r), shift), INT32_MAX);
 }
 
 void pvid_assess_errors_q31(const pvid_system_q31 *system, const pvid_solve_settings_q31 *settings,
@@ -117,7 +117,7 @@ void pvid_assess_errors_q31(const pvid_system_q31 *system, const pvid_solve_sett
     for (size_t b = 0; b < a; b++) {
         int64_t sum = 0;
         for (size_t i = 0; i < system->factor.n; i++) {
-            sum += (int64_t)inverse->column[a][i] * inverse->column[b][i];
+            sum += pvid_product_q31(inverse->column[a][i], inverse->column[b][i]);
         }
         const int64_t in_roots = pvid_scale_q31(sum, own.e + inverse->root[b].e);
         estimate->correlation[a][b] = part_of(in_roots, own.r, inverse->root[b].r);

@@ -150,7 +150,7 @@ size_t pvid_system_project_q31(const pvid_model_q31 *model, const int32_t m[], c
 
 int32_t pvid_square_ratio_q31(int32_t sd, int32_t exponent, int32_t start_sd, int32_t *prior)
 {
-    const int64_t ratio = ((int64_t)sd << 31) / start_sd;
+    const int64_t ratio = (int64_t)pvid_quotient_q31((uint64_t)sd << 31, (uint32_t)start_sd);
     const int32_t up = 31 - (int32_t)pvid_bit_length_q31((uint64_t)ratio);
     const int64_t mantissa = pvid_clamp_q31(pvid_scale_q31(ratio, -up), (int64_t)1 << 31); /* 31 bits, rounded */
     *prior = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(mantissa * mantissa, 31), INT32_MAX);
