@@ -5,25 +5,45 @@
 #include <stdbool.h>
 
 #include "number/finite_f32.h"
+#include "number/unroll.h"
 #include "pvid/gate.h"
 
 /* Largest scale [square of a residual]: far beyond any accepted row. */
 #define PVID_GATE_SCALE_MAX 1.0e30f
 
+/* The scale with one residual more, not yet below its largest value. */
+static inline float pvid_gate_scale_with_f32(const pvid_gate_f32 *self, float square)
+{
+    const float scale = self->scale + ((square - self->scale) / self->judged);
+    return (scale > self->floor) ? scale : self->floor;
+}
+
 /* Accepts a finite residual. */
 static inline bool pvid_gate_accept_f32(pvid_gate_f32 *self, float square)
 {
-    const float scale = self->scale + ((square - self->scale) / self->judged);
-    const float larger = (scale > self->floor) ? scale : self->floor;
-    self->scale = (larger < PVID_GATE_SCALE_MAX) ? larger : PVID_GATE_SCALE_MAX;
+    const float scale = pvid_gate_scale_with_f32(self, square);
+    self->scale = (scale < PVID_GATE_SCALE_MAX) ? scale : PVID_GATE_SCALE_MAX;
     return true;
 }
 
-/* pvid_gate_passes_f32: inlined for a residual of usual size behind a complete memory. */
+/* pvid_gate_passes_f32: inlined for a finite residual while the memory fills, and for one of usual size behind that. */
 static inline bool pvid_gate_judges_f32(pvid_gate_f32 *self, float square)
 {
-    const bool usual = (self->judged >= self->memory) && (square < (self->limit * self->scale));
-    return usual ? pvid_gate_accept_f32(self, square) : pvid_gate_passes_f32(self, square);
+    if (PVID_USUALLY(self->judged >= self->memory)) {
+        if (PVID_USUALLY(square < (self->limit * self->scale))) {
+            const float scale = pvid_gate_scale_with_f32(self, square);
+            if (PVID_USUALLY(scale < PVID_GATE_SCALE_MAX)) {
+                self->scale = scale;
+                return true;
+            }
+        }
+    } else if ((self->limit > 0.0f) && pvid_finite_f32(square)) {
+        self->judged += 1.0f;
+        return pvid_gate_accept_f32(self, square);
+    } else {
+        /* the gate is off, or the residual no number */
+    }
+    return pvid_gate_passes_f32(self, square);
 }
 
 #endif
