@@ -42,8 +42,7 @@ def test_one_build_keeps_all_limits_of_bytes_and_instructions() -> None:
     assert max(one.state_bytes for one in (exact, lazy, staged)) <= 820
     assert exact.instructions_mean <= 1200
     assert lazy.instructions_mean <= 720
-    # 960 once, in the first samples; 939 behind them
-    assert staged.instructions_mean <= 560 and staged.instructions_longest <= 961
+    assert staged.instructions_mean <= 560 and staged.instructions_longest <= 950
 
 
 def test_a_savitzky_golay_bank_of_315_samples_takes_few_instructions_and_bytes() -> None:

@@ -162,6 +162,13 @@ def test_integers_cost_a_third_of_soft_float_at_most(board: str, measured: Measu
     assert 3 * mean_of(measured, board, "weak", "q31") <= mean_of(measured, board, "weak", "f32")
 
 
+def test_the_weak_form_in_integers_keeps_its_limits(measured: Measured) -> None:
+    """Instructions a tick in the mean on the smallest core and with a long multiplication; bytes of state on both."""
+    for board, most in (("microbit", 500), ("mps2-an386", 260)):
+        assert mean_of(measured, board, "weak", "q31") <= most, board
+        assert measured[sizes.Configuration(BOARDS[board], "weak", "q31")][1].state_bytes <= 4096, board
+
+
 def test_the_strong_form_in_integers_costs_less_than_soft_float_at_every_row(measured: Measured) -> None:
     for board, ratio in (("microbit", 1.2), ("virt-rv32imac", 2.0)):
         assert ratio * mean_of(measured, board, "strong", "q31") <= mean_of(measured, board, "strong", "f32"), board
