@@ -104,7 +104,10 @@ MISTAKES = {
         lambda run, rig: (replace(run, phi=np.radians(run.phi)), rig),
     ),
     "phi in degrees, a small swing": Mistake(
-        lambda: (replace(run_of(release=0.3, duration=15.0), phi=np.degrees(run_of(release=0.3, duration=15.0).phi)), RIG),
+        lambda: (
+            replace(run_of(release=0.3, duration=15.0), phi=np.degrees(run_of(release=0.3, duration=15.0).phi)),
+            RIG,
+        ),
         "phi looks like degrees",
         "--columns phi=phi:deg",
         lambda run, rig: (replace(run, phi=np.radians(run.phi)), rig),

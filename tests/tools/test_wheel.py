@@ -150,8 +150,8 @@ def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel
     (others,) = environment.glob("lib/python*/site-packages")
     (packages / "others.pth").write_text(f"{others}\n", encoding="utf-8")
     with compiled_once(environment, place):
-        pip = [environment / "bin" / "python", "-m", "pip", "--python", place / "bin" / "python"]
-        subprocess.run([*pip, "install", "--quiet", "--no-deps", "--no-index", wheel], check=True)
+        pip = [str(environment / "bin" / "python"), "-m", "pip", "--python", str(place / "bin" / "python")]
+        subprocess.run([*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)], check=True)
         program = place / "bin" / "pvid"
         subprocess.run([program, "simulate", "run.csv", "--duration", "8"], cwd=tmp_path, check=True)
         asked = "import pvid; print(pvid.__file__); print(pvid.identify('run.csv'))"
