@@ -21,7 +21,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run, read_run, write_run
 from pvid.sim.pendulum import simulate
 
-SHORT = {"rigs": 30, "runs": 15, "commands": 30}
+SHORT = {"rigs": 20, "runs": 8, "commands": 20}
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -44,7 +44,7 @@ def library() -> Path:
     """libpvid_native.so with the sanitizers."""
     flags = f"-shared-libasan -Wno-pass-failed {SANITIZERS} -g"
     options = ["-DCMAKE_C_COMPILER=clang", f"-DCMAKE_C_FLAGS={flags}", "-DPVID_BUILD_TESTS=OFF"]
-    options += ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O1 -g"]
+    options += ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O0 -g"]
     with one_at_a_time(TREE):
         configure = ("cmake", "-S", ROOT, "-B", TREE, "-G", "Ninja", *options)
         for command in (configure, ("ninja", "-C", TREE, "pvid_native")):
@@ -58,7 +58,7 @@ def compiler(tmp_path: Path) -> Path:
     """The same for the engine, whose functions of a mechanism are generated."""
     made = tmp_path / "clang-sanitized"
     made.write_text(
-        f'#!/bin/sh\nunset LD_PRELOAD\nexec clang -shared-libasan -Wno-pass-failed {SANITIZERS} -g "$@" -O1\n',
+        f'#!/bin/sh\nunset LD_PRELOAD\nexec clang -shared-libasan -Wno-pass-failed {SANITIZERS} -g "$@" -O0\n',
         encoding="utf-8",
     )
     made.chmod(0o755)
@@ -135,7 +135,7 @@ def test_the_stream_program_is_clean_under_the_sanitizers(
 ) -> None:
     compiler = tmp_path / "bin" / "gcc"
     compiler.parent.mkdir()
-    compiler.write_text(f'#!/bin/sh\nexec clang {SANITIZERS} -g -O1 "$@" -O1\n', encoding="utf-8")
+    compiler.write_text(f'#!/bin/sh\nexec clang {SANITIZERS} -g -O0 "$@" -O0\n', encoding="utf-8")
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", f"{compiler.parent}:{os.environ['PATH']}")
     monkeypatch.setattr(stream_image, "BUILD", tmp_path / "targets")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -51,12 +53,19 @@ def answer(*arguments: str | Path) -> dict[str, Any]:
     return found
 
 
+@pytest.fixture(scope="module")
+def clean(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[str, Any]]:
+    """The answer of a core to the run as it is."""
+    path = write(tmp_path_factory.mktemp("clean") / "clean.csv", run)
+    return cache(lambda core: answer(path, "--core", core))
+
+
 # ---- the rig
 
 
-def test_l1_is_all_that_is_needed(run: Run, tmp_path: Path) -> None:
+def test_l1_is_all_that_is_needed(run: Run, clean: Callable[[str], dict[str, Any]], tmp_path: Path) -> None:
     path = write(tmp_path / "run.csv", run)
-    found = answer(path)
+    found = clean("f32")
     assert found["g"]["value"] == pytest.approx(STANDARD_PENDULUM.g, rel=0.01)  # the README's promise
     assert found["input"] == []
     with pytest.raises(
@@ -133,7 +142,7 @@ def test_every_command_that_reads_a_run_takes_rig_settings_and_columns(run: Run,
     rows = zip(range(8000), np.rad2deg(run.phi).tolist(), (1e3 * run.y).tolist(), strict=False)
     path.write_text("time_ms;angle_deg;h\n" + "".join(f"{k};{a!r};{b!r}\n".replace(".", ",") for k, a, b in rows))
     given = ["--set", "l1=0.3", "--columns", "t=time_ms:ms,phi=angle_deg:deg,y=h:mm"]
-    assert pvid("identify", path, *given).return_value == 0
+    assert pvid("identify", path, *given, "--no-refine").return_value == 0
     assert pvid("compare", path, *given, "--law", "stationary").return_value == 0
     assert pvid("plot", path, *given, "-o", tmp_path / "a.png").return_value == 0
     assert pvid("design", "--run", path, *given, "--set", "sample_rate=1000").return_value == 0
@@ -146,8 +155,10 @@ def test_every_command_that_reads_a_run_takes_rig_settings_and_columns(run: Run,
 # ---- gaps and jitter, up to the answer
 
 
-def test_dropped_samples_and_jitter_leave_the_answer(run: Run, tmp_path: Path) -> None:
-    clean = answer(write(tmp_path / "clean.csv", run))
+def test_dropped_samples_and_jitter_leave_the_answer(
+    run: Run, clean: Callable[[str], dict[str, Any]], tmp_path: Path
+) -> None:
+    whole = clean("f32")
     random = np.random.default_rng(1)
     kept = np.delete(np.arange(len(run)), random.choice(np.arange(1, len(run) - 1), 20, replace=False))
     dropped = answer(write(tmp_path / "dropped.csv", run, kept))
@@ -156,27 +167,29 @@ def test_dropped_samples_and_jitter_leave_the_answer(run: Run, tmp_path: Path) -
         assert told in str(found["input"])
         for name in ("w", "d1", "d2"):
             # other noise at 20 of 20 000 samples
-            assert abs(found[name]["value"] - clean[name]["value"]) < 0.3 * clean[name]["se"], name
+            assert abs(found[name]["value"] - whole[name]["value"]) < 0.3 * whole[name]["se"], name
 
 
 def test_clock_error_of_a_thousandth_is_reported(run: Run, tmp_path: Path) -> None:
     path = write(tmp_path / "run.csv", run, t=run.t * 1.001)
     RigFile.standard().write(tmp_path / "run.toml")
-    done = pvid("identify", path, "--json")
+    done = pvid("identify", path, "--no-refine", "--json")
     assert done.stderr.startswith("pvid: input: t runs at 999 Hz, -0.1 % off the rig's sample rate: t is used")
     assert json.loads(done.stdout)["input"] == [done.stderr.splitlines()[0].removeprefix("pvid: input: ")]
 
 
 @pytest.mark.parametrize("core", ["f32", "q31", "f64"])
-def test_a_long_gap_costs_windows_and_no_answer(core: str, run: Run, tmp_path: Path) -> None:
+def test_a_long_gap_costs_windows_and_no_answer(
+    core: str, run: Run, clean: Callable[[str], dict[str, Any]], tmp_path: Path
+) -> None:
     rows = np.delete(np.arange(len(run)), np.arange(6000, 6500))
-    clean = answer(write(tmp_path / "clean.csv", run), "--core", core)
+    whole = clean(core)
     found = answer(write(tmp_path / "run.csv", run, rows), "--core", core)
     assert "missing samples: 500 of 20000, in 1 gap (first at 6 s, longest 0.5 s)" in found["input"][0]
     assert len(found["input"]) == (2 if core == "f64" else 1)  # float64 uses the longest stretch, and tells
     for name in ("w", "d1", "d2"):
         # two windows of 16 less, in float64 a third of them: well below the errors that both share
-        assert abs(found[name]["value"] - clean[name]["value"]) < 2 * found[name]["se"], name
+        assert abs(found[name]["value"] - whole[name]["value"]) < 2 * found[name]["se"], name
 
 
 def test_both_cores_and_their_twins_take_gaps_alike(run: Run, tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def joined(records: Any, name: str) -> npt.NDArray[Any]:
 @every_case
 def test_a_frozen_run_equals_the_twin(case: Case, native: Native, run: Run) -> None:
     phi, y = case.samples(rig_of(case), run)
-    phi, y = phi[4_000:15_000], y[4_000:15_000]
+    phi, y = phi[4_000:12_000], y[4_000:12_000]
     assert len(phi) < TO  # it ends frozen
     twin = case.twin(case.settings(rig_of(case), 1000.0))
     twin.frozen = mask_of(phi)

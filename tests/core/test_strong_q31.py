@@ -226,9 +226,24 @@ int main(void)
 """
 
 
+@pytest.fixture(scope="module")
+def sanitized(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], list[Path]]:
+    """clang with every sanitizer, and the core's objects by it."""
+    place = tmp_path_factory.mktemp("sanitized")
+    # the hash wraps by its definition, and by nothing else
+    (place / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
+    compiler = ["clang", "-std=c99", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", *INCLUDES]
+    compiler += ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
+    compiler.append(f"-fsanitize-ignorelist={place / 'wraps'}")
+    objects = [place / f"{source.stem}.o" for source in SOURCES]
+    for source, made in zip(SOURCES, objects, strict=True):
+        tool(*compiler, "-c", source, "-o", made)
+    return compiler, objects
+
+
 @pytest.mark.parametrize("differentiator", ["finite-difference", "savitzky-golay"])
 def test_the_header_is_the_configuration_and_nothing_overflows(
-    tmp_path: Path, native: Native, differentiator: str
+    tmp_path: Path, native: Native, sanitized: tuple[list[str], list[Path]], differentiator: str
 ) -> None:
     """A program made from the generated header and the sources alone, with every sanitizer: the bits of the shared
     library, on motion, on full scale in any order, and on words beyond it."""
@@ -240,13 +255,8 @@ def test_the_header_is_the_configuration_and_nothing_overflows(
     header = CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False).stdout
     (tmp_path / "table.h").write_text(header)
     (tmp_path / "main.c").write_text(PROGRAM)
-    # the hash wraps by its definition, and by nothing else
-    (tmp_path / "wraps").write_text("[unsigned-integer-overflow]\nfun:pvid_fnv_word\n")
-    sanitizers = ["-fsanitize=address,undefined,integer", "-fno-sanitize-recover=all"]
-    sanitizers.append(f"-fsanitize-ignorelist={tmp_path / 'wraps'}")
-    includes = [*INCLUDES, f"-I{tmp_path}"]
-    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", *sanitizers, *includes]
-    tool("clang", *flags, tmp_path / "main.c", *SOURCES, "-o", tmp_path / "program")
+    compiler, objects = sanitized
+    tool(*compiler, f"-I{tmp_path}", tmp_path / "main.c", *objects, "-o", tmp_path / "program")
     run = simulate(sensors=standard_sensors(20), truth="linear", duration=3.0, seed=2).run
     phi, y = counts_of(rig, run)
     random = np.random.default_rng(3)

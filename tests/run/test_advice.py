@@ -32,7 +32,7 @@ RIG = RigFile.parse(f"l1 = 0.25\n[sensor]\nphi_lsb = {LSB!r}\n")
 
 @cache
 def run_of(
-    drive: float = 1.0, friction: float = 0.0, release: float = 1.0, truth: str = "full", duration: float = 15.0
+    drive: float = 1.0, friction: float = 0.0, release: float = 1.0, truth: str = "full", duration: float = 10.0
 ) -> Run:
     """12 bits at 500 Hz: a rig that a student might have, of parts of the standard drive and release."""
     return simulate(
@@ -104,7 +104,10 @@ MISTAKES = {
         lambda run, rig: (replace(run, phi=np.radians(run.phi)), rig),
     ),
     "phi in degrees, a small swing": Mistake(
-        lambda: (replace(run_of(release=0.3), phi=np.degrees(run_of(release=0.3).phi)), RIG),
+        lambda: (
+            replace(run_of(release=0.3, duration=15.0), phi=np.degrees(run_of(release=0.3, duration=15.0).phi)),
+            RIG,
+        ),
         "phi looks like degrees",
         "--columns phi=phi:deg",
         lambda run, rig: (replace(run, phi=np.radians(run.phi)), rig),
@@ -180,7 +183,7 @@ def test_suggested_option_cures_the_finding(native: Native, name: str) -> None:
     result, said = advised(*mistake.cured(*mistake.spoilt()), native)
     assert result is not None and result.identified
     assert said == ()
-    # 15 s of a 12-bit encoder: some 0.5 % of noise; friction and the correction's remainder leave more
+    # 10 s of a 12-bit encoder: some 0.5 % of noise; friction and the correction's remainder leave more
     assert result.value["g"] == pytest.approx(9.81, rel=0.03)
 
 
@@ -202,7 +205,7 @@ def test_a_mistake_gets_its_sentence_without_a_rig_file_too(native: Native, name
     [
         (lambda: run_of(), ()),
         (lambda: run_of(release=3.0), ("angles reach 0.25 rad",)),
-        (lambda: run_of(friction=2e-3), ("the swing decays",)),
+        (lambda: run_of(friction=2e-3, duration=15.0), ("the swing decays",)),
     ],
 )
 def test_advice_without_a_rig_file_is_on_the_cause(
@@ -316,7 +319,7 @@ def test_an_angle_that_hardly_moves_is_reported(native: Native) -> None:
 
 @pytest.mark.parametrize("name", ["phi", "y"])
 def test_a_constant_signal_is_refused_by_its_name(native: Native, name: str) -> None:
-    with pytest.raises(PvidError, match=rf"^{name} has the same value in all 7500 samples: is the sensor connected\?$"):
+    with pytest.raises(PvidError, match=rf"^{name} has the same value in all 5000 samples: is the sensor connected\?$"):
         still = 0 * run_of().y
         identified(replace(run_of(), phi=still) if name == "phi" else replace(run_of(), y=still), RIG, native)
 
@@ -336,7 +339,7 @@ def test_swing_beyond_the_valid_range_is_reported(native: Native) -> None:
 
 
 def test_decaying_swing_is_reported(native: Native) -> None:
-    _, said = advised(run_of(friction=2e-3), RIG, native)
+    _, said = advised(run_of(friction=2e-3, duration=15.0), RIG, native)
     assert len(said) == 1 and said[0].startswith("the swing decays")
 
 
@@ -385,7 +388,7 @@ def test_identify_prints_its_advice(tmp_path: Path) -> None:
     assert answer["g"] == answer["parameters"]["g"]
     assert {one["value"] for one in answer["parameters"].values()} == {None}
     assert answer["chi2"] is None and answer["modes_hz"] is None and answer["first_publication_s"] is None
-    assert sum(answer["reasons"].values()) == answer["ticks"] == 7500
+    assert sum(answer["reasons"].values()) == answer["ticks"] == 5000
 
 
 def test_a_refusal_has_the_advice_in_front_of_it(tmp_path: Path) -> None:

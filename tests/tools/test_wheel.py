@@ -131,7 +131,8 @@ def test_a_missing_extra_is_named(bare: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("python", interpreters(), ids=lambda path: f"python{_version(path)}")
 def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel: Path, tmp_path: Path) -> None:
-    """By pip, into an environment of its own that finds the dependencies in another one."""
+    """By pip, into an environment of its own that finds the dependencies in another one: for the version that the tests
+    themselves run in, in theirs."""
     version = _version(python)
 
     def make(folder: Path) -> None:
@@ -141,14 +142,15 @@ def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel
         pip = [str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet", "--no-compile"]
         subprocess.run([*pip, *needed], check=True)
 
-    environment = once(f"python-{version}", make)
+    is_ours = version == f"{sys.version_info.major}.{sys.version_info.minor}"
+    environment = Path(sys.prefix) if is_ours else once(f"python-{version}", make)
     place = tmp_path / "venv"
     subprocess.run([python, "-m", "venv", "--without-pip", place], check=True)
     (packages,) = place.glob("lib/python*/site-packages")
     (others,) = environment.glob("lib/python*/site-packages")
     (packages / "others.pth").write_text(f"{others}\n", encoding="utf-8")
-    pip = [str(environment / "bin" / "python"), "-m", "pip", "--python", str(place / "bin" / "python")]
     with compiled_once(environment, place):
+        pip = [str(environment / "bin" / "python"), "-m", "pip", "--python", str(place / "bin" / "python")]
         subprocess.run([*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)], check=True)
         program = place / "bin" / "pvid"
         subprocess.run([program, "simulate", "run.csv", "--duration", "8"], cwd=tmp_path, check=True)

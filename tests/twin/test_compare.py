@@ -30,18 +30,31 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def objects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The core with nothing changed: of each source its object."""
+    folder = tmp_path_factory.mktemp("objects")
+    compile_into(folder, *core_sources(), ROOT / "host" / "native" / "replay.c")
+    return {path.name: folder / f"{path.stem}.o" for path in (*core_sources(), Path("replay.c"))}
+
+
+def compile_into(folder: Path, *sources: Path) -> None:
+    options = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", *INCLUDES, '-DPVID_NATIVE_BUILD="mutant"', *SIZES]
+    subprocess.run(["gcc", *options, "-c", *map(str, sources)], cwd=folder, check=True)
+
+
 @pytest.mark.parametrize("name", MUTANTS)
-def test_a_changed_core_exits_1_and_names_tick_variable_and_words(name: str, recorded: Path, tmp_path: Path) -> None:
+def test_a_changed_core_exits_1_and_names_tick_variable_and_words(
+    name: str, objects: dict[str, Path], recorded: Path, tmp_path: Path
+) -> None:
     original, changed = MUTANTS[name]
     text = source(name).read_text(encoding="utf-8")
     assert text.count(original) == 1
     (tmp_path / name).write_text(text.replace(original, changed), encoding="utf-8")
+    compile_into(tmp_path, tmp_path / name)
     library = tmp_path / "libpvid_native.so"
-    others = [str(path) for path in core_sources() if path.name != name]
-    includes = [*INCLUDES, '-DPVID_NATIVE_BUILD="mutant"']
-    includes += SIZES
-    command = ["gcc", "-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-shared", *includes, str(tmp_path / name)]
-    subprocess.run([*command, *others, str(ROOT / "host/native/replay.c"), "-o", str(library), "-lm"], check=True)
+    linked = [str(path) for path in (objects | {name: (tmp_path / name).with_suffix(".o")}).values()]
+    subprocess.run(["gcc", "-shared", *linked, "-o", str(library), "-lm"], check=True)
 
     compare = ("compare", "run.csv", "--rig", "run.toml", "--form", "strong")
     done = pvid(recorded, *compare, PVID_NATIVE_LIBRARY=str(library))

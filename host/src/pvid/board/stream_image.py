@@ -13,6 +13,7 @@ import numpy as np
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import StreamRig
 from pvid.core.host_compiler import objects_of, run_compiler
+from pvid.core.sizes import raised, roomy
 from pvid.core.sources import FIRMWARE, FOLDERS, core_sources, left_out
 from pvid.design.c_tables import float_literal
 from pvid.link.frames import Configuration, Source
@@ -176,7 +177,8 @@ def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
 
 
 def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
-    """With the options of the core (firmware/cmake/PvidCompile.cmake); without what it does not link."""
+    """With the options of the core (firmware/cmake/PvidCompile.cmake); without what it does not link. This computer has
+    the memory for larger arrays than needed, with which most images are linked from the same objects."""
     application = FIRMWARE / "apps" / "stream"
     needless = re.compile(made.left_out)
     core = [path for path in core_sources() if not needless.search(path.as_posix())]
@@ -193,9 +195,13 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
         return image
     includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports"]
     options = ["-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
-    options += [f"-D{name}={value}" for name, value in made.sizes.items()] + [f"-I{one}" for one in includes]
+    sizes = raised(roomy({name: int(value) for name, value in made.sizes.items()}))
+    options += [f"-D{name}={value}" for name, value in sizes.items()] + [f"-I{one}" for one in includes]
     tree.mkdir(parents=True, exist_ok=True)
-    own = [f"-I{folder}", *options]
+    rig = tree / "rig"  # by the same name in every tree, so that ccache finds the objects of another without reading
+    if not rig.is_symlink():
+        rig.symlink_to(folder)
+    own = [f"-I{rig.name}", *options]
     # The same of every rig with these sizes, but for the second stage, whose shape stands before the core's header.
     objects = objects_of("gcc", own if made.refined else options, core, tree)
     objects += objects_of("gcc", own, sources, tree)

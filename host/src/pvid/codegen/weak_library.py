@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.model_library import model_library
-from pvid.core.sizes import raised
+from pvid.core.sizes import raised, roomy
 from pvid.core.weak_native import WeakNative
 from pvid.model.compiled import CompiledModel
 from pvid.settings.weak import WeakDesign32
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
-
-# Sizes that depend on the design alone are rounded up to multiples of these.
-_STEPS = {
-    "PVID_MAX_RING": 512,
-    "PVID_MAX_HARMONICS": 25,
-    "PVID_MAX_FUNCTIONS": 40,
-    "PVID_MAX_POWER": 8,
-    "PVID_MAX_DECIMATION": 64,
-}
 
 
 def weak_native(
@@ -44,9 +33,4 @@ def weak_native(
     if refine is not None:
         texts["pvid/refine_shape.h"] = files_refine.shape(refine, "identification")
         texts["refine_model_f32.h"] = files_refine.header(refine, "identification")
-    return WeakNative(made.name, model_library(made.name, texts, raised(_roomy(needed))))
-
-
-def _roomy(needed: Mapping[str, int]) -> dict[str, int]:
-    """The same or more, of few kinds: designs of several recordings share a library, which takes seconds to compile."""
-    return {macro: _STEPS.get(macro, 1) * -(-size // _STEPS.get(macro, 1)) for macro, size in needed.items()}
+    return WeakNative(made.name, model_library(made.name, texts, raised(roomy(needed))))

@@ -11,6 +11,15 @@ from pvid.core.sources import FIRMWARE
 _DEFINED = re.compile(r"^#define (PVID_MAX_\w+) (\d+)$", re.MULTILINE)
 _LEAST = re.compile(r"^#if (PVID_MAX_\w+) < (\d+) ", re.MULTILINE)
 
+# Sizes that depend on the design alone are rounded up to multiples of these.
+_STEPS = {
+    "PVID_MAX_RING": 512,
+    "PVID_MAX_HARMONICS": 25,
+    "PVID_MAX_FUNCTIONS": 40,
+    "PVID_MAX_POWER": 8,
+    "PVID_MAX_DECIMATION": 64,
+}
+
 
 @cache
 def default_sizes() -> Mapping[str, int]:
@@ -35,3 +44,8 @@ def raised(needed: Mapping[str, int]) -> dict[str, int]:
     """Those of the needed sizes that exceed the defaults."""
     usual = default_sizes()
     return {name: value for name, value in needed.items() if value > usual.get(name, 0)}
+
+
+def roomy(needed: Mapping[str, int]) -> dict[str, int]:
+    """The same or more, of few kinds: designs of several recordings share a build, which takes seconds to compile."""
+    return {macro: _STEPS.get(macro, 1) * -(-size // _STEPS.get(macro, 1)) for macro, size in needed.items()}
