@@ -82,3 +82,8 @@ def test_disturbances_leave_nothing_that_is_not_finite_and_nothing_confidently_w
         assert np.isfinite(found.error).all() and np.isfinite(found.se).all() and np.isfinite(found.clash)
         assert not found.confidently_wrong
         assert np.abs(found.error[-1]).max() < 2e-3
+
+
+def test_with_friction_the_search_takes_the_samples_that_tell_most() -> None:
+    case = Case(0.3, 14, (0.002, 0.0005))
+    np.testing.assert_allclose(bound_of(case, 3.0) / bound_of(case), 1.48, atol=0.02)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from pvid.board.boards import BOARDS
 from pvid.board.refined_image import build_refined_image, refined_run
 from pvid.board.replay_image import play
@@ -10,11 +12,19 @@ from pvid.settings.enums import Reason
 TIMEOUT_S = 60.0
 
 
-def test_a_board_refines_a_first_order_model_with_the_bits_of_this_computer() -> None:
-    run = refined_run("rigid_body", 4500, distance=0.1)
+@pytest.mark.parametrize(
+    ("name", "ticks", "board"),
+    [
+        ("rigid_body", 4500, "mps2-an386"),  # of order 1, steps of Adams
+        ("dc_motor", 3000, "mps2-an386"),  # sharp friction, steps of Runge-Kutta
+        ("dc_motor", 2400, "mps2-an385"),  # without a floating point unit
+    ],
+)
+def test_a_board_refines_a_mechanism_with_the_bits_of_this_computer(name: str, ticks: int, board: str) -> None:
+    run = refined_run(name, ticks, distance=0.1)
     expected = run.native().run_both(run.weak.samples)
-    image, _ = build_refined_image(BOARDS["mps2-an386"], run)
-    report = play(BOARDS["mps2-an386"], image, TIMEOUT_S)
+    image, _ = build_refined_image(BOARDS[board], run)
+    report = play(BOARDS[board], image, TIMEOUT_S)
     assert report.hash == int(expected.hash[-1])
     assert {at: int(expected.hash[at - 1]) for at in report.hashes} == report.hashes
     assert Reason.UPDATED in expected.told

@@ -151,7 +151,6 @@ def test_what_has_no_second_stage_is_refused(tmp_path: Path) -> None:
         return done.stderr
 
     assert "float32 alone" in refusal("--model", "kapitza", "--core", "q31")
-    assert "sgn" in refusal("--model", "dc_motor")
     rig = tmp_path / "rig.toml"
     for changes, why in (({"core": "q31"}, "float32 alone"), ({"form": "strong"}, "behind the weak form")):
         own = RigFile.standard()

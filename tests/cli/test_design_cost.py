@@ -17,6 +17,8 @@ from pvid.board.boards import BOARDS, Board
 from pvid.board.replay_image import ReplayReport
 from pvid.cli.main import commands
 from pvid.rig.file import RigFile
+from pvid.run import refine_design
+from pvid.settings.refine import RefineConfig
 
 BOARD = "mps2-an386"
 TIMEOUT_S = 60.0
@@ -84,12 +86,19 @@ def test_the_drive_of_a_rig_file_is_replayed_in_the_core_of_the_file(rig: Path) 
     assert found["core"] == "q31" and 0 < found["mean"] < found["longest"] and 0 < found["ticks"] <= 10_000
 
 
-def test_the_reason_why_there_is_no_second_stage_is_that_of_model_build(tmp_path: Path) -> None:
-    done = pvid("design", "--model", "dc_motor", "--on", BOARD, "--refine", "--json")
+def test_the_reason_why_there_is_no_second_stage_is_that_of_model_build(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: Any) -> RefineConfig:
+        raise PvidError("rigid_body has no steps for it")
+
+    monkeypatch.setattr(design_cost, "refine_for_simulated_rig", refused)
+    monkeypatch.setattr(refine_design, "refine_for_simulated_rig", refused)
+    done = pvid("design", "--model", "rigid_body", "--on", BOARD, "--refine", "--json")
     assert [one["form"] for one in json.loads(done.stdout)["cost"]] == ["weak"]
     (sentence,) = [line for line in done.stderr.splitlines() if "no refinement" in line]
-    assert "dc_motor has a sharp friction" in sentence
-    assert sentence in pvid("model", "build", "dc_motor", "-o", tmp_path).stderr.splitlines()
+    assert "rigid_body has no steps for it" in sentence
+    assert sentence in pvid("model", "build", "rigid_body", "-o", tmp_path).stderr.splitlines()
 
 
 def test_a_stage_that_does_not_fit_is_named_and_the_other_is_measured(

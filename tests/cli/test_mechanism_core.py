@@ -120,11 +120,11 @@ def test_where_the_core_publishes_nothing_the_values_are_null(
 
 def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     answer = pvid("compare", recorded["dc_motor"], "--core", "all")
-    assert answer.return_value == DONE and answer.stdout.count("equal") == 2 and "6000" in answer.stdout
+    assert answer.return_value == DONE and answer.stdout.count("equal") == 3 and "6000" in answer.stdout
     assert "f32" in answer.stdout and "q31" in answer.stdout
     changed = "pvid.run.mechanism_compare.WeakTwin"
     monkeypatch.setattr(changed, lambda config: WeakTwin(replace(config, iterations=1)))
-    answer = pvid("compare", recorded["dc_motor"])
+    answer = pvid("compare", recorded["rigid_body"])
     assert answer.return_value == DIFFERENT
     assert "DIFFERENT: tick" in " ".join(answer.stdout.split())
 
@@ -200,7 +200,13 @@ def test_the_second_stage_is_compared_with_its_twin_too(
     answer = pvid("compare", recorded["rigid_body"])
     assert answer.return_value == DIFFERENT
     assert answer.stdout.count("equal") == 1 and "DIFFERENT: tick" in " ".join(answer.stdout.split())
-    assert "note: no second stage: dc_motor has a sharp friction" in pvid("compare", recorded["dc_motor"]).stderr
+    why = "no steps for it"
+
+    def refused(*_: Any) -> RefineConfig:
+        raise PvidError(why)
+
+    monkeypatch.setattr("pvid.run.refined_core.refine_design", refused)
+    assert f"note: no second stage: {why}" in pvid("compare", recorded["rigid_body"]).stderr
 
 
 @pytest.mark.parametrize(

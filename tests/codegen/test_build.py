@@ -18,9 +18,10 @@ from pvid.codegen.reaches import Reaches
 from pvid.codegen.weak_library import weak_native
 from pvid.core.sizes import raised
 from pvid.core.sources import source
+from pvid.model import Integral, Model
 from pvid.models.mechanisms import compiled_of
 from pvid.run.engine_design import config_for_simulated_rig, samples_of, simulated_run_of
-from pvid.run.refine_design import refine_design
+from pvid.run.refine_design import refine_design, refine_settings
 from pvid.setup.weak_sizes import sizes_of_design
 
 USER = """
@@ -156,19 +157,21 @@ def test_the_weak_form_and_its_refinement_are_options_of_the_folder(tmp_path: Pa
 
 
 def test_what_the_refinement_in_c_lacks_is_a_sentence() -> None:
-    refused = {
-        "cart_pendulum": r"cart_pendulum has a sharp friction, sgn\(x_1\), .* --soft-sign x_1=WIDTH",
-        "battery_2rc": r"battery_2rc has the input Integral\(i, 1\)",
-    }
-    for name, sentence in refused.items():
-        compiled = compiled_of(name)
-        run_of_rig, _, p = simulated_run_of(compiled)
-        with pytest.raises(PvidError, match=sentence):
-            refine_design(compiled, config_for_simulated_rig(compiled), run_of_rig, p)
-    compiled = compiled_of("dc_motor")
-    run_of_rig, _, p = simulated_run_of(compiled)
-    with pytest.raises(PvidError, match=r"a sample rate of \d+ Hz, not 1000"):
-        refine_design(compiled, config_for_simulated_rig(compiled), run_of_rig, p, {"phi_1": 3.0})
+    motor = compiled_of("dc_motor")
+    run_of_rig, _, p = simulated_run_of(motor)
+    with pytest.raises(PvidError, match=r"needs \d+ samples a second for the fastest motion or relaxation, .* not 40"):
+        refine_settings(refine_functions(motor), run_of_rig, 40.0, p, 2.0)
+    model = Model("heat")
+    i, v = model.sensor("i", "A", noise=1e-3, driven=True), model.sensor("v", "V", noise=1e-3)
+    z, s = model.define("z", "A^2*s", Integral(i**2, 1)), model.unknown("s", "V/(A^2*s)", 1.0)
+    R, T, h = model.unknown("R", "ohm", 1.0), model.unknown("T", "s", 1.0), model.unmeasured("h", "V")
+    model.equation(v + s * z + h)
+    model.equation(T * h.d() + h - R * i)
+    signals = {name: np.sin(np.arange(2000.0)) for name in ("i", "v")}
+    with pytest.raises(
+        PvidError, match=r"has the input Integral\(i\*\*2, 1\); those of the refinement in C are samples"
+    ):
+        refine_settings(refine_functions(model.compiled("heat")), signals, 100.0, (1.0, 1.0, 1.0), 2.0)
 
 
 def test_a_soft_sign_is_one_of_the_design_too() -> None:

@@ -20,7 +20,7 @@ from pvid.base.errors import PvidError
 from pvid.codegen import files_refine, refine_twin
 from pvid.codegen.build import refine_functions
 from pvid.codegen.operations import Argument, Literal, Operation
-from pvid.codegen.refine import RefineFunctions, default_widths, refine_functions_of
+from pvid.codegen.refine import RefineFunctions, refine_functions_of
 from pvid.core.host_compiler import host_compiler
 from pvid.core.sources import INCLUDES, source
 from pvid.model import Model
@@ -54,7 +54,7 @@ def given_of(name: str) -> Given:
     """Parameters around the rig's own and states within reach, [entries, VECTORS]."""
     made, rng = functions(name), np.random.default_rng(5)
     truth = simulated_rig(name).truth
-    near = [truth.get(one.name, 0.0) for one in made.parameters]
+    near = [truth.get(one.name, 1.0 if one.sign else 0.0) for one in made.parameters]
     share = rng.uniform(0.9, 1.1, (len(near), VECTORS))
     r = np.array(near)[:, None] * share + np.where(np.array(near) == 0, 1e-2, 0)[:, None] * rng.normal(size=share.shape)
     n = len(made.coordinates)
@@ -204,19 +204,22 @@ def test_the_motion_solves_the_equations_of_the_description(name: str) -> None:
     measured = {sp.Symbol(f"measured_{k}"): value for k, value in enumerate(z)}
     outputs = [own.outputs.get(one, Jet(one)) - mark for one, mark in zip(made.outputs, measured, strict=True)]
     algebraic = {Jet(one): mark for one, mark in zip(made.outputs, measured, strict=True) if Jet(one) not in values}
-    widths = default_widths(model)
+    widths = {one.sign: sp.Symbol(one.name, real=True) for one in made.parameters if one.sign}
     integrals = {jet.d() for jet in model.opaque}
     equations = [one for one in own.equations or model.equations if not one.free_symbols & integrals]
     for one in [*equations, *outputs]:
-        soft = {
-            sign: sign.args[0] / sp.sqrt(sign.args[0] ** 2 + widths[str(sign.args[0])] ** 2) for sign in one.atoms(sgn)
-        }
+        soft = {sign: softened(sign.args[0], widths[str(sign.args[0])]) for sign in one.atoms(sgn)}
         plain = model.with_knowns(one.xreplace(soft).xreplace(own.shapes).xreplace(algebraic))
         symbols = sorted(plain.free_symbols, key=str)
         terms = [sp.lambdify(symbols, term) for term in sp.Add.make_args(sp.expand(plain))]
         at = [{**values, **measured}[symbol] for symbol in symbols]
         found = np.array([np.broadcast_to(term(*at), (VECTORS,)) for term in terms])
         assert (np.abs(found.sum(0)) <= 1e-12 * np.abs(found).sum(0)).all(), one
+
+
+def softened(v: sp.Expr, width: sp.Symbol) -> sp.Expr:
+    """What stands in the place of sgn(v)."""
+    return v / (v**4 + width**4) ** sp.Rational(1, 4)
 
 
 def _states(made: RefineFunctions) -> list[Jet]:
@@ -335,9 +338,27 @@ def test_the_shipped_header_is_the_printed_one() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_a_sign_without_a_width_is_refused_by_name() -> None:
-    with pytest.raises(PvidError, match=r"width of the soft sign of phi_1"):
-        refine_functions_of(compiled_of("dc_motor"), {})
+def test_the_width_of_a_sign_is_refined_where_it_is_not_given() -> None:
+    motor = compiled_of("dc_motor")
+    assert refine_functions_of(motor, {}).parameters[0].sign == "phi_1"
+    assert not any(one.sign for one in refine_functions_of(motor, {"phi_1": 3.0}).parameters)
+
+
+@pytest.mark.parametrize(
+    ("name", "runge_kutta", "turning", "hidden"),
+    [
+        ("dc_motor", True, (False, True), 0),
+        ("two_mass_drive", True, (True,), 1),
+        ("cart_pendulum", True, (True, False), 0),  # gravity tells the pendulum's angles apart
+        ("battery_2rc", True, (False,), 2),
+        ("rigid_body", False, (False,) * 3, 0),
+        ("furuta", False, (False,) * 2, 0),
+    ],
+)
+def test_how_a_motion_is_integrated(name: str, runge_kutta: bool, turning: tuple[bool, ...], hidden: int) -> None:
+    """Friction and relaxations by Runge-Kutta; angles without whole turns where the motion does not depend on them."""
+    made = functions(name)
+    assert (made.runge_kutta, made.turning, made.hidden) == (runge_kutta, turning, hidden)
 
 
 def test_the_description_of_a_refinement_is_checked() -> None:

@@ -327,10 +327,10 @@ static void spoil_refinement(pvid_refine_config_f32 *config)
     config->first_block = one_in(8) ? (uint16_t)below(100) : config->first_block;
     config->passes = one_in(8) ? (uint8_t)below(18) : config->passes;
     config->most_passes = one_in(8) ? (uint8_t)below(18) : config->most_passes;
-    config->jobs = one_in(8) ? (uint8_t)below(18) : config->jobs;
+    config->jobs = one_in(8) ? (uint8_t)below(132) : config->jobs;
     config->rests = one_in(4) ? (uint8_t)any_word() : config->rests;
     config->second = one_in(16) ? NULL : config->second;
-    refined.signal[0].order = one_in(16) ? (uint8_t)below(4) : refined.signal[0].order;
+    refined.signal[0].order = one_in(16) ? (int8_t)((int32_t)below(5) - 2) : refined.signal[0].order;
     refined.signal[1].sample = one_in(16) ? (uint8_t)below(KAPITZA_WEAK_SAMPLES + 1u) : refined.signal[1].sample;
     refined.signal[0].source = one_in(8) ? (uint8_t)below(3) : refined.signal[0].source;
 }

@@ -170,8 +170,10 @@ def test_without_a_second_stage_the_weak_form_has_the_same_bits() -> None:
     assert len(record.reason) == 3000
 
 
-def test_a_running_integral_is_no_input() -> None:
+def test_a_running_integral_is_an_input() -> None:
     made, rig = refine_functions(compiled_of("battery_2rc")), engine_rig("battery_2rc")
     run = {one: rig.samples[:, k] for k, one in enumerate(_samples("battery_2rc"))}
-    with pytest.raises(PvidError, match=r"battery_2rc has the input Integral\(i, 1\)"):
-        refine_settings(made, run, 10.0, rig.truth, 100.0)
+    settings = refine_settings(made, run, 1.0, rig.truth, 2400.0)
+    assert [str(one) for one in made.inputs] == ["i", "z"]
+    assert [one.order for one in settings.signal] == [0, -1, 0]
+    assert settings.signal[1].range >= 1.4 * np.abs(np.cumsum(run["i"])).max()

@@ -113,7 +113,8 @@ static void run_pass(pvid_refine_pass_f32 *pass, const double r[], const double 
     float state[4];
     to_floats(r, linear, N);
     to_floats(from, state, 4);
-    pvid_refine_pass_begin_f32(pass, linear, state, (float)STEP_S, 1.0e3f);
+    const pvid_refine_steps_f32 steps = {.h = (float)STEP_S};
+    pvid_refine_pass_begin_f32(pass, linear, state, &steps, 1.0e3f);
     while (!pvid_refine_pass_ends_f32(pass, STEPS / PVID_REFINE_SUB)) {
         uint32_t step = 0;
         (void)pvid_refine_pass_needs_f32(pass, &step);
@@ -314,7 +315,7 @@ static void test_init_refuses(void **state)
     REFUSES(passes, 0, PVID_BAD_ITERATIONS);
     REFUSES(most_passes, 1, PVID_BAD_ITERATIONS);
     REFUSES(jobs, 0, PVID_BAD_ITERATIONS);
-    REFUSES(jobs, 17, PVID_BAD_ITERATIONS);
+    REFUSES(jobs, 129, PVID_BAD_ITERATIONS);
     REFUSES(sd[0], 0.0f, PVID_BAD_ROW_SD);
     REFUSES(prior_sd[6], nan, PVID_BAD_START_SD);
     REFUSES(gain_sd[0], nan, PVID_BAD_START_SD);

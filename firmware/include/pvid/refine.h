@@ -22,6 +22,10 @@
  *   other context: pvid_publication_put_f32 of that estimate (publication.h), or
  *                  if (pvid_refine_read_f32(&refinement, &copy, &number) && (number > 0)) ...
  *
+ * With dry friction sgn(x) is replaced by x / (x^4 + width^4)^(1/4). Steps in which x may change its sign are divided
+ * more finely. The widths are the first entries of r; each block has its own, and an estimate is published however
+ * uncertain they are.
+ *
  * The model is refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is divided into jobs; a
  * tick does a few of them, so its time is bounded. A tick in which the weak form is busy does none, but no more than
  * `rests` ticks in a row do none.
@@ -41,11 +45,6 @@
 extern "C" {
 #endif
 
-/* Steps that the ring of signals holds, a power of two: at least 1.5 blocks. RAM: 2 bytes for each signal. */
-#ifndef PVID_REFINE_RING
-#define PVID_REFINE_RING 512
-#endif
-
 /* The filter of second derivatives: steps on each side. RAM: 16 bytes each. */
 #ifndef PVID_REFINE_HALF
 #define PVID_REFINE_HALF 12
@@ -56,15 +55,17 @@ extern "C" {
 /* An input or an output of the model. */
 typedef struct {
     uint8_t sample; /* entry of the argument of step */
-    uint8_t order;  /* 0: the sample, 2: its second derivative (inputs alone) */
+    int8_t order;   /* 0: the sample; of an input also 2: its second derivative, -1: its integral since init */
     uint8_t source; /* PVID_SIGNAL_SAMPLED, or of an input PVID_SIGNAL_HELD (weak_parts.h) */
     float scale;    /* factor to the model's unit */
-    float range;    /* largest absolute value [model's unit], > 0: it is kept in 16 bits */
+    float range;    /* largest absolute value [model's unit], > 0: it is kept in 16 bits. Of an output that turns
+                       (pvid_refine_turning) half of the interval modulo which it is kept */
 } pvid_refine_signal_f32;
 
 typedef struct pvid_refine_config_f32 {
     float sample_rate_hz; /* ticks per second [Hz], 1e-3..1e6 */
-    uint8_t ratio;        /* ticks a step of the motion, 1..255; a step is at most 1/40 of the fastest period */
+    uint8_t ratio;        /* ticks a step of the motion, 1..255; the design takes at most 1/48 of the fastest period
+                             (with PVID_REFINE_RUNGE_KUTTA a part of a step at most 1/25); init does not check it */
     const float *second;  /* [PVID_REFINE_HALF + 1] weights of second derivatives, centre first [1/s^2]; NULL: no
                              signal has order 2. Must outlive the object */
     const pvid_refine_signal_f32 *signal; /* [inputs + outputs]; must outlive the object */
@@ -73,12 +74,22 @@ typedef struct pvid_refine_config_f32 {
     uint8_t passes;      /* least passes over a block, 1..most_passes; in the track one pass suffices if its step is
                             below step_max / 4; recommended: 2 */
     uint8_t most_passes; /* most passes over a block, 1..16, if its steps do not become small; recommended: 8 */
-    uint8_t jobs;        /* jobs of a pass in one tick, 1..16; recommended: 3 with a floating-point unit, 1 without */
-    uint8_t rests;       /* most ticks in a row without jobs because the weak form is busy, 0..255. 255 makes the
-                            longest tick short where the weak form is seldom busy, as the pendulum's is; otherwise 1 */
+    uint8_t jobs;  /* jobs of a pass in one tick, 1..128; recommended: 3 with a floating-point unit, 1 without; with
+                      Runge-Kutta those of the design: with fewer, blocks are lost before they are fitted */
+    uint8_t rests; /* most ticks in a row without jobs because the weak form is busy, 0..255. 255 makes the
+                      longest tick short where the weak form is seldom busy, as the pendulum's is; otherwise 1 */
     float sd[PVID_REFINE_OUTPUTS];          /* of the noise of a row, at low frequencies [unit of the output], > 0 */
-    float prior_sd[PVID_REFINE_PARAMETERS]; /* of the weak form's estimate, in the search; relative if logarithmic */
+    float prior_sd[PVID_REFINE_PARAMETERS]; /* of the weak form's estimate, in the search; relative if logarithmic;
+                                               with signs 10 of its standard errors at most */
     float gain_sd[PVID_REFINE_PARAMETERS];  /* change of each step of r by one s.d. of a sensor's gain, with its sign */
+#if PVID_REFINE_RUNGE_KUTTA
+    uint8_t parts;      /* equal parts of a step, each of two jobs, 1..64 */
+    uint8_t fine_parts; /* of a step in which a sign may change, parts..64 */
+#endif
+#if PVID_REFINE_WIDTHS > 0
+    float width[PVID_REFINE_WIDTHS]; /* where the widths of the signs start [unit of the sign's argument],
+                                        1e-9..1e9; they do not fall below a quarter of this */
+#endif
     float state_limit[PVID_REFINE_ORDER *
                       PVID_REFINE_COORDINATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
     float forgetting_s;                         /* time constant of the triangle [s], > 0; 0: it does not forget */
@@ -88,7 +99,7 @@ typedef struct pvid_refine_config_f32 {
     float chi_max;      /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
     float clash_max;    /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
     float step_max;     /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
-    float step_limit;   /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 0.9 at most;
+    float step_limit;   /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 1.8 at most;
                            recommended: 2 */
     float se_max;       /* largest relative standard error of a published estimate, > 0 */
     float distance; /* relative distance from the weak form's estimate that the bias of its equations explains, >= 0.

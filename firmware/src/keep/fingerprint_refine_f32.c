@@ -30,9 +30,10 @@ static uint32_t results(uint32_t hash, const float values[], size_t n)
 
 uint32_t pvid_fingerprint_refine_model_f32(uint32_t hash)
 {
-    const uint8_t sizes[] = {PVID_REFINE_ORDER,     PVID_REFINE_COORDINATES, PVID_REFINE_INPUTS,
-                             PVID_REFINE_OUTPUTS,   PVID_REFINE_MOVING,      PVID_REFINE_PARAMETERS,
-                             PVID_REFINE_CONSTANTS, PVID_REFINE_SKEW,        PVID_REFINE_P};
+    const uint8_t sizes[] = {PVID_REFINE_ORDER,  PVID_REFINE_COORDINATES, PVID_REFINE_INPUTS,    PVID_REFINE_OUTPUTS,
+                             PVID_REFINE_MOVING, PVID_REFINE_PARAMETERS,  PVID_REFINE_CONSTANTS, PVID_REFINE_SKEW,
+                             PVID_REFINE_P,      PVID_REFINE_RUNGE_KUTTA, PVID_REFINE_SIGNS,     PVID_REFINE_WIDTHS,
+                             PVID_REFINE_HIDDEN};
     float r[PVID_REFINE_PARAMETERS];
     float m[PVID_REFINE_CONSTANTS];
     float state[PVID_REFINE_STATES];
@@ -56,7 +57,7 @@ static uint32_t signals_of(uint32_t hash, const pvid_refine_signal_f32 signal[])
 {
     uint32_t running = hash;
     for (size_t i = 0; i < PVID_REFINE_SIGNALS; i++) {
-        const uint8_t fields[] = {signal[i].sample, signal[i].order, signal[i].source};
+        const uint8_t fields[] = {signal[i].sample, (uint8_t)signal[i].order, signal[i].source};
         running = pvid_fingerprint_bytes(running, fields, sizeof fields);
         running = pvid_fingerprint_float(running, signal[i].scale);
         running = pvid_fingerprint_float(running, signal[i].range);
@@ -73,6 +74,13 @@ uint32_t pvid_fingerprint_refine_f32(uint32_t hash, const pvid_refine_config_f32
     uint32_t running = pvid_fingerprint_float(hash, config->sample_rate_hz);
     running = pvid_fingerprint_bytes(running, small, sizeof small);
     running = pvid_fingerprint_floats(running, config->second, (config->second != NULL) ? (PVID_REFINE_HALF + 1) : 0);
+#if PVID_REFINE_RUNGE_KUTTA
+    const uint8_t parts[] = {config->parts, config->fine_parts};
+    running = pvid_fingerprint_bytes(running, parts, sizeof parts);
+#endif
+#if PVID_REFINE_WIDTHS > 0
+    running = pvid_fingerprint_floats(running, config->width, PVID_REFINE_WIDTHS);
+#endif
     running = signals_of(running, config->signal);
     running = pvid_fnv_word(running, config->block);
     running = pvid_fnv_word(running, config->first_block);

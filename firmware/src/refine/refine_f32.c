@@ -62,11 +62,33 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
 /* In the track a first pass whose step of the logarithms is this much below the limit is the block's last. */
 #define SHORT 0.25f
 
+/* Standard errors that an estimate of the weak form may be off. */
+#define PRIOR_ERRORS 10.0f
+#define LEAST_PRIOR 1.0e-6f
+
+/* A step that lessens the sum of squares by less than this many variances changes no parameter by more than half of the
+ * standard error that the sensors' noise gives it. */
+#define SETTLED 0.25f
+
+/* Least variance of a row over that of the sensors: the errors of reversals in the finest steps are alike from block to
+ * block. */
+#define REVERSALS 4.0f
+
+/* Part of a width's start below which it does not fall: the steps are too long for a sharper reversal. */
+#define SHARPEST 0.25f
+
 /* Jobs of a pass for each of its big steps, at most, and for its beginning; ticks of a solution; entries that such a
  * block keeps free. */
-#define JOBS 9u
+#if PVID_REFINE_RUNGE_KUTTA
+#define JOBS(self) (15u + (10u * (self)->config.parts)) /* with few fine steps; with more the block may be lost */
+#define SOLVE_JOBS(self) (1u + ((self)->config.jobs / 8u))
+#define SOLVE_TICKS(self) (5u + (45u / SOLVE_JOBS(self)))
+#else
+#define JOBS(self) 9u
+#define SOLVE_JOBS(self) 1u
+#define SOLVE_TICKS(self) 45u
+#endif
 #define FIRST_JOBS 16u
-#define SOLVE_TICKS 45u
 #define SPARE 16u
 
 static inline bool is_ready(const pvid_refine_f32 *self)
@@ -100,7 +122,17 @@ static void begin_pass(pvid_refine_f32 *self)
 {
     const bool gated = (self->taken > 0u) && (self->config.gate > 0.0f) && !self->restarted;
     const float gate = gated ? (self->config.gate * self->config.sd[0] * pvid_refine_root_f32(self->level)) : ABSURD;
-    pvid_refine_pass_begin_f32(&self->work, self->linear, self->start, self->h, gate);
+    const pvid_refine_steps_f32 steps = {
+        .h = self->h,
+#if PVID_REFINE_RUNGE_KUTTA
+        .parts = self->config.parts,
+        .fine_parts = self->config.fine_parts,
+#endif
+#if PVID_REFINE_TURNING
+        .turn = self->front.turn,
+#endif
+    };
+    pvid_refine_pass_begin_f32(&self->work, self->linear, self->start, &steps, gate);
     self->phase = PASS;
     self->waiting = false;
 }
@@ -141,7 +173,14 @@ static void start_job(pvid_refine_f32 *self)
         if (code > 0u) {
             const size_t output = (code - 1u) / 2u;
             const float z = at[0].z[output];
+#if PVID_REFINE_TURNING
+            const float turn = self->front.turn[output];
+            const float next = pvid_refine_turned(at[1].z[output] - z, turn);
+            const float last = pvid_refine_turned(at[2].z[output] - z, turn);
+            const float rate = ((4.0f * next) - last) * scale;
+#else
             const float rate = (((4.0f * at[1].z[output]) - at[2].z[output]) - (3.0f * z)) * scale;
+#endif
             const float x = ((code & 1u) != 0u) ? z : rate;
             self->start[i] = pvid_refine_within_f32(x, self->config.state_limit[i]) ? x : 0.0f;
         }
@@ -158,10 +197,33 @@ static bool is_off(const pvid_refine_f32 *self)
 }
 #endif
 
-/* The triangle and r are those of the weak form. */
+/* The triangle is that of the weak form's estimate. Where friction makes the residuals jump with each step of r, its
+ * standard errors limit the prior. */
+static void begin_from_prior(pvid_refine_f32 *self)
+{
+#if PVID_REFINE_SIGNS > 0
+    float sd[N];
+    memcpy(sd, self->config.prior_sd, sizeof sd);
+    for (size_t i = 0; i < PVID_REFINE_P; i++) {
+        const size_t place = pvid_refine_place_of_p[i];
+        const float size = pvid_refine_is_logarithmic_f32(place) ? self->weak[place] : 1.0f;
+        const float told = (PRIOR_ERRORS * self->weak_se[i]) / size;
+        const float prior = (told > LEAST_PRIOR) ? told : LEAST_PRIOR;
+        sd[place] = (prior < sd[place]) ? prior : sd[place];
+    }
+    pvid_refine_prior_f32(sd, self->config.sd[0], self->triangle);
+#else
+    pvid_refine_prior_f32(self->config.prior_sd, self->config.sd[0], self->triangle);
+#endif
+}
+
+/* A search begins with the prior of the weak form; with signs, whose prior is narrow, about its present estimate. */
 static void begin_search(pvid_refine_f32 *self)
 {
-    pvid_refine_prior_f32(self->config.prior_sd, self->config.sd[0], self->triangle);
+#if PVID_REFINE_SIGNS > 0
+    memcpy(self->r, self->weak, sizeof self->r);
+#endif
+    begin_from_prior(self);
     self->taken = 0;
     self->refused = 0;
     self->level = 0.0f;
@@ -172,6 +234,9 @@ PVID_COLD static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *
 {
     float r[N];
     pvid_refine_from_p(weak->p, r);
+#if PVID_REFINE_WIDTHS > 0
+    memcpy(r, self->config.width, sizeof self->config.width);
+#endif
     if (pvid_refine_region(r)) {
         memcpy(self->weak, r, sizeof self->weak);
         memcpy(self->weak_se, weak->se, sizeof self->weak_se);
@@ -181,6 +246,9 @@ PVID_COLD static void take_weak(pvid_refine_f32 *self, const pvid_estimate_f32 *
 
 static void begin_anew(pvid_refine_f32 *self)
 {
+#if PVID_REFINE_SIGNS > 0
+    begin_from_prior(self);
+#endif
     memcpy(self->r, self->weak, sizeof self->r);
     memcpy(self->next, self->weak, sizeof self->next);
     forget_state(self);
@@ -189,13 +257,17 @@ static void begin_anew(pvid_refine_f32 *self)
     self->length = self->config.first_block;
 }
 
-/* How far back a block of the present length may begin: the ring must have it for its passes, the origin is the limit.
- */
-static uint32_t oldest(const pvid_refine_f32 *self)
+/* Ticks of a pass of this length with its solution. */
+static uint32_t ticks_of_pass(const pvid_refine_f32 *self, uint32_t length)
+{
+    return (((JOBS(self) * length) + FIRST_JOBS) / self->config.jobs) + SOLVE_TICKS(self);
+}
+
+/* How far back a block may begin: the ring must have it for so many passes of a length, the origin is the limit. */
+static uint32_t oldest(const pvid_refine_f32 *self, uint32_t passes, uint32_t length)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    const uint32_t jobs = (JOBS * (uint32_t)self->length) + FIRST_JOBS;
-    const uint32_t ticks = config->passes * ((jobs / config->jobs) + SOLVE_TICKS);
+    const uint32_t ticks = passes * ticks_of_pass(self, length);
     const uint32_t taken = (ticks / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + SPARE; /* in the meantime */
     const uint32_t room = pvid_refine_front_room_f32(&self->front);
     const uint32_t end = pvid_refine_front_end_f32(&self->front);
@@ -203,11 +275,30 @@ static uint32_t oldest(const pvid_refine_f32 *self)
     return ((end - self->origin) > back) ? (end - back) : self->origin;
 }
 
+/* Whether the ring still has the beginning of the block for another pass of this length. With Runge-Kutta a pass may
+ * take as long as the block: then at the end of that pass. */
+static bool lasts(const pvid_refine_f32 *self, uint32_t length)
+{
+#if PVID_REFINE_RUNGE_KUTTA
+    const pvid_refine_config_f32 *config = &self->config;
+    const uint32_t taken = ticks_of_pass(self, length) / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u);
+    const int32_t back = (int32_t)((pvid_refine_front_end_f32(&self->front) + taken) - self->begin);
+    return back <= ((int32_t)pvid_refine_front_room_f32(&self->front) - 8);
+#else
+    (void)length;
+    return is_there(self);
+#endif
+}
+
 /* From an estimate of the weak form that the samples of the past have not been tried with. */
 static void begin_anew_in_the_past(pvid_refine_f32 *self)
 {
     begin_anew(self);
-    self->begin = oldest(self);
+#if PVID_REFINE_RUNGE_KUTTA
+    self->begin = oldest(self, self->config.most_passes, self->config.block / 2u); /* the search doubles its length */
+#else
+    self->begin = oldest(self, self->config.passes, self->length);
+#endif
 }
 
 /* ---- the end of a block ---- */
@@ -221,17 +312,22 @@ static bool is_sane(const pvid_refine_f32 *self)
     return sane;
 }
 
-/* Behind a block that was taken and began at `began`: twice as long, and from as far back as possible. */
+/* Behind a block that was taken and began at `began`: twice as long, and from as far back as possible, but where a
+ * coordinate is hidden: its value there is not known. */
 static void lengthen(pvid_refine_f32 *self, uint32_t began)
 {
     const uint32_t twice = 2u * (uint32_t)self->length;
     self->length = (uint16_t)((twice < self->config.block) ? twice : self->config.block);
-    const uint32_t first = oldest(self);
+#if PVID_REFINE_HIDDEN > 0
+    (void)began;
+#else
+    const uint32_t first = oldest(self, self->config.passes, self->length);
     if ((int32_t)(self->begin - first) > 0) {
         self->begin = first;
         self->again = true;
         self->same_start = first == began;
     }
+#endif
 }
 
 static void take(pvid_refine_f32 *self, float square, float clash, bool again, uint32_t began)
@@ -256,6 +352,9 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
     }
+#if PVID_REFINE_WIDTHS > 0
+    pvid_refine_forget_widths_f32(config->prior_sd, config->sd[0] * fade, self->triangle);
+#endif
 }
 
 /* A block that is not taken. In the track it counts with the largest clash of a block that is: what the next search
@@ -295,6 +394,28 @@ static void resize(pvid_refine_f32 *self, bool sane, float square)
     }
 }
 
+#if PVID_REFINE_TURNING
+/* Takes whole turns off the start of the next block, so that float32 keeps its resolution: the motion is the same. */
+static void turn_back(pvid_refine_f32 *self)
+{
+    for (size_t output = 0; output < PVID_REFINE_OUTPUTS; output++) {
+        const uint8_t angle = (uint8_t)(1u + (2u * output));
+        float whole = 0.0f;
+        for (size_t i = PVID_REFINE_STATES; (i > 0u) && (pvid_refine_turning[output] != 0u); i--) {
+            if (pvid_refine_measured[i - 1u] == angle) {
+                const float x = self->expected[i - 1u];
+                whole = x - pvid_refine_turned(x, self->front.turn[output]);
+            }
+        }
+        for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+            if (pvid_refine_measured[i] == angle) {
+                self->expected[i] -= whole;
+            }
+        }
+    }
+}
+#endif
+
 /* The start of the next block. */
 static void follow(pvid_refine_f32 *self)
 {
@@ -304,6 +425,9 @@ static void follow(pvid_refine_f32 *self)
         memcpy(self->expected, self->start, sizeof self->expected);
     } else if (within) {
         pvid_refine_end_state_f32(&self->solve, &self->work, self->linear, self->expected);
+#if PVID_REFINE_TURNING
+        turn_back(self);
+#endif
         for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
             within = within && pvid_refine_within_f32(self->expected[i], self->config.state_limit[i]);
         }
@@ -325,6 +449,17 @@ static float mean_square(const pvid_refine_f32 *self)
     return self->solve.residual / (freedom * (WHITENESS * variance));
 }
 
+/* Whether the last step is small: beside the weak form's errors, or with signs, whose reversals make the motion jump
+ * with each step, beside the errors of what the blocks know. */
+static bool is_settled(const pvid_refine_f32 *self)
+{
+    bool settled = self->solve.size < self->config.step_max;
+#if PVID_REFINE_SIGNS > 0
+    settled = settled || (self->solve.promise < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
+#endif
+    return settled;
+}
+
 /* Takes the block or not. */
 static void end_block(pvid_refine_f32 *self)
 {
@@ -337,8 +472,7 @@ static void end_block(pvid_refine_f32 *self)
     const bool again = self->again;
     const float limit = again ? (MAY_GROW * config->chi_max) : config->chi_max;
     const bool taken = self->sane && (square < (limit * room)) &&
-                       ((self->taken == 0u) || again || (clash < (config->clash_max * room))) &&
-                       (self->solve.size < config->step_max);
+                       ((self->taken == 0u) || again || (clash < (config->clash_max * room))) && is_settled(self);
     const uint32_t began = self->begin;
     self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
     self->again = false;
@@ -369,6 +503,11 @@ static inline void pass_jobs(pvid_refine_f32 *self)
     } else if (progress == PVID_REFINE_PASS_DONE) {
         pvid_refine_solve_begin_f32(&self->solve);
         self->phase = SOLVE;
+#if PVID_REFINE_RUNGE_KUTTA
+    } else if (progress == PVID_REFINE_PASS_LOST) {
+        self->solved = false;
+        self->phase = END;
+#endif
     } else {
         /* at the next tick */
     }
@@ -385,21 +524,28 @@ static void solve_job(pvid_refine_f32 *self)
     }
 }
 
-/* Whether the block has had enough passes: until the steps are small, in the track mostly one pass; or the ring has
- * lost it. */
+/* Whether the block has had enough passes: until the steps are small, in the track mostly one pass; or the ring would
+ * lose it. */
 static bool is_enough(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
     const bool tracks = (self->taken > 0u) && (self->solve.bend < (SHORT * config->step_max));
-    const bool small = (tracks || (self->pass >= config->passes)) && (self->solve.size < config->step_max);
-    return small || (self->pass >= config->most_passes) || !is_there(self);
+    const bool small = (tracks || (self->pass >= config->passes)) && is_settled(self);
+    return small || (self->pass >= config->most_passes) || !lasts(self, self->length);
+}
+
+/* Whether there is time for a block twice as long. */
+static bool may_grow(const pvid_refine_f32 *self, uint32_t twice)
+{
+    return (PVID_REFINE_RUNGE_KUTTA == 0) || lasts(self, twice);
 }
 
 /* Whether a block of a search goes on twice as long. */
 static bool grows(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    return (self->taken == 0u) && (self->pass >= 2u) && ((2u * (uint32_t)self->length) < config->block) &&
+    const uint32_t twice = 2u * (uint32_t)self->length;
+    return (self->taken == 0u) && (self->pass >= 2u) && (twice < config->block) && may_grow(self, twice) &&
            (self->solve.size < ROUGH) && (mean_square(self) < (MAY_GROW * config->chi_max));
 }
 
@@ -415,6 +561,12 @@ static void move(pvid_refine_f32 *self)
 #endif
     float moved[N];
     pvid_refine_move_f32(self->linear, self->solve.step, moved);
+#if PVID_REFINE_WIDTHS > 0
+    for (size_t i = 0; i < PVID_REFINE_WIDTHS; i++) {
+        const float least = SHARPEST * self->config.width[i];
+        moved[i] = (moved[i] > least) ? moved[i] : least;
+    }
+#endif
     memcpy(self->linear, moved, sizeof self->linear);
     for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
         self->start[i] += self->solve.shift[i];
@@ -441,7 +593,10 @@ static void move(pvid_refine_f32 *self)
 static float variance_of_row(const pvid_refine_f32 *self)
 {
     const float level = at_least_one(self->level);
-    const float larger = (self->clash > level) ? self->clash : level;
+    float larger = (self->clash > level) ? self->clash : level;
+#if PVID_REFINE_SIGNS > 0
+    larger = (larger > REVERSALS) ? larger : REVERSALS;
+#endif
     return (self->config.sd[0] * self->config.sd[0]) * larger;
 }
 
@@ -508,7 +663,9 @@ PVID_COLD static pvid_reason seldom(pvid_refine_f32 *self)
         break;
 #endif
     case SOLVE:
-        solve_job(self);
+        for (uint32_t left = SOLVE_JOBS(self); (left > 0u) && (self->phase == (uint8_t)SOLVE); left--) {
+            solve_job(self);
+        }
         break;
     case MOVE:
         move(self);

@@ -1,6 +1,7 @@
 #include "number/uncontracted.h"
 
-/* Means x of `ratio` samples, of an input that is held from tick to tick of its means about the ticks; x - droop (x_-1
+/* Means x of `ratio` samples, of an input that is held from tick to tick of its means about the ticks (with Runge-Kutta
+ * its mean from an entry to the next, without droop), of an integral of its values; x - droop (x_-1
  * - 2 x + x_+1): the mean's droop undone to second order (the weights undo the rest). Second derivatives: w_0 x + sum_i
  * w_i (x_-i + x_+i), i = 1..half.
  *
@@ -15,6 +16,9 @@
 
 #include "number/finite_f32.h"
 #include "number/unroll.h"
+#if PVID_REFINE_TURNING
+#include "refine_model_f32.h"
+#endif
 
 #define INPUTS PVID_REFINE_INPUTS
 #define SIGNALS PVID_REFINE_SIGNALS
@@ -31,14 +35,35 @@ PVID_COLD void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvi
     const float ratio = (float)config->ratio;
     self->share = 1.0f / ratio;
     self->behind = PVID_REFINE_LATE;
+#if PVID_REFINE_RUNGE_KUTTA
+    self->middle = (uint8_t)(config->ratio - ((config->ratio - 1u) / 2u));
+    self->between = (config->ratio & 1u) == 0u;
+    self->flat = config->ratio == 1u;
+#endif
     for (size_t i = 0; i < SIGNALS; i++) {
         const pvid_refine_signal_f32 *signal = &config->signal[i];
         const float steps = 1.0f / (ratio * ratio); /* the droop of a held input's own steps stays */
         self->droop[i] = ((signal->source == (uint8_t)PVID_SIGNAL_HELD) ? (1.0f + steps) : (1.0f - steps)) / 24.0f;
-        self->sample[i] = signal->sample;
-        self->derived[i] = signal->order == 2u;
         self->to_counts[i] = signal->scale * (FULL_SCALE / signal->range);
         self->from_counts[i] = signal->range / FULL_SCALE;
+        self->sample[i] = signal->sample;
+        self->derived[i] = signal->order == 2;
+#if PVID_REFINE_INTEGRALS
+        if (i < (size_t)INPUTS) {
+            self->half_tick[i] = (signal->order == -1) ? (0.5f / config->sample_rate_hz) : 0.0f;
+        }
+#endif
+#if PVID_REFINE_TURNING
+        if (i >= (size_t)INPUTS) {
+            const bool turns = pvid_refine_turning[i - INPUTS] != 0u;
+            self->turn[i - INPUTS] = turns ? (65536.0f * self->from_counts[i]) : 0.0f;
+        }
+#endif
+#if PVID_REFINE_RUNGE_KUTTA
+        if (i < (size_t)INPUTS) {
+            self->held_between[i] = signal->source == (uint8_t)PVID_SIGNAL_HELD;
+        }
+#endif
         self->behind = self->derived[i] ? (uint8_t)(PVID_REFINE_HALF + PVID_REFINE_LATE) : self->behind;
     }
     pvid_refine_front_reset_f32(self, config);
@@ -63,13 +88,64 @@ PVID_COLD void pvid_refine_front_reset_f32(pvid_refine_front_f32 *self, const pv
 
 uint32_t pvid_refine_front_first_f32(const pvid_refine_front_f32 *self)
 {
-    return (uint32_t)self->behind - PVID_REFINE_LATE;
+    const uint32_t complete = (uint32_t)self->behind - PVID_REFINE_LATE;
+#if PVID_REFINE_RUNGE_KUTTA
+    return complete + 1u; /* a step needs the entry before */
+#else
+    return complete;
+#endif
 }
 
 uint32_t pvid_refine_front_room_f32(const pvid_refine_front_f32 *self)
 {
     return (uint32_t)PVID_REFINE_RING - self->behind;
 }
+
+#if PVID_REFINE_RUNGE_KUTTA
+/* Weights of four entries at `t`, 0..1 from the second to the third one: of the cubic through them. */
+static void weights_of_samples(float t, float weight[])
+{
+    const float before = t + 1.0f;
+    const float behind = t - 1.0f;
+    const float last = t - 2.0f;
+    weight[0] = ((t * behind) * last) * (-1.0f / 6.0f);
+    weight[1] = ((before * behind) * last) * 0.5f;
+    weight[2] = ((before * t) * last) * -0.5f;
+    weight[3] = ((before * t) * behind) * (1.0f / 6.0f);
+}
+
+/* The same for means of the steps behind the entries: of the parabola with these means. A step of one tick is flat. */
+static void weights_of_means(const pvid_refine_front_f32 *self, float t, float weight[])
+{
+    const float place = self->flat ? 0.0f : (t - 0.5f);
+    const float bend = self->flat ? 0.0f : (0.5f * ((place * place) - (1.0f / 12.0f)));
+    weight[0] = bend - (0.5f * place);
+    weight[1] = 1.0f - (2.0f * bend);
+    weight[2] = bend + (0.5f * place);
+    weight[3] = 0.0f;
+}
+
+void pvid_refine_front_read_part_f32(const pvid_refine_front_f32 *self, uint32_t entry, float from, float to,
+                                     pvid_refine_signals_f32 *signals)
+{
+    const float time[3] = {from, 0.5f * (from + to), to};
+    float *input[3] = {signals->u, signals->middle, signals->end};
+    for (size_t k = 0; k < 3u; k++) {
+        float weight[2][4];
+        weights_of_samples(time[k], weight[0]);
+        weights_of_means(self, time[k], weight[1]);
+        for (size_t i = 0; i < INPUTS; i++) {
+            const float *own = weight[self->held_between[i] ? 1 : 0];
+            float sum = 0.0f;
+            for (uint32_t j = 0; j < 4u; j++) {
+                sum += own[j] * (float)self->ring[(entry + j - 1u) & MASK][i];
+            }
+            input[k][i] = sum * self->from_counts[i];
+        }
+    }
+    pvid_refine_front_outputs_f32(self, self->ring[(entry + 1u) & MASK], signals->z);
+}
+#endif
 
 /* Sizes of floats by their bits, which order as they do; NaN is the largest. */
 #define SIZE 0x7FFFFFFFu
@@ -91,6 +167,25 @@ static int16_t counts(float *rest, float x)
     *rest = whole - (float)rounded;
     return rounded;
 }
+
+#if PVID_REFINE_TURNING
+#define MOST_COUNTS 2.0e9f
+
+/* The same without whole turns. */
+static int16_t counts_of_turning(float *rest, float x)
+{
+    const float whole = x + *rest;
+    if (!((whole > -MOST_COUNTS) && (whole < MOST_COUNTS))) {
+        *rest = 0.0f;
+        return INT16_MIN;
+    }
+    const float half = (whole < 0.0f) ? -0.5f : 0.5f;
+    const int32_t rounded = (int32_t)(whole + half);
+    const int32_t within = (int32_t)(((uint32_t)rounded + 0x8000u) & 0xFFFFu) - 0x8000;
+    *rest = whole - (float)rounded;
+    return (int16_t)((within == INT16_MIN) ? (INT16_MIN + 1) : within);
+}
+#endif
 
 /* The second derivative in the middle of the oldest means of a line. */
 static float second_derivative(const float line[], const float weights[])
@@ -116,10 +211,18 @@ static void enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *con
                 counts(&self->rest[signal], d * self->to_counts[signal]);
         }
     } else {
-        self->ring[self->next & MASK][signal] = counts(&self->rest[signal], x * self->to_counts[signal]);
+        const float scaled = x * self->to_counts[signal];
+#if PVID_REFINE_TURNING
+        const bool turns = (signal >= (size_t)INPUTS) && (pvid_refine_turning[signal - INPUTS] != 0u);
+        self->ring[self->next & MASK][signal] =
+            turns ? counts_of_turning(&self->rest[signal], scaled) : counts(&self->rest[signal], scaled);
+#else
+        self->ring[self->next & MASK][signal] = counts(&self->rest[signal], scaled);
+#endif
     }
 }
 
+#if !PVID_REFINE_RUNGE_KUTTA
 /* The sum of a held input's means about the ticks: half of each of the two samples that bound the block is another
  * block's. */
 static void about_the_ticks(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, const float sample[])
@@ -132,6 +235,7 @@ static void about_the_ticks(pvid_refine_front_f32 *self, const pvid_refine_confi
         }
     }
 }
+#endif
 
 static float size_of(float x)
 {
@@ -211,7 +315,11 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
                                                   const float sample[])
 {
     const bool known = self->means >= 2u;
+#if PVID_REFINE_RUNGE_KUTTA
+    (void)sample;
+#else
     about_the_ticks(self, config, sample);
+#endif
     for (size_t i = 0; i < INPUTS; i++) {
         if (!pvid_finite_f32(self->sum[i])) {
             return PVID_REFINE_BROKEN;
@@ -230,8 +338,20 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
             third += off;
             fourth += 4.0f * off;
         }
+        float entry = middle - (self->droop[i] * second);
+#if PVID_REFINE_RUNGE_KUTTA
+        if ((i < (size_t)INPUTS) && self->held_between[i]) {
+            entry = (self->held[i] + self->ahead[i]) * self->share;
+            self->held[i] = self->sum[i] - self->ahead[i];
+        }
+#endif
         if (known) {
-            enter(self, config, i, middle - (self->droop[i] * second));
+            enter(self, config, i, entry);
+#if PVID_REFINE_RUNGE_KUTTA
+            if ((i < (size_t)INPUTS) && !self->derived[i] && (self->ring[self->next & MASK][i] == INT16_MIN)) {
+                return PVID_REFINE_BROKEN; /* beyond its range */
+            }
+#endif
         }
         past[0] = x;
         past[1] = first;
@@ -259,6 +379,9 @@ PVID_COLD void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pv
 {
     for (size_t i = 0; i < INPUTS; i++) {
         const float x = sample[config->signal[i].sample];
+#if PVID_REFINE_INTEGRALS
+        self->before[i] = -x; /* the first trapezoid is empty */
+#endif
         self->reference[i] = self->derived[i] ? x : 0.0f;
         self->held[i] = x - self->reference[i];
     }

@@ -79,7 +79,7 @@ PVID_COLD pvid_reason pvid_refine_verdict_f32(const pvid_refine_estimate_f32 *es
     for (size_t i = 0; i < N; i++) {
         const bool logarithmic = pvid_refine_is_logarithmic_f32(i);
         certain = certain && pvid_finite_f32(estimate->r[i]) && pvid_finite_f32(estimate->se[i]) &&
-                  (!logarithmic || (estimate->se[i] <= (config->se_max * estimate->r[i])));
+                  (!logarithmic || pvid_refine_is_width(i) || (estimate->se[i] <= (config->se_max * estimate->r[i])));
     }
     if (!certain) {
         return PVID_HELD_UNCERTAIN;

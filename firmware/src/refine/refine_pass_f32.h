@@ -7,11 +7,18 @@
 
 #include "refine/refine_front_f32.h"
 
-/* Begins at a state with parameters r and steps of h seconds. */
-void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[], float h, float gate);
+/* Begins at a state with parameters r. */
+void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const float r[], const float start[],
+                                const pvid_refine_steps_f32 *steps, float gate);
 
-/* What a pass needs: another tick, an entry of the ring that is not there yet, or nothing more. */
-typedef enum { PVID_REFINE_PASS_ON, PVID_REFINE_PASS_WAITS, PVID_REFINE_PASS_DONE } pvid_refine_progress;
+/* What a pass needs: another tick, an entry of the ring that is not there yet, or nothing more; or an entry that has
+ * been overwritten. */
+typedef enum {
+    PVID_REFINE_PASS_ON,
+    PVID_REFINE_PASS_WAITS,
+    PVID_REFINE_PASS_DONE,
+    PVID_REFINE_PASS_LOST
+} pvid_refine_progress;
 
 /* A block in the ring: its first entry, its big steps; weight: factor on the rows of each output. */
 typedef struct {

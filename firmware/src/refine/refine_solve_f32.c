@@ -69,6 +69,17 @@ PVID_COLD void pvid_refine_prior_f32(const float prior_sd[], float sd, float tri
     }
 }
 
+#if PVID_REFINE_WIDTHS > 0
+PVID_COLD void pvid_refine_forget_widths_f32(const float prior_sd[], float sd, float triangle[])
+{
+    for (size_t i = 0; i < PVID_REFINE_WIDTHS; i++) {
+        float *row = &triangle[at(N, i, i)];
+        memset(row, 0, (N - i) * sizeof row[0]);
+        row[0] = sd / prior_sd[i];
+    }
+}
+#endif
+
 void pvid_refine_solve_begin_f32(pvid_refine_solve_f32 *self)
 {
     self->job = 0;
@@ -229,8 +240,12 @@ static bool join(pvid_refine_solve_f32 *self, float sum[])
 static bool solve(pvid_refine_solve_f32 *self, const float prior_sd[], float step_limit)
 {
     float *step = self->step;
+    float longest = 0.0f; /* widths of signs included */
     float largest = 0.0f;
     float bend = 0.0f;
+#if PVID_REFINE_SIGNS > 0
+    self->promise = 0.0f;
+#endif
     for (size_t i = N; i > 0u; i--) {
         const size_t k = i - 1u;
         const float *entry = &self->triangle[at(N, k, k)];
@@ -242,17 +257,23 @@ static bool solve(pvid_refine_solve_f32 *self, const float prior_sd[], float ste
             return false;
         }
         step[k] = sum / entry[0];
+#if PVID_REFINE_SIGNS > 0
+        self->promise += self->right[k] * self->right[k];
+#endif
         const float size = ((step[k] < 0.0f) ? -step[k] : step[k]) / prior_sd[k];
-        largest = (size <= largest) ? largest : size;
-        bend = ((size <= bend) || !pvid_refine_is_logarithmic_f32(k)) ? bend : size;
+        longest = (size <= longest) ? longest : size;
+        if (!pvid_refine_is_width(k)) {
+            largest = (size <= largest) ? largest : size;
+            bend = ((size <= bend) || !pvid_refine_is_logarithmic_f32(k)) ? bend : size;
+        }
     }
     self->size = largest;
     self->bend = bend;
-    if (!(largest < 1.0e6f)) {
+    if (!(longest < 1.0e6f)) {
         return false;
     }
-    if (largest > step_limit) {
-        const float scale = step_limit / largest;
+    if (longest > step_limit) {
+        const float scale = step_limit / longest;
         for (size_t i = 0; i < N; i++) {
             step[i] *= scale;
         }

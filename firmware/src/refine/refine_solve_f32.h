@@ -13,6 +13,17 @@ typedef enum { PVID_REFINE_SOLVING, PVID_REFINE_SOLVED, PVID_REFINE_UNSOLVED } p
 /* Whether steps of this entry of r are steps of its logarithm. */
 bool pvid_refine_is_logarithmic_f32(size_t parameter);
 
+/* Whether a parameter is the width of a sign: each block has its own, no estimate waits until it is certain. */
+static inline bool pvid_refine_is_width(size_t parameter)
+{
+#if PVID_REFINE_WIDTHS > 0
+    return parameter < (size_t)PVID_REFINE_WIDTHS;
+#else
+    (void)parameter;
+    return false;
+#endif
+}
+
 /* The step from one value of an entry of r to another. */
 float pvid_refine_difference_f32(size_t parameter, float to, float from);
 
@@ -21,6 +32,12 @@ void pvid_refine_move_f32(const float r[], const float step[], float moved[]);
 
 /* Standard deviations of the steps: a diagonal triangle in residuals of `sd`. */
 void pvid_refine_prior_f32(const float prior_sd[], float sd, float triangle[]);
+
+#if PVID_REFINE_WIDTHS > 0
+/* Removes the information on the widths. They come first in r, so that without their rows the triangle is that of the
+ * other entries for any widths. The prior takes their place. */
+void pvid_refine_forget_widths_f32(const float prior_sd[], float sd, float triangle[]);
+#endif
 
 void pvid_refine_solve_begin_f32(pvid_refine_solve_f32 *self);
 

@@ -23,8 +23,11 @@ static pvid_status signals_are_valid(const pvid_refine_config_f32 *config, size_
     }
     for (size_t i = 0; i < PVID_REFINE_SIGNALS; i++) {
         const pvid_refine_signal_f32 *signal = &config->signal[i];
-        const bool derived = (signal->order == 2u) && (i < (size_t)PVID_REFINE_INPUTS) && (config->second != NULL);
-        if (((signal->order != 0u) && !derived) || (signal->sample >= samples) ||
+        const bool derived = (signal->order == 2) && (i < (size_t)PVID_REFINE_INPUTS) && (config->second != NULL);
+        const bool integrated = (signal->order == -1) && (i < (size_t)PVID_REFINE_INPUTS) &&
+                                (signal->source == (uint8_t)PVID_SIGNAL_SAMPLED);
+        if (((signal->order != 0) && !derived && !(integrated && (PVID_REFINE_INTEGRALS != 0))) ||
+            (signal->sample >= samples) ||
             (signal->source >
              (((i < (size_t)PVID_REFINE_INPUTS)) ? (uint8_t)PVID_SIGNAL_HELD : (uint8_t)PVID_SIGNAL_SAMPLED)) ||
             !pvid_within_f32(signal->scale, -1.0e9f, 1.0e9f)) {
@@ -46,7 +49,7 @@ static pvid_status blocks_are_valid(const pvid_refine_config_f32 *config)
         return PVID_BAD_WINDOW;
     }
     const bool passes = (config->passes >= 1u) && (config->passes <= config->most_passes) &&
-                        (config->most_passes <= 16u) && (config->jobs >= 1u) && (config->jobs <= 16u);
+                        (config->most_passes <= 16u) && (config->jobs >= 1u) && (config->jobs <= 128u);
     return passes ? PVID_OK : PVID_BAD_ITERATIONS;
 }
 
@@ -59,6 +62,16 @@ static pvid_status sizes_are_valid(const pvid_refine_config_f32 *config)
         !all_within(config->gain_sd, PVID_REFINE_PARAMETERS, -1.0e9f, 1.0e9f)) {
         return PVID_BAD_START_SD;
     }
+#if PVID_REFINE_RUNGE_KUTTA
+    if ((config->parts < 1u) || (config->fine_parts < config->parts) || (config->fine_parts > 64u)) {
+        return PVID_BAD_DECIMATION;
+    }
+#endif
+#if PVID_REFINE_WIDTHS > 0
+    if (!all_within(config->width, PVID_REFINE_WIDTHS, 1.0e-9f, 1.0e9f)) {
+        return PVID_BAD_BOUNDS;
+    }
+#endif
     if (!all_within(config->state_limit, PVID_REFINE_STATES, 1.0e-9f, 1.0e9f)) {
         return PVID_BAD_BOUNDS;
     }

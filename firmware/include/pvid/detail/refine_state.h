@@ -25,19 +25,34 @@
 /* The front end: means of blocks of samples, their droop undone, second derivatives; then the ring, in units of range /
  * 32767. The derivatives are behind by `half` entries. */
 typedef struct {
-    uint8_t wait;                                        /* samples that the block needs yet */
-    uint8_t means;                                       /* since the restart, up to 2 */
-    bool referred;                                       /* there is a first sample */
-    bool postponed;                                      /* the end of the present period of `peak` */
-    uint8_t sample[PVID_REFINE_SIGNALS];                 /* places in the argument of step */
-    bool derived[PVID_REFINE_SIGNALS];                   /* of order 2 */
-    uint8_t behind;                                      /* entries by which the slowest signal is behind */
-    uint16_t place;                                      /* of the newest entry of `line` */
-    uint32_t next;                                       /* entry of the ring that is written next */
-    float share;                                         /* 1 / ratio */
-    float droop[PVID_REFINE_SIGNALS];                    /* (1 - 1 / ratio^2) / 24; held (1 + 1 / ratio^2) / 24 */
-    float to_counts[PVID_REFINE_SIGNALS];                /* 32767 / range, with the scale of the signal */
-    float from_counts[PVID_REFINE_SIGNALS];              /* range / 32767 */
+    uint8_t wait;                        /* samples that the block needs yet */
+    uint8_t means;                       /* since the restart, up to 2 */
+    bool referred;                       /* there is a first sample */
+    bool postponed;                      /* the end of the present period of `peak` */
+    uint8_t sample[PVID_REFINE_SIGNALS]; /* places in the argument of step */
+    bool derived[PVID_REFINE_SIGNALS];   /* of order 2 */
+#if PVID_REFINE_RUNGE_KUTTA
+    bool held_between[PVID_REFINE_INPUTS]; /* held from tick to tick: an entry is the mean from it to the next one */
+    bool flat;                             /* a step is one tick */
+    bool between;                          /* the middle of a block is between two ticks */
+    uint8_t middle;                        /* `wait` before the sample in the middle of a block, or before it */
+    float ahead[PVID_REFINE_INPUTS];       /* of held ones: the part of the sum before that middle */
+#endif
+    uint8_t behind;                         /* entries by which the slowest signal is behind */
+    uint16_t place;                         /* of the newest entry of `line` */
+    uint32_t next;                          /* entry of the ring that is written next */
+    float share;                            /* 1 / ratio */
+    float droop[PVID_REFINE_SIGNALS];       /* (1 - 1 / ratio^2) / 24; held (1 + 1 / ratio^2) / 24 */
+    float to_counts[PVID_REFINE_SIGNALS];   /* 32767 / range, with the scale of the signal */
+    float from_counts[PVID_REFINE_SIGNALS]; /* range / 32767 */
+#if PVID_REFINE_INTEGRALS
+    float half_tick[PVID_REFINE_INPUTS]; /* [s]; 0: no integral is taken */
+    float before[PVID_REFINE_INPUTS];    /* the last sample */
+    float integral[PVID_REFINE_INPUTS];
+#endif
+#if PVID_REFINE_TURNING
+    float turn[PVID_REFINE_OUTPUTS]; /* 65536 counts of a turning output, else 0 */
+#endif
     float sum[PVID_REFINE_SIGNALS];                      /* of the block */
     float rest[PVID_REFINE_SIGNALS];                     /* what rounding left of the last entry [counts] */
     float reference[PVID_REFINE_INPUTS];                 /* the first sample since the restart */
@@ -59,7 +74,10 @@ typedef union {
 /* One pass over one block: the motion from a start, the derivatives of the motion, and the sums of the rows. */
 typedef struct {
     float h;    /* a step [s] */
-    float gate; /* largest |residual| that is used; 0: no gate */
+    float gate; /* largest |residual| that is used */
+#if PVID_REFINE_TURNING
+    float turn[PVID_REFINE_OUTPUTS]; /* as of the front */
+#endif
 #if PVID_REFINE_SKEW
     float skew[3];                   /* of the outputs on the inputs: s, s^2/2, s^3/(6 h) */
     float slip[PVID_REFINE_OUTPUTS]; /* dz/ds at the middle of the big step */
@@ -71,8 +89,20 @@ typedef struct {
     float kick[PVID_REFINE_COORDINATES *
                (PVID_REFINE_STATES + PVID_REFINE_MOVING)]; /* K, D, B at the middle of the big step; then the change of
                                                               the columns by it */
-    float scratch[2][PVID_REFINE_STATES];                  /* between the jobs of a first step */
-    float slope[PVID_REFINE_COORDINATES];                  /* likewise */
+#if PVID_REFINE_RUNGE_KUTTA
+    float factor[PVID_REFINE_COORDINATES][PVID_REFINE_COORDINATES]; /* between the jobs of a kick */
+    float part_s;                                                   /* h over the parts of the present step */
+#if PVID_REFINE_SIGNS > 0
+    float argument[PVID_REFINE_SIGNS]; /* of the signs, at the beginning of the step */
+#endif
+    uint16_t doubled;   /* by how much the factor's time is yet to grow */
+    uint8_t some_parts; /* of a step */
+    uint8_t fine_parts; /* of one in which a sign may change */
+    uint8_t parts;      /* of the present one */
+    uint8_t part;       /* of the step, that is next */
+#endif
+    float scratch[2][PVID_REFINE_STATES]; /* between the jobs of a step of Runge-Kutta */
+    float slope[PVID_REFINE_COORDINATES]; /* likewise */
 #if !PVID_REFINE_OUTPUT_LINEAR
     float output_column[PVID_REFINE_OUTPUTS *
                         (PVID_REFINE_STATES + PVID_REFINE_STILL)]; /* dz/dq, dz/dv, dz/dr at that middle */
@@ -98,8 +128,11 @@ typedef struct {
     float shift[PVID_REFINE_STATES];    /* of the block's start */
     float size;                         /* of the step before it is shortened [prior_sd] */
     float bend;                         /* likewise of its logarithms, on which the motion depends least linearly */
-    float residual;                     /* sum of squares of the block after its own fit */
-    float clash;                        /* what the block and the past cannot both have, squared */
+#if PVID_REFINE_SIGNS > 0
+    float promise; /* by how much the step lessens the sum of squares */
+#endif
+    float residual; /* sum of squares of the block after its own fit */
+    float clash;    /* what the block and the past cannot both have, squared */
     uint8_t job;
     uint8_t row;      /* of the block, that joins the triangle */
     uint8_t rotation; /* its next one */

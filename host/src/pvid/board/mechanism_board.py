@@ -192,7 +192,7 @@ class MechanismBoard:
     def names(self) -> BoardNames:
         """What the board says about itself."""
         units = {one.name: one.unit for one in self.compiled.signals}
-        refined = () if self.refine is None else self.equations.parameters
+        refined = [] if self.refine is None else [one for one in self.equations.parameters if not one.sign]
         return BoardNames(
             self.config.design.model.name,
             tuple((name, units[name]) for name in self.config.design.model.sample_names),

@@ -27,7 +27,7 @@ from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.fixed_model import fixed_model
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.reaches import Reaches, reaches_of
-from pvid.codegen.refine import RefineFunctions, default_widths, has_skew, refine_functions_of, without_optional
+from pvid.codegen.refine import RefineFunctions, has_skew, refine_functions_of, without_optional
 from pvid.codegen.strong import renamed, strong_functions_of
 from pvid.codegen.strong_twin import StrongModelConfig
 from pvid.codegen.weak import weak_functions_of
@@ -202,10 +202,9 @@ def _weak_files(compiled: CompiledModel, command: str, options: Options) -> dict
 
 
 def refine_functions(compiled: CompiledModel, options: Options | None = None) -> RefineFunctions:
-    """Of the refinement in float32, with the chosen widths of signs and those of the description."""
+    """Of the refinement in float32; widths of signs that are not chosen are refined."""
     model = without_optional(compiled)
-    widths = {**default_widths(model), **(options or Options()).soft_signs}
-    return refine_functions_of(model, widths, has_skew(model))
+    return refine_functions_of(model, (options or Options()).soft_signs, has_skew(model))
 
 
 def refine_refusal(compiled: CompiledModel) -> str | None:

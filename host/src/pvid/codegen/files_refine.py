@@ -16,8 +16,9 @@ from pvid.codegen.banner import c_comment
 from pvid.codegen.c_f32 import definition
 from pvid.codegen.literals import c_literal
 from pvid.codegen.operations import Literal, Program
-from pvid.codegen.refine import RefineFunction, RefineFunctions
+from pvid.codegen.refine import RefineFunction, RefineFunctions, signs_of
 from pvid.codegen.statements import Language, call_of, statements
+from pvid.model.signals import Integral
 
 WRITTEN = {  # by the core's functions, whatever the model has of it
     "constants": ("m",),
@@ -25,6 +26,7 @@ WRITTEN = {  # by the core's functions, whatever the model has of it
     "jacobian": ("a", "K", "D", "B"),
     "output": ("z",),
     "output_jacobian": ("Zq", "Zv", "Zr"),
+    "signs": ("g",),
     "chart": ("row",),
 }
 INLINE = "PVID_ALWAYS_INLINE void"
@@ -37,6 +39,7 @@ _MEANING = {
     "jacobian": "a, da/dq, da/dv by rows; B[parameter][row] = da/d(steps of the motion's parameters).",
     "output": "z: what the sensors measure.",
     "output_jacobian": "dz/dq, dz/dv (only with PVID_REFINE_OUTPUT_RATES), dz/d(steps of r behind the moving ones).",
+    "signs": "g: arguments of the signs.",
     "region": "Whether a mechanism with these parameters is possible.",
     "chart": "Derivatives by the steps of the motion's parameters to those by the steps of r.",
 }
@@ -104,12 +107,18 @@ def shape(made: RefineFunctions, command: str) -> str:
     rates = any(is_nonzero(made, "Zv"))
     counts = [
         ("ORDER", made.order, "q'' = a(q, v, u, r)" if made.order == 2 else "q' = a(q, u, r)"),
+        ("RUNGE_KUTTA", int(made.runge_kutta), "1: each step is Runge-Kutta's (ORDER 1), 0: Adams's"),
         ("COORDINATES", len(made.coordinates), "entries of q, hidden ones included"),
+        ("HIDDEN", made.hidden, "coordinates that no sensor measures; counted with RUNGE_KUTTA"),
         ("INPUTS", len(made.inputs), "entries of u"),
+        ("INTEGRALS", int(has_integrals(made)), "1: an input is the integral of a sample"),
         ("OUTPUTS", len(made.outputs), "entries of z, which are measured"),
         ("OUTPUT_RATES", int(rates), "1: an output depends on v"),
         ("OUTPUT_LINEAR", int(_is_linear(made)), "1: the derivatives of the outputs are constants"),
+        ("TURNING", int(any(made.turning)), "1: an output is kept modulo an interval"),
         ("MOVING", made.moving - made.skew, "first entries of r: they change the motion"),
+        ("SIGNS", len(signs_of(made.model)), "of friction in the equations"),
+        ("WIDTHS", len(widths(made)), "first entries of r that are widths of signs"),
         ("SKEW", int(made.skew), "1: the entry behind them is the skew of the sensors"),
         ("PARAMETERS", len(made.parameters), "entries of r"),
         ("CONSTANTS", len(made.constants), "that the equations need of r"),
@@ -118,11 +127,26 @@ def shape(made: RefineFunctions, command: str) -> str:
     ]
     wide = max(len(f"{name} {value}") for name, value, _ in counts)
     body = [f"#define PVID_REFINE_{f'{name} {value}'.ljust(wide)} /* {what} */" for name, value, what in counts]
+    body += ["", *_ring(ring_of(made))]
     return _guarded("PVID_REFINE_SHAPE_H", about, body)
 
 
+def ring_of(made: RefineFunctions) -> int:
+    """PVID_REFINE_RING: where a step may be a tick the ring is longer."""
+    return 2048 if made.runge_kutta else 512
+
+
+def _ring(entries: int) -> list[str]:
+    return [
+        "/* Entries of the ring of signals, a power of two: at least 1.5 blocks. RAM: 2 bytes for each signal. */",
+        "#ifndef PVID_REFINE_RING",
+        f"#define PVID_REFINE_RING {entries}",
+        "#endif",
+    ]
+
+
 def header(made: RefineFunctions, command: str) -> str:
-    """refine_model_f32.h: the functions."""
+    """refine_model_f32: the functions."""
     check_outputs(made)
     kinds = {kind for one in made.functions.values() for kind in one.program.kinds}
     about = [
@@ -149,10 +173,20 @@ def header(made: RefineFunctions, command: str) -> str:
         f"#define PVID_REFINE_HAS_CHART {int('chart' in made.functions)}",
         "",
         *_measured(made),
+        *(_turning(made) if any(made.turning) else []),
     ]
     for one in made.functions.values():
         body += [f"/* {_MEANING[one.name]} {one.program.cost.capitalize()}. */", function(one, FLOAT, made), ""]
     return _guarded("PVID_REFINE_MODEL_F32_H", about, [*body, *_places(made)])
+
+
+def _turning(made: RefineFunctions) -> list[str]:
+    values = ", ".join(str(int(one)) for one in made.turning)
+    return [
+        "/* 1: the motion is the same when this output is shifted, with the entries of the state that are near it. */",
+        f"static const uint8_t pvid_refine_turning[PVID_REFINE_OUTPUTS] = {{{values}}};",
+        "",
+    ]
 
 
 def _measured(made: RefineFunctions) -> list[str]:
@@ -186,6 +220,17 @@ def check_outputs(made: RefineFunctions) -> None:
                 )
 
 
+def widths(made: RefineFunctions) -> list[str]:
+    """Arguments of the signs whose widths are refined, in the order of r."""
+    return [one.sign for one in made.parameters if one.sign]
+
+
+def has_integrals(made: RefineFunctions) -> bool:
+    """Whether an input is the integral of a sample."""
+    opaque = made.model.opaque
+    return any(jet in opaque and opaque[jet].has(Integral) for jet in made.inputs)
+
+
 def _is_linear(made: RefineFunctions) -> bool:
     """Whether the derivatives of the outputs are constants."""
     program = made.functions["output_jacobian"].program
@@ -208,6 +253,8 @@ def _from(made: RefineFunctions, entry: int) -> str:
     one = made.parameters[entry]
     if one.place >= 0:
         return f"p[{one.place}] of the weak form"
+    if one.sign:
+        return f"width of the sign of {one.sign}"
     skewed = made.skew and entry == made.moving - 1
     return "by which the sensors are late on the inputs" if skewed else "starts at 0"
 
@@ -228,7 +275,7 @@ def _places(made: RefineFunctions) -> list[str]:
     to_r = [f"r[{k}] = {f'p[{one.place}]' if one.place >= 0 else '0.0f'};" for k, one in enumerate(made.parameters)]
     by_p = {one.place: k for k, one in enumerate(made.parameters) if one.place >= 0}
     return [
-        "/* r of an estimate of the weak form; entries that it does not have are 0. */",
+        "/* r of an estimate of the weak form; entries that it does not have are 0, widths as well. */",
         definition("static inline void pvid_refine_from_p(const float p[], float r[])", to_r),
         "",
         "/* Entries of p by that of r, for the comparison of the two estimates. */",

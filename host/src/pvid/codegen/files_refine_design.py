@@ -49,7 +49,7 @@ def header(made: RefineFunctions, settings: RefineConfig, command: str) -> str:
 def tables(settings: RefineConfig, name: str) -> list[str]:
     """The configuration in C: static const `name`, behind its tables."""
     signals = [
-        f"    {{{one.sample}u, {one.order}u, {int(one.source)}u, {number(one.scale)}, {number(one.range)}}},"
+        f"    {{{one.sample}u, {one.order}, {int(one.source)}u, {number(one.scale)}, {number(one.range)}}},"
         for one in settings.signal
     ]
     second = [] if settings.second is None else [f"static const float {name}_second[] = {_row(settings.second)};"]
@@ -68,6 +68,9 @@ def tables(settings: RefineConfig, name: str) -> list[str]:
             )
         },
     }
+    for name_of, value in (("parts", settings.parts), ("fine_parts", settings.fine_parts)):
+        fields |= {} if value is None else {name_of: value}
+    fields |= {} if settings.width is None else {"width": _row(settings.width)}
     return [
         *second,
         f"static const pvid_refine_signal_f32 {name}_signal[] = {{",

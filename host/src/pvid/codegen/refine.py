@@ -6,10 +6,13 @@
     m, q, v, u -> z, Zq, Zv, Zr    what the sensors measure, and its derivatives
     r -> region                    whether the mechanism is possible
     r, row -> row                  derivatives by the motion's steps to those by the steps of r: the chart
-    m, q, v, u -> g                arguments of the signs, where widths are settings
+    m, q, v, u -> g                arguments of the signs
 
 A refinement with a skew has one more moving entry behind the others: the time by which the sensors are late on the
 inputs. Its column is U times the derivative of u; the kernel makes it, and its entries of B are not written.
+
+The width of a sign, v / (v^4 + width^4)^(1/4) in the place of sgn(v), is refined too where it is not given. Motions
+with signs, or with relaxations beside oscillations, have order 1: their steps are Runge-Kutta's.
 
 A step of a positive parameter is one of its logarithm. The motion's parameters are those of r, but for shapes:
 functions of unknowns that the equations contain in their place. Derivatives come from the equations, not from the
@@ -35,6 +38,7 @@ _ARRAYS = frozenset("m q v u r a z K D B U row Zq Zv Zr".split())
 SKEW = "tau"
 SKEW_SD = 5e-3  # [s]
 LOG_SD = 0.15  # of the logarithm of a positive parameter: how far off the start may be
+WIDTH_SD = 0.9  # of the logarithm of a sign's width
 
 
 @dataclass(frozen=True)
@@ -45,8 +49,9 @@ class RefinedParameter:
     ----------
     name, unit : as in files
     log : its step is one of the logarithm
-    place : in p of the weak form; -1: it starts at 0
+    place : in p of the weak form; -1: it starts at 0, or is a width
     prior_sd : how far off the start may be, in its step
+    sign : argument of the sign whose width it is; empty: it is none
     """
 
     name: str
@@ -54,6 +59,7 @@ class RefinedParameter:
     log: bool
     place: int
     prior_sd: float
+    sign: str = ""
 
 
 @dataclass(frozen=True)
@@ -91,6 +97,9 @@ class RefineFunctions:
     constants : what each m is, as text
     settings : further entries of r's array where constants are arguments: widths of signs, knowns
     skew : the last moving entry is that of the sensors
+    runge_kutta : each step is Runge-Kutta's; else Adams's
+    hidden : coordinates, of order 1 or 2, that no sensor measures, where steps are Runge-Kutta's
+    turning : of each output, whether the motion is the same when it is shifted, with hidden coordinates
     measured : of q, and of v of order 2: 1 + 2 output where it is that output, 2 + 2 output: its rate, 0: neither
     functions : by name
     """
@@ -107,6 +116,9 @@ class RefineFunctions:
     constants: tuple[str, ...]
     settings: tuple[str, ...]
     skew: bool
+    runge_kutta: bool
+    hidden: int
+    turning: tuple[bool, ...]
     measured: tuple[int, ...]
     functions: Mapping[str, RefineFunction] = field(repr=False)
 
@@ -120,12 +132,6 @@ def signs_of(model: CompiledModel) -> tuple[sp.Expr, ...]:
     """Arguments of the signs in the equations of the refinement."""
     found = {one for equation in _equations(model) for one in equation.atoms(sgn)}
     return tuple(one.args[0] for one in sorted(found, key=str))
-
-
-def default_widths(model: CompiledModel) -> dict[str, float]:
-    """A hundredth of the largest rate, as far as the description tells, for each sign."""
-    reach = {one.name: one.reach for one in model.signals}
-    return {str(one): max(reach.get(jet.of, 1.0) for jet in jets(one)) / 100 for one in signs_of(model)}
 
 
 def has_skew(model: CompiledModel) -> bool:
@@ -147,15 +153,15 @@ def refine_functions_of(
     model
         As compiled.
     widths
-        Argument of a sgn, as in phi_1 -> width of v / sqrt(v^2 + width^2) in its place. None: widths and known
-        constants are settings, arguments behind r.
+        Argument of a sgn, as in phi_1 -> width of v / (v^4 + width^4)^(1/4) in its place; those of the others are
+        refined. None: widths and known constants are settings, arguments behind r.
     skew
         r has one.
 
     Raises
     ------
     PvidError
-        Where the equations do not determine a motion, or a sign has no width.
+        Where the equations do not determine a motion.
     """
     return _Refine(model, widths, skew).functions()
 
@@ -186,23 +192,23 @@ class _Refine:
         own = model.refinement
         self._definitions: dict[sp.Symbol, sp.Expr] = {}
         self._inner: list[tuple[sp.Symbol, sp.Expr, sp.Expr]] = []  # symbol, argument, derivative by the argument
+        self._by_width: dict[sp.Symbol, list[tuple[sp.Symbol, sp.Expr]]] = {}  # symbol, derivative by the width
         equations = _equations(model)
         self.settings: tuple[sp.Symbol, ...] = ()
+        self.widths: dict[sp.Symbol, sp.Expr] = {}  # that are refined: argument of the sign
         signs = {one: width_name(one) for one in signs_of(model)}
         width_symbols = {one: sp.Symbol(name, positive=True) for one, name in signs.items()}
         if widths is None:
             self.settings = (*width_symbols.values(), *(one.symbol for one in model.knowns))
         else:
-            missing = [str(one) for one in signs if not widths.get(str(one), 0.0) > 0]
-            if missing:
-                raise PvidError(
-                    f"{model.name}: the refinement needs the width of the soft sign of {missing[0]} "
-                    f"(--soft-sign {missing[0]}=WIDTH)"
-                )
-            literal = {mark: sp.Rational(repr(float(widths[str(one)]))) for one, mark in width_symbols.items()}
-            self._definitions |= literal
+            for argument, mark in width_symbols.items():
+                if str(argument) in widths:
+                    self._definitions[mark] = sp.Rational(repr(float(widths[str(argument)])))
+                else:
+                    self.widths[mark] = argument
         inputs_of = {one.name for one in model.signals if one.driven or one.kind == "input"}
         inputs_of |= {jet.of for jet in model.opaque}
+        self._equations = equations
         whole = [*equations, *own.outputs.values()]
         found = {jet for one in whole for jet in jets(one)}
         order = [one.name for one in model.signals] + [jet.of for jet in model.opaque]
@@ -217,7 +223,8 @@ class _Refine:
             )
         top = {name: max(jet.order for jet in found if jet.of == name) for name in free}
         self.highest = [Jet(name, top[name]) for name in free]
-        self.order = 2 if all(n == 2 for n in top.values()) else 1
+        self.runge_kutta = widths is not None and (bool(signs) or len(set(top.values())) > 1)
+        self.order = 2 if all(n == 2 for n in top.values()) and not self.runge_kutta else 1
         if self.order == 2:
             self.q = [Jet(name) for name in free]
             self.v = [Jet(name, 1) for name in free]
@@ -277,11 +284,11 @@ class _Refine:
                 f"{', '.join(map(str, hidden))}, which are not in its equations otherwise: there must be as many"
             )
         places = iter(shapes)
-        moving = [one for one in every if one in direct or one in hidden]
+        moving = [*self.widths, *(one for one in every if one in direct or one in hidden)]
         self.motion = [next(places) if one in hidden else one for one in moving]
         self.r = moving + [one for one in every if one not in moving]
         for one in self.r:
-            if one not in used and one not in behind:
+            if one not in used and one not in behind and one not in self.widths:
                 raise PvidError(f"{model.name}: {one} is in no equation of the refinement and in no output")
         self.moving = len(moving)
         by_symbol = {one.symbol: one for one in model.unknowns}
@@ -294,6 +301,11 @@ class _Refine:
                 sd = LOG_SD if unknown.positive else unknown.sd
                 place = model.unknowns.index(unknown)
                 self.parameters.append(RefinedParameter(name, unknown.unit, unknown.positive, place, sd))
+            elif one in self.widths:
+                argument = self.widths[one]
+                self.parameters.append(
+                    RefinedParameter(name, _unit_of(model, argument), True, -1, WIDTH_SD, str(argument))
+                )
             else:
                 self.parameters.append(RefinedParameter(name, extras[one].unit, False, -1, extras[one].sd))
         self.log = {one: entry.log for one, entry in zip(self.r, self.parameters, strict=True)}
@@ -308,13 +320,19 @@ class _Refine:
         signs = {}
         for one in sorted(whole.atoms(sgn), key=str):
             argument = one.args[0]
-            soft, slope, root = (sp.Symbol(f"{word}[{argument}]") for word in ("sign", "slope", "root"))
+            words = ("sign", "slope", "part", "square", "length", "root")
+            soft, slope, part, square, length, root = (sp.Symbol(f"{word}[{argument}]") for word in words)
             width = widths[argument]
             if soft not in self._definitions:
-                self._definitions[root] = 1 / sp.sqrt(argument**2 + width**2)
-                self._definitions[soft] = argument * root
-                self._definitions[slope] = width**2 * root * root**2
+                self._definitions[part] = argument * (1 / width)
+                self._definitions[square] = part * part
+                self._definitions[length] = sp.sqrt(1 + square * square)
+                self._definitions[root] = 1 / sp.sqrt(length)
+                self._definitions[soft] = part * root
+                self._definitions[slope] = (1 / width) * root / (length * length)
                 self._inner.append((soft, argument, slope))
+                if width in self.widths:
+                    self._by_width[width] = [(soft, -part * slope)]
             signs[one] = soft
         whole = whole.xreplace(signs)
         for one in sorted({*whole.atoms(sp.sin), *whole.atoms(sp.cos)}, key=str):
@@ -449,6 +467,8 @@ class _Refine:
             step = sp.diff(argument, x)
             if step != 0 and by_inner[mark] != 0:
                 total += by_inner[mark] * slope * step
+        for mark, slope in self._by_width.get(x, ()):
+            total += by_inner[mark] * slope
         return total
 
     def _column(self, x: sp.Symbol, factor: sp.Expr = _ONE) -> list[sp.Expr]:
@@ -514,7 +534,7 @@ class _Refine:
             "output": [("z", list(self.z))],
             "output_jacobian": [(key, e) for key, e in readings.items() if e],
         }
-        if self.settings and signs_of(self.model):
+        if signs_of(self.model):
             groups["signs"] = [("g", list(signs_of(self.model)))]
         return self._generated(groups)
 
@@ -591,14 +611,39 @@ class _Refine:
             constants=split.texts(r_names),
             settings=tuple(map(str, self.settings)),
             skew=self.skew,
+            runge_kutta=self.runge_kutta,
+            hidden=len(self._hidden({Jet(name) for name in self.outputs})) if self.runge_kutta else 0,
+            turning=self._turning(),
             measured=self._measured(),
             functions=made,
         )
 
     def _measured(self) -> tuple[int, ...]:
+        """Hidden coordinates begin where a measured one is if only the distance from it matters."""
         direct = {Jet(name): k for k, name in enumerate(self.outputs) if name not in self.model.refinement.outputs}
+        hidden = self._hidden(direct)
+        near = next((k for jet, k in direct.items() if hidden and self._is_free(jet, *hidden)), None)
+        if near is not None:
+            direct |= dict.fromkeys(hidden, near)
         codes = {jet: 1 + 2 * k for jet, k in direct.items()} | {jet.d(): 2 + 2 * k for jet, k in direct.items()}
         return tuple(codes.get(one, 0) for one in (*self.q, *self.v))
+
+    def _hidden(self, measured: Collection[Jet]) -> list[Jet]:
+        return [jet for jet in (Jet(one.of) for one in self.highest if one.order > 0) if jet not in measured]
+
+    def _turning(self) -> tuple[bool, ...]:
+        """Only where steps are Runge-Kutta's: elsewhere the ring keeps whole angles."""
+        own = self.model.refinement.outputs
+        direct = {Jet(name): name for name in self.outputs if name not in own}
+        hidden = self._hidden(direct)
+        free = {name for jet, name in direct.items() if jet in self.q and self._is_free(jet, *hidden)}
+        return tuple(self.runge_kutta and name in free for name in self.outputs)
+
+    def _is_free(self, *coordinates: Jet) -> bool:
+        """Whether the motion is the same when these are shifted together."""
+        shift = sp.Dummy()
+        moved = {one: one + shift for one in coordinates}
+        return all(sp.expand(one.xreplace(moved) - one) == 0 for one in self._equations)
 
     def _chart(self) -> list[list[sp.Expr]]:
         """d(steps of the motion)/d(steps of r), by entries of r; empty: it is the identity."""
@@ -616,6 +661,13 @@ class _Refine:
                     column.append(sp.Integer(int(one == step)))
             found.append(column)
         return found
+
+
+def _unit_of(model: CompiledModel, rate: sp.Expr) -> str:
+    """Of a sign's argument: that of the first signal in it, by its order."""
+    first = min(jets(rate), key=str)
+    unit = next((one.unit for one in model.signals if one.name == first.of), "") or "1"
+    return unit if first.order == 0 else f"{unit}/s" if first.order == 1 else f"{unit}/s^{first.order}"
 
 
 def _locals(names: Sequence[str]) -> list[str]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.files_refine import is_nonzero, refine_hash
+from pvid.codegen.files_refine import is_nonzero, refine_hash, ring_of, widths
 from pvid.codegen.literals import python_literal
-from pvid.codegen.refine import RefineFunction, RefineFunctions
+from pvid.codegen.refine import RefineFunction, RefineFunctions, signs_of
 from pvid.codegen.statements import Language, call_of, statements
 from pvid.codegen.twin_file import namespace
 from pvid.twin.f32.refine_model import Derivatives, RefineShape
@@ -100,6 +100,7 @@ class RefineTwin:
     jacobian: Callable[..., tuple[Float32, ...]]
     output: Callable[..., tuple[Float32, ...]]
     output_jacobian: Callable[..., tuple[Float32, ...]]
+    signs: Callable[..., tuple[Float32, ...]] | None
     region: Callable[[Float32], npt.NDArray[np.bool_]]
     chart: Callable[[Float32], tuple[Float32, ...]] | None
 
@@ -114,6 +115,7 @@ def loaded(made: RefineFunctions) -> RefineTwin:
         jacobian=space["jacobian"],
         output=space["output"],
         output_jacobian=space["output_jacobian"],
+        signs=space.get("signs"),
         region=space["region"],
         chart=space.get("chart"),
     )
@@ -138,7 +140,13 @@ class GeneratedRefine:
             rates=any(is_nonzero(made, "Zv")),
             logarithmic=tuple(one.log for one in made.parameters),
             place_of_p=tuple(by_p[place] for place in sorted(by_p)),
+            runge_kutta=made.runge_kutta,
+            signs=len(signs_of(made.model)),
+            widths=len(widths(made)),
+            ring=ring_of(made),
             measured=made.measured,
+            hidden=made.hidden,
+            turning=made.turning,
         )
 
     def _called(self, name: str, **arrays: Float32) -> dict[str, Float32]:
@@ -167,6 +175,10 @@ class GeneratedRefine:
             D=found["D"].reshape(n, n) if "D" in found else np.zeros((n, n), np.float32),
             B=found["B"].reshape(self._still, n),
         )
+
+    def signs(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32:
+        """Arguments of the signs."""
+        return self._called("signs", m=m, q=q, v=v, u=u)["g"]
 
     def output(self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32) -> Float32:
         """z."""

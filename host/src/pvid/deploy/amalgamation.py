@@ -28,6 +28,7 @@ _MACRO = re.compile(r"^[ \t]*#[ \t]*define (\w+)", re.MULTILINE)
 _TEXTS = "pvid/text.h"
 _IN_HEADER = ("pvid/status.h", _TEXTS)
 _FIRST = "number/uncontracted.h"
+_PART = re.compile(r"A part of \w+\.c\.")
 
 
 def amalgamated(d: Deployment) -> tuple[str, str]:
@@ -45,9 +46,10 @@ def amalgamated(d: Deployment) -> tuple[str, str]:
         f'#include "{d.library}.h"\n',
         "/* One translation unit: no sizes in the names. */\n#define PVID_PLAIN_NAMES\n",
     ]
-    done = {*_IN_HEADER, own}
+    parts = _parts(files)
+    done = {*_IN_HEADER, own, *parts}
     wanted = [_FIRST] if _FIRST in files else []
-    wanted += [one for name in sources(files) for one in includes_of(files[name])]
+    wanted += [one for name in (*sources(files), *parts) for one in includes_of(files[name])]
     source += [_inlined(name, files, done) for name in wanted]
     source += _units(files)
     public = {name for path in sources(files) for name in _PUBLIC.findall(_COMMENT.sub("", files[path]))}
@@ -64,17 +66,38 @@ def _inlined(name: str, files: Mapping[str, str], done: set[str]) -> str:
     return _OWN_INCLUDE.sub(lambda found: _inlined(found[1], files, done), files[name])
 
 
+def _parts(files: Mapping[str, str]) -> list[str]:
+    """Headers that are a part of one source, as their first comment says: their names are its own."""
+    return [name for name, text in files.items() if name.endswith(".h") and _PART.search(text)]
+
+
+def _with_parts(name: str, files: Mapping[str, str], done: set[str]) -> str:
+    """A source with its parts in their places, each once."""
+    parts = set(_parts(files))
+
+    def text_of(found: re.Match[str]) -> str:
+        if found[1] not in parts:
+            return found[0]
+        if found[1] in done:
+            return ""
+        done.add(found[1])
+        return _with_parts(found[1], files, done)
+
+    return _OWN_INCLUDE.sub(text_of, files[name])
+
+
 def _plain(text: str) -> str:
     return _OWN_INCLUDE.sub("", text)
 
 
 def _units(files: Mapping[str, str]) -> list[str]:
     """The sources; names of their own that others have too get the file's name behind them."""
-    own_names = {name: _own_names(_COMMENT.sub("", files[name])) for name in sources(files)}
+    whole = {name: _with_parts(name, files, set()) for name in sources(files)}
+    own_names = {name: _own_names(_COMMENT.sub("", text)) for name, text in whole.items()}
     often = Counter(one for names in own_names.values() for one in names)
     parts = []
     for name in sources(files):
-        text, stem = _plain(files[name]), re.sub(r"\W", "_", name.rpartition("/")[2].removesuffix(".c"))
+        text, stem = _plain(whole[name]), re.sub(r"\W", "_", name.rpartition("/")[2].removesuffix(".c"))
         text = _renamed(text, {one: f"{one}_{stem}" for one in own_names[name] if often[one] > 1})
         if name.endswith("/text.c"):
             text = re.sub(r"^(const char \*pvid_\w+_text\()", r"PVID_WEAK_SYMBOL \1", text, flags=re.MULTILINE)

@@ -547,10 +547,10 @@ class _Recomputation:
         for a, b in ((a, b) for a, b in _UPPER if b < n_p):
             what = f"published covariance of {self._p_names[a]} and {self._p_names[b]}"
             yield what, _word(logged[a, b]), _word(best["covariance"][a, b])
-        own = refine.estimate
+        own, widths = refine.estimate, refine.shape.widths
         zero = np.zeros(refine.shape.parameters, np.float32)
         for name, values in (("r", zero if own is None else own.r), ("se", zero if own is None else own.se)):
-            for i, value in enumerate(values):
+            for i, value in enumerate(values[widths:]):
                 yield f"refined {name}[{i}]", _word(getattr(check, name)[i]), _word(value)
         for name in ("level", "clash"):
             value = np.float32(0) if own is None else getattr(own, name)

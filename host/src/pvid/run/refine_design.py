@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +17,8 @@ from pvid.codegen.refine import RefineFunctions, signs_of
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
-from pvid.model.compiled import CompiledModel
-from pvid.model.signals import Jet
+from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.signals import Integral, Jet
 from pvid.models.registry import DEFAULT
 from pvid.run.engine_design import Run, simulated_run_of
 from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
@@ -25,13 +26,17 @@ from pvid.settings.weak import Source, WeakConfig
 from pvid.sim.pendulum import simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
+Float32 = npt.NDArray[np.float32]
 
 _STILL = 0.04  # h |lambda| up to which Adams-Bashforth is stable for a decay
 _LEAST = 4.0  # periods of the fastest motion in a block
 _STATES = 40  # of the run that are looked at
 _WITH_SIGNS, _WITHOUT = 0.75, 0.95  # part of them for which the step is short enough
 _A_PERIOD = 48.0  # steps in a period
-_MARGIN = 1.5  # ranges over what the run has of them
+_SHARP, _SOFT = 1e-6, 1e6  # widths of signs
+_REVERSAL = 4.0  # of the noise of a sample: the error is a small part of the jump
+_HALF_TURN = 32767 / 4  # resolutions: an output that turns is kept in quarters of one
+_MARGIN, _MORE = 1.5, 6.0  # ranges over what the run has of them, of integrals, which may go on
 
 
 def refine_design(
@@ -55,15 +60,8 @@ def refine_design(
     PvidError
         Where the refinement in C does not have what the model needs: the reason in a sentence.
     """
-    widths = dict(soft_signs or {})
-    made = refine_functions(compiled, Options(soft_signs=widths))
+    made = refine_functions(compiled, Options(soft_signs=soft_signs or {}))
     files_refine.check_outputs(made)
-    sharp = [str(one) for one in signs_of(made.model) if str(one) not in widths]
-    if sharp:
-        raise PvidError(
-            f"{compiled.name} has a sharp friction, sgn({sharp[0]}), within whose reversal the refinement in C makes "
-            f"too few steps: `model build --soft-sign {sharp[0]}=WIDTH` makes it a soft one"
-        )
     near = config.estimator.start if p is None else p
     settings = refine_settings(made, run, config.sample_rate, near, 4 * config.hop_s)
     own = made.model.refinement.equations
@@ -111,41 +109,64 @@ def refine_settings(
     engine = weak_model_of(model)
     names, sources = engine.sample_names, {one.sample: one.source for one in engine.signal if one.source is Source.HELD}
     inputs = [_input(made, jet) for jet in made.inputs]
+    turning = {name for name, turns in zip(made.outputs, made.turning, strict=True) if turns}
     samples = [*inputs, *((name, 0, 1.0) for name in made.outputs)]
     signal = []
     for name, order, scale in samples:
         if name not in names:
             raise PvidError(f"{model.name}: its input {name} is no sample")
         x = np.asarray(run[name], float)
-        largest = np.nanmax(np.abs(x)) if order == 0 else np.nanmax(np.abs(_curvature(x, rate, block_s)))
         place = names.index(name)
-        range_ = _MARGIN * float(abs(scale) * largest)
-        signal.append(RefineSignal(place, order, scale, range_, sources.get(place, Source.SAMPLED)))
+        range_ = (_MORE if order == -1 else _MARGIN) * abs(scale) * _largest(x, order, rate, block_s)
+        if name in turning:
+            range_ = _HALF_TURN * _step_of(model.signal(name))
+        source = Source.SAMPLED if order == -1 else sources.get(place, Source.SAMPLED)
+        signal.append(RefineSignal(place, order, scale, range_, source))
+    r = r_of(made, p)
+    jumps = _jumps(made, r, run, rate)
     rig = RefineRig(
         sample_rate=rate,
         slow_hz=2.0 / block_s,
-        fast_hz=max(fastest_hz(made, p, run, rate), _LEAST / block_s),
+        fast_hz=max(fastest_hz(made, r, run, rate), _LEAST / block_s),
         signal=tuple(signal),
         sample_sd=tuple(model.signal(name).sd for name in made.outputs),
         prior_sd=tuple(one.prior_sd for one in made.parameters),
         gain_sd=(0.0,) * len(made.parameters),
         state_limit=_state_limit(made, run, rate),
+        runge_kutta=made.runge_kutta,
+        ring=files_refine.ring_of(made),
+        fine_s=_fine_s(made, jumps, block_s),
+        jumps=jumps,
     )
     settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
 
 
 def _input(made: RefineFunctions, jet: Jet) -> tuple[str, int, float]:
-    """Sample, order of the derivative and factor of an input."""
+    """Sample, order (-1: its integral) and factor of an input."""
     model = made.model
     value = model.with_knowns(model.opaque.get(jet, jet))
+    order = 0
+    if len(integrals := value.atoms(Integral)) == 1:
+        (integral,) = integrals
+        inside, folds = integral.args
+        if folds == 1 and sp.simplify(value / integral).is_number:
+            value, order = sp.simplify(value / integral) * inside, -1
     found = [one for one in value.atoms(Jet) if one.order in (0, 2)]
     scale = sp.simplify(value / found[0]) if len(found) == 1 else None
-    if scale is None or not scale.is_number:
+    if scale is None or not scale.is_number or value.has(Integral) or (order and found[0].order):
         raise PvidError(
-            f"{model.name} has the input {value}; those of the refinement in C are samples and their second rates"
+            f"{model.name} has the input {model.opaque.get(jet, jet)}; those of the refinement in C are samples, their "
+            "second rates and their integrals"
         )
-    return found[0].of, found[0].order, float(scale)
+    return found[0].of, order or found[0].order, float(scale)
+
+
+def _largest(x: Float, order: int, rate: float, block_s: float) -> float:
+    """Absolute value of a signal of this order."""
+    if order == -1:
+        x = np.cumsum(np.nan_to_num(x)) / rate
+    return float(np.nanmax(np.abs(_curvature(x, rate, block_s) if order == 2 else x)))
 
 
 def _curvature(x: Float, rate: float, block_s: float) -> Float:
@@ -155,40 +176,81 @@ def _curvature(x: Float, rate: float, block_s: float) -> Float:
     return np.asarray(np.diff(mean, 2) * (rate / step) ** 2)
 
 
-def fastest_hz(made: RefineFunctions, p: npt.ArrayLike, run: Mapping[str, npt.ArrayLike], rate: float) -> float:
+def fastest_hz(made: RefineFunctions, r: Float, run: Mapping[str, npt.ArrayLike], rate: float) -> float:
     """Of the motion, as an oscillation that needs as short a step: at most of the run's states.
 
     In the others a soft sign changes, or a large motion is at its fastest for a moment. (With a step for three quarters
     of the rotary pendulum's states hardly a block fits; with one for 85 % its estimates are 2 times the bound off.)
     """
-    model, n = GeneratedRefine(made), len(made.coordinates)
-    m = model.constants(model.from_p(np.asarray(p, np.float32)))
-    u = np.zeros(len(made.inputs), np.float32)
     found = []
     for q, v in _states(made, run, rate):
-        slopes = model.jacobian(m, q, v, u)
-        K = np.asarray(slopes.K, float)
-        if made.order == 2:
-            K = np.block([[np.zeros((n, n)), np.eye(n)], [K, np.asarray(slopes.D, float)]])
-        rates = np.linalg.eigvals(K)
-        found.append(max(np.abs(rates.imag).max() / (2 * np.pi), np.abs(rates.real).max() / _STILL / _A_PERIOD))
+        rates = np.linalg.eigvals(_slopes(made, r, q, v))
+        if made.runge_kutta:
+            found.append(np.abs(rates).max() / (2 * np.pi))
+        else:
+            found.append(max(np.abs(rates.imag).max() / (2 * np.pi), np.abs(rates.real).max() / _STILL / _A_PERIOD))
     return float(np.quantile(found, _WITH_SIGNS if signs_of(made.model) else _WITHOUT))
 
 
-def _states(
-    made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float
-) -> Iterator[tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]]:
-    """q and v of the run; what is not measured is 0."""
+def r_of(made: RefineFunctions, p: npt.ArrayLike, width: float = _SHARP) -> Float:
+    """r of parameters of the weak form."""
+    given = np.asarray(p, float)
+    return np.array([given[x.place] if x.place >= 0 else width if x.sign else 0.0 for x in made.parameters])
+
+
+def _slopes(made: RefineFunctions, r: Float, q: Float32, v: Float32) -> Float:
+    """Derivatives of the rates of all states by the states."""
+    model, n = GeneratedRefine(made), len(made.coordinates)
+    slopes = model.jacobian(model.constants(r.astype(np.float32)), q, v, np.zeros(len(made.inputs), np.float32))
+    K = np.asarray(slopes.K, float)
+    if made.order == 1:
+        return K
+    return np.block([[np.zeros((n, n)), np.eye(n)], [K, np.asarray(slopes.D, float)]])
+
+
+def _jumps(made: RefineFunctions, r: Float, run: Mapping[str, npt.ArrayLike], rate: float) -> tuple[float, ...]:
+    """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined."""
+    states = list(_states(made, run, rate))
+    q, v = states[len(states) // 2]
+    still = np.where([name.endswith("_1") for name in made.coordinates], np.float32(0), q)
+    found = []
+    for place in (k for k, one in enumerate(made.parameters) if one.sign):
+        soft = r.copy()
+        soft[place] = _SOFT
+        change = _slopes(made, r, still, v) - _slopes(made, soft, still, v)  # of rank 1
+        found.append(2 * _SHARP * abs(float(np.trace(change))))
+    return tuple(found)
+
+
+def _fine_s(made: RefineFunctions, jumps: Sequence[float], block_s: float) -> float:
+    """Longest step at the reversal of a friction: an error of its part of the jump, kept for half a block, is small
+    beside the noise of a sample."""
+    sd = {f"{name}_1": made.model.signal(name).sd for name in made.outputs}
+    least = min(sd.values())
+    signs = [one.sign for one in made.parameters if one.sign]
+    longest = [_REVERSAL * sd.get(one, least) / (jump * block_s / 2) for one, jump in zip(signs, jumps, strict=True)]
+    return min(longest, default=math.inf)
+
+
+def _values(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float) -> dict[str, Float]:
+    """What the sensors of the run measure and its rates, name_1, at some of the samples."""
     n = len(next(iter(run.values())))  # type: ignore[arg-type]
     step = max(n // _STATES, 1)
-    measured = {name: np.asarray(run[name], float) for name in made.outputs}
-    at = np.arange(step, n - step, step)
-    none = np.zeros(len(at))
-    q = np.array([measured[name][at] if name in measured else none for name in made.coordinates], np.float32)
-    half = max(step // 8, 1)
-    slope = {name: (x[at + half] - x[at - half]) * rate / (2 * half) for name, x in measured.items()}
-    v = np.array([slope.get(name, none) for name in made.coordinates], np.float32)
-    for k in range(len(at)):
+    at, half = np.arange(step, n - step, step), max(step // 8, 1)
+    found = {}
+    for name in made.outputs:
+        x = np.asarray(run[name], float)
+        found[name], found[f"{name}_1"] = x[at], (x[at + half] - x[at - half]) * rate / (2 * half)
+    return found
+
+
+def _states(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float) -> Iterator[tuple[Float32, Float32]]:
+    """q and v of the run; what is not measured is 0."""
+    values = _values(made, run, rate)
+    none = np.zeros(len(values[made.outputs[0]]))
+    q = np.array([values.get(name, none) for name in made.coordinates], np.float32)
+    v = np.array([values.get(f"{name}_1", none) for name in made.coordinates], np.float32)
+    for k in range(len(none)):
         if np.isfinite(q[:, k]).all() and np.isfinite(v[:, k]).all():
             yield q[:, k], v[:, k] if made.order == 2 else v[:0, k]
 
@@ -197,5 +259,17 @@ def _state_limit(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: 
     """Twenty times the largest measured coordinate and rate; of a hidden one as of the largest."""
     largest = {name: float(np.nanmax(np.abs(np.asarray(run[name], float)))) for name in made.outputs}
     most = max(largest.values())
-    places = [20.0 * largest.get(name, most) for name in made.coordinates]
-    return tuple(places) if made.order == 1 else (*places, *(one * rate for one in places))
+    if made.order == 2:
+        places = [20.0 * largest.get(name, most) for name in made.coordinates]
+        return (*places, *(one * rate for one in places))
+    turns = [name for name, one in zip(made.outputs, made.turning, strict=True) if one]
+    turn = max((2 * _HALF_TURN * _step_of(made.model.signal(name)) for name in turns), default=0.0)
+    rates = {f"{name}_1": one * rate for name, one in largest.items()}
+    hidden = {name: most * rate if name.endswith("_1") else max(most, turn) for name in made.coordinates}
+    limits = {**hidden, **rates, **largest, **{name: max(largest[name], turn) for name in turns}}
+    return tuple(20.0 * limits[name] for name in made.coordinates)
+
+
+def _step_of(signal: Signal) -> float:
+    """Resolution of a sensor."""
+    return signal.resolution or signal.sd

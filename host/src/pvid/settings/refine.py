@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ class RefineSignal:
     Attributes
     ----------
     sample : place in the argument of step
-    order : 0: the sample, 2: its second derivative
+    order : 0: the sample, 2: its second derivative, -1: its integral
     source : of an input HELD where it is held from tick to tick
     scale : factor to the model's unit
     range : largest absolute value [model's unit]
@@ -56,6 +57,9 @@ class RefineConfig:
     forgetting_s : time constant; 0: none
     outlier_gate : means of samples that stand out by more than this multiple of the usual are left out; 0: no gate
     gate, chi_max, clash_max, step_max, step_limit, se_max, distance : limits
+    parts, fine_parts
+        steps of Runge-Kutta in a step of the motion, in one in which a sign may change; None: steps are Adams's
+    width : where the widths of the signs start [widths]; None: none is refined
     """
 
     sample_rate: float
@@ -81,6 +85,9 @@ class RefineConfig:
     step_limit: float = 2.0
     se_max: float = 0.01
     distance: float = 0.03
+    parts: int | None = None
+    fine_parts: int | None = None
+    width: Float32 | None = None
 
 
 @dataclass(frozen=True)
@@ -90,12 +97,16 @@ class RefineRig:
     Attributes
     ----------
     sample_rate : [Hz]
-    slow_hz, fast_hz : frequencies of the motion
+    slow_hz, fast_hz : frequencies of the motion; with Runge-Kutta the largest rate over 2 pi
     signal : inputs, then outputs of the model
     sample_sd : white noise of a sample of each output [outputs]
     prior_sd, gain_sd : [parameters]
     state_limit : [states]
     rests : ticks in a row, at most, that the refinement leaves to the weak form
+    runge_kutta : each step is Runge-Kutta's; else Adams's
+    ring : entries
+    fine_s : longest step of Runge-Kutta where a sign may change [s]
+    jumps : of the rates of the signs' arguments at their reversals [widths]
     """
 
     sample_rate: float
@@ -107,3 +118,7 @@ class RefineRig:
     gain_sd: Sequence[float]
     state_limit: Sequence[float]
     rests: int = 1
+    runge_kutta: bool = False
+    ring: int = 512
+    fine_s: float = math.inf
+    jumps: Sequence[float] = ()

@@ -12,7 +12,7 @@ from pvid.settings.enums import Reason
 from pvid.settings.refine import BIG_STEP, RefineConfig
 from pvid.twin.f32.refine_front import Entry, Front
 from pvid.twin.f32.refine_model import Float32, RefineModel
-from pvid.twin.f32.refine_pass import Pass
+from pvid.twin.f32.refine_pass import Job, PartSignals, Pass, Signals, turned
 from pvid.twin.f32.refine_solve import Solution, Solve, Steps, inverse_column
 from pvid.twin.fnv import START, fold_bytes
 
@@ -31,6 +31,9 @@ _FIRST_CLASH = _F(2)
 _KEPT = _F(1 / 16)
 _APART = 4
 _SHORT = _F(0.25)
+_SHARPEST, _REVERSALS = _F(0.25), _F(4)
+_PRIOR_ERRORS, _LEAST_PRIOR = _F(10), _F(1e-6)
+_SETTLED = _F(0.25)
 _JOBS = 9
 _FIRST_JOBS = 16
 _SOLVE_TICKS = 45
@@ -86,6 +89,7 @@ class RefineTwin:
         shape = self.shape = model.shape
         self.model, self.config = model, config
         self.steps = Steps(model)
+        self.parts = config.parts or 1
         self.sd = np.asarray(config.sd, _F)
         self.prior_sd = np.asarray(config.prior_sd, _F)
         self.gain_sd = np.asarray(config.gain_sd, _F)
@@ -127,7 +131,8 @@ class RefineTwin:
         gate = _ABSURD
         if self.taken > 0 and self.config.gate > 0 and not self.restarted:
             gate = (_F(self.config.gate) * self.sd[0]) * np.sqrt(_at_least_one(self.level))
-        self.work.begin(self.linear, self.start, self.h, gate)
+        parts = self.parts, self.config.fine_parts or 1
+        self.work.begin(self.linear, self.start, self.h, parts, gate, self.front.turn)
         self.phase = Phase.PASS
         self.waiting = False
 
@@ -153,8 +158,12 @@ class RefineTwin:
         scale = _F(1) / ((_F(2) * _F(_APART)) * self.h)
         for i, code in enumerate(self.shape.measured):
             if code > 0:
-                first, middle, last = (one[(code - 1) // 2] for one in at)
+                output = (code - 1) // 2
+                first, middle, last = (one[output] for one in at)
                 rate = (((_F(4) * middle) - last) - (_F(3) * first)) * scale
+                if any(self.shape.turning):
+                    middle, last = (turned(one - at[0], self.front.turn)[output] for one in at[1:])
+                    rate = ((_F(4) * middle) - last) * scale
                 x = first if code % 2 else rate
                 self.start[i] = x if abs(x) < self.state_limit[i] else _F(0)
         self._begin_pass()
@@ -163,34 +172,72 @@ class RefineTwin:
         few = self.work.used * 10 < self.length * 6 * self.shape.outputs
         return any(self.shape.measured) and not self.restarted and self.taken > 0 and self.passed == 0 and few
 
+    def _begin_from_prior(self) -> None:
+        sd = self.prior_sd.copy()
+        if self.shape.signs:
+            for i, place in enumerate(self.shape.place_of_p):
+                size = self.weak[place] if self.steps.logarithmic[place] else _F(1)
+                told = (_PRIOR_ERRORS * self.weak_se[i]) / size
+                prior = told if told > _LEAST_PRIOR else _LEAST_PRIOR
+                sd[place] = prior if prior < sd[place] else sd[place]
+        self.triangle = np.diag(self.sd[0] / sd)
+
     def _begin_search(self) -> None:
-        self.triangle = np.diag(self.sd[0] / self.prior_sd)
+        if self.shape.signs:
+            self.r = self.weak.copy()
+        self._begin_from_prior()
         self.taken = self.refused = 0
         self.level = _F(0)
 
     def _take_weak(self, p: Float32, se: Float32) -> None:
         r = self.model.from_p(p)
+        if self.config.width is not None:
+            r[self.steps.is_width] = self.config.width
         if self.model.region(r):
             self.weak, self.weak_se = r, se.copy()
             self.renewed = True
 
     def _begin_anew(self) -> None:
+        self._begin_from_prior()
         self.r, self.next = self.weak.copy(), self.weak.copy()
         self._forget_state()
         self.renewed = False
         self.lost = 0
         self.length = self.config.first_block
 
-    def _oldest(self) -> int:
-        jobs = _JOBS * self.length + _FIRST_JOBS
-        ticks = self.config.passes * (jobs // self.config.jobs + _SOLVE_TICKS)
+    @property
+    def _solve_jobs(self) -> int:
+        """In a tick."""
+        return 1 + self.config.jobs // 8 if self.shape.runge_kutta else 1
+
+    def _ticks(self, length: int) -> int:
+        """Of a pass with its solution."""
+        of_big_step, solve = _JOBS, _SOLVE_TICKS
+        if self.shape.runge_kutta:
+            of_big_step, solve = 15 + 10 * self.parts, 5 + _SOLVE_TICKS // self._solve_jobs
+        return (of_big_step * length + _FIRST_JOBS) // self.config.jobs + solve
+
+    def _lasts(self, length: int) -> bool:
+        """Whether the ring still has the beginning of the block for another pass of this length; where a pass takes as
+        long as the block, at its end."""
+        if not self.shape.runge_kutta:
+            return self._is_there()
+        taken = self._ticks(length) // max(self.config.ratio - 1, 1)
+        return self.front.end + taken - self.begin <= self.front.room - 8
+
+    def _oldest(self, ticks: int) -> int:
+        """How far back a block may begin that the ring must have for so many ticks."""
         taken = ticks // max(self.config.ratio - 1, 1) + _SPARE
         back = max(self.front.room - taken, 0)
         return max(self.front.end - back, self.origin)
 
     def _begin_anew_in_the_past(self) -> None:
         self._begin_anew()
-        self.begin = self._oldest()
+        config = self.config
+        if self.shape.runge_kutta:
+            self.begin = self._oldest(config.most_passes * self._ticks(config.block // 2))
+        else:
+            self.begin = self._oldest(config.passes * self._ticks(self.length))
 
     # ---- the end of a block ----
 
@@ -200,8 +247,8 @@ class RefineTwin:
 
     def _lengthen(self, began: int) -> None:
         self.length = min(2 * self.length, self.config.block)
-        first = self._oldest()
-        if self.begin > first:
+        first = self._oldest(self.config.passes * self._ticks(self.length))
+        if self.begin > first and not self.shape.hidden:
             self.again, self.same_start = True, first == began
             self.begin = first
 
@@ -220,6 +267,9 @@ class RefineTwin:
             self._lengthen(began)
             fade = _KEPT if self.again else fade
         self.triangle = self.solve.triangle * fade
+        for i in range(self.shape.widths):
+            self.triangle[i] = 0
+            self.triangle[i, i] = (self.sd[0] * fade) / self.prior_sd[i]
 
     def _refuse(self) -> None:
         if self.taken > 0:
@@ -243,6 +293,14 @@ class RefineTwin:
         elif not self.sane or not square <= _HOPELESS * _F(config.chi_max):
             self.length = config.first_block
 
+    def _turn_back(self) -> None:
+        """Takes whole turns off the start of the next block."""
+        for output, turn in enumerate(self.front.turn):
+            angles = np.array(self.shape.measured) == 1 + 2 * output
+            if turn > 0 and np.any(angles):
+                x = self.expected[angles][0]
+                self.expected[angles] -= x - turned(np.atleast_1d(x), np.atleast_1d(turn))[0]
+
     def _follow(self) -> None:
         within = self.sane
         if self.again:
@@ -250,6 +308,7 @@ class RefineTwin:
             self.expected = self.start.copy()
         elif within:
             self.expected = self.solve.end_state(self.work, self.linear)
+            self._turn_back()
             within = bool(np.all(np.abs(self.expected) < self.state_limit))
         self.restarted = False
         if not within:
@@ -259,6 +318,11 @@ class RefineTwin:
         used, unknowns = self.work.used, self.shape.unknowns
         freedom = _F(used - unknowns) if used > unknowns + 1 else _F(1)
         return _F(self.solve.residual / (freedom * (_WHITENESS * self.variance)))
+
+    def _is_settled(self) -> bool:
+        if self.solve.size < _F(self.config.step_max):
+            return True
+        return self.shape.signs > 0 and bool(self.solve.promise < _SETTLED * self.variance)
 
     def _end_block(self) -> None:
         config, square = self.config, self._mean_square()
@@ -271,7 +335,7 @@ class RefineTwin:
             self.sane
             and square < limit * room
             and (self.taken == 0 or again or clash < _F(config.clash_max) * room)
-            and self.solve.size < _F(config.step_max)
+            and self._is_settled()
         )
         began = self.begin
         self.begin += self.work.step * BIG_STEP
@@ -292,7 +356,10 @@ class RefineTwin:
             self.covariance = np.multiply.outer(self.gain_sd, self.gain_sd)
         x = inverse_column(self.solve.triangle, self.passed)
         level = _at_least_one(self.level)
-        variance = self.variance * (self.clash if self.clash > level else level)
+        larger = self.clash if self.clash > level else level
+        if self.shape.signs:
+            larger = larger if larger > _REVERSALS else _REVERSALS
+        variance = self.variance * larger
         upto = self.passed + 1
         self.covariance[:upto, :upto] = self.covariance[:upto, :upto] + np.multiply.outer(variance * x[:upto], x[:upto])
         self.passed += 1
@@ -303,8 +370,8 @@ class RefineTwin:
         logarithmic = self.steps.logarithmic
         se = np.where(logarithmic, sd * self.r, sd)
         self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level, self.clash)
-        certain = np.all(np.isfinite(self.r)) and np.all(np.isfinite(se))
-        certain = certain and np.all(~logarithmic | (se <= _F(self.config.se_max) * self.r))
+        uncertain = logarithmic & ~self.steps.is_width & ~(se <= _F(self.config.se_max) * self.r)
+        certain = np.all(np.isfinite(self.r)) and np.all(np.isfinite(se)) and not np.any(uncertain)
         self.verdict = Reason.UPDATED
         if not certain:
             self.verdict = Reason.HELD_UNCERTAIN
@@ -324,13 +391,22 @@ class RefineTwin:
 
     def _pass_jobs(self) -> None:
         for _ in range(self.config.jobs):
-            step, signals = self.work.awaited(), None
+            step = self.work.awaited()
+            signals: Signals | PartSignals | None = None
             if step is not None:
                 entry = self.begin + step
+                if self.shape.runge_kutta and self.front.end - entry > self.front.room - 4:
+                    self.solved, self.phase = False, Phase.END
+                    return
                 if self.front.end <= entry:
                     self.waiting, self.due = True, entry + 1
                     return
-                signals = self.front.read(entry)
+                if not self.shape.runge_kutta or self.work.job == Job.START:
+                    signals = self.front.read(entry)
+                else:
+                    part, of_a_step = self.work.part, _F(1) / _F(self.work.parts)
+                    since, to = (_F(k) * of_a_step for k in (part, part + 1))
+                    signals = self.front.read_part(entry - 2, since, to)
             self.work.do(self.linear, self.weight, signals)
             if self.work.ends(self.length):
                 self.solve.begin()
@@ -348,12 +424,18 @@ class RefineTwin:
     def _is_enough(self) -> bool:
         config = self.config
         tracks = self.taken > 0 and self.solve.bend < _SHORT * _F(config.step_max)
-        small = (tracks or self.passed >= config.passes) and self.solve.size < _F(config.step_max)
-        return bool(small) or self.passed >= config.most_passes or not self._is_there()
+        small = (tracks or self.passed >= config.passes) and self._is_settled()
+        return bool(small) or self.passed >= config.most_passes or not self._lasts(self.length)
 
     def _grows(self) -> bool:
         config = self.config
-        short = self.taken == 0 and self.passed >= 2 and 2 * self.length < config.block
+        twice = 2 * self.length
+        short = (
+            self.taken == 0
+            and self.passed >= 2
+            and twice < config.block
+            and (not self.shape.runge_kutta or self._lasts(twice))
+        )
         return bool(short and self.solve.size < _ROUGH and self._mean_square() < _MAY_GROW * _F(config.chi_max))
 
     def _move(self) -> None:
@@ -362,6 +444,9 @@ class RefineTwin:
             self._begin_block()
             return
         self.linear = self.steps.moved(self.linear, self.solve.step)
+        if self.config.width is not None:
+            widths = self.linear[self.steps.is_width]
+            self.linear[self.steps.is_width] = np.maximum(widths, _SHARPEST * self.config.width)
         self.start = self.start + self.solve.shift
         self.passed += 1
         if self._grows():
@@ -406,7 +491,9 @@ class RefineTwin:
             case Phase.PASS:
                 self._pass_jobs()
             case Phase.SOLVE:
-                self._solve_job()
+                for _ in range(self._solve_jobs):
+                    if self.phase is Phase.SOLVE:
+                        self._solve_job()
             case Phase.MOVE:
                 self._move()
             case Phase.END:

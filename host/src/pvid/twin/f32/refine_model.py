@@ -25,7 +25,13 @@ class RefineShape:
     rates: bool  # an output depends on v
     logarithmic: tuple[bool, ...]
     place_of_p: tuple[int, ...]
+    hidden: int = 0  # coordinates that no sensor measures
+    runge_kutta: bool = False  # each step
+    signs: int = 0  # in the equations
+    widths: int = 0  # of signs, the first entries of r
+    ring: int = 512  # PVID_REFINE_RING
     measured: tuple[int, ...] = ()  # of the states: 1 + 2 output: that output, 2 + 2 output: its rate, 0: neither
+    turning: tuple[bool, ...] = ()  # of the outputs: they are kept without whole turns
 
     @property
     def states(self) -> int:
@@ -72,6 +78,7 @@ class RefineModel(Protocol):
     def constants(self, r: Float32) -> Float32: ...
     def motion(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32: ...
     def jacobian(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Derivatives: ...
+    def signs(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32: ...
     def output(self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32) -> Float32: ...
     def output_jacobian(
         self, m: Float32, q: Float32, v: Float32, u: Float32, r: Float32

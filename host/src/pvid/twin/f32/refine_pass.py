@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,21 @@ _POSITION = "1/2 1/6 1/8 19/180 3/32 863/10080 275/3456 33953/453600"
 _VELOCITY = "1/1 1/2 5/12 3/8 251/720 95/288 19087/60480 5257/17280"
 _STARTS = 3
 
+_REACH = _F(2)  # changes of a sign's argument in a step, within which it may change
+_DOUBLED = 64 * BIG_STEP  # parts of a big step that the factor of its columns is made from
+
 Signals = tuple[Float32, Float32]
 """Inputs [inputs] and outputs [outputs] of a step."""
+
+
+class PartSignals(NamedTuple):
+    """Of a part of a step of Runge-Kutta: inputs at its beginning, its middle and its end [inputs], outputs at the
+    end of the step."""
+
+    u: Float32
+    middle: Float32
+    end: Float32
+    z: Float32
 
 
 class Job(IntEnum):
@@ -33,8 +47,12 @@ class Job(IntEnum):
     MORE_COLUMNS = 9
     ROWS = 10
     MORE_ROWS = 11
+    SLOPES = 12
+    DOUBLE = 13
+    SPREAD = 14
 
 
+_AHEAD_OF_RUNGE_KUTTA = {Job.START: 0, Job.SLOPES: 2, Job.STEP: 2}
 _AHEAD = {Job.START: 0, Job.MEAN: 1, Job.MEAN_AGAIN: 1, Job.FULL: 2, Job.END: 2, Job.STEP: 1}
 
 
@@ -45,6 +63,15 @@ def _weights(text: str) -> Float32:
 
 _OF_POSITION, _OF_VELOCITY = map(_weights, (_POSITION, _VELOCITY))
 ORDER = len(_OF_POSITION) - 1
+
+
+def turned(difference: Float32, turn: Float32) -> Float32:
+    """pvid_refine_turned of each output."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turns = np.where(turn > 0, difference / turn, _F(0))
+        countable = np.abs(turns) < _F(1e9)
+        whole = np.where(countable, np.trunc(turns + np.where(turns < 0, _F(-0.5), _F(0.5))), _F(0))
+        return np.asarray(np.where(countable, difference - turn * whole.astype(_F), difference), _F)
 
 
 def _product(a: Float32, b: Float32) -> Float32:
@@ -78,9 +105,14 @@ class Pass:
         self.middle = np.zeros(shape.states, _F)
         self.job = Job.CLEAR
 
-    def begin(self, r: Float32, start: Float32, h: np.float32, gate: np.float32) -> None:
+    def begin(
+        self, r: Float32, start: Float32, h: np.float32, parts: tuple[int, int], gate: np.float32, turn: Float32
+    ) -> None:
         """pvid_refine_pass_begin_f32."""
-        self.h, self.gate = h, gate
+        self.h, self.gate, self.turn = h, gate, turn
+        self.some_parts, self.fine_parts = parts
+        self.parts = self.fine_parts if self.shape.signs else self.some_parts
+        self.part, self.part_s = 0, h / _F(self.parts)
         if self.shape.skew:
             skew = r[self.shape.moving]
             square = (_F(0.5) * skew) * skew
@@ -91,11 +123,12 @@ class Pass:
 
     def awaited(self) -> int | None:
         """The step of the block whose signals the next job needs; None: none."""
-        return None if self.job not in _AHEAD else self.step * BIG_STEP + self.at + _AHEAD[self.job]
+        ahead = _AHEAD_OF_RUNGE_KUTTA if self.shape.runge_kutta else _AHEAD
+        return None if self.job not in ahead else self.step * BIG_STEP + self.at + ahead[self.job]
 
     def ends(self, length: int) -> bool:
         """Whether the pass is complete."""
-        return self.step >= length and self.job <= Job.STEP
+        return self.step >= length and (self.job <= Job.STEP or self.job == Job.SLOPES)
 
     def _clear(self) -> None:
         self.difference[:] = 0
@@ -180,11 +213,20 @@ class Pass:
             a, jerk = self.difference[0], self.difference[1]
             first, second, third = self.skew
             v = state[-q:]
-            late = np.concatenate([state[:q] + (first * v + (second * a + third * jerk)), v + first * a])
-        return np.asarray(measured - self.model.output(self.constants, late[:q], late[-q:], u, r), _F)
+            if self.shape.order == 1:
+                late = state + (first * a + (second / self.h) * jerk)
+            else:
+                late = np.concatenate([state[:q] + (first * v + (second * a + third * jerk)), v + first * a])
+        return turned(measured - self.model.output(self.constants, late[:q], late[-q:], u, r), self.turn)
 
     def _start(self, r: Float32, signals: Signals) -> None:
-        self.difference[0] = self._motion(self.state, signals[0])
+        if self.shape.signs:
+            self.argument = self.model.signs(self.constants, self.state, self.state, signals[0])
+        if not self.shape.runge_kutta:
+            self.difference[0] = self._motion(self.state, signals[0])
+        elif self.shape.skew:
+            self._renew(self._motion(self.state, signals[0]), False)
+            self.difference[1] = 0
         self.last = self._residuals(r, self.state, signals)
 
     def _derivatives(self, r: Float32, u: Float32) -> Float32:
@@ -200,12 +242,15 @@ class Pass:
         a, v = self.difference[0], self.state[-self.q :]
         total: Float32 = np.zeros(self.shape.outputs, _F)
         for k in range(self.q):
-            total = total + of_q[:, k] * (v[k] + self.skew[0] * a[k])
+            total = total + of_q[:, k] * (a[k] if self.shape.order == 1 else v[k] + self.skew[0] * a[k])
             if self.shape.rates:
                 total = total + of_v[:, k] * a[k]
         return total
 
     def _make_kick(self) -> None:
+        if self.shape.runge_kutta:
+            self._first_order_kick(self.mean_K, self.mean_B)
+            return
         found = self.found
         if self.shape.order == 1:
             self._first_order_kick(found.K, found.B)
@@ -214,12 +259,16 @@ class Pass:
 
     def _first_order_kick(self, K: Float32, B: Float32) -> None:
         big = _F(BIG_STEP) * self.h
-        unit = np.eye(self.q, dtype=_F)
+        t = big / _F(_DOUBLED) if self.shape.runge_kutta else big
+        unit = t * np.eye(self.q, dtype=_F)
         factor = unit
         for n in (4, 3, 2):
-            factor = np.asarray((big / _F(n)) * _product(K, factor) + unit)
-        self.kick_q = big * _product(factor, K)
-        self.kick_r = big * _product(factor, B.T)
+            factor = np.asarray((t / _F(n)) * _product(K, factor) + unit)
+        if self.shape.runge_kutta:
+            for _ in range(_DOUBLED.bit_length() - 1):
+                factor = np.asarray(_F(2) * factor + _product(factor, _product(K, factor)))
+        self.kick_q = _product(factor, K)
+        self.kick_r = _product(factor, B.T)
 
     def _second_order_kick(self, K: Float32, D: Float32, B: Float32) -> None:
         big = _F(BIG_STEP) * self.h
@@ -240,14 +289,54 @@ class Pass:
             self.starts -= 1
         a = self._derivatives(r, signals[0]) if middle else self._motion(self.state if started else x, signals[0])
         self._renew(a, started)
-        e = self._residuals(r, self.state if started else x, signals)
-        self.mean = np.asarray(self.mean + _F(0.5) * (self.last + e), _F)
-        self.last = e
+        self._add_residuals(self._residuals(r, self.state if started else x, signals))
         if middle and self.shape.skew:
             self.slip = self._slip()
         self.at += 1
         if started and self.at == BIG_STEP // 2 - 1:
             self._predict()
+
+    def _add_residuals(self, e: Float32) -> None:
+        self.mean = np.asarray(self.mean + _F(0.5) * (self.last + e), _F)
+        self.last = e
+
+    def _slopes(self, r: Float32, signals: PartSignals) -> None:
+        if self.at == BIG_STEP // 2 and self.part == 0:
+            self.output_column = self.model.output_jacobian(self.constants, self.state, self.state, signals.u, r)
+            if self.shape.skew:
+                self.slip = self._slip()
+        found = self.model.jacobian(self.constants, self.state, self.state, signals.u)
+        share = _F(1) / _F(BIG_STEP * self.parts)
+        if self.at == 0 and self.part == 0:
+            self.mean_K, self.mean_B = np.zeros_like(found.K), np.zeros_like(found.B)
+        self.mean_K, self.mean_B = self.mean_K + share * found.K, self.mean_B + share * found.B
+        self.k0: Float32 = found.a
+        self.k1: Float32 = self._motion(self.state + (_F(0.5) * self.part_s) * self.k0, signals.middle)
+
+    def _divide(self, u: Float32) -> None:
+        """How many parts the next step has."""
+        self.part = 0
+        if self.shape.signs:
+            argument = self.model.signs(self.constants, self.state, self.state, u)
+            change = _REACH * (argument - self.argument)
+            self.argument = argument
+            self.parts = self.fine_parts if np.any(argument * argument <= change * change) else self.some_parts
+            self.part_s = self.h / _F(self.parts)
+
+    def _part_of_step(self, r: Float32, signals: PartSignals) -> None:
+        h = self.part_s
+        k2 = self._motion(self.state + (_F(0.5) * h) * self.k1, signals.middle)
+        k3 = self._motion(self.state + h * k2, signals.end)
+        mean = self.k1 + k2
+        self.state = self.state + (h / _F(6)) * ((self.k0 + _F(2) * mean) + k3)
+        self.part += 1
+        if self.part < self.parts:
+            return
+        self._divide(signals.end)
+        if self.shape.skew:
+            self._renew(self._motion(self.state, signals.end), False)
+        self._add_residuals(self._residuals(r, self.state, (signals.end, signals.z)))
+        self.at += 1
 
     # ---- columns and rows ----
 
@@ -324,9 +413,11 @@ class Pass:
     # ---- jobs ----
 
     def _job_of_step(self) -> Job:
+        if self.shape.runge_kutta:
+            return Job.SLOPES
         return Job.MEAN if self.starts and self.at % 2 == 0 else Job.STEP
 
-    def do(self, r: Float32, weight: Float32, signals: Signals | None) -> None:
+    def do(self, r: Float32, weight: Float32, signals: Signals | PartSignals | None) -> None:
         """The next job of pvid_refine_pass_run_f32. Columns and sums are those of the second of their two jobs."""
         match self.job:
             case Job.CLEAR:
@@ -334,7 +425,17 @@ class Pass:
                 self.job = Job.START
             case Job.KICK:
                 self._make_kick()
-                self.job = self._job_of_step()
+                self.doubled = _DOUBLED
+                self.job = Job.DOUBLE if self.shape.runge_kutta else self._job_of_step()
+            case Job.DOUBLE:
+                self.doubled //= 2
+                self.job = Job.DOUBLE if self.doubled > 1 else Job.SPREAD
+            case Job.SPREAD:
+                self.job = Job.COLUMNS
+            case Job.SLOPES:
+                assert isinstance(signals, PartSignals)
+                self._slopes(r, signals)
+                self.job = Job.STEP
             case Job.COLUMNS | Job.ROWS:
                 self.job = Job(self.job + 1)
             case Job.MORE_COLUMNS:
@@ -344,14 +445,19 @@ class Pass:
                 self._add_rows()
                 self.job = self._job_of_step()
             case Job.STEP:
-                assert signals is not None
-                self._step(r, signals)
-                behind = {BIG_STEP // 2: Job.KICK, BIG_STEP: Job.COLUMNS}
-                self.job = behind.get(self.at, self._job_of_step())
+                if isinstance(signals, PartSignals):
+                    self._part_of_step(r, signals)
+                else:
+                    assert signals is not None
+                    self._step(r, signals)
+                at_middle = {BIG_STEP // 2: Job.KICK, BIG_STEP: Job.COLUMNS}
+                behind = {BIG_STEP: Job.KICK} if self.shape.runge_kutta else at_middle
+                self.job = self._job_of_step() if self.part else behind.get(self.at, self._job_of_step())
             case _:
-                assert signals is not None
+                assert signals is not None and not isinstance(signals, PartSignals)
                 self._first_job(r, signals)
-                self.job = Job(self.job + 1)
+                starts = self.job == Job.START
+                self.job = self._job_of_step() if starts else Job(self.job + 1)
 
     def _first_job(self, r: Float32, signals: Signals) -> None:
         match self.job:

@@ -27,7 +27,9 @@ class Steps:
     """Steps of r: of the logarithm where r is logarithmic."""
 
     def __init__(self, model: RefineModel) -> None:
-        self.logarithmic = np.array(model.shape.logarithmic)
+        shape = model.shape
+        self.logarithmic = np.array(shape.logarithmic)
+        self.is_width = np.arange(shape.parameters) < shape.widths
 
     def difference(self, to: Float32, source: Float32) -> Float32:
         """pvid_refine_difference_f32 of all entries."""
@@ -142,7 +144,7 @@ class Solve:
     def _solve(self, prior_sd: Float32, step_limit: np.float32) -> bool:
         n = self.shape.parameters
         step = self.step
-        largest = bend = _F(0)
+        longest = largest = bend = self.promise = _F(0)
         for k in range(n - 1, -1, -1):
             total = self.right[k]
             for j in range(k + 1, n):
@@ -150,14 +152,18 @@ class Solve:
             if not self.triangle[k, k] > 0:
                 return False
             step[k] = total / self.triangle[k, k]
+            self.promise = self.promise + self.right[k] * self.right[k]
             size = (-step[k] if step[k] < 0 else step[k]) / prior_sd[k]
+            longest = longest if size <= longest else size
+            if self.steps.is_width[k]:
+                continue
             largest = largest if size <= largest else size
             bend = bend if size <= bend or not self.shape.logarithmic[k] else size
         self.size, self.bend = largest, bend
-        if not largest < _F(1e6):
+        if not longest < _F(1e6):
             return False
-        if largest > step_limit:
-            step *= step_limit / largest
+        if longest > step_limit:
+            step *= step_limit / longest
         return True
 
     def _limit(self, linear: Float32) -> bool:
