@@ -115,17 +115,17 @@ def _angle(case: Case, change: Float) -> Float:
 
 
 @lru_cache(4)
-def bound_of(case: Case) -> Float:
+def bound_of(case: Case, since_s: float = 0.0) -> Float:
     """Relative standard deviations of w, d1, d2 [3]: all that the refinement estimates is unknown, the drive is known.
 
-    The start's rates are left out; that of the skew is the angle's own rate.
+    The start's rates are left out; that of the skew is the angle's own rate. Samples before `since_s` are not used.
     """
     exact = _angle(case, np.zeros(len(_STEPS)))
     columns = [
         (_angle(case, step * unit) - exact) / step for step, unit in zip(_STEPS, np.eye(len(_STEPS)), strict=True)
     ]
     columns[5] = np.gradient(exact, 1 / RATE_HZ)
-    jacobian = np.stack(columns, axis=1)
+    jacobian = np.stack(columns, axis=1)[round(since_s * RATE_HZ) :]
     covariance = np.linalg.inv(jacobian.T @ jacobian) * sample_sd(case.bits) ** 2
     return np.sqrt(np.diag(covariance)[:3])
 
