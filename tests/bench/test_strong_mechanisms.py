@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from bench.strong_mechanisms import HEADER, ON, comparison_of, row_of
-from pvid.board.strong_image import differs_at, play_on_board
+from pvid.board.strong_image import play_on_board
 
 
 @pytest.mark.slow
@@ -21,6 +21,6 @@ def test_a_row_has_the_cost_of_each_board_and_equal_bits() -> None:
 def test_a_wrong_hash_is_found() -> None:
     run = comparison_of("rigid_body", 600)
     report = play_on_board("mps2-an386", run)
-    assert differs_at(report, run) is None
-    assert differs_at(replace(report, hash=report.hash ^ 1), run) == report.ticks
-    assert differs_at(replace(report, hashes={500: report.hashes[500] ^ 1}), run) == 500
+    assert report.differs_at(run.hashes) is None
+    assert replace(report, hash=report.hash ^ 1).differs_at(run.hashes) == report.ticks
+    assert replace(report, hashes={500: report.hashes[500] ^ 1}).differs_at(run.hashes) == 500

@@ -218,7 +218,7 @@ def test_the_motion_solves_the_equations_of_the_description(name: str) -> None:
 
 
 def softened(v: sp.Expr, width: sp.Symbol) -> sp.Expr:
-    """What stands in the place of sgn(v)."""
+    """The smooth replacement of sgn(v)."""
     return v / (v**4 + width**4) ** sp.Rational(1, 4)
 
 
@@ -349,7 +349,7 @@ def test_the_width_of_a_sign_is_refined_where_it_is_not_given() -> None:
     [
         ("dc_motor", True, (False, True), 0),
         ("two_mass_drive", True, (True,), 1),
-        ("cart_pendulum", True, (True, False), 0),  # gravity tells the pendulum's angles apart
+        ("cart_pendulum", True, (True, False), 0),  # gravity: the motion depends on the pendulum's angle
         ("battery_2rc", True, (False,), 2),
         ("rigid_body", False, (False,) * 3, 0),
         ("furuta", False, (False,) * 2, 0),

@@ -97,8 +97,7 @@ def run_case(case: Case, seed: int) -> Outcome:
     model, truth = case.simulation.model, case.simulation.truth
     identifier = case.identifier(seed)
     found = identifier.run_both(case.samples(seed))
-    entries = {one.place: k for k, one in enumerate(refine_functions(model).parameters) if one.place >= 0}
-    places = [entries[k] for k in range(len(truth))]
+    places = refine_functions(model).places_of_p
     there = np.any(found.r[-1] != 0)
     r, se = (np.where(there, one[-1].astype(np.float64), np.nan)[places] for one in (found.r, found.se))
     weak = np.array(list(identifier.estimator.p), np.float64)[: len(truth)]
@@ -144,22 +143,21 @@ def imperfect_rows(name: str, case: Case, seeds: int) -> Iterator[tuple[str, ...
     """A row for each imperfection but those of gains: errors of all published estimates, of their worst parameter."""
     simulation = case.simulation
     size = size_of(simulation)
-    entries = {one.place: k for k, one in enumerate(refine_functions(simulation.model).parameters) if one.place >= 0}
-    places = [entries[k] for k in range(len(simulation.truth))]
+    places = refine_functions(simulation.model).places_of_p
     for imperfection in CASES:
         imperfections = imperfection.of(simulation)
         if imperfections is None or imperfections.gain:
             continue
         ratios: list[Float] = []
         shares: list[Float] = []
-        stood = []
+        share_of_time = []
         for seed in range(seeds):
             samples = samples_of(case.config, simulation.run(seed, imperfections))
             found = case.identifier(seed).run_both(samples)
             there = np.any(found.r != 0, axis=1)
             new = there & np.concatenate([[True], np.any(found.r[1:] != found.r[:-1], axis=1)])
             error = np.abs(found.r[new][:, places] - simulation.truth)
-            stood.append(float(np.mean(there)))
+            share_of_time.append(float(np.mean(there)))
             if np.any(new):
                 ratios.append(error / found.se[new][:, places])
                 shares.append(error / size)
@@ -168,7 +166,7 @@ def imperfect_rows(name: str, case: Case, seeds: int) -> Iterator[tuple[str, ...
             ratio, share = np.concatenate(ratios), np.concatenate(shares)
             wrong = int(np.sum(np.any((ratio > 5) & (share > 0.01), axis=1)))
             cells = f"{np.median(ratio.max(1)):.1f}", f"{ratio.max():.1f}", f"{100 * share.max():.2g}", str(wrong)
-        yield name, imperfection.name, f"{len(ratios)} of {seeds}", f"{100 * np.mean(stood):.0f}", *cells
+        yield name, imperfection.name, f"{len(ratios)} of {seeds}", f"{100 * np.mean(share_of_time):.0f}", *cells
 
 
 def refined_rows(seeds: int, progress: Callable[[], None] = lambda: None) -> list[tuple[str, ...]]:

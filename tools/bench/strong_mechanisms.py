@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
-from pvid.board.strong_image import differs_at, play_on_board
+from pvid.board.strong_image import play_on_board
 from pvid.models import mechanisms
 from pvid.rig.run import Recording
 from pvid.run.strong_compare import StrongComparison
@@ -37,7 +37,7 @@ def row_of(name: str) -> tuple[str, ...]:
             costs.append("does not fit")
             continue
         costs.append(f"{report.instructions_mean:.0f} / {report.instructions_longest:.0f}")
-        equal = equal and differs_at(report, run) is None
+        equal = equal and report.differs_at(run.hashes) is None
         state = str(report.state_bytes) if state == "-" else state
     return name, str(run.design.config.window), state, *costs, "equal" if equal else "DIFFERENT"
 

@@ -31,6 +31,7 @@ static const float of_position[AB + 1] = {1.0f / 2.0f,  1.0f / 6.0f,       1.0f 
 static const float of_velocity[AB + 1] = {
     1.0f,           1.0f / 2.0f,         5.0f / 12.0f,      3.0f / 8.0f, 251.0f / 720.0f,
     95.0f / 288.0f, 19087.0f / 60480.0f, 5257.0f / 17280.0f};
+
 static inline void begin_steps(pvid_refine_pass_f32 *self, const pvid_refine_steps_f32 *steps)
 {
     (void)steps;
@@ -167,14 +168,6 @@ static void end_double(pvid_refine_pass_f32 *self, const float u[])
     }
     memcpy(self->scratch[0], end, sizeof end);
 }
-#if PVID_REFINE_ORDER == 1
-static void make_kick(pvid_refine_pass_f32 *self)
-{
-    float factor[N_Q][N_Q];
-    make_factor(self->kick, (float)PVID_REFINE_SUB * self->h, factor);
-    spread(self->kick, factor);
-}
-#endif
 
 /* What the columns need, at the middle of the big step; `a`: the accelerations there. */
 PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[], const float u[], float a[])
@@ -188,6 +181,7 @@ PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[
     (void)r;
 #endif
 }
+
 /* The first accelerations of a block, and the residuals there. */
 static void start(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {

@@ -207,8 +207,8 @@ static void begin_from_prior(pvid_refine_f32 *self)
     for (size_t i = 0; i < PVID_REFINE_P; i++) {
         const size_t place = pvid_refine_place_of_p[i];
         const float size = pvid_refine_is_logarithmic_f32(place) ? self->weak[place] : 1.0f;
-        const float told = (PRIOR_ERRORS * self->weak_se[i]) / size;
-        const float prior = (told > LEAST_PRIOR) ? told : LEAST_PRIOR;
+        const float scaled = (PRIOR_ERRORS * self->weak_se[i]) / size;
+        const float prior = (scaled > LEAST_PRIOR) ? scaled : LEAST_PRIOR;
         sd[place] = (prior < sd[place]) ? prior : sd[place];
     }
     pvid_refine_prior_f32(sd, self->config.sd[0], self->triangle);
@@ -450,12 +450,12 @@ static float mean_square(const pvid_refine_f32 *self)
 }
 
 /* Whether the last step is small: beside the weak form's errors, or with signs, whose reversals make the motion jump
- * with each step, beside the errors of what the blocks know. */
+ * with each step, beside the errors of the blocks so far. */
 static bool is_settled(const pvid_refine_f32 *self)
 {
     bool settled = self->solve.size < self->config.step_max;
 #if PVID_REFINE_SIGNS > 0
-    settled = settled || (self->solve.promise < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
+    settled = settled || (self->solve.reduction < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
 #endif
     return settled;
 }

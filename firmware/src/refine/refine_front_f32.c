@@ -125,25 +125,19 @@ static void weights_of_means(const pvid_refine_front_f32 *self, float t, float w
     weight[3] = 0.0f;
 }
 
-void pvid_refine_front_read_part_f32(const pvid_refine_front_f32 *self, uint32_t entry, float from, float to,
-                                     pvid_refine_signals_f32 *signals)
+void pvid_refine_front_between_f32(const pvid_refine_front_f32 *self, uint32_t entry, float t, float input[])
 {
-    const float time[3] = {from, 0.5f * (from + to), to};
-    float *input[3] = {signals->u, signals->middle, signals->end};
-    for (size_t k = 0; k < 3u; k++) {
-        float weight[2][4];
-        weights_of_samples(time[k], weight[0]);
-        weights_of_means(self, time[k], weight[1]);
-        for (size_t i = 0; i < INPUTS; i++) {
-            const float *own = weight[self->held_between[i] ? 1 : 0];
-            float sum = 0.0f;
-            for (uint32_t j = 0; j < 4u; j++) {
-                sum += own[j] * (float)self->ring[(entry + j - 1u) & MASK][i];
-            }
-            input[k][i] = sum * self->from_counts[i];
+    float weight[2][4];
+    weights_of_samples(t, weight[0]);
+    weights_of_means(self, t, weight[1]);
+    for (size_t i = 0; i < INPUTS; i++) {
+        const float *own = weight[self->held_between[i] ? 1 : 0];
+        float sum = 0.0f;
+        for (uint32_t j = 0; j < 4u; j++) {
+            sum += own[j] * (float)self->ring[(entry + j - 1u) & MASK][i];
         }
+        input[i] = sum * self->from_counts[i];
     }
-    pvid_refine_front_outputs_f32(self, self->ring[(entry + 1u) & MASK], signals->z);
 }
 #endif
 

@@ -97,9 +97,9 @@ PVID_ALWAYS_INLINE uint32_t pvid_refine_front_end_f32(const pvid_refine_front_f3
 }
 
 /* Outputs of an entry. */
-PVID_ALWAYS_INLINE void pvid_refine_front_outputs_f32(const pvid_refine_front_f32 *self, const int16_t value[],
-                                                      float output[])
+PVID_ALWAYS_INLINE void pvid_refine_front_outputs_f32(const pvid_refine_front_f32 *self, uint32_t entry, float output[])
 {
+    const int16_t *value = self->ring[entry & ((uint32_t)PVID_REFINE_RING - 1u)];
     PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_OUTPUTS; i++)
     {
         const int16_t z = value[PVID_REFINE_INPUTS + i];
@@ -117,7 +117,7 @@ PVID_ALWAYS_INLINE void pvid_refine_front_read_f32(const pvid_refine_front_f32 *
     {
         signals->u[i] = (float)value[i] * self->from_counts[i];
     }
-    pvid_refine_front_outputs_f32(self, value, signals->z);
+    pvid_refine_front_outputs_f32(self, entry, signals->z);
 }
 
 #if PVID_REFINE_TURNING
@@ -132,10 +132,9 @@ static inline float pvid_refine_turned(float difference, float turn)
 #endif
 
 #if PVID_REFINE_RUNGE_KUTTA
-/* Signals of a part of the step from an entry to the next one: from `from` to `to`, 0..1. Inputs are those of the cubic
- * through the two entries and their neighbours. */
-void pvid_refine_front_read_part_f32(const pvid_refine_front_f32 *self, uint32_t entry, float from, float to,
-                                     pvid_refine_signals_f32 *signals);
+/* Inputs at the time t, 0..1 from an entry to the next one: of the cubic through the two entries and their neighbours;
+ * held ones of the parabola with the means of this step and its neighbours. */
+void pvid_refine_front_between_f32(const pvid_refine_front_f32 *self, uint32_t entry, float t, float input[]);
 #endif
 
 #endif

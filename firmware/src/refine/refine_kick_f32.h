@@ -133,6 +133,16 @@ static void spread(float kick[], float factor[][N_Q])
     }
 }
 
+#if !PVID_REFINE_RUNGE_KUTTA
+/* F K and F B over a big step. */
+static void make_kick(pvid_refine_pass_f32 *self)
+{
+    float factor[N_Q][N_Q];
+    make_factor(self->kick, (float)PVID_REFINE_SUB * self->h, factor);
+    spread(self->kick, factor);
+}
+#endif
+
 #endif
 
 #endif

@@ -57,6 +57,7 @@ static void double_factor(pvid_refine_pass_f32 *self)
         }
     }
 }
+
 /* Adds the derivatives at the beginning of a part to their mean over the big step; `a`: the rates there. */
 PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float u[], float a[])
 {
@@ -69,6 +70,7 @@ PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float u[
         self->kick[i] += share * found[i];
     }
 }
+
 #if PVID_REFINE_SKEW
 /* New rates `a`, and their change. */
 static void renew(pvid_refine_pass_f32 *self, const float a[])
@@ -225,16 +227,28 @@ static inline void kick_job(pvid_refine_pass_f32 *self)
     }
 }
 
-/* Signals of a job, `entry`: the last one that it needs. */
+/* Signals of a job, `entry`: the last one that it needs. Of a part of a step its first half takes the inputs at the
+ * beginning and the middle, its other half those at the middle and the end, and the outputs. */
 static inline void read_signals(const pvid_refine_pass_f32 *self, const pvid_refine_front_f32 *front, uint32_t entry,
                                 pvid_refine_signals_f32 *signals)
 {
-    if (self->job == (uint8_t)START) {
+    const uint32_t begin = entry - 2u; /* of the step */
+    const float part = 1.0f / (float)self->parts;
+    const float from = (float)self->part * part;
+    const float to = (float)(self->part + 1u) * part;
+    switch (self->job) {
+    case START:
         pvid_refine_front_read_f32(front, entry, signals);
-    } else {
-        const float part = 1.0f / (float)self->parts;
-        pvid_refine_front_read_part_f32(front, entry - 2u, (float)self->part * part, (float)(self->part + 1u) * part,
-                                        signals);
+        break;
+    case SLOPES:
+        pvid_refine_front_between_f32(front, begin, from, signals->u);
+        pvid_refine_front_between_f32(front, begin, 0.5f * (from + to), signals->middle);
+        break;
+    default:
+        pvid_refine_front_between_f32(front, begin, 0.5f * (from + to), signals->middle);
+        pvid_refine_front_between_f32(front, begin, to, signals->end);
+        pvid_refine_front_outputs_f32(front, entry - 1u, signals->z);
+        break;
     }
 }
 

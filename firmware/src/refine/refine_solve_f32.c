@@ -244,7 +244,7 @@ static bool solve(pvid_refine_solve_f32 *self, const float prior_sd[], float ste
     float largest = 0.0f;
     float bend = 0.0f;
 #if PVID_REFINE_SIGNS > 0
-    self->promise = 0.0f;
+    self->reduction = 0.0f;
 #endif
     for (size_t i = N; i > 0u; i--) {
         const size_t k = i - 1u;
@@ -258,7 +258,7 @@ static bool solve(pvid_refine_solve_f32 *self, const float prior_sd[], float ste
         }
         step[k] = sum / entry[0];
 #if PVID_REFINE_SIGNS > 0
-        self->promise += self->right[k] * self->right[k];
+        self->reduction += self->right[k] * self->right[k];
 #endif
         const float size = ((step[k] < 0.0f) ? -step[k] : step[k]) / prior_sd[k];
         longest = (size <= longest) ? longest : size;

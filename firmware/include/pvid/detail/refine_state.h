@@ -129,7 +129,7 @@ typedef struct {
     float size;                         /* of the step before it is shortened [prior_sd] */
     float bend;                         /* likewise of its logarithms, on which the motion depends least linearly */
 #if PVID_REFINE_SIGNS > 0
-    float promise; /* by how much the step lessens the sum of squares */
+    float reduction; /* of the sum of squares, which the linearized step predicts */
 #endif
     float residual; /* sum of squares of the block after its own fit */
     float clash;    /* what the block and the past cannot both have, squared */

@@ -89,11 +89,6 @@ def play_on_board(target: str, run: StrongComparison) -> ReplayReport:
     return play(board, image, _START_S + _SECONDS_A_TICK * ticks)
 
 
-def differs_at(report: ReplayReport, run: StrongComparison) -> int | None:
-    """The first tick whose hash is not that of this machine; None: there is none."""
-    return report.differs_at(run.hashes)
-
-
 def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:
     """Runs a recording on an emulated board and compares every hash that it reports.
 
@@ -103,7 +98,7 @@ def compare_on_board(target: str, run: StrongComparison, law: str) -> Outcome:
         As play_on_board.
     """
     report = play_on_board(target, run)
-    apart = differs_at(report, run)
+    apart = report.differs_at(run.hashes)
     verdict = "equal" if apart is None else f"DIFFERENT: hash at tick {apart}"
     return Outcome(target, "f32", "strong", law, report.ticks, report.hash, apart is None, verdict)
 

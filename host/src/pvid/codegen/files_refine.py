@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -122,7 +122,7 @@ def shape(made: RefineFunctions, command: str) -> str:
         ("SKEW", int(made.skew), "1: the entry behind them is the skew of the sensors"),
         ("PARAMETERS", len(made.parameters), "entries of r"),
         ("CONSTANTS", len(made.constants), "that the equations need of r"),
-        ("P", sum(one.place >= 0 for one in made.parameters), "entries of the weak form's p that r needs"),
+        ("P", len(made.places_of_p), "entries of the weak form's p that r needs"),
         ("MODEL_ID", refine_id(made), "changes with everything that the generated functions are made from"),
     ]
     wide = max(len(f"{name} {value}") for name, value, _ in counts)
@@ -146,7 +146,7 @@ def _ring(entries: int) -> list[str]:
 
 
 def header(made: RefineFunctions, command: str) -> str:
-    """refine_model_f32: the functions."""
+    """refine_model_f32.h: the functions."""
     check_outputs(made)
     kinds = {kind for one in made.functions.values() for kind in one.program.kinds}
     about = [
@@ -266,20 +266,19 @@ def _input(made: RefineFunctions, jet: sp.Symbol) -> str:
     return str(jet)
 
 
-def _table(name: str, size: str, values: list[int]) -> str:
+def _table(name: str, size: str, values: Sequence[int]) -> str:
     return f"static const uint8_t pvid_refine_{name}[PVID_REFINE_{size}] = {{{', '.join(map(str, values))}}};"
 
 
 def _places(made: RefineFunctions) -> list[str]:
     """Between p of the weak form and r."""
     to_r = [f"r[{k}] = {f'p[{one.place}]' if one.place >= 0 else '0.0f'};" for k, one in enumerate(made.parameters)]
-    by_p = {one.place: k for k, one in enumerate(made.parameters) if one.place >= 0}
     return [
         "/* r of an estimate of the weak form; entries that it does not have are 0, widths as well. */",
         definition("static inline void pvid_refine_from_p(const float p[], float r[])", to_r),
         "",
         "/* Entries of p by that of r, for the comparison of the two estimates. */",
-        _table("place_of_p", "P", [by_p[place] for place in sorted(by_p)]),
+        _table("place_of_p", "P", made.places_of_p),
     ]
 
 

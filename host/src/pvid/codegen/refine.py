@@ -122,6 +122,12 @@ class RefineFunctions:
     measured: tuple[int, ...]
     functions: Mapping[str, RefineFunction] = field(repr=False)
 
+    @property
+    def places_of_p(self) -> list[int]:
+        """Entries of r, by those of the weak form's p."""
+        entry = {one.place: k for k, one in enumerate(self.parameters) if one.place >= 0}
+        return [entry[place] for place in sorted(entry)]
+
 
 def width_name(argument: sp.Expr) -> str:
     """Of the setting that is the width of the sign of this argument."""

@@ -128,7 +128,6 @@ class GeneratedRefine:
         self.made = made
         self._twin = loaded(made)
         self._still = made.moving - made.skew  # first entry of r that does not change the motion
-        by_p = {one.place: k for k, one in enumerate(made.parameters) if one.place >= 0}
         self.shape = RefineShape(
             order=made.order,
             coordinates=len(made.coordinates),
@@ -139,7 +138,7 @@ class GeneratedRefine:
             skew=made.skew,
             rates=any(is_nonzero(made, "Zv")),
             logarithmic=tuple(one.log for one in made.parameters),
-            place_of_p=tuple(by_p[place] for place in sorted(by_p)),
+            place_of_p=tuple(made.places_of_p),
             runge_kutta=made.runge_kutta,
             signs=len(signs_of(made.model)),
             widths=len(widths(made)),

@@ -27,6 +27,7 @@ from pvid.sim.pendulum import simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
+State = tuple[Float32, Float32]  # q, v
 
 _STILL = 0.04  # h |lambda| up to which Adams-Bashforth is stable for a decay
 _LEAST = 4.0  # periods of the fastest motion in a block
@@ -122,12 +123,12 @@ def refine_settings(
             range_ = _HALF_TURN * _step_of(model.signal(name))
         source = Source.SAMPLED if order == -1 else sources.get(place, Source.SAMPLED)
         signal.append(RefineSignal(place, order, scale, range_, source))
-    r = r_of(made, p)
-    jumps = _jumps(made, r, run, rate)
+    motion, states, r = GeneratedRefine(made), list(_states(made, run, rate)), r_of(made, p)
+    jumps = _jumps(motion, r, states)
     rig = RefineRig(
         sample_rate=rate,
         slow_hz=2.0 / block_s,
-        fast_hz=max(fastest_hz(made, r, run, rate), _LEAST / block_s),
+        fast_hz=max(_fastest_hz(motion, r, states), _LEAST / block_s),
         signal=tuple(signal),
         sample_sd=tuple(model.signal(name).sd for name in made.outputs),
         prior_sd=tuple(one.prior_sd for one in made.parameters),
@@ -176,20 +177,20 @@ def _curvature(x: Float, rate: float, block_s: float) -> Float:
     return np.asarray(np.diff(mean, 2) * (rate / step) ** 2)
 
 
-def fastest_hz(made: RefineFunctions, r: Float, run: Mapping[str, npt.ArrayLike], rate: float) -> float:
+def _fastest_hz(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> float:
     """Of the motion, as an oscillation that needs as short a step: at most of the run's states.
 
     In the others a soft sign changes, or a large motion is at its fastest for a moment. (With a step for three quarters
     of the rotary pendulum's states hardly a block fits; with one for 85 % its estimates are 2 times the bound off.)
     """
     found = []
-    for q, v in _states(made, run, rate):
-        rates = np.linalg.eigvals(_slopes(made, r, q, v))
-        if made.runge_kutta:
+    for q, v in states:
+        rates = np.linalg.eigvals(_slopes(motion, r, q, v))
+        if motion.made.runge_kutta:
             found.append(np.abs(rates).max() / (2 * np.pi))
         else:
             found.append(max(np.abs(rates.imag).max() / (2 * np.pi), np.abs(rates.real).max() / _STILL / _A_PERIOD))
-    return float(np.quantile(found, _WITH_SIGNS if signs_of(made.model) else _WITHOUT))
+    return float(np.quantile(found, _WITH_SIGNS if signs_of(motion.made.model) else _WITHOUT))
 
 
 def r_of(made: RefineFunctions, p: npt.ArrayLike, width: float = _SHARP) -> Float:
@@ -198,26 +199,26 @@ def r_of(made: RefineFunctions, p: npt.ArrayLike, width: float = _SHARP) -> Floa
     return np.array([given[x.place] if x.place >= 0 else width if x.sign else 0.0 for x in made.parameters])
 
 
-def _slopes(made: RefineFunctions, r: Float, q: Float32, v: Float32) -> Float:
+def _slopes(motion: GeneratedRefine, r: Float, q: Float32, v: Float32) -> Float:
     """Derivatives of the rates of all states by the states."""
-    model, n = GeneratedRefine(made), len(made.coordinates)
-    slopes = model.jacobian(model.constants(r.astype(np.float32)), q, v, np.zeros(len(made.inputs), np.float32))
+    made, n = motion.made, len(motion.made.coordinates)
+    slopes = motion.jacobian(motion.constants(r.astype(np.float32)), q, v, np.zeros(len(made.inputs), np.float32))
     K = np.asarray(slopes.K, float)
     if made.order == 1:
         return K
     return np.block([[np.zeros((n, n)), np.eye(n)], [K, np.asarray(slopes.D, float)]])
 
 
-def _jumps(made: RefineFunctions, r: Float, run: Mapping[str, npt.ArrayLike], rate: float) -> tuple[float, ...]:
+def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[float, ...]:
     """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined."""
-    states = list(_states(made, run, rate))
+    made = motion.made
     q, v = states[len(states) // 2]
     still = np.where([name.endswith("_1") for name in made.coordinates], np.float32(0), q)
     found = []
     for place in (k for k, one in enumerate(made.parameters) if one.sign):
         soft = r.copy()
         soft[place] = _SOFT
-        change = _slopes(made, r, still, v) - _slopes(made, soft, still, v)  # of rank 1
+        change = _slopes(motion, r, still, v) - _slopes(motion, soft, still, v)  # of rank 1
         found.append(2 * _SHARP * abs(float(np.trace(change))))
     return tuple(found)
 
@@ -244,7 +245,7 @@ def _values(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float
     return found
 
 
-def _states(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float) -> Iterator[tuple[Float32, Float32]]:
+def _states(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float) -> Iterator[State]:
     """q and v of the run; what is not measured is 0."""
     values = _values(made, run, rate)
     none = np.zeros(len(values[made.outputs[0]]))

@@ -168,7 +168,7 @@ def _values(answer: MechanismAnswer, made: RefineFunctions, estimate: npt.NDArra
     r = np.asarray(estimate["r"], np.float64)
     unit = np.where([one.log for one in parameters], r, 1.0)
     covariance = np.asarray(estimate["covariance"], np.float64) * np.outer(unit, unit)
-    places = [next(k for k, one in enumerate(parameters) if one.place == n) for n in range(len(answer.found.p))]
+    places = made.places_of_p
     gains = refined_gains_of(answer.model, answer.found)
     values = values_of(answer.model, r[places], covariance[np.ix_(places, places)], gains, identified=answer.identified)
     for k, one in enumerate(parameters):

@@ -178,8 +178,7 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
         )
         return answer, refined, text
     made = refined.problem.kernel.made
-    places = [next(k for k, one in enumerate(made.parameters) if one.place == n) for n in range(len(weak.p))]
-    p, covariance = refined.problem.values(found, places)
+    p, covariance = refined.problem.values(found, made.places_of_p)
     values = values_of(model, p, covariance, refined_gains_of(model, weak), identified=answer.identified)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
     return replace(answer, values=values), refined, text

@@ -177,8 +177,8 @@ class RefineTwin:
         if self.shape.signs:
             for i, place in enumerate(self.shape.place_of_p):
                 size = self.weak[place] if self.steps.logarithmic[place] else _F(1)
-                told = (_PRIOR_ERRORS * self.weak_se[i]) / size
-                prior = told if told > _LEAST_PRIOR else _LEAST_PRIOR
+                scaled = (_PRIOR_ERRORS * self.weak_se[i]) / size
+                prior = scaled if scaled > _LEAST_PRIOR else _LEAST_PRIOR
                 sd[place] = prior if prior < sd[place] else sd[place]
         self.triangle = np.diag(self.sd[0] / sd)
 
@@ -322,7 +322,7 @@ class RefineTwin:
     def _is_settled(self) -> bool:
         if self.solve.size < _F(self.config.step_max):
             return True
-        return self.shape.signs > 0 and bool(self.solve.promise < _SETTLED * self.variance)
+        return self.shape.signs > 0 and bool(self.solve.reduction < _SETTLED * self.variance)
 
     def _end_block(self) -> None:
         config, square = self.config, self._mean_square()

@@ -18,8 +18,6 @@ _LATE = 3  # PVID_REFINE_LATE
 _PERIOD = 64
 _PART = _F(0.58)
 _LARGEST = _F(3.4e38)
-
-
 _MOST_COUNTS = _F(2e9)
 
 
@@ -184,9 +182,8 @@ class Front:
             self.ring[self.next % self.size, signal] = self._counts(signal, x)
 
     def _end_block(self, last: Float32) -> Entry:
-        about = np.logical_and(self.is_held, np.logical_not(self.held_between))
-        self.sum = np.where(about, self.sum + _F(0.5) * (self.held - last), self.sum)
         if not self.runge_kutta:
+            self.sum = np.where(self.is_held, self.sum + _F(0.5) * (self.held - last), self.sum)
             self.held = last
         if not np.all(np.isfinite(self.sum[: self.inputs])):
             return Entry.BROKEN

@@ -144,7 +144,7 @@ class Solve:
     def _solve(self, prior_sd: Float32, step_limit: np.float32) -> bool:
         n = self.shape.parameters
         step = self.step
-        longest = largest = bend = self.promise = _F(0)
+        longest = largest = bend = self.reduction = _F(0)
         for k in range(n - 1, -1, -1):
             total = self.right[k]
             for j in range(k + 1, n):
@@ -152,7 +152,7 @@ class Solve:
             if not self.triangle[k, k] > 0:
                 return False
             step[k] = total / self.triangle[k, k]
-            self.promise = self.promise + self.right[k] * self.right[k]
+            self.reduction = self.reduction + self.right[k] * self.right[k]
             size = (-step[k] if step[k] < 0 else step[k]) / prior_sd[k]
             longest = longest if size <= longest else size
             if self.steps.is_width[k]:
