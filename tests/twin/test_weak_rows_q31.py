@@ -38,6 +38,12 @@ def scaled_theta(one: Rig, kind: int, factor: float, lanes: int) -> Scaled:
     return Scaled(*(np.repeat(numbers[:, k : k + 1], lanes, axis=1) for k in range(2)))
 
 
+def white_of(one: Rig, kind: int, theta: Scaled) -> weak_white.White:
+    """With the design's variance of the equation's own error."""
+    variance = Scaled(*(np.full_like(theta.m[0], x) for x in one.design.error_variance[kind]))
+    return weak_white.white(one.design, kind, theta, variance)
+
+
 def windows_of(one: Rig) -> Int:
     return weak_collect.collect(one.counts, one.design).windows
 
@@ -47,7 +53,7 @@ def test_c_and_twin_have_the_same_columns(one: Rig, core: Core, factor: float) -
     windows = windows_of(one)
     for kind in range(len(one.design.model.kind)):
         theta = scaled_theta(one, kind, factor, len(windows))
-        made = weak_white.columns(weak_white.white(one.design, kind, theta), kind, windows)
+        made = weak_white.columns(white_of(one, kind, theta), kind, windows)
         for w in range(len(windows)):
             x, exponent, live = core.columns(one, kind, Scaled(theta.m[:, w], theta.e[:, w]), windows[w])
             assert np.array_equal(x, made.x[:, :, w])
@@ -65,7 +71,7 @@ def test_windows_of_zeros_and_of_full_scale_have_the_same_columns(one: Rig, core
             windows[:, place] = windows_of(one)[0, place]
     for kind in range(len(one.design.model.kind)):
         theta = scaled_theta(one, kind, 1.0, len(windows))
-        made = weak_white.columns(weak_white.white(one.design, kind, theta), kind, windows)
+        made = weak_white.columns(white_of(one, kind, theta), kind, windows)
         for w in range(len(windows)):
             x, exponent, live = core.columns(one, kind, Scaled(theta.m[:, w], theta.e[:, w]), windows[w])
             assert np.array_equal(x, made.x[:, :, w])
@@ -79,7 +85,7 @@ def test_products_of_columns_are_those_of_the_oracle(one: Rig) -> None:
     theta = one.compiled.parameters.theta(one.truth)
     for kind in range(len(one.design.model.kind)):
         scaled = scaled_theta(one, kind, 1.0, len(windows))
-        made = weak_white.columns(weak_white.white(one.design, kind, scaled), kind, windows)
+        made = weak_white.columns(white_of(one, kind, scaled), kind, windows)
         found = made.x * 2.0 ** made.exponent[:, np.newaxis, :]
         found[:, np.arange(found.shape[1])[:, np.newaxis] < made.live] = 0
         white = one.rows.white((kind,), theta, [EquationError()] * one.rows.kinds)

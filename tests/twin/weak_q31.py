@@ -237,7 +237,7 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     }
     pvid_weak_white_init_q31(&white, design);
     pvid_weak_white_weigh_q31(&white, design, (uint8_t)kind, theta, 0, design->n_noise, weight);
-    pvid_weak_white_spectrum_q31(&white, design, (uint8_t)kind, weight, 0, harmonics);
+    pvid_weak_white_spectrum_q31(&white, design, (uint8_t)kind, design->error_variance[kind], weight, 0, harmonics);
     const pvid_scaled_q31 least = pvid_weak_white_floor_q31(&white, design);
     pvid_weak_white_invert_q31(&white, least, 0, harmonics);
     for (size_t k = 0; k < pvid_weak_mirrors_q31(design); k++) {

@@ -181,6 +181,7 @@ PVID_COLD void pvid_trust_begin_anew_f32(pvid_trust_f32 *self, const pvid_estima
     self->groups = 0;
     self->groups_to_fade = 0;
     self->converged = false;
+    self->arrived = false;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
     restart_alarm(self);
 }
@@ -249,8 +250,8 @@ PVID_COLD static void raise_alarm(pvid_trust_f32 *self, const pvid_estimator_f32
     }
 }
 
-PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason reason, float size, bool above_noise,
-                                        float error, const pvid_estimate_f32 *candidate)
+PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason reason, bool above_noise, float error,
+                                        const pvid_estimate_f32 *candidate)
 {
     if (reason != PVID_UPDATED) {
         return reason;
@@ -259,9 +260,7 @@ PVID_COLD static pvid_reason verdict_on(const pvid_trust_f32 *self, pvid_reason 
         !(candidate->least_pivot >= self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    const float small_enough = ARRIVED * error;
-    const bool arrived = size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
-    if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !arrived) {
+    if ((self->groups < self->config.groups_min) || !(error <= self->config.se_max) || !self->arrived) {
         return PVID_HELD_UNCERTAIN;
     }
     return PVID_UPDATED;
@@ -300,8 +299,10 @@ PVID_COLD pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_est
     pvid_trust_count_uninformative(&self->uninformative, reason, pvid_trust_fallback_f32(self) != NULL);
     const float error = pvid_trust_largest_error_f32(estimator, candidate);
     const bool settled = (reason == PVID_UPDATED) && (size <= SETTLED_STEP);
+    const float small_enough = ARRIVED * error;
+    self->arrived = (reason == PVID_UPDATED) && (size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP));
     raise_alarm(self, estimator, settled, variance_ratio, error, candidate);
-    return verdict_on(self, reason, size, above_noise, error, candidate);
+    return verdict_on(self, reason, above_noise, error, candidate);
 }
 
 PVID_COLD pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,

@@ -166,6 +166,7 @@ void pvid_trust_begin_anew_q31(pvid_trust_q31 *self, const pvid_estimator_q31 *e
     self->groups = 0;
     self->groups_to_fade = 0;
     self->converged = false;
+    self->arrived = false;
     memcpy(self->anchor, estimator->p, sizeof self->anchor);
     restart_alarm(self);
 }
@@ -210,12 +211,13 @@ static void renew_if_stale(pvid_trust_q31 *self, const pvid_estimator_q31 *estim
     }
 }
 
-/* Sets the alarm and renews the sums if they are stale. `settled`: the last step was small. */
+/* Sets the alarm and renews the sums if they are stale. `settled`: the last step was small; error: the largest relative
+ * standard error. */
 static void raise_alarm(pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, bool settled, int64_t variance_ratio,
-                        const pvid_estimate_q31 *candidate)
+                        int64_t error, const pvid_estimate_q31 *candidate)
 {
     const bool agrees = all_rows_agree(self, estimator, candidate);
-    const bool errors_small = largest_error(estimator, candidate) <= SMALL_ERROR;
+    const bool errors_small = error <= SMALL_ERROR;
     const bool renewing = self->groups_to_fade > 0u;
     self->errors_small = errors_small;
     bool short_exceeds = false;
@@ -232,8 +234,16 @@ static void raise_alarm(pvid_trust_q31 *self, const pvid_estimator_q31 *estimato
     }
 }
 
-static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 *estimator, pvid_reason reason,
-                           int64_t size, bool above_noise, const pvid_estimate_q31 *candidate)
+/* Whether the last step was small beside the largest relative error. */
+static bool has_arrived(int64_t size, int64_t error)
+{
+    const int64_t clamped = pvid_clamp_q31(error, (int64_t)1 << 44);
+    const int64_t small_enough = pvid_round_shift_q31(clamped * ARRIVED, 16u + (ERROR_BITS - PVID_SIZE_BITS));
+    return size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
+}
+
+static pvid_reason verdict(const pvid_trust_q31 *self, pvid_reason reason, int64_t error, bool above_noise,
+                           const pvid_estimate_q31 *candidate)
 {
     if (reason != PVID_UPDATED) {
         return reason;
@@ -242,11 +252,7 @@ static pvid_reason verdict(const pvid_trust_q31 *self, const pvid_estimator_q31 
         (candidate->least_pivot < self->config.kappa_min)) {
         return PVID_HELD_NOT_EXCITED;
     }
-    const int64_t error = largest_error(estimator, candidate);
-    const int64_t clamped = pvid_clamp_q31(error, (int64_t)1 << 44);
-    const int64_t small_enough = pvid_round_shift_q31(clamped * ARRIVED, 16u + (ERROR_BITS - PVID_SIZE_BITS));
-    const bool arrived = size <= ((small_enough > SMALL_STEP) ? small_enough : SMALL_STEP);
-    if ((self->groups < self->config.groups_min) || (error > self->config.se_max) || !arrived) {
+    if ((self->groups < self->config.groups_min) || (error > self->config.se_max) || !self->arrived) {
         return PVID_HELD_UNCERTAIN;
     }
     return PVID_UPDATED;
@@ -294,8 +300,10 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
         return reason;
     }
     pvid_trust_count_uninformative(&self->uninformative, reason, pvid_trust_fallback_q31(self) != NULL);
-    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, candidate);
-    const pvid_reason judged = verdict(self, estimator, reason, size, above_noise, candidate);
+    const int64_t error = largest_error(estimator, candidate);
+    self->arrived = (reason == PVID_UPDATED) && has_arrived(size, error);
+    raise_alarm(self, estimator, (reason == PVID_UPDATED) && (size <= SETTLED_STEP), variance_ratio, error, candidate);
+    const pvid_reason judged = verdict(self, reason, error, above_noise, candidate);
     if (judged == PVID_UPDATED) {
         uint32_t number = self->mark.number[0];
         pvid_count_up(&number);

@@ -30,6 +30,7 @@ static const uint32_t layout[] = {
     PLACE(finish.work),
     PLACE(finish),
     PLACE(finish.gate),
+    PLACE(finish.error),
     PLACE(finish.white),
     PLACE(finish.scores),
     PLACE(finish.work.solve),

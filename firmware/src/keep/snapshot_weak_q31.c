@@ -30,6 +30,7 @@ static const uint32_t layout[] = {
     PLACE(finish),
     PLACE(finish.gate),
     PLACE(finish.scores),
+    PLACE(finish.error),
     PLACE(finish.work),
     PLACE(finish.work.rows.parts),
     PLACE(estimator),

@@ -115,15 +115,20 @@ void pvid_weak_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_weak_des
     }
 }
 
+pvid_scaled_q31 pvid_weak_noise_error_share_q31(const pvid_weak_design_q31 *design, size_t kind,
+                                                const pvid_scaled_q31 share[])
+{
+    const pvid_scaled_q31 functions = pvid_scaled_of_q31((int64_t)design->functions, 0);
+    return pvid_scaled_over_q31(share[design->error_order[kind]], functions);
+}
+
 /* All of the variance is sum c_j Q_j / K, and the share of the equation's own error. */
-pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_design_q31 *design, size_t kind,
-                                            const pvid_scaled_q31 share[])
+pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_design_q31 *design, pvid_scaled_q31 error_variance,
+                                            pvid_scaled_q31 error_share)
 {
     if (design->n_noise == 0u) {
         const pvid_scaled_q31 none = {0, 0};
         return none;
     }
-    const pvid_scaled_q31 error = pvid_scaled_times_q31(design->error_variance[kind], share[design->error_order[kind]]);
-    const pvid_scaled_q31 functions = pvid_scaled_of_q31((int64_t)design->functions, 0);
-    return pvid_scaled_minus_q31(pvid_scaled_of_q31(1, 0), pvid_scaled_over_q31(error, functions));
+    return pvid_scaled_minus_q31(pvid_scaled_of_q31(1, 0), pvid_scaled_times_q31(error_variance, error_share));
 }

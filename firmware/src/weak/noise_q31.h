@@ -25,8 +25,12 @@ void pvid_weak_noise_take_q31(pvid_estimator_q31 *estimator, const pvid_weak_des
                               const pvid_scaled_q31 theta[], size_t first, const int8_t n_bits[], int32_t y_bits,
                               pvid_scaled_q31 pull[]);
 
-/* The part of the rows' variance, 1, that the sensors' noise explains. */
-pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_design_q31 *design, size_t kind,
-                                            const pvid_scaled_q31 share[]);
+/* The part of the rows' variance, 1, that is for each unit of the variance of the equation's own error. */
+pvid_scaled_q31 pvid_weak_noise_error_share_q31(const pvid_weak_design_q31 *design, size_t kind,
+                                                const pvid_scaled_q31 share[]);
+
+/* The part that the sensors' noise explains. */
+pvid_scaled_q31 pvid_weak_noise_sensors_q31(const pvid_weak_design_q31 *design, pvid_scaled_q31 error_variance,
+                                            pvid_scaled_q31 error_share);
 
 #endif

@@ -16,6 +16,7 @@
 #include "solve/products_f32.h"
 #include "solve/staged_f32.h"
 #include "weak/columns_f32.h"
+#include "weak/error_f32.h"
 #include "weak/scores_f32.h"
 #include "weak/steps.h"
 #include "weak/sums_f32.h"
@@ -97,6 +98,8 @@ PVID_COLD pvid_status pvid_weak_finish_init_f32(pvid_weak_finish_f32 *self, cons
     self->compensation = config->compensation;
     pvid_weak_white_init_f32(&self->white, design, dt);
     pvid_weak_scores_init_f32(&self->scores, config->estimator.forgetting_s * windows_hz);
+    pvid_weak_error_init_f32(self->error, design);
+    self->left = 1.0f;
     self->stage = STAGE_IDLE;
     return PVID_OK;
 }
@@ -167,7 +170,8 @@ PVID_SELDOM static bool weigh_stage(pvid_weak_f32 *self)
 
 PVID_SELDOM static bool spectrum_stage(pvid_weak_f32 *self)
 {
-    pvid_weak_white_spectrum_f32(&self->finish.white, self->design, self->finish.kind);
+    pvid_weak_finish_f32 *finish = &self->finish;
+    pvid_weak_white_spectrum_f32(&finish->white, self->design, finish->kind, finish->error[finish->kind].variance);
     return false;
 }
 
@@ -452,6 +456,13 @@ PVID_COLD static void end_kind(pvid_weak_f32 *self)
     }
 }
 
+/* The rows so far count no more. */
+PVID_COLD static void begin_anew(pvid_weak_f32 *self)
+{
+    pvid_trust_begin_anew_f32(&self->trust, &self->estimator);
+    pvid_weak_scores_init_f32(&self->finish.scores, self->finish.scores.memory);
+}
+
 /* The estimator and the gate accept the kind, or the reason why not. */
 PVID_COLD static pvid_reason accept_kind(pvid_weak_f32 *self, float freedom)
 {
@@ -467,8 +478,7 @@ PVID_COLD static pvid_reason accept_kind(pvid_weak_f32 *self, float freedom)
         return PVID_REJECTED_OUTLIER;
     }
     if (verdict == PVID_GATE_OPENS) {
-        pvid_trust_begin_anew_f32(&self->trust, &self->estimator);
-        pvid_weak_scores_init_f32(&finish->scores, finish->scores.memory);
+        begin_anew(self);
     }
     return PVID_ACCUMULATED;
 }
@@ -485,7 +495,8 @@ PVID_COLD static bool gate_stage(pvid_weak_f32 *self)
         return false;
     }
     if (finish->used == 0u) {
-        const float factor = pvid_trust_fade_factor_f32(&self->trust);
+        const float factor = finish->left * pvid_trust_fade_factor_f32(&self->trust);
+        finish->left = 1.0f;
         if (factor < 1.0f) {
             pvid_information_fade_f32(&self->estimator.information, factor);
         }
@@ -507,6 +518,18 @@ PVID_COLD static bool pull_stage(pvid_weak_f32 *self)
     return goes_on(finish, last, all);
 }
 
+/* The residuals of the kind to the variance of its own error. */
+PVID_COLD static void take_error(pvid_weak_f32 *self)
+{
+    pvid_weak_finish_f32 *finish = &self->finish;
+    const pvid_weak_design_f32 *design = self->design;
+    const uint8_t kind = finish->kind;
+    const float residual = finish->rss / ((float)design->functions - (float)finish->live);
+    const float share = pvid_weak_white_error_share_f32(&finish->white, design, kind);
+    const float left = pvid_weak_error_take_f32(&finish->error[kind], design->error_variance[kind], residual, share);
+    finish->left = (left < finish->left) ? left : finish->left;
+}
+
 PVID_COLD static bool correct_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
@@ -519,6 +542,9 @@ PVID_COLD static bool correct_stage(pvid_weak_f32 *self)
         (void)pvid_estimator_add_to_b_f32(&self->estimator, finish->work.rows.pull);
     }
     finish->expected += pvid_weak_white_sensors_f32(&finish->white, self->design);
+    if (self->trust.arrived) {
+        take_error(self);
+    }
     return false;
 }
 
@@ -676,6 +702,9 @@ PVID_COLD static bool publish_stage(pvid_weak_f32 *self)
     finish->report = (uint8_t)pvid_trust_publish_f32(&self->trust, &self->estimator, (pvid_reason)finish->verdict,
                                                      finish->reason, &finish->candidate);
     finish->stage = STAGE_IDLE;
+    if (finish->left < 1.0f) {
+        begin_anew(self);
+    }
     return false;
 }
 

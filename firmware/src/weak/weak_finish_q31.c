@@ -11,6 +11,7 @@
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
 #include "weak/columns_q31.h"
+#include "weak/error_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/noise_q31.h"
 #include "weak/scores_q31.h"
@@ -96,6 +97,8 @@ pvid_status pvid_weak_finish_init_q31(pvid_weak_finish_q31 *self, const pvid_wea
         self->known.used = self->known.used || (design->error_variance[i].m > 0);
     }
     self->known.age = NOISE_WINDOWS;
+    pvid_weak_error_init_q31(self->error, design);
+    self->left = INT32_MAX;
     for (size_t i = 0; i < design->model->kinds; i++) {
         pvid_weak_white_init_q31(&self->white[i], design);
     }
@@ -169,7 +172,8 @@ static bool spectrum_stage(pvid_weak_q31 *self)
     const size_t harmonics = finish->white[finish->kind].cosines;
     const size_t end = lesser((size_t)finish->index + HARMONICS_PER_STAGE, harmonics);
     pvid_weak_white_spectrum_q31(&finish->white[finish->kind], self->design, finish->kind,
-                                 finish->work.rows.parts.noise.weight, finish->index, end);
+                                 finish->error[finish->kind].variance, finish->work.rows.parts.noise.weight,
+                                 finish->index, end);
     finish->index = (uint16_t)end;
     if (end == harmonics) {
         finish->work.rows.least = pvid_weak_white_floor_q31(&finish->white[finish->kind], self->design);
@@ -234,6 +238,24 @@ static void begin_noise(pvid_weak_q31 *self)
     }
 }
 
+/* What the sensors explain of the kind's rows; a variance of its own error that does not fit them is changed. */
+static void explain(pvid_weak_q31 *self)
+{
+    pvid_weak_finish_q31 *finish = &self->finish;
+    const pvid_weak_design_q31 *design = self->design;
+    pvid_weak_error_q31 *error = &finish->error[finish->kind];
+    const pvid_scaled_q31 share =
+        pvid_weak_noise_error_share_q31(design, finish->kind, finish->work.rows.parts.noise.share);
+    finish->known.sensors =
+        pvid_scaled_plus_q31(finish->known.sensors, pvid_weak_noise_sensors_q31(design, error->variance, share));
+    const pvid_scaled_q31 before = error->variance;
+    const int32_t left = pvid_weak_error_change_q31(error, design->error_variance[finish->kind], share);
+    finish->left = (left < finish->left) ? left : finish->left;
+    if ((error->variance.m != before.m) || (error->variance.e != before.e)) {
+        finish->known.age = NOISE_WINDOWS; /* the next window computes the noise anew */
+    }
+}
+
 /* C at p; what the sensors explain; then an entry of the table each. */
 static bool noise_stage(pvid_weak_q31 *self)
 {
@@ -249,8 +271,7 @@ static bool noise_stage(pvid_weak_q31 *self)
         pvid_system_jacobian_q31(&self->estimator, h, work->c, work->f);
         take_theta(self);
     } else if (finish->index == 1u) {
-        finish->known.sensors =
-            pvid_scaled_plus_q31(finish->known.sensors, pvid_weak_noise_sensors_q31(design, finish->kind, work->share));
+        explain(self);
     } else if (design->noise[finish->index - 2u].kind == finish->kind) {
         pvid_weak_noise_take_q31(&self->estimator, design, &design->noise[finish->index - 2u], work, work->of_theta,
                                  finish->theta, finish->n_bits, finish->y_bits, &finish->known.pull[finish->theta]);
@@ -395,22 +416,36 @@ static int64_t freedom_of(const pvid_weak_q31 *self)
     return (freedom > 0) ? freedom : 1;
 }
 
-/* Whether the gate accepts the kind; if it opens to a changed mechanism, the sums begin anew. Saturated rows pass; the
- * estimator rejects them. */
+/* The rows so far count no more. */
+PVID_COLD static void begin_anew(pvid_weak_q31 *self)
+{
+    pvid_trust_begin_anew_q31(&self->trust, &self->estimator);
+    memset(&self->finish.scores, 0, sizeof self->finish.scores);
+}
+
+/* Whether the gate accepts the kind, whose residuals may then change the variance of its own error; if it opens to a
+ * changed mechanism, the sums begin anew. Saturated rows pass; the estimator rejects them. */
 static bool passes(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
     pvid_gate_q31 *gate = &finish->gate[finish->kind];
-    if ((gate->limit.m == 0) || finish->saturated) {
+    if (finish->saturated) {
         return true;
     }
-    const pvid_gate_verdict verdict =
-        pvid_gate_judge_q31(gate, variance_ratio_of(finish->expected, finish->rss, freedom_of(self)));
-    if (verdict == PVID_GATE_OPENS) {
-        pvid_trust_begin_anew_q31(&self->trust, &self->estimator);
-        memset(&finish->scores, 0, sizeof finish->scores);
+    const pvid_scaled_q31 ratio = variance_ratio_of(finish->expected, finish->rss, freedom_of(self));
+    const pvid_gate_verdict verdict = (gate->limit.m == 0) ? PVID_GATE_ACCEPTS : pvid_gate_judge_q31(gate, ratio);
+    if (verdict == PVID_GATE_REJECTS) {
+        return false;
     }
-    return verdict != PVID_GATE_REJECTS;
+    if (verdict == PVID_GATE_OPENS) {
+        begin_anew(self);
+    }
+    const pvid_scaled_q31 least = self->design->error_variance[finish->kind];
+    if (finish->known.used && self->trust.arrived &&
+        pvid_weak_error_take_q31(&finish->error[finish->kind], least, ratio)) {
+        finish->known.age = NOISE_WINDOWS; /* the next window computes the noise anew */
+    }
+    return true;
 }
 
 static bool fade_stage(pvid_weak_q31 *self)
@@ -421,6 +456,11 @@ static bool fade_stage(pvid_weak_q31 *self)
     }
     if (finish->index == 0u) {
         finish->fade_factor = pvid_trust_fade_factor_q31(&self->trust);
+        if (finish->left < INT32_MAX) {
+            const int64_t factor = pvid_times_q31(finish->fade_factor, finish->left);
+            finish->fade_factor = (factor > 0) ? (int32_t)factor : 1;
+            finish->left = INT32_MAX;
+        }
     }
     if (finish->fade_factor > 0) {
         pvid_information_fade_q31(&self->estimator.information, finish->index, finish->fade_factor);
@@ -559,6 +599,9 @@ static void judge_stage(pvid_weak_q31 *self, pvid_reason *reason)
     pvid_weak_finish_q31 *finish = &self->finish;
     *reason = pvid_trust_judge_q31(&self->trust, &self->estimator, finish->reason, finish->size,
                                    finish->work.solve.above_noise, finish->rss, &finish->work.solve.matrix.estimate);
+    if (finish->left < INT32_MAX) {
+        begin_anew(self);
+    }
 }
 
 /* ---- the order of the stages ---- */

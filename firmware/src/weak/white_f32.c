@@ -86,13 +86,14 @@ static float polynomial_of(const float c[], size_t powers, float x)
     return sum;
 }
 
-void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind)
+void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
+                                  float error_variance)
 {
     const size_t harmonics = pvid_weak_harmonics(design);
     float mean = 0.0f;
     float c[PVID_MAX_POWER]; /* of the sensors and the equation */
     memcpy(c, self->weight, sizeof c);
-    c[design->error_order[kind]] += design->error_variance[kind];
+    c[design->error_order[kind]] += error_variance;
     for (size_t h = 0; h < harmonics; h++) {
         const float rate = (float)h * self->omega;
         self->scale[h] = samples_of(design, h) * polynomial_of(c, self->powers, rate * rate);
@@ -269,4 +270,10 @@ PVID_COLD float pvid_weak_white_sensors_f32(const pvid_weak_white_f32 *self, con
         sum += self->weight[j] * self->share[j];
     }
     return sum / (float)design->functions;
+}
+
+PVID_COLD float pvid_weak_white_error_share_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design,
+                                                uint8_t kind)
+{
+    return self->share[design->error_order[kind]] / (float)design->functions;
 }

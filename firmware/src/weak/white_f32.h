@@ -45,8 +45,9 @@ void pvid_weak_white_init_f32(pvid_weak_white_f32 *self, const pvid_weak_design_
 void pvid_weak_white_weigh_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
                                const float theta[], size_t first, size_t last);
 
-/* D_h from the weights and the equation's own error; then 1 / sqrt(D_h) in its place. */
-void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind);
+/* D_h from the weights and the variance of the equation's own error; then 1 / sqrt(D_h) in its place. */
+void pvid_weak_white_spectrum_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
+                                  float error_variance);
 void pvid_weak_white_scale_f32(pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design);
 
 /* The next of the basis' stages, counted from 0. */
@@ -67,7 +68,9 @@ void pvid_weak_white_share_f32(pvid_weak_white_f32 *self, const pvid_weak_design
 void pvid_weak_white_pull_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design, uint8_t kind,
                               const float x[], size_t first, size_t last, float out[]);
 
-/* Mean variance of the white rows by the sensors alone. */
+/* Mean variance of the white rows: by the sensors alone; for each unit of the variance of the own error. */
 float pvid_weak_white_sensors_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design);
+float pvid_weak_white_error_share_f32(const pvid_weak_white_f32 *self, const pvid_weak_design_f32 *design,
+                                      uint8_t kind);
 
 #endif

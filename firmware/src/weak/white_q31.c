@@ -61,17 +61,17 @@ static int64_t samples_of(const pvid_weak_design_q31 *design, size_t harmonic)
 }
 
 void pvid_weak_white_spectrum_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, uint8_t kind,
-                                  const pvid_scaled_q31 weight[], size_t first, size_t last)
+                                  pvid_scaled_q31 error_variance, const pvid_scaled_q31 weight[], size_t first,
+                                  size_t last)
 {
     const size_t order = design->error_order[kind];
-    const pvid_scaled_q31 error = design->error_variance[kind];
     for (size_t h = first; h < last; h++) {
         const pvid_scaled_q31 square = pvid_scaled_of_q31((int64_t)(h * h), 0);
         pvid_scaled_q31 sum = none;
         for (size_t j = self->powers; j > 0u; j--) {
             sum = pvid_scaled_plus_q31(pvid_scaled_times_q31(sum, square), weight[j - 1u]);
             if (j - 1u == order) {
-                sum = pvid_scaled_plus_q31(sum, error);
+                sum = pvid_scaled_plus_q31(sum, error_variance);
             }
         }
         sum = pvid_scaled_times_q31(sum, pvid_scaled_of_q31(samples_of(design, h), 0));

@@ -20,9 +20,10 @@ void pvid_weak_white_init_q31(pvid_weak_white_q31 *self, const pvid_weak_design_
 void pvid_weak_white_weigh_q31(const pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, uint8_t kind,
                                const pvid_scaled_q31 theta[], size_t first, size_t last, pvid_scaled_q31 weight[]);
 
-/* D_h of harmonics first..last-1 from the weights and the equation's own error. */
+/* D_h of harmonics first..last-1 from the weights and the variance of the equation's own error. */
 void pvid_weak_white_spectrum_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, uint8_t kind,
-                                  const pvid_scaled_q31 weight[], size_t first, size_t last);
+                                  pvid_scaled_q31 error_variance, const pvid_scaled_q31 weight[], size_t first,
+                                  size_t last);
 
 /* The least D_h: 2^-33 of the mean of all. */
 pvid_scaled_q31 pvid_weak_white_floor_q31(const pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design);

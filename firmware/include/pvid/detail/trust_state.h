@@ -18,6 +18,7 @@ struct pvid_trust_f32 {
     bool misfit;                    /* the alarm is raised */
     uint8_t groups_to_fade;         /* remaining groups of a renewal: before each the sums are multiplied by a factor */
     bool anew;                      /* the sums begin anew with the next group */
+    bool arrived;                   /* the last step of p was small beside its standard error */
     float anchor[PVID_MAX_P];       /* p at which the rows in the sums last agreed with p, or at the last renewal */
     float long_mean;                /* of the variance ratios (residual variance over its expectation) of the groups */
     float recent[PVID_TRUST_SHORT]; /* variance ratios of the last groups */

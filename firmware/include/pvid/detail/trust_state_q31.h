@@ -14,6 +14,7 @@ struct pvid_trust_q31 {
     uint8_t next;           /* place of the next group in `recent` */
     uint8_t groups_to_fade; /* remaining groups of a renewal: before each the sums are multiplied by a factor */
     bool anew;              /* the sums begin anew with the next group */
+    bool arrived;           /* the last step of p was small beside its standard error */
     bool errors_small;      /* the present standard errors are small; otherwise a renewal waits */
     bool converged;         /* p has once settled with small standard errors */
     bool published;         /* an estimate has been published */

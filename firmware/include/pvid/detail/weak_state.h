@@ -113,6 +113,13 @@ typedef struct {
     float neighbour[PVID_WEAK_PAIRS];
 } pvid_weak_scores_f32;
 
+/* Variance of an equation's own error. */
+typedef struct {
+    float variance;  /* in use */
+    float mean;      /* mean square of the white rows of the last windows */
+    uint8_t windows; /* in the mean */
+} pvid_weak_error_f32;
+
 /* Orthonormal directions that the test functions leave out, of each family. */
 typedef struct {
     float norm[2];                          /* of the present direction, before it was divided by it */
@@ -181,7 +188,9 @@ typedef struct {
     float expected;     /* sum over the kinds of the rows' variance by the sensors alone */
     float free;         /* rows less nuisances of the kinds that were added */
     float square;       /* sum of squares of their residuals before the steps */
+    float left;         /* of the older rows' information, behind this window: pvid_weak_error_take_f32 */
     pvid_gate_f32 gate[PVID_MAX_KINDS];
+    pvid_weak_error_f32 error[PVID_MAX_KINDS];
     pvid_weak_white_f32 white;
     pvid_weak_scores_f32 scores;
     pvid_weak_work_f32 work;

@@ -173,6 +173,13 @@ typedef struct {
     pvid_weak_pair_q31 pair[PVID_WEAK_PAIRS_Q31]; /* upper triangle, row by row */
 } pvid_weak_scores_q31;
 
+/* Variance of an equation's own error. */
+typedef struct {
+    pvid_scaled_q31 variance; /* in use, of h^(2 order) at a step */
+    int32_t mean;             /* mean square of the white rows of the last windows, Q8 */
+    uint8_t windows;          /* in the mean */
+} pvid_weak_error_q31;
+
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
     uint8_t stage;
@@ -193,6 +200,7 @@ typedef struct {
     int64_t size;             /* of the last step, relative, Q22 */
     int64_t rss;              /* of the kind's rows before the steps; from MEAN on the window's variance ratio */
     int32_t fade_factor;      /* factor on the sums before this window's rows, Q31; 0: none */
+    int32_t left;             /* of the older rows' information, behind this window, Q31: pvid_weak_error_change_q31 */
     pvid_scaled_q31 expected; /* variance of a row */
     int8_t n_bits[PVID_MAX_THETA_Q31]; /* formats of the rows */
     int8_t y_bits;
@@ -200,6 +208,7 @@ typedef struct {
     pvid_weak_known_q31 known;
     pvid_weak_white_q31 white[PVID_MAX_KINDS]; /* at the p of one of the last windows */
     pvid_weak_scores_q31 scores;
+    pvid_weak_error_q31 error[PVID_MAX_KINDS];
     pvid_weak_work_q31 work;
 } pvid_weak_finish_q31;
 

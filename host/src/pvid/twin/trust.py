@@ -53,6 +53,7 @@ class TrustTwin(ABC):
         self.anew = np.zeros(lanes, np.bool_)
         self.errors_small = np.zeros(lanes, np.bool_)
         self.converged = np.zeros(lanes, np.bool_)
+        self.arrived = np.zeros(lanes, np.bool_)
         self.published = np.zeros(lanes, np.bool_)
         self.misfit = np.zeros(lanes, np.bool_)
         self.long_mean: Array = np.zeros(lanes, self.number)
@@ -89,6 +90,7 @@ class TrustTwin(ABC):
         self.groups = 0
         self.groups_to_fade = np.zeros_like(self.groups_to_fade)
         self.converged = np.zeros_like(self.converged)
+        self.arrived = np.zeros_like(self.arrived)
         self.anchor = self.estimator.p.copy()
         self._restart_alarm(self.anew)
 
@@ -127,11 +129,12 @@ class TrustTwin(ABC):
         self._count_uninformative(stepped)
         error = self.largest_error(candidate)
         settled = stepped & (size <= self.settled_step)
+        self.arrived = stepped & self._has_arrived(size, error)
         self._raise_alarm(settled, error <= self.small_error, variance_ratio, candidate)
         enough_kappa = self.config.kappa_min
         excited = above_noise & (candidate["kappa"] >= enough_kappa) & (candidate["least_pivot"] >= enough_kappa)
         enough = self.groups >= self.config.groups_min
-        sure = enough & (error <= self.config.se_max) & self._has_arrived(size, error)
+        sure = enough & (error <= self.config.se_max) & self.arrived
         verdict = reason.copy()
         verdict[stepped & ~excited] = Reason.HELD_NOT_EXCITED
         verdict[stepped & excited & ~sure] = Reason.HELD_UNCERTAIN

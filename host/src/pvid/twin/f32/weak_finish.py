@@ -13,6 +13,7 @@ from pvid.twin.f32.estimator import RelativeEstimator
 from pvid.twin.f32.gate import Gate
 from pvid.twin.f32.trust import Trust
 from pvid.twin.f32.weak_columns import parts_of_columns, projected
+from pvid.twin.f32.weak_error import OwnError
 from pvid.twin.f32.weak_noise import Noise
 from pvid.twin.f32.weak_scores import Scores
 from pvid.twin.f32.weak_white import Rows, White, total
@@ -54,6 +55,8 @@ class Finish:
             Gate(config.gate, windows_hz, _GATE_MEMORY, np.ones(lanes, np.float32)) for _ in range(design.model.kinds)
         ]
         self.scores = Scores(len(estimator.p), estimator.forgetting_s * windows_hz)
+        self._left = np.ones(lanes, np.float32)  # of the older rows' information, behind a window
+        self.errors = [OwnError(_F(one), lanes) for one in design.error_variance]
         self.alone = False
         self.candidate: Candidate = np.zeros_like(trust.estimate)
 
@@ -161,7 +164,7 @@ class Finish:
         for kind, own in enumerate(self.design.model.kind):
             block = slice(first, first + own.thetas)
             theta = estimator.theta[block]
-            white = White(self.rows, kind, theta)
+            white = White(self.rows, kind, theta, self.errors[kind].variance)
             if self._checks_noise:
                 noise.add(white, first)
             first += own.thetas
@@ -184,17 +187,21 @@ class Finish:
                 yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
                 continue
             if of_all_lanes(opens):
-                self.trust.begin_anew()
-                self.scores.begin_anew()
+                self._begin_anew()
             if used == 0:
+                factor = self._left * self.trust.next_fade_factor()
+                self._left = np.ones(lanes, np.float32)
                 with np.errstate(all="ignore"):
-                    estimator.information.fade(self.trust.next_fade_factor())
+                    estimator.information.fade(factor)
                 estimator.sums = estimator.information.read()
             used += 1
             free, square = free + freedom, square + rss
             yield None
             yield from self._pull(white, block, score)
             expected = expected + white.sensors()
+            with np.errstate(all="ignore"):
+                left = self.errors[kind].take(self.trust.arrived, rss / freedom, white.error_share())
+            self._left = np.where(left < self._left, left, self._left)
             yield from self._add(kind, np.concatenate([n, e[None]]), squares, score[block], rss)
         if used == 0:
             self.scores.skip()
@@ -282,7 +289,14 @@ class Finish:
         yield None
         reported = self.trust.publish(verdict, reason, candidate)
         self.candidate = np.where(verdict == Reason.UPDATED, self.trust.estimate, candidate)  # with what it neglects
+        if of_all_lanes(self._left < 1):
+            self._begin_anew()
         yield reported
+
+    def _begin_anew(self) -> None:
+        """The rows so far count no more."""
+        self.trust.begin_anew()
+        self.scores.begin_anew()
 
     def _cluster(self, candidate: Candidate) -> None:
         """The larger of the two standard errors of each parameter; the covariance grows with it."""

@@ -54,15 +54,16 @@ class Rows:
 
 
 class White:
-    """Noise of the rows of a kind at its theta [thetas, lanes].
+    """Noise of the rows of a kind at its theta [thetas, lanes], with the variance of its own error [lanes].
 
     Attributes
     ----------
     full : theta, and -1 of Y [thetas + 1, lanes]
     """
 
-    def __init__(self, rows: Rows, kind: int, theta: Float32) -> None:
+    def __init__(self, rows: Rows, kind: int, theta: Float32, error_variance: Float32) -> None:
         self.rows, self.kind = rows, kind
+        self._error_variance = error_variance
         self.full = np.concatenate([theta, np.full((1, theta.shape[1]), _F(-1))])
         with np.errstate(all="ignore"):
             self.weight = self._weighed()
@@ -82,7 +83,7 @@ class White:
         rows, design = self.rows, self.rows.design
         own = self.weight.copy()
         order = int(design.error_order[self.kind])
-        own[order] = own[order] + _F(design.error_variance[self.kind])
+        own[order] = own[order] + self._error_variance
         spectrum = np.zeros((rows.harmonics, own.shape[1]), np.float32)
         for j in reversed(range(rows.powers)):
             spectrum = spectrum * rows.square[:, None] + own[j]
@@ -173,6 +174,11 @@ class White:
         """Mean variance of the white rows by the sensors alone [lanes]."""
         with np.errstate(all="ignore"):
             return total(self.weight * self.share) / _F(self.rows.design.functions)
+
+    def error_share(self) -> Float32:
+        """The same for each unit of the variance of the own error [lanes]."""
+        with np.errstate(all="ignore"):
+            return np.asarray(self.share[int(self.rows.design.error_order[self.kind])] / _F(self.rows.design.functions))
 
 
 def _reflection(x: Float32) -> Float32:

@@ -14,10 +14,11 @@ from pvid.twin.play import Work
 from pvid.twin.q31 import weak_noise, weak_white
 from pvid.twin.q31.estimator import ROW_LIMIT, EstimatorQ31
 from pvid.twin.q31.gate import GateQ31
-from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift
+from pvid.twin.q31.integer import WIDE, Int, clamp, integers, round_shift, times_q31
 from pvid.twin.q31.scaled import Scaled, scaled
 from pvid.twin.q31.trust import TrustQ31
 from pvid.twin.q31.weak_collect import Schedule
+from pvid.twin.q31.weak_error import NOTHING_LOST, OwnError
 from pvid.twin.q31.weak_scores import Scores
 from pvid.twin.record import Mask, of_all_lanes
 
@@ -129,6 +130,8 @@ class NoiseOfWindows:
         self.compensates = compensation and bool(design.noise)
         self.size = np.zeros(estimator.lanes, np.int64)  # of the last step
         self.white: dict[int, weak_white.White] = {}  # of each kind
+        self.errors = [OwnError(one, estimator.lanes) for one in design.error_variance]
+        self.left = np.full(estimator.lanes, NOTHING_LOST)  # of the older rows' information, behind a window
         self._age = _NOISE_WINDOWS
 
     def begin(self) -> bool:
@@ -138,11 +141,31 @@ class NoiseOfWindows:
         self._age = 1 if renewed else self._age + 1
         return renewed
 
+    def next_fade_factor(self, trust: TrustQ31) -> Int:
+        """On the sums before a window's rows [lanes]; 0: none."""
+        factor, left = trust.next_fade_factor(), self.left
+        self.left = np.full_like(left, NOTHING_LOST)
+        return np.where(left < NOTHING_LOST, np.maximum(times_q31(factor, left), 1), factor)
+
+    def take_residuals(self, kind: int, asked: Mask, residual: Scaled) -> None:
+        """Of a window's rows, in the lanes asked: mean square over its expectation [lanes]."""
+        if self.is_used and of_all_lanes(self.errors[kind].take(asked, residual)):
+            self._age = _NOISE_WINDOWS
+
+    def explain(self, kind: int, first: int, theta: Scaled, formats: tuple[Sequence[int], int]) -> None:
+        """What the sensors explain of a kind's rows; a variance of its own error that does not fit them is changed."""
+        before = self.errors[kind].variance
+        white = self.white[kind]
+        left = self.known.take(white, white.design, kind, first, theta, formats, self.errors[kind])
+        self.left = np.minimum(self.left, left)
+        after = self.errors[kind].variance
+        if of_all_lanes((after.m != before.m) | (after.e != before.e)):
+            self._age = _NOISE_WINDOWS
+
 
 def _take_noise(
     noise: NoiseOfWindows,
     renewed: bool,
-    white: weak_white.White,
     place: int,
     first: int,
     theta: Scaled,
@@ -150,10 +173,11 @@ def _take_noise(
 ) -> Work:
     """Of a kind, behind its rows, where it is computed anew."""
     if renewed and noise.is_used:
+        design = noise.white[place].design
         if not place:
-            noise.known.begin(white.design)
-        noise.known.take(white, white.design, place, first, theta, formats)
-        for _ in range(_noise_stages(white.design)):
+            noise.known.begin(design)
+        noise.explain(place, first, theta, formats)
+        for _ in range(_noise_stages(design)):
             yield None
 
 
@@ -182,7 +206,7 @@ def stages(
         own = slice(first, first + kind.thetas)
         theta = scaled(estimator.theta[own], -integers(estimator.theta_bits[own])[:, np.newaxis])
         if renewed:
-            noise.white[place] = weak_white.white(design, place, theta)
+            noise.white[place] = weak_white.white(design, place, theta, noise.errors[place].variance)
             for _ in range(_white_stages(design)):
                 yield None
         white = noise.white[place]
@@ -200,27 +224,28 @@ def stages(
             rss = clamp(rss + innovations[k] * innovations[k], WIDE)
         for _ in range(_stages_before_gate(design, kind, live) - 1):
             yield None
-        gate = gates[place]
+        gate, residual = gates[place], _ratio(rss, freedom, expected)
         if gate.is_on:
-            passes, opens = gate.judge(_ratio(rss, freedom, expected), ~saturated)
+            passes, opens = gate.judge(residual, ~saturated)
             if not of_all_lanes(passes):
                 estimator.counters["rejected_outlier"] += 1
                 yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
-                yield from _take_noise(noise, renewed, white, place, first, theta, formats)
+                yield from _take_noise(noise, renewed, place, first, theta, formats)
                 first += kind.thetas
                 continue
             if of_all_lanes(opens):
                 trust.begin_anew()
                 scores.begin_anew()
+        noise.take_residuals(place, trust.arrived & ~saturated, residual)
         yield None
         if used:
             yield None
         else:
-            yield from estimator.fade(trust.next_fade_factor())
+            yield from estimator.fade(noise.next_fade_factor(trust))
         for k in range(live, design.functions):
             added = estimator.take_row(n[k], innovations[k], ~saturated, place)
             yield None if (added == Reason.ACCUMULATED).all() else added
-        yield from _take_noise(noise, renewed, white, place, first, theta, formats)
+        yield from _take_noise(noise, renewed, place, first, theta, formats)
         first += kind.thetas
         if noise.compensates:
             estimator.add_to_b(_of_kind(known.pull, own, ~saturated))
@@ -250,4 +275,8 @@ def stages(
     if estimator.was_due:
         rows = estimator.divider * sum(design.functions - kind.nuisances for kind in design.model.kind)
         scores.widen(candidate, estimator, rows)
-    yield trust.judge(reason, size, above_noise, ratio, candidate)
+    reported = trust.judge(reason, size, above_noise, ratio, candidate)
+    if of_all_lanes(noise.left < NOTHING_LOST):
+        trust.begin_anew()
+        scores.begin_anew()
+    yield reported

@@ -10,6 +10,7 @@ from pvid.settings.weak_q31 import WeakDesignQ31
 from pvid.twin.q31.estimator import EstimatorQ31
 from pvid.twin.q31.integer import Int, integers
 from pvid.twin.q31.scaled import Scaled, scaled
+from pvid.twin.q31.weak_error import OwnError
 from pvid.twin.q31.weak_white import White, mirrored
 
 _ONE = 1 << 30
@@ -82,8 +83,10 @@ class Known:
         first: int,
         theta: Scaled,
         formats: tuple[Sequence[int], int],
-    ) -> None:
-        """Adds a kind, whose first theta is number `first`, at theta [thetas, lanes]."""
+        error: OwnError,
+    ) -> Int:
+        """Adds a kind, whose first theta is number `first`, at theta [thetas, lanes]; a variance of its own error that
+        does not fit its rows is changed. Returns what is then left of the information in older rows [lanes]."""
         share = shares(white, design)
         n_bits, y_bits = formats
         thetas = design.model.kind[kind].thetas
@@ -106,10 +109,10 @@ class Known:
                 bits = n_bits[first + one.a] + n_bits[first + one.b]
                 part = (whole if one.a == one.b else half).shifted(bits)
                 self._add(first + one.a, first + one.b, part, c, f)
+        of_error = share[design.error_order[kind]].over(number(design.functions, like))
         if design.noise:
-            error = Scaled(*(np.full_like(like, x) for x in design.error_variance[kind]))
-            share_of_error = error.times(share[design.error_order[kind]]).over(number(design.functions, like))
-            self.sensors = self.sensors.plus(number(1, like).minus(share_of_error))
+            self.sensors = self.sensors.plus(number(1, like).minus(error.variance.times(of_error)))
+        return error.change(of_error)
 
     def _add(self, a: int, b: int, own: Scaled, c: Int, f: Int) -> None:
         model, table = self.estimator.model, self.estimator.noise_table

@@ -107,7 +107,7 @@ def _number(x: int, like: Int) -> Scaled:
     return scaled(np.full_like(like, x), 0)
 
 
-def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]:
+def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled, error_variance: Scaled) -> tuple[Int, Int]:
     """1 / sqrt(D_h) [H + 1, lanes] with the exponents, at theta of the kind [thetas, lanes]."""
     like = theta.m[0]
     thetas = design.model.kind[kind].thetas
@@ -122,14 +122,13 @@ def spectrum(design: WeakDesignQ31, kind: int, theta: Scaled) -> tuple[Int, Int]
         if one.kind == kind:
             factor = Scaled(*(np.full_like(like, x) for x in one.factor))
             weight[one.power] = weight[one.power].plus(factor.times(of(one.a).times(of(one.b))))
-    error = Scaled(*(np.full_like(like, x) for x in design.error_variance[kind]))
     found = []
     for h in range(design.highest + 1):
         total = nothing
         for j in range(powers - 1, -1, -1):
             total = total.times(_number(h * h, like)).plus(weight[j])
             if j == design.error_order[kind]:
-                total = total.plus(error)
+                total = total.plus(error_variance)
         total = total.times(_number(2 * design.hop if h == 0 else design.hop, like))
         found.append(pick(total.m > 0, total, nothing))
     mean = nothing
@@ -158,9 +157,9 @@ def _mirrors(design: WeakDesignQ31, gain: Int, exponent: Int, first: int, count:
     return found
 
 
-def white(design: WeakDesignQ31, kind: int, theta: Scaled) -> White:
+def white(design: WeakDesignQ31, kind: int, theta: Scaled, error_variance: Scaled) -> White:
     """At theta of the kind [thetas, lanes]."""
-    gain, exponent = spectrum(design, kind, theta)
+    gain, exponent = spectrum(design, kind, theta, error_variance)
     cosines = design.highest + 1
     mirrors = (
         _mirrors(design, gain, exponent, 0, cosines),
