@@ -359,6 +359,13 @@ PROOFS = (
         taken=("pvid_scale_q31", "pvid_bit_length_q31", "pvid_root_of_q31"),
     ),
     Proof(
+        "weak_error_q31",
+        "any mean square of residuals on top of any mean of them; any share of any variance of an equation's own error",
+        ("src/weak/error_q31.c", "src/number/integer_q31.c"),
+        ("-eva-slevel", "100"),
+        taken=("pvid_scale_q31", *SCALED),
+    ),
+    Proof(
         "weak_front_q31",
         "the weak engine's front end, the pendulum's design: any counts within full scale, three times round the line",
         ("src/number/integer_q31.c",),

@@ -141,3 +141,21 @@ def test_residuals_are_compared_with_what_the_sensors_explain(core: Core) -> Non
     sensors = twin.noise.known.sensors
     assert 0 < float(sensors.m[0]) * 2.0 ** float(sensors.e[0]) < 0.5
     assert_equal(one, core, replace(one.config, design=wide), one.counts)
+
+
+def test_an_equation_s_own_error_that_comes_and_goes_has_the_bits_of_the_twin(core: Core) -> None:
+    """White noise of a motor's recorded voltage, in the first half of the run: the variance of the error rises, older
+    rows count no more; then it falls."""
+    one = rig("dc_motor", 12000)
+    readings = one.counts.copy()
+    place = one.made.samples.index("V")
+    readings[place, :6000] += np.rint(np.random.default_rng(2).standard_normal(6000) / one.lsb[place]).astype(np.int64)
+    of_half, of_run = (WeakTwinQ31(one.config, one.parameters.model) for _ in range(2))
+    of_half.run(readings[:, :6000])
+    of_run.run(readings)
+    first, last = (
+        max(float(x.variance.m[0]) * 2.0 ** float(x.variance.e[0]) for x in twin.noise.errors)
+        for twin in (of_half, of_run)
+    )
+    assert first > 10 * last
+    assert_equal(one, core, one.config, readings)

@@ -255,3 +255,19 @@ def test_random_settings_and_faults_equal_the_twin(seed: int) -> None:
     rig, config, samples = random_case(seed)
     record = assert_equals_the_twin(rig.native, config, samples)[0]
     assert (record.reason == Reason.REJECTED_NOT_FINITE).any() or np.isfinite(samples).all()
+
+
+def test_an_equation_s_own_error_that_comes_and_goes_has_the_bits_of_the_twin() -> None:
+    """White noise of a motor's recorded voltage, in the first half of the run: the variance of the error rises, older
+    rows count no more; then it falls."""
+    rig = engine_rig("dc_motor")
+    samples = rig.samples[:12000].copy()
+    place = rig.config.design.model.sample_names.index("V")
+    samples[:6000, place] += np.random.default_rng(2).standard_normal(6000).astype(np.float32)
+    of_half, of_run = WeakTwin(rig.config), WeakTwin(rig.config)
+    of_half.run(samples[:6000])
+    of_run.run(samples)
+    first, last = (max(float(one.variance[0]) for one in twin.finish.errors) for twin in (of_half, of_run))
+    assert first > 10 * last
+    record = assert_equals_the_twin(rig.native, rig.config, samples)[0]
+    assert updates(record.reason) > 0

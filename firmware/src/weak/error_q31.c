@@ -32,16 +32,11 @@ PVID_COLD void pvid_weak_error_init_q31(pvid_weak_error_q31 self[], const pvid_w
     }
 }
 
-static bool rises(const pvid_weak_error_q31 *self)
-{
-    return (self->windows >= FEWEST) && (self->mean > RISES);
-}
-
+/* Whether the variance is to be changed. */
 static bool changes(const pvid_weak_error_q31 *self, pvid_scaled_q31 least)
 {
-    const bool falls =
-        (self->windows >= FEWEST) && (self->mean < FALLS) && pvid_scaled_exceeds_q31(self->variance, least);
-    return rises(self) || falls;
+    const bool falls = (self->mean < FALLS) && pvid_scaled_exceeds_q31(self->variance, least);
+    return (self->windows >= FEWEST) && ((self->mean > RISES) || falls);
 }
 
 PVID_COLD bool pvid_weak_error_take_q31(pvid_weak_error_q31 *self, pvid_scaled_q31 least, pvid_scaled_q31 residual)
@@ -68,7 +63,7 @@ PVID_COLD int32_t pvid_weak_error_change_q31(pvid_weak_error_q31 *self, pvid_sca
         return INT32_MAX;
     }
     const int32_t left =
-        rises(self) ? (int32_t)pvid_quotient_q31((uint64_t)ONE << 31, (uint32_t)self->mean) : INT32_MAX;
+        (self->mean > RISES) ? (int32_t)pvid_quotient_q31((uint64_t)ONE << 31, (uint32_t)self->mean) : INT32_MAX;
     self->variance = pvid_scaled_exceeds_q31(found, least) ? found : least;
     self->windows = 0;
     return left;

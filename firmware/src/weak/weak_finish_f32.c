@@ -518,18 +518,6 @@ PVID_COLD static bool pull_stage(pvid_weak_f32 *self)
     return goes_on(finish, last, all);
 }
 
-/* The residuals of the kind to the variance of its own error. */
-PVID_COLD static void take_error(pvid_weak_f32 *self)
-{
-    pvid_weak_finish_f32 *finish = &self->finish;
-    const pvid_weak_design_f32 *design = self->design;
-    const uint8_t kind = finish->kind;
-    const float residual = finish->rss / ((float)design->functions - (float)finish->live);
-    const float share = pvid_weak_white_error_share_f32(&finish->white, design, kind);
-    const float left = pvid_weak_error_take_f32(&finish->error[kind], design->error_variance[kind], residual, share);
-    finish->left = (left < finish->left) ? left : finish->left;
-}
-
 PVID_COLD static bool correct_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
@@ -542,10 +530,19 @@ PVID_COLD static bool correct_stage(pvid_weak_f32 *self)
         (void)pvid_estimator_add_to_b_f32(&self->estimator, finish->work.rows.pull);
     }
     finish->expected += pvid_weak_white_sensors_f32(&finish->white, self->design);
-    if (self->trust.arrived) {
-        take_error(self);
-    }
     return false;
+}
+
+/* The residuals of the kind to the variance of its own error. */
+PVID_COLD static void take_error(pvid_weak_f32 *self)
+{
+    pvid_weak_finish_f32 *finish = &self->finish;
+    const pvid_weak_design_f32 *design = self->design;
+    const uint8_t kind = finish->kind;
+    const float residual = finish->rss / ((float)design->functions - (float)finish->live);
+    const float share = pvid_weak_white_error_share_f32(&finish->white, design, kind);
+    const float left = pvid_weak_error_take_f32(&finish->error[kind], design->error_variance[kind], residual, share);
+    finish->left = (left < finish->left) ? left : finish->left;
 }
 
 /* Products of column `index` with those behind it, the last of them e: a row of M without its diagonal, and an entry of
@@ -560,6 +557,9 @@ PVID_SELDOM static bool add_stage(pvid_weak_f32 *self)
     pvid_information_block_f32(model, finish->theta, &block);
     if (finish->index == thetas) {
         pvid_products_end_f32(&self->estimator, &block, work->theta, finish->rss, (uint32_t)rows_of(self));
+        if (self->trust.arrived) {
+            take_error(self);
+        }
         end_kind(self);
         return false;
     }

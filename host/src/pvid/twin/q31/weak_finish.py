@@ -196,6 +196,9 @@ def stages(
 
     formats : n_bits, y_bits
     """
+    if scores.alone:
+        scores.skip()
+    scores.alone = False
     lanes = estimator.lanes
     expected = scaled(estimator.row_sd * estimator.row_sd, -16)
     sums = np.broadcast_to(window, (lanes, *window.shape))
