@@ -26,7 +26,7 @@ _PARTS = (
     ("half-window sums and their join", r"sums_q31"),
     ("a window: white columns, rows, residuals", r"weak_finish_q31|columns_q31|white_q31|mirror_q31|rescale_q31"),
     ("a window: the sensors' noise", r"noise_q31"),
-    ("a window: scatter of the scores", r"scores_q31"),
+    ("a window: scatter of the scores, equation errors", r"scores_q31|error_q31"),
     (
         "a window: sums, solves, assessment",
         r"staged_q31|system_q31|cholesky_q31|information_q31|row_q31|step_q31|assess_q31|estimator_q31|scaled_model_q31",
@@ -45,7 +45,7 @@ _STRUCTS = (
     ("lengths of the window's sums, with these if they need a place", "sizeof(pvid_weak_window_q31)"),
     ("rows while they are made, or a solve", "sizeof(pvid_weak_work_q31)"),
     (
-        "gates, noise, formats of the rows",
+        "gates, noise, equation errors, formats of the rows",
         "sizeof(pvid_weak_finish_q31) - sizeof(pvid_weak_work_q31) - sizeof(pvid_weak_scores_q31)"
         " - sizeof(((pvid_weak_finish_q31 *)0)->white)",
     ),

@@ -28,7 +28,7 @@ _PARTS = (
     ("channels and integrals of a step", r"weak_step_f32|\w+_weak_f32|elementary_f32"),
     ("half-window sums and their join", r"sums_f32"),
     ("a window: white columns, rows, residuals, noise", r"weak_finish_f32|columns_f32|white_f32|products_f32"),
-    ("a window: scatter of the scores", r"scores_f32"),
+    ("a window: scatter of the scores, equation errors", r"scores_f32|error_f32"),
     (
         "a window: sums, solves, assessment",
         r"staged_f32|direct_f32|pattern_f32|cholesky_f32|information_f32|assess_f32|estimator_f32|step_f32|kinds",

@@ -108,7 +108,7 @@ typedef struct {
     const pvid_weak_noise_f32 *noise;        /* [n_noise] */
     uint16_t n_noise;
     const uint8_t *error_order;  /* [kinds] the equation error is the derivative of this order of white noise */
-    const float *error_variance; /* [kinds] variance of that noise at a step, >= 0; 0: no equation error */
+    const float *error_variance; /* [kinds] least variance of that noise at a step, >= 0; residuals raise it */
     const float *sign_width;     /* [signs] of the soft sign tanh(v / width); 0: the mean of sgn over a step */
     float overlap;               /* variance inflation by the noise that overlapping windows share, >= 1 */
 } pvid_weak_design_f32;

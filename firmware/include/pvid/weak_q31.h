@@ -132,8 +132,8 @@ typedef struct {
     const pvid_weak_noise_q31 *noise; /* [n_noise] */
     uint16_t n_noise;
     const uint8_t *error_order; /* [kinds] the equation error is the derivative of this order of white noise */
-    const pvid_scaled_q31
-        *error_variance; /* [kinds] of that noise at a step, times W_h h^(2 order) the share in D_h; or 0 */
+    const pvid_scaled_q31 *error_variance; /* [kinds] least one of that noise at a step, times W_h h^(2 order) the share
+                                              in D_h; or 0; residuals raise it */
 } pvid_weak_design_q31;
 
 /* ---- the configuration ---- */

@@ -231,7 +231,7 @@ class WeakDesign32:
     circle : sin(pi j / hop) [5 hop / 2], a turn and a quarter
     noise : sorted by kind, then by columns
     error_order : of each kind uint8 [kinds]: its own error is that derivative of white noise
-    error_variance : of that noise at a step [kinds]; 0: the sensors explain the rows
+    error_variance : least one of that noise at a step [kinds]; residuals raise it
     sign_width : of the soft sign [signs]; 0: the mean of sgn over a step
     overlap : variance inflation by the noise that overlapping windows share
     """

@@ -126,7 +126,7 @@ class WeakDesignQ31:
     factor : of each term (m, e), of h^order times a unit of S_h
     noise : sorted by kind, then power
     error_order : of each kind: its own error is that derivative of white noise
-    error_variance : of that noise at a step, of h^(2 order) (m, e) [kinds]; (0, 0): the sensors explain the rows
+    error_variance : least one of that noise at a step, of h^(2 order) (m, e) [kinds]; residuals raise it
     units : value of one unit of S_h of each channel [channels]
     margins : for each quantity the bits that its largest value leaves free
     """
