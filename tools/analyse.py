@@ -3,6 +3,7 @@
 
     tools/analyse.py            every finding, but for those that firmware/analysis.toml deviates from; exits 1 on one
     tools/analyse.py FILE...    of these sources alone
+    tools/analyse.py --quick    clang-tidy gives up a function after a third of its paths, which is three times as fast
     tools/analyse.py --update   writes the numbers of findings into firmware/analysis.toml, too
 
 A deviation names a tool, a rule, a reason, and what it covers: files and a regular expression that the line of the
@@ -54,6 +55,7 @@ HIDDEN = (
     *("__ARM_ARCH_6M__", "__ARM_FEATURE_CLZ", "__ARM_SIZEOF_MINIMAL_ENUM"),
 )
 WHOLE = ("weak_step_f32.c", "integer_q31.c")
+FEWER_PATHS = ("-Xclang", "-analyzer-config", "-Xclang", "max-nodes=75000")  # of 225000, of each function
 UNUSED = ("2.3", "2.4", "2.5")  # MISRA's rules of what a program never uses: of some sources they say nothing
 PACKAGES = {
     "gcc": "gcc",
@@ -150,8 +152,8 @@ def gcc(unit: Unit) -> set[Finding]:
     )
 
 
-def clang_tidy(unit: Unit) -> set[Finding]:
-    options = [*unit.options, *asserts(unit)]
+def clang_tidy(unit: Unit, quick: bool) -> set[Finding]:
+    options = [*unit.options, *asserts(unit), *(FEWER_PATHS if quick else ())]
 
     def made() -> str:
         output = run(["clang-tidy", "--quiet", str(unit.source), "--", *options])
@@ -215,14 +217,15 @@ def with_all_macros(alike: list[Unit]) -> set[Finding]:
     return {one for one in found if one.rule not in UNUSED}
 
 
-def all_findings(among: list[Unit]) -> list[Finding]:
+def all_findings(among: list[Unit], quick: bool) -> list[Finding]:
     groups: dict[tuple[str, ...], list[Unit]] = defaultdict(list)
     for unit in among:
         groups[unit.options].append(unit)
     with ThreadPoolExecutor(2) as pool:
         jobs = [pool.submit(cppcheck, alike) for alike in sorted(groups.values(), key=len, reverse=True)]
         jobs += [pool.submit(with_all_macros, alike) for alike in groups.values()]
-        jobs += [pool.submit(tool, unit) for tool in (clang_tidy, gcc) for unit in among]
+        jobs += [pool.submit(clang_tidy, unit, quick) for unit in among]
+        jobs += [pool.submit(gcc, unit) for unit in among]
         return sorted(set().union(*(job.result() for job in jobs)))
 
 
@@ -291,6 +294,7 @@ def main() -> int:
     parser.add_argument(
         "--update", action="store_true", help="write the numbers of findings into firmware/analysis.toml"
     )
+    parser.add_argument("--quick", action="store_true", help="clang-tidy follows a third of the paths of a function")
     take_files(parser)
     given = parser.parse_args()
     update, files = given.update, set(given.files)
@@ -299,7 +303,7 @@ def main() -> int:
     among = chosen(units(), files, parser)
     demand(PACKAGES)
 
-    findings = all_findings(among)
+    findings = all_findings(among, given.quick)
     known = deviations()
     faults = [str(finding) for finding in findings if not any(entry.covers(finding) for entry in known)]
     counted = [(entry, sum(entry.covers(finding) for finding in findings)) for entry in known]

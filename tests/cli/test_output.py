@@ -23,6 +23,7 @@ from pvid.sim.pendulum import simulate
 
 PVID = [sys.executable, "-P", "-m", "pvid"]
 READER_GONE = 141
+NO_BYTECODE = "import sys; sys.dont_write_bytecode = True"
 
 
 def printing(*arguments: str, to: IO[Any] | int, **options: Any) -> subprocess.CompletedProcess[str]:
@@ -65,9 +66,18 @@ def test_a_table_that_does_not_fit_leaves_an_empty_file(tmp_path: Path) -> None:
     def bounded() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 
+    # whose bytecode would be cut short, too, and break every later run
+    command = [sys.executable, "-P", "-c", f"{NO_BYTECODE}; from pvid.cli.main import main; main()"]
     table = tmp_path / "table.h"
     with table.open("wb") as file:
-        done = printing("tables", "--form", "fir", to=file, preexec_fn=bounded)
+        done = subprocess.run(
+            [*command, "tables", "--form", "fir"],
+            stdout=file,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            preexec_fn=bounded,
+        )
     assert done.returncode == 2
     assert done.stderr == "pvid: the output cannot be written: File too large\n"
     assert table.read_bytes() == b""
@@ -78,13 +88,15 @@ def test_a_table_that_does_not_fit_leaves_an_empty_file(tmp_path: Path) -> None:
 
 @contextmanager
 def files_up_to(size: int) -> Iterator[None]:
-    """As a disk that is nearly full."""
+    """As a disk that is nearly full. Python would cut short the bytecode, too, of what is first imported meanwhile."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sys, "dont_write_bytecode", True)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:

@@ -53,11 +53,16 @@ def answer(*arguments: str | Path) -> dict[str, Any]:
     return found
 
 
+def settings_of(core: str) -> tuple[str, ...]:
+    """The refinement, which is the same whatever the core, is that of one."""
+    return ("--core", core, *(() if core == "f32" else ("--no-refine",)))
+
+
 @pytest.fixture(scope="module")
 def clean(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[str, Any]]:
     """The answer of a core to the run as it is."""
     path = write(tmp_path_factory.mktemp("clean") / "clean.csv", run)
-    return cache(lambda core: answer(path, "--core", core))
+    return cache(lambda core: answer(path, *settings_of(core)))
 
 
 # ---- the rig
@@ -184,7 +189,7 @@ def test_a_long_gap_costs_windows_and_no_answer(
 ) -> None:
     rows = np.delete(np.arange(len(run)), np.arange(6000, 6500))
     whole = clean(core)
-    found = answer(write(tmp_path / "run.csv", run, rows), "--core", core)
+    found = answer(write(tmp_path / "run.csv", run, rows), *settings_of(core))
     assert "missing samples: 500 of 20000, in 1 gap (first at 6 s, longest 0.5 s)" in found["input"][0]
     assert len(found["input"]) == (2 if core == "f64" else 1)  # float64 uses the longest stretch, and tells
     for name in ("w", "d1", "d2"):

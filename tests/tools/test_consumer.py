@@ -17,6 +17,7 @@ from pvid.core.sources import public_headers
 
 CONSUMER = ROOT / "tests" / "consumer"
 SOURCES = ("CMakeLists.txt", "LICENSE", "firmware")  # all that a user's build needs
+QUICK = "-DCMAKE_BUILD_TYPE=None"  # no optimisation: how it is linked is not changed by that, nor a bit
 HARMONICS = 17  # not the default: the definition must reach whoever links the library
 
 
@@ -111,7 +112,8 @@ def test_fetch_content(by_package: list[str], tmp_path: Path) -> None:
             file.add(ROOT / name, f"pvid-1/{name}")
     url = archive.as_uri()
     printed = built(
-        tmp_path / "build", "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}", f"-DPVID_MAX_HARMONICS={HARMONICS}"
+        *(tmp_path / "build", QUICK, "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}"),
+        f"-DPVID_MAX_HARMONICS={HARMONICS}",
     )
     assert printed == by_package
 
@@ -120,7 +122,7 @@ def test_add_subdirectory(by_package: list[str], tmp_path: Path) -> None:
     for name in SOURCES:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
-    options = ("-DPVID_BY=add_subdirectory", f"-DPVID_SOURCES={tmp_path}")
+    options = (QUICK, "-DPVID_BY=add_subdirectory", f"-DPVID_SOURCES={tmp_path}")
     printed = Printed.of(built(tmp_path / "build", *options)[0])
     assert printed.harmonics == 13  # the default
     assert printed.hash == Printed.of(by_package[0]).hash  # sizes change no bit
@@ -169,7 +171,7 @@ def test_a_header_of_sizes_travels_too(tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "my_sizes.h").write_text("#define PVID_MAX_HARMONICS 19\n", encoding="utf-8")
-    options = ("-DPVID_CONFIG_HEADER=my_sizes.h", f"-DCMAKE_C_FLAGS=-I{mine}")
+    options = (QUICK, "-DPVID_CONFIG_HEADER=my_sizes.h", f"-DCMAKE_C_FLAGS=-I{mine}")
     install(tmp_path / "prefix", tmp_path / "build", *options)
     compiled = tmp_path / "consumer"
     both = flags(tmp_path / "prefix", "--cflags", "--libs")

@@ -9,6 +9,7 @@ import tomllib
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,7 @@ def test_the_wheel_has_the_core_its_sources_and_the_licences(wheel: Path) -> Non
     assert wheel.stat().st_size < 4_000_000 and "py3-none" in wheel.name
 
 
+@cache
 def _version(python: str) -> str | None:
     """As in 3.12; None where it does not answer: a version manager's stand-in for a version that is not chosen."""
     asked = "import sys, venv, ensurepip; print('%d.%d' % sys.version_info[:2])"

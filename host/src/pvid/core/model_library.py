@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+from filelock import FileLock
+
 from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
@@ -92,8 +94,8 @@ def _build(
 ) -> None:
     """Whole or not at all: several processes may build the same."""
     with tempfile.TemporaryDirectory(dir=library.parent.parent) as made:
-        # Its name is that of the headers in it, and the options have no other path of here: ccache finds the core's
-        # objects of another mechanism, but for headers that one of these stands before (pvid/refine_shape.h).
+        # Its name is that of the headers in it, and the options have no other path of here: ccache finds the objects
+        # of another mechanism, but for headers that one of these stands before (pvid/refine_shape.h).
         headers_here = sorted(name for name in texts if name.endswith(".h"))
         folder = Path(made) / hashlib.sha256("\0".join(headers_here).encode()).hexdigest()[:8]
         folder.mkdir()
@@ -102,7 +104,11 @@ def _build(
             (folder / name).write_text(text, encoding="utf-8")
         options = [*_FLAGS, *definitions, f"-I{folder.name}", *INCLUDES, f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        objects = objects_of(compiler, options, [*code, *_sources(engine, _REFINED in texts)], Path(made))
+        if _REFINED in texts:
+            objects = objects_of(compiler, options, [*code, *_sources(engine, True)], Path(made))
+        else:
+            objects = objects_of(compiler, options, code, Path(made))
+            objects += _core_objects(compiler, definitions, engine, library.parent.parent)
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
         declared = _declarations(compiler, headers, options, Path(made), engine)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
@@ -111,6 +117,23 @@ def _build(
         except OSError:
             if not library.exists():
                 raise
+
+
+def _core_objects(compiler: str, definitions: list[str], engine: EngineCore, cache_folder: Path) -> list[str]:
+    """Of the core without the second stage: those of one size are the same for every mechanism."""
+    sources = _sources(engine, False)
+    named = [str(one) for one in sources]
+    key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, *named, _core_hash()]).encode())
+    place = cache_folder / f"core-{engine.name}-{key.hexdigest()[:20]}"
+    with FileLock(place.with_name(f".{place.name}.lock")):
+        if not place.exists():
+            with tempfile.TemporaryDirectory(dir=cache_folder) as made:
+                folder = Path(made) / "objects"
+                folder.mkdir()
+                options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}"]
+                objects_of(compiler, options, sources, folder)
+                folder.rename(place)
+    return sorted(map(str, place.glob("*.o")))
 
 
 def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, engine: EngineCore) -> str:

@@ -234,6 +234,7 @@ class Problem:
         free = np.flatnonzero(prior.free) if move else np.zeros(0, int)
         cost = self.cost(r, cut, starts, use, prior)
         converged, passes = False, 0
+        found = None  # the block of r and these starts
         while passes < most and not self.budget.is_spent:
             passes += 1
             found = self.block(r, cut, starts, use)
@@ -257,11 +258,11 @@ class Problem:
                     break
                 near, begun, now = damped
             gained = cost - now
-            r, starts, cost = near, begun, now
+            r, starts, cost, found = near, begun, now, None
             if gained < 1e-9 * cost:
                 converged = relative < 0.3
                 break
-        return self._judged(r, prior, cut, starts, use, converged, passes, cost)
+        return self._judged(r, prior, cut, starts, use, converged, passes, cost, found)
 
     def _share(self, d_r: Float) -> float:
         """Of a step that a pass takes at most."""
@@ -328,11 +329,24 @@ class Problem:
         return d_r, d_starts, triangle.T @ triangle
 
     def _judged(
-        self, r: Float, prior: Prior, cut: Cut, starts: Float, use: Bool, converged: bool, passes: int, cost: float
+        self,
+        r: Float,
+        prior: Prior,
+        cut: Cut,
+        starts: Float,
+        use: Bool,
+        converged: bool,
+        passes: int,
+        cost: float,
+        found: Block | None,
     ) -> Refined:
+        """`found`: the block of r and these starts where it is known."""
         n, states = self.n, self.kernel.states
         empty = np.full((n, n), np.nan)
-        found = self.block(r, cut, starts, use) if np.isfinite(cost) else None
+        if not np.isfinite(cost):
+            found = None
+        elif found is None:
+            found = self.block(r, cut, starts, use)
         if found is None:
             return Refined(r, empty, empty, np.inf, np.inf, False, passes, cut, starts, 0.0, np.inf)
         free = np.flatnonzero(prior.free)

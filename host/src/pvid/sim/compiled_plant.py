@@ -12,7 +12,7 @@ from pvid.base.errors import PvidError
 from pvid.core.host_compiler import host_compiler
 from pvid.core.sources import build_folder
 
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w")
+_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-shared", "-fPIC", "-w")
 
 
 def loaded(code: str) -> ctypes.CDLL:
