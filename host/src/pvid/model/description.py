@@ -235,10 +235,11 @@ class Model:
         self._coordinates.append(jet)
         return jet
 
-    def refined(self, name: str, unit: str, sd: float, optional: bool = False) -> sp.Symbol:
+    def refined(self, name: str, unit: str, sd: float, optional: str = "") -> sp.Symbol:
         """An unknown of the refinement that the rows do not have: it starts at 0, within about sd [unit].
 
-        optional : on the host alone, where the residuals ask for it; elsewhere it is 0
+        optional : key of the rig file's table [refine] that it belongs to: without it, it is 0 but in float64, where the
+            residuals ask for it
         """
         if not 0 < sd < math.inf:
             raise self._refused(f"{name}: sd must be positive")

@@ -190,6 +190,23 @@ class Identifier:
 
 
 @dataclass(frozen=True)
+class Refine:
+    """What the second stage in C estimates besides viscous friction and the skew of the sensors.
+
+    Attributes
+    ----------
+    dry_friction : sharp friction of pivot and joint, over 1e-4 g l2; the steps are then Runge-Kutta's
+    slant : angle of the pivot's slide against the vertical
+    """
+
+    dry_friction: bool = False
+    slant: bool = False
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[refine] ")
+
+
+@dataclass(frozen=True)
 class ModelTable:
     """The mechanism of the rig.
 
@@ -211,7 +228,7 @@ class RigFile:
     Attributes
     ----------
     l1 : length of rod 1
-    nominal, sensor, identifier, model : the tables of the file
+    nominal, sensor, identifier, refine, model : the tables of the file
     sample_rate : rate of the samples; default: that of the run
     l1_sd : relative standard deviation of l1; part of the standard errors, because no run shows it
     """
@@ -223,6 +240,7 @@ class RigFile:
     sample_rate: float | None = _number(None, "Hz", 1e-3, 1e6)
     l1_sd: float = _number(0.001, "relative", 0.0, 1.0)
     model: ModelTable = field(default_factory=ModelTable)
+    refine: Refine = field(default_factory=Refine)
 
     def __post_init__(self) -> None:
         _check_fields(self, "")
@@ -279,6 +297,7 @@ class RigFile:
             nominal=Nominal(**guess),
             sensor=Sensor(**tables["sensor"]),
             identifier=Identifier(**tables["identifier"]),
+            refine=Refine(**tables["refine"]),
             model=model,
             **top,
         )
@@ -357,6 +376,7 @@ _TABLES: dict[str, type] = {
     "sensor": Sensor,
     "nominal": Nominal,
     "identifier": Identifier,
+    "refine": Refine,
     "model": ModelTable,
 }
 

@@ -19,6 +19,7 @@ from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Integral, Jet
+from pvid.models.kapitza.refinement import PARAMETERS
 from pvid.models.registry import DEFAULT
 from pvid.run.engine_design import Run, simulated_run_of
 from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
@@ -143,6 +144,36 @@ def refine_settings(
     return settings if model.refinement.equations else replace(settings, distance=0.0)
 
 
+def with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> RefineRig:
+    """What the pendulum's refinement with options depends on.
+
+    Parameters
+    ----------
+    rig : without options, from refine_rig
+    p : parameters near those of the rig, as the weak form has them
+    """
+    prior_sd, gain_sd = (dict(zip(PARAMETERS, one, strict=True)) for one in (rig.prior_sd, rig.gain_sd))
+    rig = replace(
+        rig,
+        prior_sd=tuple(prior_sd.get(one.name, one.prior_sd) for one in made.parameters),
+        gain_sd=tuple(gain_sd.get(one.name, 0.0) for one in made.parameters),
+    )
+    if not made.runge_kutta:
+        return rig
+    n = len(made.coordinates)
+    angles, rates = rig.state_limit[: n // 2], rig.state_limit[n // 2 :]
+    at_rest = np.zeros(n, np.float32), np.zeros(0, np.float32)
+    jumps = _jumps(GeneratedRefine(made), r_of(made, p), [at_rest])
+    return replace(
+        rig,
+        state_limit=tuple(limit for pair in zip(angles, rates, strict=True) for limit in pair),
+        runge_kutta=True,
+        ring=files_refine.ring_of(made),
+        fine_s=_fine_s(made, jumps, 2.0 / rig.slow_hz),
+        jumps=jumps,
+    )
+
+
 def _input(made: RefineFunctions, jet: Jet) -> tuple[str, int, float]:
     """Sample, order (-1: its integral) and factor of an input."""
     model = made.model
@@ -210,8 +241,10 @@ def _slopes(motion: GeneratedRefine, r: Float, q: Float32, v: Float32) -> Float:
 
 
 def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[float, ...]:
-    """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined."""
+    """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined; a
+    friction that starts at 0 is as large there as it may be."""
     made = motion.made
+    r = np.where([one.place < 0 and not one.sign for one in made.parameters], [one.prior_sd for one in made.parameters], r)
     q, v = states[len(states) // 2]
     still = np.where([name.endswith("_1") for name in made.coordinates], np.float32(0), q)
     found = []
