@@ -125,6 +125,8 @@ def refine_settings(
         source = Source.SAMPLED if order == -1 else sources.get(place, Source.SAMPLED)
         signal.append(RefineSignal(place, order, scale, range_, source))
     motion, states, r = GeneratedRefine(made), list(_states(made, run, rate)), r_of(made, p)
+    if made.runge_kutta and model.refinement.equations:  # whose motion is not that of the weak form's windows
+        block_s = min(block_s, _slow_s(motion, r))
     jumps = _jumps(motion, r, states)
     rig = RefineRig(
         sample_rate=rate,
@@ -162,8 +164,7 @@ def with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> Ref
         return rig
     n = len(made.coordinates)
     angles, rates = rig.state_limit[: n // 2], rig.state_limit[n // 2 :]
-    at_rest = np.zeros(n, np.float32), np.zeros(0, np.float32)
-    jumps = _jumps(GeneratedRefine(made), r_of(made, p), [at_rest])
+    jumps = _jumps(GeneratedRefine(made), r_of(made, p), [_at_rest(made)])
     return replace(
         rig,
         state_limit=tuple(limit for pair in zip(angles, rates, strict=True) for limit in pair),
@@ -222,6 +223,18 @@ def _fastest_hz(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> f
         else:
             found.append(max(np.abs(rates.imag).max() / (2 * np.pi), np.abs(rates.real).max() / _STILL / _A_PERIOD))
     return float(np.quantile(found, _WITH_SIGNS if signs_of(motion.made.model) else _WITHOUT))
+
+
+def _slow_s(motion: GeneratedRefine, r: Float) -> float:
+    """Two periods of the slowest oscillation at rest; inf: there is none."""
+    at_rest = _at_rest(motion.made)
+    rates = np.abs(np.linalg.eigvals(_slopes(motion, r, *at_rest)).imag)
+    return 4 * math.pi / float(rates[rates > 0].min()) if rates.any() else math.inf
+
+
+def _at_rest(made: RefineFunctions) -> State:
+    n = len(made.coordinates)
+    return np.zeros(n, np.float32), np.zeros(n if made.order == 2 else 0, np.float32)
 
 
 def r_of(made: RefineFunctions, p: npt.ArrayLike, width: float = _SHARP) -> Float:
