@@ -132,11 +132,8 @@ def shape(made: RefineFunctions, command: str) -> str:
 
 
 def ring_of(made: RefineFunctions) -> int:
-    """PVID_REFINE_RING: where a step may be a tick the ring is longer; inputs that are derivatives are smooth, and so
-    are steps of some ticks."""
-    if not made.runge_kutta:
-        return 512
-    return 1024 if made.skew else 2048
+    """PVID_REFINE_RING: where a step may be a tick the ring is longer."""
+    return 2048 if made.runge_kutta else 512
 
 
 def _ring(entries: int) -> list[str]:

@@ -15,7 +15,7 @@ HALF = 12  # PVID_REFINE_HALF
 
 _STEPS_OF_FAST = 48.0  # steps of Adams in the fast period, at least
 _STEPS_OF_RUNGE_KUTTA = 25.0
-_STEPS_WITH_REVERSALS = 80.0  # likewise, between reversals of a friction
+_STEPS_WITH_REVERSALS = 120.0  # likewise; with 80 one run in 40 stays at a wrong estimate
 _MOST_PARTS = 8  # of a step of one tick
 _MOST_FINE = 64
 _MOST_TICKS = 4  # of a step in which a sign may change, or an input jump

@@ -238,8 +238,7 @@ class Model:
     def refined(self, name: str, unit: str, sd: float, optional: str = "") -> sp.Symbol:
         """An unknown of the refinement that the rows do not have: it starts at 0, within about sd [unit].
 
-        optional : key of the rig file's table [refine] that it belongs to: without it, it is 0 but in float64, where the
-            residuals ask for it
+        optional : key of the rig file's table [refine] without which it is 0; in float64 the residuals choose it
         """
         if not 0 < sd < math.inf:
             raise self._refused(f"{name}: sd must be positive")

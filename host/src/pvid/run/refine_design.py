@@ -257,7 +257,9 @@ def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[
     """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined; a
     friction that starts at 0 is as large there as it may be."""
     made = motion.made
-    r = np.where([one.place < 0 and not one.sign for one in made.parameters], [one.prior_sd for one in made.parameters], r)
+    r = np.where(
+        [one.place < 0 and not one.sign for one in made.parameters], [one.prior_sd for one in made.parameters], r
+    )
     q, v = states[len(states) // 2]
     still = np.where([name.endswith("_1") for name in made.coordinates], np.float32(0), q)
     found = []
