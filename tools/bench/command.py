@@ -115,7 +115,7 @@ def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
 
 
 @bench.command(name="refine-options")
-@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each case.")
+@click.option("--seeds", default=40, show_default=True, type=click.IntRange(min=2), help="Runs of each case.")
 @UPDATE
 def bench_refine_options(seeds: int, update: Path | None) -> int:
     """The refinement of the pendulum in C with dry friction and a slanted slide, and what that costs."""

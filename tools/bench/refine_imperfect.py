@@ -186,7 +186,8 @@ def run_fault(fault: Fault, seed: int) -> Published:
         changes["gain_sd"] = np.asarray(about.gain_sd, np.float32)
     identifier = engine.identifier(standard_start(seed), **changes)
     found = identifier.run_both(np.stack([y, phi], axis=1))
-    places, names = engine.equations.places_of_p[:3], [one.name for one in engine.equations.parameters]
+    places = np.array(engine.equations.places_of_p[:3])
+    names = [one.name for one in engine.equations.parameters]
     stands = found.r[:, places[0]] > 0
     new = np.flatnonzero(np.any(np.diff(found.r, axis=0, prepend=0.0) != 0, axis=1) & stands)
     last = dict(zip(names, map(float, found.r[new[-1]]), strict=True)) if len(new) else {}

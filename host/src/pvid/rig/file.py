@@ -191,12 +191,14 @@ class Identifier:
 
 @dataclass(frozen=True)
 class Refine:
-    """What the second stage in C estimates besides viscous friction and the skew of the sensors.
+    """What the second stage in C estimates besides viscous friction and the skew of the sensors; in float64 the
+    refinement tries both where the residuals ask for it.
 
     Attributes
     ----------
-    dry_friction : sharp friction of pivot and joint, over 1e-4 g l2; the steps are then Runge-Kutta's
-    slant : angle of the pivot's slide against the vertical
+    dry_friction : second stage in C: estimate the sharp friction of pivot and joint too, f1 and f2; 7 times the
+        instructions, and twice the RAM
+    slant : second stage in C: estimate the slant of the pivot's slide against the vertical too, along which y is read
     """
 
     dry_friction: bool = False
