@@ -24,7 +24,7 @@ from typing import cast
 import pvid
 from pvid.cli.page_table import put_table, with_table
 from pvid.link import frames
-from pvid.rig.file import Identifier, ModelTable, Nominal, RigFile, Sensor
+from pvid.rig.file import Identifier, ModelTable, Nominal, Refine, RigFile, Sensor
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -79,6 +79,8 @@ GOOD_FOR_MOST = {
     "stride": "the default",
     "outlier_gate": "leave it out",
     "outlier_patience_s": "leave it out",
+    "dry_friction": "`true` for plain bearings, if your board has the time",
+    "slant": "`true`: it costs next to nothing",
 }
 
 
@@ -95,6 +97,7 @@ def rig_file_tables() -> str:
         ("[sensor]", Sensor),
         ("[nominal]", Nominal),
         ("[identifier]", Identifier),
+        ("[refine]", Refine),
         ("[model]", ModelTable),
     )
     for title, owner in tables:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.refine import HEADER, Case, bound_of, refine_table, row_of, run_case
 from bench.refine_imperfect import HEADER as IMPERFECT
 from bench.refine_imperfect import Fault, imperfect_table, run_fault
+from bench.refine_options import HEADER as OPTIONS
+from bench.refine_options import row_of as row_of_options
 from bench.refine_step import HEADER as CHANGED
 from bench.refine_step import Change, run_change
 from bench.refine_step import row_of as row_of_change
@@ -55,6 +59,30 @@ def test_what_the_equations_lack_is_in_the_standard_errors(fault: Fault) -> None
         assert len(found.error)
         assert np.abs(found.error / found.se).max() < 4.5
         assert not found.confidently_wrong
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Fault(0.1, dry=1e-3, options=("dry_friction",)),
+        Fault(0.3, options=("dry_friction",)),
+        Fault(0.2, slant=0.03, options=("slant",)),
+        Fault(0.2, dry=3e-4, slant=0.03, options=("dry_friction", "slant")),
+    ],
+)
+def test_options_refine_what_the_equations_lack_without_them(fault: Fault) -> None:
+    runs = [run_fault(fault, seed) for seed in range(3)]
+    for one in runs:
+        assert len(one.error) and one.available > 0.7 and not one.confidently_wrong
+        assert np.abs(one.error / one.se).max() < 4.0
+        if fault.dry:
+            np.testing.assert_allclose([one.extras["f1"], one.extras["f2"]], fault.dry * 1.14 / 0.3**2, rtol=0.04)
+        if fault.slant:
+            assert abs(one.extras["slant"] - np.sin(fault.slant)) < 1e-4
+    assert len(row_of_options(fault, runs)) == len(OPTIONS)
+    bare = replace(fault, options=())
+    if fault.slant or fault.dry == 1e-3:
+        assert not len(run_fault(bare, 0).error)
 
 
 @pytest.mark.parametrize("what", ["g", "l2"])

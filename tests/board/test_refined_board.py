@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pvid.board.boards import BOARDS
-from pvid.board.refined_image import build_refined_image, refined_run
+from pvid.board.refined_image import RefinedRun, build_refined_image, refined_pendulum, refined_run
 from pvid.board.replay_image import play
 from pvid.settings.enums import Reason
 
@@ -21,7 +21,15 @@ TIMEOUT_S = 60.0
     ],
 )
 def test_a_board_refines_a_mechanism_with_the_bits_of_this_computer(name: str, ticks: int, board: str) -> None:
-    run = refined_run(name, ticks, distance=0.1)
+    _plays(refined_run(name, ticks, distance=0.1), board)
+
+
+def test_a_board_refines_the_pendulum_with_dry_friction_and_slant() -> None:
+    board = "mps2-an386"
+    _plays(refined_pendulum(6500, BOARDS[board], ("dry_friction", "slant")), board)
+
+
+def _plays(run: RefinedRun, board: str) -> None:
     expected = run.native().run_both(run.weak.samples)
     image, _ = build_refined_image(BOARDS[board], run)
     report = play(BOARDS[board], image, TIMEOUT_S)

@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from bench.refine_imperfect import truth_of
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
+from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.target import HOST_TARGET
 from pvid.cli.main import commands
 from pvid.cli.mechanism import recording_of
 from pvid.models.simulated_rig import simulated_rig
-from pvid.rig.file import RigFile
+from pvid.rig.file import Refine, RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.engine_design import config_to_identify
 from pvid.run.mechanism import identify_mechanism
@@ -27,6 +29,7 @@ from pvid.run.refine_design import refine_design
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
+from pvid.sim.pendulum import STANDARD_PENDULUM, standard_sensors
 from pvid.twin.refine import RefineTwin
 from pvid.twin.weak import WeakTwin
 
@@ -171,6 +174,30 @@ def test_both_stages_in_c_refine_a_pendulum_of_its_own_rig_file(tmp_path: Path) 
         assert abs(described["parameters"][name]["value"] - truth) < 3.5 * described["parameters"][name]["se_noise"], (
             name
         )
+
+
+def test_the_options_of_a_rig_file_reach_the_second_stage_in_c_and_a_board(tmp_path: Path) -> None:
+    """Dry friction and a slant without which nothing is refined; the board's frames have eight refined parameters."""
+    phi, y = standard_sensors().measure(*truth_of(0.2, 3e-4, 0.02, 15.0), 0)
+    run = tmp_path / "run.csv"
+    columns = np.stack([np.arange(len(phi)) / 1000, phi, y], axis=1)
+    np.savetxt(run, columns, fmt="%.9g", delimiter=",", header="t,phi,y", comments="")
+    rig = RigFile.standard()
+    rig.write(run.with_suffix(".toml"))
+    bare = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
+    assert not bare["refinement"]["adopted"]
+    chosen = replace(rig, refine=Refine(dry_friction=True, slant=True))
+    chosen.write(run.with_suffix(".toml"))
+    shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json", "--on", HOST_TARGET).stdout)
+    assert shown["refinement"]["adopted"]
+    friction = 3e-4 * STANDARD_PENDULUM.g * STANDARD_PENDULUM.l2 / STANDARD_PENDULUM.l1**2
+    truth = {**simulated_rig("kapitza").truth, "f1": friction, "f2": friction, "slant": np.sin(0.02)}
+    for name in ("w", "d1", "d2", "f1", "f2", "slant"):
+        one = shown["parameters"][name]
+        assert abs(one["value"] - truth[name]) < 3.5 * one["se_noise"], name
+    board = MechanismBoard.of_rig_file(chosen, refined=True)
+    assert [name for name, _ in board.names.refined] == ["k1", "k2", "f1", "f2", "slant", "tau"]
+    assert board_of(board.text()).equations.parameters == board.equations.parameters  # type: ignore[union-attr]
 
 
 def test_where_nothing_is_refined_the_answer_is_that_of_the_weak_form_and_says_so(

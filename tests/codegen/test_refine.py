@@ -39,6 +39,8 @@ WARNINGS = (
     "-Wshadow",
 )
 VECTORS = 200
+# Names, and options of the refinement behind them.
+NAMES = (*mechanisms.names(), "kapitza slant", "kapitza dry_friction slant")
 
 Float = npt.NDArray[np.float64]
 Given = dict[str, Any]
@@ -46,14 +48,15 @@ Given = dict[str, Any]
 
 @cache
 def functions(name: str) -> RefineFunctions:
-    return refine_functions(compiled_of(name))
+    mechanism, *options = name.split()
+    return refine_functions(compiled_of(mechanism).with_options(options))
 
 
 @cache
 def given_of(name: str) -> Given:
     """Parameters around the rig's own and states within reach, [entries, VECTORS]."""
     made, rng = functions(name), np.random.default_rng(5)
-    truth = simulated_rig(name).truth
+    truth = simulated_rig(name.split()[0]).truth
     near = [truth.get(one.name, 1.0 if one.sign else 0.0) for one in made.parameters]
     share = rng.uniform(0.9, 1.1, (len(near), VECTORS))
     r = np.array(near)[:, None] * share + np.where(np.array(near) == 0, 1e-2, 0)[:, None] * rng.normal(size=share.shape)
@@ -145,7 +148,7 @@ class InC:
         return {key: value.T for key, value in out.items()}
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", NAMES)
 def test_c_and_twin_have_the_same_bits(name: str, tmp_path: Path) -> None:
     made = functions(name)
     in_c, twin, given = (
@@ -183,7 +186,7 @@ def test_c_and_twin_have_the_same_bits(name: str, tmp_path: Path) -> None:
     assert (found == twin.region(given["r"])).all() and not found[::2].any() and found[1::2].all()
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", NAMES)
 def test_the_motion_solves_the_equations_of_the_description(name: str) -> None:
     """With values of float64 in the equations themselves, which the printer took apart."""
     made = functions(name)
@@ -223,7 +226,7 @@ def softened(v: sp.Expr, width: sp.Symbol) -> sp.Expr:
 
 
 def _states(made: RefineFunctions) -> list[Jet]:
-    names = [one.name for one in made.model.signals] + [jet.of for jet in made.model.hidden]
+    names = {one.name for one in made.model.signals} | {jet.of for jet in made.model.hidden} | set(made.coordinates)
     found = []
     for text in made.coordinates:
         of, _, order = text.rpartition("_")
@@ -231,7 +234,7 @@ def _states(made: RefineFunctions) -> list[Jet]:
     return found
 
 
-@pytest.mark.parametrize("name", mechanisms.names())
+@pytest.mark.parametrize("name", NAMES)
 def test_derivatives_are_those_of_finite_differences(name: str) -> None:
     """In float64, from each function's own list: central, to 2e-6 of the largest entry."""
     made = functions(name)
@@ -381,3 +384,16 @@ def test_the_description_of_a_refinement_is_checked() -> None:
     model.refined("lost", "1", sd=1.0)
     with pytest.raises(PvidError, match="lost is in no equation of the refinement"):
         refine_functions_of(model.compiled("test"), {})
+
+
+def test_an_option_adds_its_parameters_and_nothing_else() -> None:
+    pendulum = compiled_of("kapitza")
+    assert pendulum.options == ("dry_friction", "slant") and pendulum.with_options([]) is pendulum
+    plain = functions("kapitza")
+    slanted, dry = (functions(f"kapitza {one}") for one in ("slant", "dry_friction"))
+    names = [[one.name for one in made.parameters] for made in (plain, slanted, dry)]
+    assert names[1] == [*names[0][:5], "slant", *names[0][5:]]
+    assert names[2][2:] == [*names[0][:5], "f1", "f2", *names[0][5:]]
+    assert [one.sign for one in dry.parameters[:2]] == ["a1_1 - a2_1", "a1_1"]
+    assert (slanted.runge_kutta, dry.runge_kutta) == (False, True)
+    assert functions("kapitza dry_friction slant").model.refinement.extras != pendulum.refinement.extras

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import pytest
 import sympy as sp
 
 from pvid.base.errors import PvidError
-from pvid.model.compiled import CompiledModel, Following, Known, Signal, Unknown
+from pvid.model.compiled import CompiledModel, Extra, Following, Known, Refinement, Signal, Unknown
 from pvid.model.signals import Jet
 from pvid.rig.mechanism_file import MechanismRig, with_settings
 
@@ -27,6 +29,8 @@ R = 2
 [identifier]
 forgetting_s = 20
 outlier_patience_s = 5
+[refine]
+stiction = true
 """
 
 
@@ -43,6 +47,7 @@ def model() -> CompiledModel:
         knowns=(Known(g, "m/s^2", 9.81),),
         outputs=(),
         rows=(),
+        refinement=Refinement(extras=(Extra(sp.Symbol("s"), "N*m", 0.1, "stiction"),)),
     )
 
 
@@ -56,6 +61,8 @@ def test_values_of_the_file_replace_those_of_the_model() -> None:
     assert (changed.unknowns[0].guess, changed.unknowns[0].sd) == (2.0, 4.0)
     assert changed.unknowns[1].sd == 0.1
     assert changed.following == Following(forgetting_s=20.0, outlier_patience_s=5.0)
+    assert model().options == ("stiction",) and changed.options == ()
+    assert replace(rig, refine={"stiction": False}).applied(model()).options == ("stiction",)
 
 
 def test_text_gives_the_same_rig_back() -> None:
@@ -89,6 +96,7 @@ def test_settings_come_before_the_file() -> None:
             "identifier: 'divider' is not a key: forgetting_s, outlier_gate",
         ),
         ("[model]\nname='x'\n[identifier]\nforgetting_s=-3", "identifier.forgetting_s must not be negative"),
+        ("[model]\nname='x'\n[refine]\nslant=1", "refine.slant must be true or false, not '1'"),
         ("model = 3", "model must be a table"),
         ("[model", "is not TOML"),
     ],
@@ -107,9 +115,10 @@ def test_a_mistake_is_named(text: str, sentence: str) -> None:
         ({"sensor": {"V": {"noise": 1.0}}}, "sensor.V: an input of the model has a gain_sd alone"),
         ({"nominal": {"L": 1.0}}, "nominal.L: the model has no 'L'; it has R and i0"),
         ({"nominal": {"R": -1.0}}, "nominal.R must be positive, not -1"),
+        ({"refine": {"slant": True}}, "refine.slant: the model has no 'slant'; it has stiction"),
     ],
 )
-def test_what_the_model_does_not_have_is_named(table: dict[str, dict[str, float]], sentence: str) -> None:
+def test_what_the_model_does_not_have_is_named(table: dict[str, dict[str, Any]], sentence: str) -> None:
     rig = MechanismRig.of_document({"model": {"name": "dc_motor"}, **table})
     with pytest.raises(PvidError) as caught:
         rig.applied(model())

@@ -9,8 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pvid.base.errors import PvidError
+from pvid.models.mechanisms import compiled_of
 from pvid.rig.described import described
-from pvid.rig.file import Identifier, Nominal, RigFile, Sensor, load
+from pvid.rig.file import Identifier, Nominal, Refine, RigFile, Sensor, load
+from pvid.run.mechanism import model_of
 from pvid.setup.f32 import strong_config
 
 
@@ -86,6 +88,8 @@ def test_the_window_is_the_forms_own_unless_given() -> None:
             "^\\[identifier\\] kappa_min must be from 0 to 0.999, not 1",
         ),
         ("l1 = 0.3\n[identifier]\nforgetting_s = -1", "^\\[identifier\\] forgetting_s must be from 0"),
+        ("l1 = 0.3\n[refine]\nslant = 0.01", "^\\[refine\\] slant must be true or false, not 0.01"),
+        ("l1 = 0.3\n[refine]\nfriction = true", "^\\[refine\\] 'friction' is not a key .* dry_friction, slant"),
         ("a." * 3000 + "b = 1", "rig file|TOML"),
     ],
 )
@@ -128,11 +132,12 @@ def zero_to(high: float) -> st.SearchStrategy[float]:
         outlier_patience_s=st.none() | zero_to(1e12),
         dead_zone=zero_to(100),
     ),
+    refine=st.builds(Refine, dry_friction=st.booleans(), slant=st.booleans()),
 )
 def test_text_gives_the_same_rig_back(
-    l1: float, rate: float | None, sensor: Sensor, nominal: Nominal, identifier: Identifier
+    l1: float, rate: float | None, sensor: Sensor, nominal: Nominal, identifier: Identifier, refine: Refine
 ) -> None:
-    rig = RigFile(l1=l1, nominal=nominal, sensor=sensor, identifier=identifier, sample_rate=rate)
+    rig = RigFile(l1=l1, nominal=nominal, sensor=sensor, identifier=identifier, sample_rate=rate, refine=refine)
     assert RigFile.parse(rig.text()) == rig
 
 
@@ -140,7 +145,7 @@ def test_a_written_file_holds_every_key_and_is_read_back(tmp_path: Path) -> None
     path = tmp_path / "rig.toml"
     RigFile.standard().write(path)
     text = path.read_text()
-    for table in (RigFile, Sensor, Nominal, Identifier):
+    for table in (RigFile, Sensor, Nominal, Identifier, Refine):
         for key in fields(table):
             assert key.name in text
     assert load(path) == RigFile.standard()
@@ -301,6 +306,13 @@ def test_a_rig_file_in_the_terms_of_the_description() -> None:
     ratio = (0.1 / 0.08) ** 2
     expected = {"w": 38.0, "d1": 1 + ratio * (1 + 0.25 / 0.1), "d2": 2.5 * ratio, "c": 0.1}
     assert found.nominal == pytest.approx(expected)
+    assert found.refine == {"dry_friction": False, "slant": False}
+
+
+def test_the_options_of_the_refinement_reach_the_description() -> None:
+    own = RigFile.parse("l1 = 0.25\n[refine]\nslant = true")
+    assert model_of(described(own)).options == ("dry_friction",)
+    assert [one.name for one in fields(own.refine)] == list(compiled_of("kapitza").options)
 
 
 def test_a_block_makes_points_of_means_in_the_strong_form() -> None:

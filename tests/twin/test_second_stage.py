@@ -11,6 +11,8 @@ import pytest
 from weak_rig import EngineRig, engine_rig
 
 from pvid.base.errors import PvidError
+from pvid.board.boards import BOARDS
+from pvid.board.refined_image import refined_pendulum
 from pvid.codegen.build import refine_functions
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_library import weak_native
@@ -69,6 +71,19 @@ def test_the_twin_has_the_bits_of_a_first_order_model() -> None:
     core, twin = given.identifier(distance=0.1), RefineTwin(given.model, settings)
     record = core.run_both(given.rig.samples[:6000])
     expected = twin.run(given.rig.samples[:6000], record.weak_p, record.weak_se, record.busy)
+    np.testing.assert_array_equal(record.r, expected.r)
+    np.testing.assert_array_equal(record.se, expected.se)
+    np.testing.assert_array_equal(np.array(list(core.refinement.work.state), np.float32), twin.work.state)
+    assert Reason.UPDATED in record.told
+
+
+@pytest.mark.parametrize(("options", "ticks"), [(("slant",), 10_000), (("dry_friction", "slant"), 7000)])
+def test_the_twin_has_the_bits_of_the_pendulum_with_options(options: tuple[str, ...], ticks: int) -> None:
+    """Dry friction of hidden angles, a skew and derived inputs, with steps of Runge-Kutta."""
+    run = refined_pendulum(ticks, BOARDS["mps2-an386"], options)
+    core, twin = run.native(), RefineTwin(GeneratedRefine(run.made), run.settings)
+    record = core.run_both(run.weak.samples)
+    expected = twin.run(run.weak.samples, record.weak_p, record.weak_se, record.busy)
     np.testing.assert_array_equal(record.r, expected.r)
     np.testing.assert_array_equal(record.se, expected.se)
     np.testing.assert_array_equal(np.array(list(core.refinement.work.state), np.float32), twin.work.state)

@@ -114,6 +114,21 @@ def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="refine-options")
+@click.option("--seeds", default=40, show_default=True, type=click.IntRange(min=2), help="Runs of each case.")
+@UPDATE
+def bench_refine_options(seeds: int, update: Path | None) -> int:
+    """The refinement of the pendulum in C with dry friction and a slanted slide, and what that costs."""
+    from bench import refine_options
+
+    with progress_bar("refine-options", seeds * len(refine_options.CASES)) as advance:
+        done = count(1)
+        rows = refine_options.options_table(seeds, lambda: advance(next(done)))
+    put_table(update, "refine-options", markdown(refine_options.HEADER, rows))
+    put_table(update, "refine-options-cost", markdown(refine_options.COST_HEADER, refine_options.cost_table()))
+    return DONE
+
+
 @bench.command(name="refine-mechanisms")
 @click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
 @UPDATE

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from bench.pendulum import RIGS, design_for
 from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
@@ -23,6 +24,7 @@ from pvid.oracle.weak.rows import WeakRows
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.mechanism import model_of
+from pvid.run.refine_design import with_options
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak import config_of, design_tables, for_engine
@@ -170,6 +172,7 @@ class Engine:
     library: WeakNative
     weak: WeakConfig
     refine: RefineConfig
+    equations: RefineFunctions
 
     def identifier(self, start: Float, **changes: Any) -> RefinedIdentifier:
         """From p of the weak form."""
@@ -178,9 +181,10 @@ class Engine:
         return self.library.refined_of(weak, replace(self.refine, **changes))
 
 
-@lru_cache(4)
-def engine_of(bits: int) -> Engine:
-    """Tables from the first run at the truth; the refinement knows the rig file's guess."""
+@lru_cache(8)
+def engine_of(bits: int, options: tuple[str, ...] = ()) -> Engine:
+    """Tables from the first run at the truth; the refinement knows the rig file's guess. `options` of the refinement,
+    as in a rig file."""
     rig = next(one for one in RIGS if one.name == "standard" and one.bits == bits)
     sensor = {"phi": {"resolution": 2 * np.pi / 2**bits}}
     model = model_of(MechanismRig("kapitza", RATE_HZ, known={"l1": L1}, sensor=sensor))
@@ -191,8 +195,9 @@ def engine_of(bits: int) -> Engine:
     nominal = RigFile.standard().nominal
     guess = Pendulum(L1, nominal.l2, nominal.rho2, nominal.g).linear
     about = refine_rig(RATE_HZ, L1, guess, sample_sd(bits), y_gain_sd=0.0, samples=("y", "phi"))
-    library = weak_native(model, weak.design, refine_functions(compiled_of("kapitza")))
-    return Engine(library, weak, refine_config(about))
+    equations = refine_functions(compiled_of("kapitza").with_options(options))
+    about = with_options(equations, about, np.append(guess, 0.0))
+    return Engine(weak_native(model, weak.design, equations), weak, refine_config(about), equations)
 
 
 def run_case(case: Case, seed: int, **changes: Any) -> Outcome:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -54,6 +54,8 @@ class Fault:
     gain : relative error of y's scale, which is as large as the rig file expects
     wild : single samples of phi or y that are off, so many of 10^5, by so many LSB
     disturbed : outliers, missing and stuck samples of both sensors and jumps of the encoder's zero, a few a minute
+    slant : of the pivot's slide [rad]
+    options : of the refinement, whose equations then contain the friction or the slant
     """
 
     angle: float
@@ -64,12 +66,15 @@ class Fault:
     disturbed: bool = False
     wild: tuple[str, int, float] | None = None
     duration: float = 40.0
+    slant: float = 0.0
+    options: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
         """What is added to the standard rig."""
         parts = (
             ("dry friction {:g} g l2", self.dry),
+            ("slant {:g} rad", self.slant),
             ("backlash {:g} LSB", self.backlash),
             ("eccentric by {:g} rad", self.eccentricity),
             ("gain of y off by {:g}", self.gain),
@@ -122,7 +127,7 @@ def _make_wild(phi: Float, y: Float, wild: tuple[str, int, float], random: np.ra
 
 
 @lru_cache(2)
-def _truth(angle: float, dry: float, duration: float) -> tuple[Float, Float]:
+def truth_of(angle: float, dry: float, slant: float, duration: float) -> tuple[Float, Float]:
     """The exact angle and pivot."""
     motion = PivotMotion(np.array([[one.amplitude_m, one.frequency_hz, one.phase_rad] for one in STANDARD_DRIVE]))
     rig = STANDARD_PENDULUM
@@ -130,7 +135,7 @@ def _truth(angle: float, dry: float, duration: float) -> tuple[Float, Float]:
     steps, step_s = step_of(rig, _FAST_HZ, motion, friction, _SLIP, duration)
     start = [*(RELEASE[angle] * np.array(STANDARD_RELEASE)), 0.0, 0.0]
     drive = accelerations(motion, steps, step_s)
-    state = integrate(Native(), rig, start, drive, step_s, dry=friction, slip=_SLIP)
+    state = integrate(Native(), rig, start, drive, step_s, dry=friction, slip=_SLIP, slant=slant)
     assert state is not None
     t = np.arange(round(duration * RATE_HZ)) / RATE_HZ
     return relative_angle(state, step_s, t), motion.position(t)
@@ -145,12 +150,16 @@ class Published:
     error, se : relative [publications, 3]
     clash : of the last one
     available : part of the run's ticks at which a refined estimate stood
+    first : time of the first one [s]; NaN: there is none
+    extras : names of the refinement's options -> their last estimates
     """
 
     error: Float
     se: Float
     clash: float
     available: float
+    first: float
+    extras: Mapping[str, float]
 
     @property
     def confidently_wrong(self) -> bool:
@@ -161,7 +170,7 @@ class Published:
 
 def run_fault(fault: Fault, seed: int) -> Published:
     """One run through both stages."""
-    exact, pivot = _truth(fault.angle, fault.dry, fault.duration)
+    exact, pivot = truth_of(fault.angle, fault.dry, fault.slant, fault.duration)
     if fault.eccentricity:
         exact = eccentric(exact, fault.eccentricity, _ECCENTRIC_AT)
     if fault.backlash:
@@ -171,16 +180,24 @@ def run_fault(fault: Fault, seed: int) -> Published:
         _disturb(phi, y, np.random.default_rng([seed, 7]))
     if fault.wild:
         _make_wild(phi, y, fault.wild, np.random.default_rng([seed, 11]))
-    about = refine_rig(RATE_HZ, STANDARD_PENDULUM.l1, TRUTH, sample_sd(BITS), y_gain_sd=fault.gain)
-    gain_sd = np.asarray(about.gain_sd, np.float32)
-    identifier = engine_of(BITS).identifier(standard_start(seed), gain_sd=gain_sd)
+    engine, changes = engine_of(BITS, fault.options), {}
+    if fault.gain:
+        about = refine_rig(RATE_HZ, STANDARD_PENDULUM.l1, TRUTH, sample_sd(BITS), y_gain_sd=fault.gain)
+        changes["gain_sd"] = np.asarray(about.gain_sd, np.float32)
+    identifier = engine.identifier(standard_start(seed), **changes)
     found = identifier.run_both(np.stack([y, phi], axis=1))
-    new = np.flatnonzero(np.any(np.diff(found.r, axis=0, prepend=0.0) != 0, axis=1) & (found.r[:, 0] > 0))
+    places = np.array(engine.equations.places_of_p[:3])
+    names = [one.name for one in engine.equations.parameters]
+    stands = found.r[:, places[0]] > 0
+    new = np.flatnonzero(np.any(np.diff(found.r, axis=0, prepend=0.0) != 0, axis=1) & stands)
+    last = dict(zip(names, map(float, found.r[new[-1]]), strict=True)) if len(new) else {}
     return Published(
-        found.r[new, :3] / TRUTH - 1,
-        found.se[new, :3] / TRUTH,
+        found.r[np.ix_(new, places)] / TRUTH - 1,
+        found.se[np.ix_(new, places)] / TRUTH,
         float(identifier.refinement.estimate.clash),
-        float(np.mean(found.r[:, 0] > 0)),
+        float(np.mean(stands)),
+        float(new[0]) / RATE_HZ if len(new) else np.nan,
+        {name: last[name] for name in ("f1", "f2", "slant") if name in last},
     )
 
 

@@ -14,9 +14,7 @@
 static pvid_weak_f32 identifier;
 
 #ifdef STREAM_REFINED
-#define SHOWN                                                                                                          \
-    (PVID_REFINE_PARAMETERS - PVID_REFINE_WIDTHS) /* the widths, which are first, differ from block to block */
-#if SHOWN > 8
+#if STREAM_SHOWN > 8
 #error "the frames hold eight parameters"
 #endif
 
@@ -79,9 +77,9 @@ void identifier_refined(uint8_t payload[PVID_REFINED_ESTIMATE_BYTES], uint32_t s
     put_p(&payload[PVID_REFINED_ESTIMATE_P], &payload[PVID_REFINED_ESTIMATE_COVARIANCE], &best);
     if (pvid_refine_read_f32(&refinement, &refined, &number) && (number > 0u)) {
         pvid_put_u32(&payload[PVID_REFINED_ESTIMATE_NUMBER], number);
-        for (size_t i = 0; i < SHOWN; i++) {
-            pvid_put_f32(&payload[PVID_REFINED_ESTIMATE_R + (4u * i)], refined.r[PVID_REFINE_WIDTHS + i]);
-            pvid_put_f32(&payload[PVID_REFINED_ESTIMATE_SE + (4u * i)], refined.se[PVID_REFINE_WIDTHS + i]);
+        for (size_t i = 0; i < STREAM_SHOWN; i++) {
+            pvid_put_f32(&payload[PVID_REFINED_ESTIMATE_R + (4u * i)], refined.r[stream_shown[i]]);
+            pvid_put_f32(&payload[PVID_REFINED_ESTIMATE_SE + (4u * i)], refined.se[stream_shown[i]]);
         }
         pvid_put_f32(&payload[PVID_REFINED_ESTIMATE_LEVEL], refined.level);
         pvid_put_f32(&payload[PVID_REFINED_ESTIMATE_CLASH], refined.clash);

@@ -32,7 +32,7 @@ from pvid.core.weak_native import RefinedIdentifier
 from pvid.design.c_tables import float_literal
 from pvid.design.refine import refine_config
 from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
-from pvid.link.names import BoardNames
+from pvid.link.names import BoardNames, shown_of_refined
 from pvid.model.compiled import CompiledModel
 from pvid.models.kapitza.refinement import refine_rig
 from pvid.models.mechanisms import names as shipped
@@ -54,7 +54,7 @@ from pvid.run.engine_design import (
 )
 from pvid.run.mechanism import model_of
 from pvid.run.nominal_run import model_of_rig_file, nominal_run
-from pvid.run.refine_design import refine_design
+from pvid.run.refine_design import refine_design, with_options
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
@@ -192,13 +192,21 @@ class MechanismBoard:
     def names(self) -> BoardNames:
         """What the board says about itself."""
         units = {one.name: one.unit for one in self.compiled.signals}
-        refined = [] if self.refine is None else [one for one in self.equations.parameters if not one.sign]
+        refined = [self.equations.parameters[place] for place in self._shown]
         return BoardNames(
             self.config.design.model.name,
             tuple((name, units[name]) for name in self.config.design.model.sample_names),
             tuple((one.name, one.unit) for one in self.compiled.unknowns),
             refined=tuple((one.name, "" if one.unit == "1" else one.unit) for one in refined),
         )
+
+    @property
+    def _shown(self) -> tuple[int, ...]:
+        """Refined parameters that the board sends."""
+        if self.refine is None:
+            return ()
+        made = self.equations
+        return shown_of_refined(len(made.parameters), len(files_refine.widths(made)), made.places_of_p)
 
     @property
     def p_names(self) -> tuple[str, ...]:
@@ -240,7 +248,7 @@ class MechanismBoard:
             code |= {
                 "pvid/refine_shape.h": files_refine.shape(self.equations, _COMMAND),
                 "refine_model_f32.h": files_refine.header(self.equations, _COMMAND),
-                "stream_refine.h": _refine_header(self.refine),
+                "stream_refine.h": _refine_header(self.refine, self._shown),
             }
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
         simulated = isinstance(self.rig, RigFile) and not len(self.recording)
@@ -363,21 +371,24 @@ class MechanismBoard:
 
 def _refine_of_rig_file(rig: RigFile, compiled: CompiledModel, config: WeakConfig) -> RefineConfig:
     """Settings of the second stage for the guess of a pendulum's rig file."""
-    guess = [one.guess for one in compiled.unknowns][:3]
+    guess = [one.guess for one in compiled.unknowns]
     about = refine_rig(
         config.sample_rate,
         rig.l1,
-        guess,
+        guess[:3],
         compiled.signal("phi").sd,
         y_gain_sd=rig.sensor.y_gain_sd,
         samples=("y", "phi"),
     )
+    about = with_options(refine_functions(compiled), about, guess)
     return refine_config(about, compiled.following.forgetting_s, compiled.following.outlier_gate)
 
 
-def _refine_header(settings: RefineConfig) -> str:
-    """stream_refine.h: `stream_refine_config`."""
-    lines = ['#include "pvid/refine.h"', "", *files_refine_design.tables(settings, "stream_refine_config")]
+def _refine_header(settings: RefineConfig, shown: Sequence[int]) -> str:
+    """stream_refine.h: `stream_refine_config`, and which entries of r the board sends."""
+    lines = ['#include "pvid/refine.h"', "", *files_refine_design.tables(settings, "stream_refine_config"), ""]
+    lines += [f"#define STREAM_SHOWN {len(shown)}", "/* Entries of r that the board sends. */"]
+    lines += [f"static const uint8_t stream_shown[STREAM_SHOWN] = {{{', '.join(map(str, shown))}}};"]
     return "\n".join(["#ifndef STREAM_REFINE_H", "#define STREAM_REFINE_H", "", *lines, "", "#endif", ""])
 
 

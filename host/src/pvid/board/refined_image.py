@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import Board
@@ -48,9 +50,10 @@ class RefinedRun:
         )
 
 
-def refined_run(name: str, ticks: int, **changes: object) -> RefinedRun:
-    """The shipped rig of a mechanism; `changes` of the refinement's settings."""
+def refined_run(name: str, ticks: int, options: Collection[str] = (), **changes: object) -> RefinedRun:
+    """The shipped rig of a mechanism; `options` and `changes` of the settings are the refinement's."""
     run = mechanism_run(name, ticks)
+    run = replace(run, compiled=run.compiled.with_options(options))
     rig, made = simulated_rig(name), refine_functions(run.compiled)
     names = run.config.design.model.sample_names
     signals = {one: run.samples[:, k] for k, one in enumerate(names)}
@@ -65,18 +68,27 @@ def light_work(board: Board) -> dict[str, int]:
     return {"jobs": 3 if board.has_fpu else 1, "rests": 255}
 
 
-def refined_pendulum(ticks: int, board: Board) -> RefinedRun:
+def refined_pendulum(
+    ticks: int, board: Board, options: Collection[str] = (), motion: Mapping[str, npt.ArrayLike] | None = None
+) -> RefinedRun:
     """The pendulum's standard rig with its full equations and 14 bits, on which the refinement finds its track; the
     ticks of the steady state count in the mean, as in mechanism_run, behind the first window in which it is published.
+
+    Parameters
+    ----------
+    options : of the refinement; Runge-Kutta's steps have their usual jobs, with fewer they are too late
+    motion : another one of the rig: phi and y
 
     Raises
     ------
     PvidError
         Where it is not published within `ticks`.
     """
-    run = refined_run(DEFAULT, ticks, **light_work(board))
-    measured = full_pendulum((ticks + 1) / 1000.0)
-    samples = np.stack([measured[one] for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
+    run = refined_run(DEFAULT, ticks, options)
+    if not run.made.runge_kutta:
+        run = replace(run, settings=replace(run.settings, **light_work(board)))  # type: ignore[arg-type]
+    measured = motion or full_pendulum((ticks + 1) / 1000.0)
+    samples = np.stack([np.asarray(measured[one]) for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
     run = replace(run, weak=replace(run.weak, counts=np.rint(samples / run.weak.lsb).astype(np.int32)))
     published = np.flatnonzero(run.native().run_both(run.weak.samples).told == Reason.UPDATED)
     if not len(published):

@@ -15,9 +15,10 @@ HALF = 12  # PVID_REFINE_HALF
 
 _STEPS_OF_FAST = 48.0  # steps of Adams in the fast period, at least
 _STEPS_OF_RUNGE_KUTTA = 25.0
+_STEPS_WITH_REVERSALS = 120.0  # likewise; with 80 one run in 40 stays at a wrong estimate
 _MOST_PARTS = 8  # of a step of one tick
 _MOST_FINE = 64
-_MOST_TICKS = 4  # of a step in which a sign may change
+_MOST_TICKS = 4  # of a step in which a sign may change, or an input jump
 _PART_OF_RING = 0.6  # that a block has
 _BANDS = 4.0  # pass band of second derivatives over the fast frequency
 _PERIODS = 2.0  # slow periods of a block
@@ -83,7 +84,9 @@ def _steps_of(rig: RefineRig) -> tuple[int, int, int]:
             f"{rig.fast_hz:.3g} Hz, not {rig.sample_rate:g}"
         )
     ratio = math.floor(min(longest, _MOST_FINE * rig.fine_s) * rig.sample_rate)
-    if rig.runge_kutta:  # inputs may jump: no longer steps than the ring needs for a block, or than reversals bear
+    if rig.jumps and all(one.order == 2 for one in rig.inputs):  # which are smooth
+        ratio = min(ratio, math.floor(rig.sample_rate / (_STEPS_WITH_REVERSALS * rig.fast_hz)))
+    elif rig.runge_kutta:  # inputs may jump: no longer steps than the ring needs for a block, or than reversals bear
         for_ring = math.ceil(_PERIODS / rig.slow_hz * rig.sample_rate / (_PART_OF_RING * rig.ring))
         ratio = min(ratio, _MOST_TICKS if rig.jumps else for_ring)
     ratio = min(max(ratio, 1), 255)

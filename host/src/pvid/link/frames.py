@@ -453,8 +453,8 @@ class RefinedEstimate(Message):
     """Board to PC beside every Estimate, which is the weak form's, if there is a second stage (refine.h).
 
     p and covariance are what both stages publish (pvid_refine_best_f32), `stage` is whose they are (Stage). r, se,
-    level and clash are of the refinement's estimate, and `number` is its number; all are 0 while none stands. `reason`
-    is what its last block told.
+    level and clash are of the refinement's estimate (of r what names.shown_of_refined says), and `number` is its
+    number; all are 0 while none stands. `reason` is what its last block told.
     """
 
     TYPE = 15

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pvid.base.errors import PvidError
@@ -32,12 +33,19 @@ _LINE = re.compile(rf"(sample|p|r) ({_NAME})(?: ([A-Za-z0-9/*^()%.+-]{{1,24}}))?
 MOST = 1200  # characters of a text
 
 
+def shown_of_refined(parameters: int, widths: int, in_p: Sequence[int]) -> tuple[int, ...]:
+    """Entries of the refinement's r that RefinedEstimate has: without the widths, which are first and differ from block
+    to block, and without those in p where the others fill its places."""
+    found = tuple(range(widths, parameters))
+    return found if len(found) <= MAX_P else tuple(one for one in found if one not in in_p)
+
+
 @dataclass(frozen=True)
 class BoardNames:
     """A mechanism by the names and units of its samples and of its parameters; a unit of "" is that of a number.
 
     counts : value of a count of each sample, if the board sends counts
-    refined : entries of the refinement's r; () without a second stage
+    refined : entries of the refinement's r that it sends; () without a second stage
     """
 
     mechanism: str

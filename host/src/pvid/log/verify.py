@@ -40,6 +40,7 @@ from pvid.link.frames import (
     RawCount,
     RefinedEstimate,
 )
+from pvid.link.names import shown_of_refined
 from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
 from pvid.run.compare import P_NAMES, Difference
@@ -547,10 +548,11 @@ class _Recomputation:
         for a, b in ((a, b) for a, b in _UPPER if b < n_p):
             what = f"published covariance of {self._p_names[a]} and {self._p_names[b]}"
             yield what, _word(logged[a, b]), _word(best["covariance"][a, b])
-        own, widths = refine.estimate, refine.shape.widths
-        zero = np.zeros(refine.shape.parameters, np.float32)
+        own, shape = refine.estimate, refine.shape
+        zero = np.zeros(shape.parameters, np.float32)
+        shown = shown_of_refined(shape.parameters, shape.widths, shape.place_of_p)
         for name, values in (("r", zero if own is None else own.r), ("se", zero if own is None else own.se)):
-            for i, value in enumerate(values[widths:]):
+            for i, value in enumerate(values[list(shown)]):
                 yield f"refined {name}[{i}]", _word(getattr(check, name)[i]), _word(value)
         for name in ("level", "clash"):
             value = np.float32(0) if own is None else getattr(own, name)

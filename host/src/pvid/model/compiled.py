@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import sympy as sp
@@ -147,13 +147,14 @@ class Extra:
     symbol : in the equations of the refinement
     unit : as in "1/s"
     sd : how far from 0 it can be [unit]
-    optional : it is 0 but where the refinement on the host asks for it
+    optional : the option of the rig file that it belongs to: it is 0 but where that is chosen, or where the refinement
+        in float64 asks for it; empty: it is always there
     """
 
     symbol: sp.Symbol
     unit: str
     sd: float
-    optional: bool = False
+    optional: str = ""
 
     @property
     def name(self) -> str:
@@ -253,6 +254,17 @@ class CompiledModel:
     def p_names(self) -> tuple[str, ...]:
         """Names of p."""
         return tuple(one.name for one in self.unknowns)
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Of the refinement, that a rig file may choose."""
+        return tuple(dict.fromkeys(one.optional for one in self.refinement.extras if one.optional))
+
+    def with_options(self, chosen: Collection[str]) -> CompiledModel:
+        """With these options of the refinement."""
+        extras = self.refinement.extras
+        own = tuple(replace(one, optional="") if one.optional in chosen else one for one in extras)
+        return replace(self, refinement=replace(self.refinement, extras=own)) if own != extras else self
 
     def signal(self, name: str) -> Signal:
         """The one with this name."""

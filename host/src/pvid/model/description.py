@@ -235,15 +235,15 @@ class Model:
         self._coordinates.append(jet)
         return jet
 
-    def refined(self, name: str, unit: str, sd: float, optional: bool = False) -> sp.Symbol:
+    def refined(self, name: str, unit: str, sd: float, optional: str | None = None) -> sp.Symbol:
         """An unknown of the refinement that the rows do not have: it starts at 0, within about sd [unit].
 
-        optional : on the host alone, where the residuals ask for it; elsewhere it is 0
+        optional : key of the rig file's table [refine] without which it is 0; in float64 the residuals choose it
         """
         if not 0 < sd < math.inf:
             raise self._refused(f"{name}: sd must be positive")
         symbol = self._symbol(name, unit)
-        self._extras.append(Extra(symbol, unit, float(sd), optional))
+        self._extras.append(Extra(symbol, unit, float(sd), optional or ""))
         return symbol
 
     def shape(self, name: str, unit: str, expression: sp.Expr) -> sp.Symbol:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from pvid.base.errors import PvidError
@@ -38,6 +39,7 @@ def described(rig: RigFile) -> MechanismRig:
         nominal=nominal,
         known_sd=known_sd,
         identifier={key: float(value) for key, value in given.items() if value is not None},
+        refine={one.name: getattr(rig.refine, one.name) for one in fields(rig.refine)},
     )
 
 

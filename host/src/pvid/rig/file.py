@@ -190,6 +190,25 @@ class Identifier:
 
 
 @dataclass(frozen=True)
+class Refine:
+    """What the second stage in C estimates besides viscous friction and the skew of the sensors; in float64 the
+    refinement tries both where the residuals ask for it.
+
+    Attributes
+    ----------
+    dry_friction : second stage in C: estimate the sharp friction of pivot and joint too, f1 and f2; 7 times the
+        instructions, and twice the RAM
+    slant : second stage in C: estimate the slant of the pivot's slide against the vertical too, along which y is read
+    """
+
+    dry_friction: bool = False
+    slant: bool = False
+
+    def __post_init__(self) -> None:
+        _check_fields(self, "[refine] ")
+
+
+@dataclass(frozen=True)
 class ModelTable:
     """The mechanism of the rig.
 
@@ -211,7 +230,7 @@ class RigFile:
     Attributes
     ----------
     l1 : length of rod 1
-    nominal, sensor, identifier, model : the tables of the file
+    nominal, sensor, identifier, refine, model : the tables of the file
     sample_rate : rate of the samples; default: that of the run
     l1_sd : relative standard deviation of l1; part of the standard errors, because no run shows it
     """
@@ -223,6 +242,7 @@ class RigFile:
     sample_rate: float | None = _number(None, "Hz", 1e-3, 1e6)
     l1_sd: float = _number(0.001, "relative", 0.0, 1.0)
     model: ModelTable = field(default_factory=ModelTable)
+    refine: Refine = field(default_factory=Refine)
 
     def __post_init__(self) -> None:
         _check_fields(self, "")
@@ -279,6 +299,7 @@ class RigFile:
             nominal=Nominal(**guess),
             sensor=Sensor(**tables["sensor"]),
             identifier=Identifier(**tables["identifier"]),
+            refine=Refine(**tables["refine"]),
             model=model,
             **top,
         )
@@ -357,6 +378,7 @@ _TABLES: dict[str, type] = {
     "sensor": Sensor,
     "nominal": Nominal,
     "identifier": Identifier,
+    "refine": Refine,
     "model": ModelTable,
 }
 

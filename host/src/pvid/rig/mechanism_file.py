@@ -15,6 +15,8 @@
     R = 1.2                   # rough guesses: the start of the estimate
     [identifier]
     forgetting_s = 20         # how the estimate follows a change: see Following
+    [refine]
+    dry_friction = true       # options of the model's second stage in C
 
 A key that the model does not have becomes a PvidError that names it and lists those that it has.
 """
@@ -54,6 +56,7 @@ class MechanismRig:
         input gain_sd alone
     nominal : guesses of the unknowns
     identifier : what differs from Following's defaults
+    refine : options of the refinement in C that are chosen or not
     """
 
     model: str
@@ -63,6 +66,7 @@ class MechanismRig:
     nominal: Mapping[str, float] = field(default_factory=dict)
     known_sd: Mapping[str, float] = field(default_factory=dict)
     identifier: Mapping[str, float] = field(default_factory=dict)
+    refine: Mapping[str, bool] = field(default_factory=dict)
 
     @classmethod
     def parse(cls, text: str) -> MechanismRig:
@@ -78,7 +82,7 @@ class MechanismRig:
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> MechanismRig:
         """From the tables of a text; see `parse`."""
-        known_keys = ("sample_rate", "model", "known", "known_sd", "sensor", "nominal", "identifier")
+        known_keys = ("sample_rate", "model", "known", "known_sd", "sensor", "nominal", "identifier", "refine")
         for key in document:
             if key not in known_keys:
                 raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(known_keys)} are")
@@ -106,6 +110,7 @@ class MechanismRig:
             _numbers(_table(document, "nominal"), "nominal"),
             _numbers(_table(document, "known_sd"), "known_sd"),
             identifier,
+            _switches(_table(document, "refine"), "refine"),
         )
 
     def text(self) -> str:
@@ -118,6 +123,8 @@ class MechanismRig:
         for name, keys in tables.items():
             if keys:
                 lines += ["", f"[{name}]", *(f"{key} = {value!r}" for key, value in keys.items())]
+        if self.refine:
+            lines += ["", "[refine]", *(f"{key} = {str(value).lower()}" for key, value in self.refine.items())]
         return "\n".join(lines).lstrip("\n") + "\n"
 
     def write(self, path: Path) -> None:
@@ -133,7 +140,7 @@ class MechanismRig:
         Raises
         ------
         PvidError
-            Naming a constant, signal or unknown that the model does not have, or a guess that the model excludes.
+            Naming a constant, signal, unknown or option that the model does not have, or a guess that it excludes.
         """
         _refuse_unknown("known", self.known, [one.name for one in model.knowns])
         _refuse_unknown("sensor", self.sensor, [one.name for one in model.signals])
@@ -142,6 +149,7 @@ class MechanismRig:
                 raise PvidError(f"sensor.{signal.name}: an input of the model has a gain_sd alone")
         _refuse_unknown("nominal", self.nominal, list(model.p_names))
         _refuse_unknown("known_sd", self.known_sd, [one.name for one in model.knowns])
+        _refuse_unknown("refine", self.refine, list(model.options))
         knowns = tuple(
             replace(one, value=self.known.get(one.name, one.value), sd=self.known_sd.get(one.name, one.sd))
             for one in model.knowns
@@ -160,7 +168,8 @@ class MechanismRig:
                 raise PvidError(f"nominal.{one.name} must be positive, not {guess:g}")
             unknowns.append(replace(one, guess=guess, sd=2 * guess if one.positive else one.sd))
         following = replace(model.following, **self.identifier)
-        return replace(model, knowns=knowns, signals=tuple(signals), unknowns=tuple(unknowns), following=following)
+        own = replace(model, knowns=knowns, signals=tuple(signals), unknowns=tuple(unknowns), following=following)
+        return own.with_options([name for name, chosen in self.refine.items() if chosen])
 
 
 def channels_of(model: CompiledModel) -> tuple[Channel, ...]:
@@ -211,6 +220,13 @@ def _numbers(table: Mapping[str, Any], place: str) -> dict[str, float]:
         if (key in (*_OF_A_SENSOR, "sample_rate") or place in ("known_sd", "identifier")) and not value >= 0:
             raise PvidError(f"{place}.{key} must not be negative".removeprefix("."))
     return {key: float(value) for key, value in table.items()}
+
+
+def _switches(table: Mapping[str, Any], place: str) -> dict[str, bool]:
+    for key, value in table.items():
+        if not isinstance(value, bool):
+            raise PvidError(f"{place}.{key} must be true or false, not {shown(str(value))}")
+    return dict(table)
 
 
 def _refuse_unknown(table: str, given: Iterable[str], names: list[str]) -> None:

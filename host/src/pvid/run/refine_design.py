@@ -19,6 +19,7 @@ from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Integral, Jet
+from pvid.models.kapitza.refinement import PARAMETERS
 from pvid.models.registry import DEFAULT
 from pvid.run.engine_design import Run, simulated_run_of
 from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
@@ -124,6 +125,8 @@ def refine_settings(
         source = Source.SAMPLED if order == -1 else sources.get(place, Source.SAMPLED)
         signal.append(RefineSignal(place, order, scale, range_, source))
     motion, states, r = GeneratedRefine(made), list(_states(made, run, rate)), r_of(made, p)
+    if made.runge_kutta and model.refinement.equations:  # whose motion is not that of the weak form's windows
+        block_s = min(block_s, _slow_s(motion, r))
     jumps = _jumps(motion, r, states)
     rig = RefineRig(
         sample_rate=rate,
@@ -141,6 +144,35 @@ def refine_settings(
     )
     settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
+
+
+def with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> RefineRig:
+    """What the pendulum's refinement with options depends on.
+
+    Parameters
+    ----------
+    rig : without options, from refine_rig
+    p : parameters near those of the rig, as the weak form has them
+    """
+    prior_sd, gain_sd = (dict(zip(PARAMETERS, one, strict=True)) for one in (rig.prior_sd, rig.gain_sd))
+    rig = replace(
+        rig,
+        prior_sd=tuple(prior_sd.get(one.name, one.prior_sd) for one in made.parameters),
+        gain_sd=tuple(gain_sd.get(one.name, 0.0) for one in made.parameters),
+    )
+    if not made.runge_kutta:
+        return rig
+    n = len(made.coordinates)
+    angles, rates = rig.state_limit[: n // 2], rig.state_limit[n // 2 :]
+    jumps = _jumps(GeneratedRefine(made), r_of(made, p), [_at_rest(made)])
+    return replace(
+        rig,
+        state_limit=tuple(limit for pair in zip(angles, rates, strict=True) for limit in pair),
+        runge_kutta=True,
+        ring=files_refine.ring_of(made),
+        fine_s=_fine_s(made, jumps, 2.0 / rig.slow_hz),
+        jumps=jumps,
+    )
 
 
 def _input(made: RefineFunctions, jet: Jet) -> tuple[str, int, float]:
@@ -193,6 +225,18 @@ def _fastest_hz(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> f
     return float(np.quantile(found, _WITH_SIGNS if signs_of(motion.made.model) else _WITHOUT))
 
 
+def _slow_s(motion: GeneratedRefine, r: Float) -> float:
+    """Two periods of the slowest oscillation at rest; inf: there is none."""
+    at_rest = _at_rest(motion.made)
+    rates = np.abs(np.linalg.eigvals(_slopes(motion, r, *at_rest)).imag)
+    return 4 * math.pi / float(rates[rates > 0].min()) if rates.any() else math.inf
+
+
+def _at_rest(made: RefineFunctions) -> State:
+    n = len(made.coordinates)
+    return np.zeros(n, np.float32), np.zeros(n if made.order == 2 else 0, np.float32)
+
+
 def r_of(made: RefineFunctions, p: npt.ArrayLike, width: float = _SHARP) -> Float:
     """r of parameters of the weak form."""
     given = np.asarray(p, float)
@@ -210,8 +254,12 @@ def _slopes(motion: GeneratedRefine, r: Float, q: Float32, v: Float32) -> Float:
 
 
 def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[float, ...]:
-    """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined."""
+    """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined; a
+    friction that starts at 0 is as large there as it may be."""
     made = motion.made
+    r = np.where(
+        [one.place < 0 and not one.sign for one in made.parameters], [one.prior_sd for one in made.parameters], r
+    )
     q, v = states[len(states) // 2]
     still = np.where([name.endswith("_1") for name in made.coordinates], np.float32(0), q)
     found = []

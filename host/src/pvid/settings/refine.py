@@ -122,3 +122,8 @@ class RefineRig:
     ring: int = 512
     fine_s: float = math.inf
     jumps: Sequence[float] = ()
+
+    @property
+    def inputs(self) -> tuple[RefineSignal, ...]:
+        """Those of the signals."""
+        return self.signal[: len(self.signal) - len(self.sample_sd)]

@@ -21,12 +21,12 @@ model.output("rho2", "m", l1 * L2**0.5 / d2)
 # The refinement: the full equations in absolute angles, with the friction of both joints.
 a1, a2 = model.coordinate("a1", "rad"), model.coordinate("a2", "rad")
 k1, k2 = model.refined("k1", "1/s", sd=0.1), model.refined("k2", "1/s", sd=0.05)
-f1, f2 = (model.refined(f"f{n}", "1/s^2", sd=1.0, optional=True) for n in (1, 2))  # dry friction
-slant = model.refined("slant", "rad", sd=0.1, optional=True)  # of the pivot's slide against the vertical
+f1, f2 = (model.refined(f"f{n}", "1/s^2", sd=0.03, optional="dry_friction") for n in (1, 2))
+slant = model.refined("slant", "rad", sd=0.1, optional="slant")  # of the pivot's slide against the vertical
 lam, sig = model.shape("lam", "", L2 / d2), model.shape("sig", "", 1 / L2)  # l2/l1, (rho2/l2)^2
 swing, v1, turn = sin(a2 - a1), a1.d(), a2.d() - a1.d()
-joint, push = k2 * turn + f2 * sgn(turn), slant * u
-first = a1.d(2) + lam * (cos(a2 - a1) * a2.d(2) - swing * a2.d() ** 2) + G * sin(a1) + push * cos(a1)
-second = cos(a2 - a1) * a1.d(2) + (1 + sig) * lam * a2.d(2) + swing * v1**2 + G * sin(a2) + push * cos(a2)
+joint, push, lift = k2 * turn + f2 * sgn(turn), slant * u, w + (1 - slant**2 / 2) * u  # y is along the slide
+first = a1.d(2) + lam * (cos(a2 - a1) * a2.d(2) - swing * a2.d() ** 2) + lift * sin(a1) + push * cos(a1)
+second = cos(a2 - a1) * a1.d(2) + (1 + sig) * lam * a2.d(2) + swing * v1**2 + lift * sin(a2) + push * cos(a2)
 first, second = first + k1 * v1 + f1 * sgn(v1) - joint, second + joint / lam
 model.refine([first, second], outputs={phi: a2 - a1 + c}, region=[L2 - 0.02])
