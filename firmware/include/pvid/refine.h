@@ -49,6 +49,7 @@ extern "C" {
 #ifndef PVID_REFINE_HALF
 #define PVID_REFINE_HALF 12
 #endif
+#define PVID_REFINE_STATES (PVID_REFINE_ORDER * PVID_REFINE_COORDINATES)
 #define PVID_REFINE_LATE 3 /* steps until the gate of wild samples has judged one */
 #define PVID_REFINE_LINE (2 * ((2 * PVID_REFINE_HALF) + 1 + PVID_REFINE_LATE))
 
@@ -86,13 +87,17 @@ typedef struct pvid_refine_config_f32 {
     uint8_t parts;      /* equal parts of a step, each of two jobs, 1..64 */
     uint8_t fine_parts; /* of a step in which a sign may change, parts..64 */
 #endif
+#if PVID_REFINE_OBSERVER
+    float observer[PVID_REFINE_OUTPUTS * PVID_REFINE_STATES]; /* correction of the states at the end of a big step by a
+                                                                 row of each output, -1e9..1e9 [state / first output];
+                                                                 0: none */
+#endif
 #if PVID_REFINE_WIDTHS > 0
     float width[PVID_REFINE_WIDTHS]; /* where the widths of the signs start [unit of the sign's argument],
                                         1e-9..1e9; they do not fall below a quarter of this */
 #endif
-    float state_limit[PVID_REFINE_ORDER *
-                      PVID_REFINE_COORDINATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
-    float forgetting_s;                         /* time constant of the triangle [s], > 0; 0: it does not forget */
+    float state_limit[PVID_REFINE_STATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
+    float forgetting_s;                    /* time constant of the triangle [s], > 0; 0: it does not forget */
     float outlier_gate; /* means of `ratio` samples of an output, or of an input of order 2, that stand out by more than
                            this multiple of the usual are replaced, 2..1e3; 0: no gate; recommended: 4 */
     float gate;         /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */

@@ -128,6 +128,9 @@ static void begin_pass(pvid_refine_f32 *self)
         .parts = self->config.parts,
         .fine_parts = self->config.fine_parts,
 #endif
+#if PVID_REFINE_OBSERVER
+        .observer = self->config.observer,
+#endif
 #if PVID_REFINE_TURNING
         .turn = self->front.turn,
 #endif

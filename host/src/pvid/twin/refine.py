@@ -93,6 +93,8 @@ class RefineTwin:
         self.sd = np.asarray(config.sd, _F)
         self.prior_sd = np.asarray(config.prior_sd, _F)
         self.gain_sd = np.asarray(config.gain_sd, _F)
+        given = config.observer
+        self.observer = None if given is None else np.asarray(given, _F).reshape(shape.outputs, shape.states)
         self.state_limit = np.asarray(config.state_limit, _F)
         self.variance = self.sd[0] * self.sd[0]
         self.weight = self.sd[0] / self.sd
@@ -132,7 +134,7 @@ class RefineTwin:
         if self.taken > 0 and self.config.gate > 0 and not self.restarted:
             gate = (_F(self.config.gate) * self.sd[0]) * np.sqrt(_at_least_one(self.level))
         parts = self.parts, self.config.fine_parts or 1
-        self.work.begin(self.linear, self.start, self.h, parts, gate, self.front.turn)
+        self.work.begin(self.linear, self.start, self.h, parts, gate, self.front.turn, self.observer)
         self.phase = Phase.PASS
         self.waiting = False
 
