@@ -103,7 +103,8 @@ typedef struct pvid_refine_config_f32 {
     float gate;         /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */
     float chi_max;      /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
     float clash_max;    /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
-    float step_max;     /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
+    float step_max;     /* limit of its last step [prior_sd], > 0; with signs a twentieth of it behind the second block;
+                           recommended: 0.02 */
     float step_limit;   /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 1.8 at most;
                            recommended: 2 */
     float se_max;       /* largest relative standard error of a published estimate, > 0 */

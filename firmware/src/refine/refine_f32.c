@@ -70,6 +70,12 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
  * standard error that the sensors' noise gives it. */
 #define SETTLED 0.25f
 
+/* With signs: part of the limit of a block's last step below which its linearization is exact enough. Blocks with a
+ * longer one are taken only up to the second, and this part of their triangle remains: the others are to outweigh their
+ * error. */
+#define FINE 0.05f
+#define ROUGHLY 0.25f
+
 /* Least variance of a row over that of the sensors: the errors of reversals in the finest steps are alike from block to
  * block. */
 #define REVERSALS 4.0f
@@ -315,6 +321,27 @@ static bool is_sane(const pvid_refine_f32 *self)
     return sane;
 }
 
+#if PVID_REFINE_SIGNS > 0
+/* Whether the last step is small beside the errors of the blocks so far, or so short that the motion is linear in it:
+ * reversals make the motion jump with each step. */
+static bool is_fine(const pvid_refine_f32 *self)
+{
+    return (self->solve.size < (FINE * self->config.step_max)) ||
+           (self->solve.reduction < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
+}
+#endif
+
+/* Whether the last step is small beside the weak form's errors; with signs behind the second block a fine one. */
+static bool is_settled(const pvid_refine_f32 *self)
+{
+    const bool small = self->solve.size < self->config.step_max;
+#if PVID_REFINE_SIGNS > 0
+    return (small && (self->taken < 2u)) || is_fine(self);
+#else
+    return small;
+#endif
+}
+
 /* Behind a block that was taken and began at `began`: twice as long, and from as far back as possible, but where a
  * coordinate is hidden: its value there is not known. */
 static void lengthen(pvid_refine_f32 *self, uint32_t began)
@@ -352,6 +379,9 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         lengthen(self, began);
         fade = self->again ? KEPT : fade;
     }
+#if PVID_REFINE_SIGNS > 0
+    fade = is_fine(self) ? fade : (ROUGHLY * fade);
+#endif
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
     }
@@ -450,17 +480,6 @@ static float mean_square(const pvid_refine_f32 *self)
     const uint32_t used = self->work.used;
     const float freedom = (used > (PVID_REFINE_UNKNOWNS + 1u)) ? (float)(used - PVID_REFINE_UNKNOWNS) : 1.0f;
     return self->solve.residual / (freedom * (WHITENESS * variance));
-}
-
-/* Whether the last step is small: beside the weak form's errors, or with signs, whose reversals make the motion jump
- * with each step, beside the errors of the blocks so far. */
-static bool is_settled(const pvid_refine_f32 *self)
-{
-    bool settled = self->solve.size < self->config.step_max;
-#if PVID_REFINE_SIGNS > 0
-    settled = settled || (self->solve.reduction < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
-#endif
-    return settled;
 }
 
 /* Takes the block or not. */

@@ -34,6 +34,7 @@ _SHORT = _F(0.25)
 _SHARPEST, _REVERSALS = _F(0.25), _F(4)
 _PRIOR_ERRORS, _LEAST_PRIOR = _F(10), _F(1e-6)
 _SETTLED = _F(0.25)
+_FINE, _ROUGHLY = _F(0.05), _F(0.25)
 _JOBS = 9
 _FIRST_JOBS = 16
 _SOLVE_TICKS = 45
@@ -268,6 +269,8 @@ class RefineTwin:
         if self.length < config.block:
             self._lengthen(began)
             fade = _KEPT if self.again else fade
+        if self.shape.signs and not self._is_fine():
+            fade = _ROUGHLY * fade
         self.triangle = self.solve.triangle * fade
         for i in range(self.shape.widths):
             self.triangle[i] = 0
@@ -321,10 +324,15 @@ class RefineTwin:
         freedom = _F(used - unknowns) if used > unknowns + 1 else _F(1)
         return _F(self.solve.residual / (freedom * (_WHITENESS * self.variance)))
 
+    def _is_fine(self) -> bool:
+        short = self.solve.size < _FINE * _F(self.config.step_max)
+        return bool(short or self.solve.reduction < _SETTLED * self.variance)
+
     def _is_settled(self) -> bool:
-        if self.solve.size < _F(self.config.step_max):
-            return True
-        return self.shape.signs > 0 and bool(self.solve.reduction < _SETTLED * self.variance)
+        small = bool(self.solve.size < _F(self.config.step_max))
+        if self.shape.signs:
+            return (small and self.taken < 2) or self._is_fine()
+        return small
 
     def _end_block(self) -> None:
         config, square = self.config, self._mean_square()
