@@ -380,7 +380,8 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         fade = self->again ? KEPT : fade;
     }
 #if PVID_REFINE_SIGNS > 0
-    fade = is_fine(self) ? fade : (ROUGHLY * fade);
+    self->rough = !is_fine(self);
+    fade = self->rough ? (ROUGHLY * fade) : fade;
 #endif
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
@@ -482,13 +483,24 @@ static float mean_square(const pvid_refine_f32 *self)
     return self->solve.residual / (freedom * (WHITENESS * variance));
 }
 
+/* Part of the triangle that remains of the past, beside forgetting: the clash is to be that with all of it. */
+static float kept_of_past(const pvid_refine_f32 *self)
+{
+    const float kept = self->again ? KEPT : 1.0f;
+#if PVID_REFINE_SIGNS > 0
+    return self->rough ? (ROUGHLY * kept) : kept;
+#else
+    return kept;
+#endif
+}
+
 /* Takes the block or not. */
 static void end_block(pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
     const float square = mean_square(self);
-    const float past = self->again ? (KEPT * KEPT) : 1.0f;
-    const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * past);
+    const float kept = kept_of_past(self);
+    const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * (kept * kept));
     self->sane = is_sane(self);
     const float room = at_least_one(self->level);
     const bool again = self->again;

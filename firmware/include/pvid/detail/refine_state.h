@@ -149,14 +149,17 @@ struct pvid_refine_f32 {
     float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
     bool renewed;                      /* the weak form has given an estimate since the search began from one */
     bool frozen;
-    bool solved;         /* the last solution exists */
-    bool restarted;      /* the block's start is not known from the one before */
-    bool busy;           /* the weak form was at the last tick that could have had jobs */
-    bool plain;          /* the next tick has a sample alone */
-    bool waiting;        /* the next job needs an entry of the ring that is not there */
-    bool sane;           /* the block */
-    bool again;          /* the block begins before the end of the last one */
-    bool same_start;     /* where that one began */
+    bool solved;     /* the last solution exists */
+    bool restarted;  /* the block's start is not known from the one before */
+    bool busy;       /* the weak form was at the last tick that could have had jobs */
+    bool plain;      /* the next tick has a sample alone */
+    bool waiting;    /* the next job needs an entry of the ring that is not there */
+    bool sane;       /* the block */
+    bool again;      /* the block begins before the end of the last one */
+    bool same_start; /* where that one began */
+#if PVID_REFINE_SIGNS > 0
+    bool rough; /* the last step of the last block that was taken was not a fine one */
+#endif
     pvid_reason verdict; /* on the block */
     pvid_reason told;    /* of the last block that ended */
     uint8_t phase;

@@ -110,7 +110,7 @@ class RefineTwin:
         n = shape.parameters
         self.phase = Phase.WAIT
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
-        self.again = self.same_start = False
+        self.again = self.same_start = self.rough = False
         self.rested = self.passed = self.taken = self.refused = self.lost = self.length = self.begin = self.origin = 0
         self.level = self.clash = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
@@ -269,7 +269,8 @@ class RefineTwin:
         if self.length < config.block:
             self._lengthen(began)
             fade = _KEPT if self.again else fade
-        if self.shape.signs and not self._is_fine():
+        self.rough = self.shape.signs > 0 and not self._is_fine()
+        if self.rough:
             fade = _ROUGHLY * fade
         self.triangle = self.solve.triangle * fade
         for i in range(self.shape.widths):
@@ -336,7 +337,8 @@ class RefineTwin:
 
     def _end_block(self) -> None:
         config, square = self.config, self._mean_square()
-        past = _KEPT * _KEPT if self.again else _F(1)
+        kept = (_KEPT if self.again else _F(1)) * (_ROUGHLY if self.rough else _F(1))
+        past = kept * kept
         clash = self.solve.clash / ((_F(self.shape.parameters) * self.variance) * past)
         self.sane = self._is_sane()
         room, again = _at_least_one(self.level), self.again
