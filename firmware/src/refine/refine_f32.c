@@ -236,6 +236,9 @@ static void begin_search(pvid_refine_f32 *self)
     self->taken = 0;
     self->refused = 0;
     self->level = 0.0f;
+#if PVID_REFINE_SIGNS > 0
+    self->kept = 1.0f;
+#endif
 }
 
 /* Takes a new estimate of the weak form if it is in the region; until a block has been taken it is the prior's mean. */
@@ -380,8 +383,9 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         fade = self->again ? KEPT : fade;
     }
 #if PVID_REFINE_SIGNS > 0
-    self->rough = !is_fine(self);
-    fade = self->rough ? (ROUGHLY * fade) : fade;
+    const float counts = is_fine(self) ? 1.0f : ROUGHLY;
+    self->kept = self->again ? (KEPT * counts) : counts;
+    fade *= counts;
 #endif
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
@@ -486,11 +490,10 @@ static float mean_square(const pvid_refine_f32 *self)
 /* Part of the triangle that remains of the past, beside forgetting: the clash is to be that with all of it. */
 static float kept_of_past(const pvid_refine_f32 *self)
 {
-    const float kept = self->again ? KEPT : 1.0f;
 #if PVID_REFINE_SIGNS > 0
-    return self->rough ? (ROUGHLY * kept) : kept;
+    return self->kept;
 #else
-    return kept;
+    return self->again ? KEPT : 1.0f;
 #endif
 }
 

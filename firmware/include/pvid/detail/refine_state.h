@@ -144,22 +144,22 @@ typedef struct {
 /* Only the functions of refine.h write to it. */
 struct pvid_refine_f32 {
     pvid_refine_config_f32 config;
-    float h;                           /* a step of the motion [s] */
-    float fade;                        /* forgetting of a full block, on the triangle */
+    float h;    /* a step of the motion [s] */
+    float fade; /* forgetting of a full block, on the triangle */
+#if PVID_REFINE_SIGNS > 0
+    float kept; /* part of the triangle behind the last block that was taken, beside forgetting */
+#endif
     float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
     bool renewed;                      /* the weak form has given an estimate since the search began from one */
     bool frozen;
-    bool solved;     /* the last solution exists */
-    bool restarted;  /* the block's start is not known from the one before */
-    bool busy;       /* the weak form was at the last tick that could have had jobs */
-    bool plain;      /* the next tick has a sample alone */
-    bool waiting;    /* the next job needs an entry of the ring that is not there */
-    bool sane;       /* the block */
-    bool again;      /* the block begins before the end of the last one */
-    bool same_start; /* where that one began */
-#if PVID_REFINE_SIGNS > 0
-    bool rough; /* the last step of the last block that was taken was not a fine one */
-#endif
+    bool solved;         /* the last solution exists */
+    bool restarted;      /* the block's start is not known from the one before */
+    bool busy;           /* the weak form was at the last tick that could have had jobs */
+    bool plain;          /* the next tick has a sample alone */
+    bool waiting;        /* the next job needs an entry of the ring that is not there */
+    bool sane;           /* the block */
+    bool again;          /* the block begins before the end of the last one */
+    bool same_start;     /* where that one began */
     pvid_reason verdict; /* on the block */
     pvid_reason told;    /* of the last block that ended */
     uint8_t phase;

@@ -110,7 +110,7 @@ class RefineTwin:
         n = shape.parameters
         self.phase = Phase.WAIT
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
-        self.again = self.same_start = self.rough = False
+        self.again = self.same_start = False
         self.rested = self.passed = self.taken = self.refused = self.lost = self.length = self.begin = self.origin = 0
         self.level = self.clash = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
@@ -191,6 +191,7 @@ class RefineTwin:
         self._begin_from_prior()
         self.taken = self.refused = 0
         self.level = _F(0)
+        self.kept = _F(1)
 
     def _take_weak(self, p: Float32, se: Float32) -> None:
         r = self.model.from_p(p)
@@ -269,9 +270,10 @@ class RefineTwin:
         if self.length < config.block:
             self._lengthen(began)
             fade = _KEPT if self.again else fade
-        self.rough = self.shape.signs > 0 and not self._is_fine()
-        if self.rough:
-            fade = _ROUGHLY * fade
+        if self.shape.signs:
+            counts = _F(1) if self._is_fine() else _ROUGHLY
+            self.kept = _KEPT * counts if self.again else counts
+            fade = fade * counts
         self.triangle = self.solve.triangle * fade
         for i in range(self.shape.widths):
             self.triangle[i] = 0
@@ -337,7 +339,9 @@ class RefineTwin:
 
     def _end_block(self) -> None:
         config, square = self.config, self._mean_square()
-        kept = (_KEPT if self.again else _F(1)) * (_ROUGHLY if self.rough else _F(1))
+        kept = _KEPT if self.again else _F(1)
+        if self.shape.signs:
+            kept = self.kept
         past = kept * kept
         clash = self.solve.clash / ((_F(self.shape.parameters) * self.variance) * past)
         self.sane = self._is_sane()
