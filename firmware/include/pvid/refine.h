@@ -26,6 +26,9 @@
  * more finely. The widths are the first entries of r; each block has its own, and an estimate is published however
  * uncertain they are.
  *
+ * Where an input is measured (PVID_REFINE_OBSERVER), its noise moves the model. An observer follows the outputs within
+ * a block, so that the errors of blocks are those of the noise.
+ *
  * The model is refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is divided into jobs; a
  * tick does a few of them, so its time is bounded. A tick in which the weak form is busy does none, but no more than
  * `rests` ticks in a row do none.

@@ -220,11 +220,12 @@ def _with_observer(settings: RefineConfig, motion: GeneratedRefine, r: Float, st
     """
     made, model = motion.made, motion.made.model
     n, step = len(made.coordinates), BIG_STEP * settings.ratio / settings.sample_rate
-    smooth = np.where([bool(one.sign) for one in made.parameters], _SOFT, r).astype(np.float32)
-    m, none = motion.constants(smooth), np.zeros(len(made.inputs), np.float32)
+    smooth = np.where([bool(one.sign) for one in made.parameters], _SOFT, r)
+    single = smooth.astype(np.float32)
+    m, none = motion.constants(single), np.zeros(len(made.inputs), np.float32)
     slopes = np.mean([_slopes(motion, smooth, q, v) for q, v in states], 0)
     by_u = np.mean([motion.input_jacobian(m, q, v, none) for q, v in states], 0, np.float64)
-    reading = np.mean([motion.output_jacobian(m, q, v, none, smooth)[0] for q, v in states], 0, np.float64)
+    reading = np.mean([motion.output_jacobian(m, q, v, none, single)[0] for q, v in states], 0, np.float64)
     sd = np.array([model.signal(one.of).sd if is_measured(model, one) else 0.0 for one in made.inputs])
     density = (by_u * sd**2) @ by_u.T / settings.sample_rate
     over, noise = _transition(slopes, density, step / 2)
