@@ -77,6 +77,49 @@ def test_sharp_friction_is_refined_to_the_bound(name: str) -> None:
         assert np.sqrt(np.mean((one.error / least) ** 2)) < 0.5 * np.sqrt(np.mean((one.weak / least) ** 2))
 
 
+@pytest.fixture(scope="module")
+def masses() -> Case:
+    """The two masses, whose current is measured: an input with noise."""
+    return Case.of("two_mass_drive", 1000.0)
+
+
+def test_an_observer_keeps_the_noise_of_a_measured_input_out_of_the_blocks(masses: Case) -> None:
+    """Every published estimate is within its standard errors; without the observer blocks differ by ten of theirs, and
+    the track is lost."""
+    none = np.zeros_like(masses.settings.observer)
+    without = replace(masses, settings=replace(masses.settings, observer=none))
+    places = refine_functions(masses.simulation.model).places_of_p
+    for seed in (0, 1):
+        found = masses.identifier(seed).run_both(masses.samples(seed))
+        there = np.any(found.r != 0, axis=1)
+        error = found.r[there][:, places] - masses.simulation.truth
+        assert np.all(np.abs(error) < 3 * found.se[there][:, places])
+        assert np.argmax(there) < 5000 and np.mean(there) > 0.7 and there[-1]
+        found = without.identifier(seed).run_both(masses.samples(seed))
+        assert np.mean(np.any(found.r != 0, axis=1)) < 0.3
+
+
+def test_the_gain_of_the_observer_is_the_steady_kalman_filters(masses: Case) -> None:
+    """Its states are in the order of the motion: angle and rate of the motor, of the load. The rows' innovations are
+    larger than the encoder's noise; those of the battery, whose current hardly has any noise, are not."""
+    settings = masses.settings
+    encoder = masses.simulation.model.signal("th").sd / np.sqrt(4 * settings.ratio)
+    assert settings.observer is not None and settings.observer.shape == (4,)
+    assert np.all(settings.observer > 0) and settings.observer[0] < 1
+    assert 1.05 < settings.sd[0] / encoder < 1.3
+    alpha = settings.observer[0]
+    beta = alpha**2 / (2 - alpha)  # of a tracker that knows no more than angle and rate
+    assert settings.observer[1] * 4e-3 == pytest.approx(beta, rel=0.5)
+    battery = Case.of("battery_2rc", 1.0).settings
+    assert battery.observer is not None and np.all(np.abs(battery.observer) < 2e-3)
+
+
+def test_a_gain_that_is_no_number_is_refused(masses: Case) -> None:
+    gain = np.full(4, np.nan, np.float32)
+    with pytest.raises(PvidError, match="refused"):
+        replace(masses, settings=replace(masses.settings, observer=gain)).identifier(0)
+
+
 @pytest.mark.parametrize(
     ("name", "ticks"),
     [

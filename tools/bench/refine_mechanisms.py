@@ -35,7 +35,7 @@ HEADER = (
     *("in 2 s.e. %", "refined", "first after s"),
 )
 
-FRICTION = ("dc_motor", "cart_pendulum", "two_link_arm")
+FRICTION = ("dc_motor", "cart_pendulum", "two_link_arm", "two_mass_drive")
 IMPERFECT = (
     *("mechanism", "imperfection", "runs with an estimate", "of the time %", "median error / s.e.", "largest / s.e."),
     *("largest %", "beyond 5 s.e. and 1 %"),

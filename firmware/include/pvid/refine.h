@@ -26,6 +26,9 @@
  * more finely. The widths are the first entries of r; each block has its own, and an estimate is published however
  * uncertain they are.
  *
+ * Where an input is measured (PVID_REFINE_OBSERVER), its noise moves the model. An observer follows the outputs within
+ * a block, so that the errors of blocks are those of the noise.
+ *
  * The model is refine_shape.h of the mechanism, chosen at build time. Never allocates. The work is divided into jobs; a
  * tick does a few of them, so its time is bounded. A tick in which the weak form is busy does none, but no more than
  * `rests` ticks in a row do none.
@@ -49,6 +52,7 @@ extern "C" {
 #ifndef PVID_REFINE_HALF
 #define PVID_REFINE_HALF 12
 #endif
+#define PVID_REFINE_STATES (PVID_REFINE_ORDER * PVID_REFINE_COORDINATES)
 #define PVID_REFINE_LATE 3 /* steps until the gate of wild samples has judged one */
 #define PVID_REFINE_LINE (2 * ((2 * PVID_REFINE_HALF) + 1 + PVID_REFINE_LATE))
 
@@ -86,19 +90,24 @@ typedef struct pvid_refine_config_f32 {
     uint8_t parts;      /* equal parts of a step, each of two jobs, 1..64 */
     uint8_t fine_parts; /* of a step in which a sign may change, parts..64 */
 #endif
+#if PVID_REFINE_OBSERVER
+    float observer[PVID_REFINE_OUTPUTS * PVID_REFINE_STATES]; /* correction of the states at the end of a big step by a
+                                                                 row of each output, -1e9..1e9 [state / first output];
+                                                                 0: none */
+#endif
 #if PVID_REFINE_WIDTHS > 0
     float width[PVID_REFINE_WIDTHS]; /* where the widths of the signs start [unit of the sign's argument],
                                         1e-9..1e9; they do not fall below a quarter of this */
 #endif
-    float state_limit[PVID_REFINE_ORDER *
-                      PVID_REFINE_COORDINATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
-    float forgetting_s;                         /* time constant of the triangle [s], > 0; 0: it does not forget */
+    float state_limit[PVID_REFINE_STATES]; /* largest |start| of a block: coordinates, then their rates, > 0 */
+    float forgetting_s;                    /* time constant of the triangle [s], > 0; 0: it does not forget */
     float outlier_gate; /* means of `ratio` samples of an output, or of an input of order 2, that stand out by more than
                            this multiple of the usual are replaced, 2..1e3; 0: no gate; recommended: 4 */
     float gate;         /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */
     float chi_max;      /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
     float clash_max;    /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
-    float step_max;     /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
+    float step_max;     /* limit of its last step [prior_sd], > 0; with signs a twentieth of it behind the second block;
+                           recommended: 0.02 */
     float step_limit;   /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 1.8 at most;
                            recommended: 2 */
     float se_max;       /* largest relative standard error of a published estimate, > 0 */

@@ -70,6 +70,12 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
  * standard error that the sensors' noise gives it. */
 #define SETTLED 0.25f
 
+/* With signs: part of the limit of a block's last step below which its linearization is exact enough. Blocks with a
+ * longer one are taken only up to the second, and this part of their triangle remains: the others are to outweigh their
+ * error. */
+#define FINE 0.05f
+#define ROUGHLY 0.25f
+
 /* Least variance of a row over that of the sensors: the errors of reversals in the finest steps are alike from block to
  * block. */
 #define REVERSALS 4.0f
@@ -127,6 +133,9 @@ static void begin_pass(pvid_refine_f32 *self)
 #if PVID_REFINE_RUNGE_KUTTA
         .parts = self->config.parts,
         .fine_parts = self->config.fine_parts,
+#endif
+#if PVID_REFINE_OBSERVER
+        .observer = self->config.observer,
 #endif
 #if PVID_REFINE_TURNING
         .turn = self->front.turn,
@@ -227,6 +236,9 @@ static void begin_search(pvid_refine_f32 *self)
     self->taken = 0;
     self->refused = 0;
     self->level = 0.0f;
+#if PVID_REFINE_SIGNS > 0
+    self->kept = 1.0f;
+#endif
 }
 
 /* Takes a new estimate of the weak form if it is in the region; until a block has been taken it is the prior's mean. */
@@ -312,6 +324,27 @@ static bool is_sane(const pvid_refine_f32 *self)
     return sane;
 }
 
+#if PVID_REFINE_SIGNS > 0
+/* Whether the last step is small beside the errors of the blocks so far, or so short that the motion is linear in it:
+ * reversals make the motion jump with each step. */
+static bool is_fine(const pvid_refine_f32 *self)
+{
+    return (self->solve.size < (FINE * self->config.step_max)) ||
+           (self->solve.reduction < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
+}
+#endif
+
+/* Whether the last step is small beside the weak form's errors; with signs behind the second block a fine one. */
+static bool is_settled(const pvid_refine_f32 *self)
+{
+    const bool small = self->solve.size < self->config.step_max;
+#if PVID_REFINE_SIGNS > 0
+    return (small && (self->taken < 2u)) || is_fine(self);
+#else
+    return small;
+#endif
+}
+
 /* Behind a block that was taken and began at `began`: twice as long, and from as far back as possible, but where a
  * coordinate is hidden: its value there is not known. */
 static void lengthen(pvid_refine_f32 *self, uint32_t began)
@@ -349,6 +382,11 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         lengthen(self, began);
         fade = self->again ? KEPT : fade;
     }
+#if PVID_REFINE_SIGNS > 0
+    const float counts = is_fine(self) ? 1.0f : ROUGHLY;
+    self->kept = self->again ? (KEPT * counts) : counts;
+    fade *= counts;
+#endif
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
     }
@@ -449,15 +487,14 @@ static float mean_square(const pvid_refine_f32 *self)
     return self->solve.residual / (freedom * (WHITENESS * variance));
 }
 
-/* Whether the last step is small: beside the weak form's errors, or with signs, whose reversals make the motion jump
- * with each step, beside the errors of the blocks so far. */
-static bool is_settled(const pvid_refine_f32 *self)
+/* Part of the triangle that remains of the past, beside forgetting: the clash is to be that with all of it. */
+static float kept_of_past(const pvid_refine_f32 *self)
 {
-    bool settled = self->solve.size < self->config.step_max;
 #if PVID_REFINE_SIGNS > 0
-    settled = settled || (self->solve.reduction < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
+    return self->kept;
+#else
+    return self->again ? KEPT : 1.0f;
 #endif
-    return settled;
 }
 
 /* Takes the block or not. */
@@ -465,8 +502,8 @@ static void end_block(pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
     const float square = mean_square(self);
-    const float past = self->again ? (KEPT * KEPT) : 1.0f;
-    const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * past);
+    const float kept = kept_of_past(self);
+    const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * (kept * kept));
     self->sane = is_sane(self);
     const float room = at_least_one(self->level);
     const bool again = self->again;

@@ -26,6 +26,9 @@ typedef struct {
     float h;
     uint8_t parts;
     uint8_t fine_parts;
+#if PVID_REFINE_OBSERVER
+    const float *observer;
+#endif
 #if PVID_REFINE_TURNING
     const float *turn; /* of the outputs, 0: it does not turn */
 #endif

@@ -26,6 +26,9 @@ PVID_COLD void pvid_refine_pass_begin_f32(pvid_refine_pass_f32 *self, const floa
 {
     self->h = steps->h;
     self->gate = gate;
+#if PVID_REFINE_OBSERVER
+    memcpy(self->observer, steps->observer, sizeof self->observer);
+#endif
 #if PVID_REFINE_TURNING
     memcpy(self->turn, steps->turn, sizeof self->turn);
 #endif
@@ -193,6 +196,29 @@ PVID_ALWAYS_INLINE void end_rows(pvid_refine_pass_f32 *self, const float derivat
     self->rows = (uint8_t)(self->rows + PVID_REFINE_OUTPUTS);
 }
 
+#if PVID_REFINE_OBSERVER
+/* The noise of a measured input moves the model, and its errors grow over a block. An observer follows the outputs: its
+ * residuals are nearly white, and its columns are those of the observer. */
+static void correct(pvid_refine_pass_f32 *self, const float derivatives[])
+{
+    const float (*row)[PVID_REFINE_WIDTH] = &self->row[self->rows - (uint8_t)PVID_REFINE_OUTPUTS];
+    for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+        float correction = 0.0f;
+        for (size_t k = 0; k < PVID_REFINE_OUTPUTS; k++) {
+            const float gain = self->observer[(k * PVID_REFINE_STATES) + i];
+            correction += gain * row[k][PVID_REFINE_WIDTH - 1];
+            for (size_t j = 0; j < PVID_REFINE_COLUMNS; j++) {
+                self->column[j][i] -= gain * row[k][j];
+            }
+        }
+        self->state[i] += correction;
+        for (size_t k = 0; k < PVID_REFINE_OUTPUTS; k++) {
+            self->last[k] -= derivatives[(k * N_Q) + i] * correction;
+        }
+    }
+}
+#endif
+
 /* The end of a big step: the first columns, or the others and what completes the rows. */
 PVID_SELDOM static void end_big_step(pvid_refine_pass_f32 *self, const float r[], const float weight[])
 {
@@ -209,6 +235,9 @@ PVID_SELDOM static void end_big_step(pvid_refine_pass_f32 *self, const float r[]
     }
     columns(self, HALF_OF_COLUMNS, PVID_REFINE_COLUMNS, derivatives, weight);
     end_rows(self, derivatives, weight);
+#if PVID_REFINE_OBSERVER
+    correct(self, derivatives);
+#endif
     end_steps(self);
     self->at = 0;
     self->step++;

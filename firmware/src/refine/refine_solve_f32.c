@@ -23,6 +23,10 @@
 /* Halvings of a step that leaves the physical region. */
 #define MOST_HALVINGS 12u
 
+/* Longest step of the logarithm of a width: the motion is less linear in it than in the others, whose steps a longer
+ * one would shorten. */
+#define WIDTH_STEP 0.7f
+
 /* Rotations of a job. */
 #define ROTATIONS 4u
 
@@ -259,6 +263,12 @@ static bool solve(pvid_refine_solve_f32 *self, const float prior_sd[], float ste
         step[k] = sum / entry[0];
 #if PVID_REFINE_SIGNS > 0
         self->reduction += self->right[k] * self->right[k];
+#endif
+#if PVID_REFINE_WIDTHS > 0
+        if (pvid_refine_is_width(k)) {
+            step[k] = (step[k] > WIDTH_STEP) ? WIDTH_STEP : step[k];
+            step[k] = (step[k] < -WIDTH_STEP) ? -WIDTH_STEP : step[k];
+        }
 #endif
         const float size = ((step[k] < 0.0f) ? -step[k] : step[k]) / prior_sd[k];
         longest = (size <= longest) ? longest : size;

@@ -67,6 +67,11 @@ static pvid_status sizes_are_valid(const pvid_refine_config_f32 *config)
         return PVID_BAD_DECIMATION;
     }
 #endif
+#if PVID_REFINE_OBSERVER
+    if (!all_within(config->observer, PVID_REFINE_OUTPUTS * PVID_REFINE_STATES, -1.0e9f, 1.0e9f)) {
+        return PVID_BAD_DESIGN;
+    }
+#endif
 #if PVID_REFINE_WIDTHS > 0
     if (!all_within(config->width, PVID_REFINE_WIDTHS, 1.0e-9f, 1.0e9f)) {
         return PVID_BAD_BOUNDS;

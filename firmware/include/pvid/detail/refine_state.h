@@ -9,7 +9,6 @@
 #define PVID_REFINE_SUB 4  /* steps of the motion in a big step: of the columns and of a row of each output */
 #define PVID_REFINE_PAST 6 /* of the differences of a signal's means */
 #define PVID_REFINE_SIGNALS (PVID_REFINE_INPUTS + PVID_REFINE_OUTPUTS)
-#define PVID_REFINE_STATES (PVID_REFINE_ORDER * PVID_REFINE_COORDINATES)
 #define PVID_REFINE_COLUMNS (PVID_REFINE_STATES + PVID_REFINE_MOVING)                      /* that are integrated */
 #define PVID_REFINE_STILL (PVID_REFINE_PARAMETERS - PVID_REFINE_MOVING - PVID_REFINE_SKEW) /* of the outputs alone */
 #define PVID_REFINE_UNKNOWNS (PVID_REFINE_STATES + PVID_REFINE_PARAMETERS)                 /* of a block */
@@ -78,6 +77,9 @@ typedef struct {
 #if PVID_REFINE_TURNING
     float turn[PVID_REFINE_OUTPUTS]; /* as of the front */
 #endif
+#if PVID_REFINE_OBSERVER
+    float observer[PVID_REFINE_OUTPUTS * PVID_REFINE_STATES]; /* as configured */
+#endif
 #if PVID_REFINE_SKEW
     float skew[3];                   /* of the outputs on the inputs: s, s^2/2, s^3/(6 h) */
     float slip[PVID_REFINE_OUTPUTS]; /* dz/ds at the middle of the big step */
@@ -142,8 +144,11 @@ typedef struct {
 /* Only the functions of refine.h write to it. */
 struct pvid_refine_f32 {
     pvid_refine_config_f32 config;
-    float h;                           /* a step of the motion [s] */
-    float fade;                        /* forgetting of a full block, on the triangle */
+    float h;    /* a step of the motion [s] */
+    float fade; /* forgetting of a full block, on the triangle */
+#if PVID_REFINE_SIGNS > 0
+    float kept; /* part of the triangle behind the last block that was taken, beside forgetting */
+#endif
     float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
     bool renewed;                      /* the weak form has given an estimate since the search began from one */
     bool frozen;

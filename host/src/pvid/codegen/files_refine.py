@@ -110,6 +110,7 @@ def shape(made: RefineFunctions, command: str) -> str:
         ("RUNGE_KUTTA", int(made.runge_kutta), "1: each step is Runge-Kutta's (ORDER 1), 0: Adams's"),
         ("COORDINATES", len(made.coordinates), "entries of q, hidden ones included"),
         ("HIDDEN", made.hidden, "coordinates that no sensor measures; counted with RUNGE_KUTTA"),
+        ("OBSERVER", int(made.observer), "1: the noise of a measured input moves the model; with RUNGE_KUTTA"),
         ("INPUTS", len(made.inputs), "entries of u"),
         ("INTEGRALS", int(has_integrals(made)), "1: an input is the integral of a sample"),
         ("OUTPUTS", len(made.outputs), "entries of z, which are measured"),

@@ -99,6 +99,7 @@ class RefineFunctions:
     skew : the last moving entry is that of the sensors
     runge_kutta : each step is Runge-Kutta's; else Adams's
     hidden : coordinates, of order 1 or 2, that no sensor measures, where steps are Runge-Kutta's
+    observer : where steps are Runge-Kutta's, whether an input is measured: its noise moves the model
     turning : of each output, whether the motion is the same when it is shifted, with hidden coordinates
     measured : of q, and of v of order 2: 1 + 2 output where it is that output, 2 + 2 output: its rate, 0: neither
     functions : by name
@@ -118,6 +119,7 @@ class RefineFunctions:
     skew: bool
     runge_kutta: bool
     hidden: int
+    observer: bool
     turning: tuple[bool, ...]
     measured: tuple[int, ...]
     functions: Mapping[str, RefineFunction] = field(repr=False)
@@ -147,6 +149,11 @@ def has_skew(model: CompiledModel) -> bool:
 
 def _inputs(model: CompiledModel) -> set[Jet]:
     return {jet for one in _equations(model) for jet in jets(one)}
+
+
+def is_measured(model: CompiledModel, jet: Jet) -> bool:
+    """Whether an input is what a sensor measures, with its noise."""
+    return jet.order == 0 and any(one.name == jet.of and one.kind == "sensor" for one in model.signals)
 
 
 def refine_functions_of(
@@ -619,6 +626,7 @@ class _Refine:
             skew=self.skew,
             runge_kutta=self.runge_kutta,
             hidden=len(self._hidden({Jet(name) for name in self.outputs})) if self.runge_kutta else 0,
+            observer=self.runge_kutta and any(is_measured(self.model, one) for one in self.u),
             turning=self._turning(),
             measured=self._measured(),
             functions=made,

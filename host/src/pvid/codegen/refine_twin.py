@@ -146,6 +146,7 @@ class GeneratedRefine:
             measured=made.measured,
             hidden=made.hidden,
             turning=made.turning,
+            observer=made.observer,
         )
 
     def _called(self, name: str, **arrays: Float32) -> dict[str, Float32]:
@@ -174,6 +175,10 @@ class GeneratedRefine:
             D=found["D"].reshape(n, n) if "D" in found else np.zeros((n, n), np.float32),
             B=found["B"].reshape(self._still, n),
         )
+
+    def input_jacobian(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32:
+        """Derivatives of a by the inputs [q, inputs]."""
+        return self._called("jacobian", m=m, q=q, v=v, u=u)["U"].reshape(self.shape.coordinates, -1)
 
     def signs(self, m: Float32, q: Float32, v: Float32, u: Float32) -> Float32:
         """Arguments of the signs."""

@@ -13,7 +13,7 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.codegen import files_refine
 from pvid.codegen.build import Options, refine_functions
-from pvid.codegen.refine import RefineFunctions, signs_of
+from pvid.codegen.refine import RefineFunctions, is_measured, signs_of
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
@@ -22,7 +22,7 @@ from pvid.model.signals import Integral, Jet
 from pvid.models.kapitza.refinement import PARAMETERS
 from pvid.models.registry import DEFAULT
 from pvid.run.engine_design import Run, simulated_run_of
-from pvid.settings.refine import RefineConfig, RefineRig, RefineSignal
+from pvid.settings.refine import BIG_STEP, RefineConfig, RefineRig, RefineSignal
 from pvid.settings.weak import Source, WeakConfig
 from pvid.sim.pendulum import simulate, standard_sensors
 
@@ -38,6 +38,7 @@ _A_PERIOD = 48.0  # steps in a period
 _SHARP, _SOFT = 1e-6, 1e6  # widths of signs
 _REVERSAL = 4.0  # of the noise of a sample: the error is a small part of the jump
 _HALF_TURN = 32767 / 4  # resolutions: an output that turns is kept in quarters of one
+_RICCATI = 2000  # big steps until the filter's gain is steady
 _MARGIN, _MORE = 1.5, 6.0  # ranges over what the run has of them, of integrals, which may go on
 
 
@@ -143,6 +144,8 @@ def refine_settings(
         jumps=jumps,
     )
     settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
+    if made.observer:
+        settings = _with_observer(settings, motion, r, states)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
 
 
@@ -251,6 +254,46 @@ def _slopes(motion: GeneratedRefine, r: Float, q: Float32, v: Float32) -> Float:
     if made.order == 1:
         return K
     return np.block([[np.zeros((n, n)), np.eye(n)], [K, np.asarray(slopes.D, float)]])
+
+
+def _with_observer(settings: RefineConfig, motion: GeneratedRefine, r: Float, states: Sequence[State]) -> RefineConfig:
+    """With the gain of the steady Kalman filter of the linearised motion, without its frictions, for the noise of the
+    inputs' sensors; rows have the noise of its innovations.
+
+    A row is the mean of the residuals over a big step: a reading in its middle.
+    """
+    made, model = motion.made, motion.made.model
+    n, step = len(made.coordinates), BIG_STEP * settings.ratio / settings.sample_rate
+    smooth = np.where([bool(one.sign) for one in made.parameters], _SOFT, r)
+    single = smooth.astype(np.float32)
+    m, none = motion.constants(single), np.zeros(len(made.inputs), np.float32)
+    slopes = np.mean([_slopes(motion, smooth, q, v) for q, v in states], 0)
+    by_u = np.mean([motion.input_jacobian(m, q, v, none) for q, v in states], 0, np.float64)
+    reading = np.mean([motion.output_jacobian(m, q, v, none, single)[0] for q, v in states], 0, np.float64)
+    sd = np.array([model.signal(one.of).sd if is_measured(model, one) else 0.0 for one in made.inputs])
+    density = (by_u * sd**2) @ by_u.T / settings.sample_rate
+    over, noise = _transition(slopes, density, step / 2)
+    rows = np.diag(np.asarray(settings.sd, float) ** 2)
+    p = np.zeros((n, n))
+    for _ in range(_RICCATI):
+        p = over @ p @ over.T + noise
+        innovation = reading @ p @ reading.T + rows
+        gain = p @ reading.T @ np.linalg.inv(innovation)
+        p = over @ (p - gain @ reading @ p) @ over.T + noise
+    white = np.sqrt(np.diag(innovation))
+    observer = (over @ gain * white / white[0]).T
+    return replace(settings, sd=white.astype(np.float32), observer=observer.ravel().astype(np.float32))
+
+
+def _transition(slopes: Float, density: Float, step: float) -> tuple[Float, Float]:
+    """What the states become over a step, and the covariance that white noise of this density adds (van Loan)."""
+    from scipy.linalg import expm  # here: it takes a tenth of a second
+
+    n = len(slopes)
+    block = np.block([[-slopes, density], [np.zeros((n, n)), slopes.T]]) * step
+    whole = expm(block)
+    over = whole[n:, n:].T
+    return over, np.asarray(over @ whole[:n, n:])
 
 
 def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[float, ...]:

@@ -60,6 +60,9 @@ class RefineConfig:
     parts, fine_parts
         steps of Runge-Kutta in a step of the motion, in one in which a sign may change; None: steps are Adams's
     width : where the widths of the signs start [widths]; None: none is refined
+    observer
+        correction of the states at the end of a big step by a row of each output, flat [outputs, states]; None: no
+        input is measured, or steps are Adams's
     """
 
     sample_rate: float
@@ -88,6 +91,7 @@ class RefineConfig:
     parts: int | None = None
     fine_parts: int | None = None
     width: Float32 | None = None
+    observer: Float32 | None = None
 
 
 @dataclass(frozen=True)

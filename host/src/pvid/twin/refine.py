@@ -34,6 +34,7 @@ _SHORT = _F(0.25)
 _SHARPEST, _REVERSALS = _F(0.25), _F(4)
 _PRIOR_ERRORS, _LEAST_PRIOR = _F(10), _F(1e-6)
 _SETTLED = _F(0.25)
+_FINE, _ROUGHLY = _F(0.05), _F(0.25)
 _JOBS = 9
 _FIRST_JOBS = 16
 _SOLVE_TICKS = 45
@@ -93,6 +94,8 @@ class RefineTwin:
         self.sd = np.asarray(config.sd, _F)
         self.prior_sd = np.asarray(config.prior_sd, _F)
         self.gain_sd = np.asarray(config.gain_sd, _F)
+        given = config.observer
+        self.observer = None if given is None else np.asarray(given, _F).reshape(shape.outputs, shape.states)
         self.state_limit = np.asarray(config.state_limit, _F)
         self.variance = self.sd[0] * self.sd[0]
         self.weight = self.sd[0] / self.sd
@@ -132,7 +135,7 @@ class RefineTwin:
         if self.taken > 0 and self.config.gate > 0 and not self.restarted:
             gate = (_F(self.config.gate) * self.sd[0]) * np.sqrt(_at_least_one(self.level))
         parts = self.parts, self.config.fine_parts or 1
-        self.work.begin(self.linear, self.start, self.h, parts, gate, self.front.turn)
+        self.work.begin(self.linear, self.start, self.h, parts, gate, self.front.turn, self.observer)
         self.phase = Phase.PASS
         self.waiting = False
 
@@ -188,6 +191,7 @@ class RefineTwin:
         self._begin_from_prior()
         self.taken = self.refused = 0
         self.level = _F(0)
+        self.kept = _F(1)
 
     def _take_weak(self, p: Float32, se: Float32) -> None:
         r = self.model.from_p(p)
@@ -266,6 +270,10 @@ class RefineTwin:
         if self.length < config.block:
             self._lengthen(began)
             fade = _KEPT if self.again else fade
+        if self.shape.signs:
+            counts = _F(1) if self._is_fine() else _ROUGHLY
+            self.kept = _KEPT * counts if self.again else counts
+            fade = fade * counts
         self.triangle = self.solve.triangle * fade
         for i in range(self.shape.widths):
             self.triangle[i] = 0
@@ -319,14 +327,22 @@ class RefineTwin:
         freedom = _F(used - unknowns) if used > unknowns + 1 else _F(1)
         return _F(self.solve.residual / (freedom * (_WHITENESS * self.variance)))
 
+    def _is_fine(self) -> bool:
+        short = self.solve.size < _FINE * _F(self.config.step_max)
+        return bool(short or self.solve.reduction < _SETTLED * self.variance)
+
     def _is_settled(self) -> bool:
-        if self.solve.size < _F(self.config.step_max):
-            return True
-        return self.shape.signs > 0 and bool(self.solve.reduction < _SETTLED * self.variance)
+        small = bool(self.solve.size < _F(self.config.step_max))
+        if self.shape.signs:
+            return (small and self.taken < 2) or self._is_fine()
+        return small
 
     def _end_block(self) -> None:
         config, square = self.config, self._mean_square()
-        past = _KEPT * _KEPT if self.again else _F(1)
+        kept = _KEPT if self.again else _F(1)
+        if self.shape.signs:
+            kept = self.kept
+        past = kept * kept
         clash = self.solve.clash / ((_F(self.shape.parameters) * self.variance) * past)
         self.sane = self._is_sane()
         room, again = _at_least_one(self.level), self.again

@@ -24,6 +24,7 @@
 #define PVID_REFINE_RUNGE_KUTTA 0        /* 1: each step is Runge-Kutta's (ORDER 1), 0: Adams's */
 #define PVID_REFINE_COORDINATES 2        /* entries of q, hidden ones included */
 #define PVID_REFINE_HIDDEN 0             /* coordinates that no sensor measures; counted with RUNGE_KUTTA */
+#define PVID_REFINE_OBSERVER 0           /* 1: the noise of a measured input moves the model; with RUNGE_KUTTA */
 #define PVID_REFINE_INPUTS 1             /* entries of u */
 #define PVID_REFINE_INTEGRALS 0          /* 1: an input is the integral of a sample */
 #define PVID_REFINE_OUTPUTS 1            /* entries of z, which are measured */

@@ -31,6 +31,7 @@ class RefineShape:
     widths: int = 0  # of signs, the first entries of r
     ring: int = 512  # PVID_REFINE_RING
     measured: tuple[int, ...] = ()  # of the states: 1 + 2 output: that output, 2 + 2 output: its rate, 0: neither
+    observer: bool = False  # the noise of a measured input moves the model
     turning: tuple[bool, ...] = ()  # of the outputs: they are kept without whole turns
 
     @property

@@ -106,10 +106,19 @@ class Pass:
         self.job = Job.CLEAR
 
     def begin(
-        self, r: Float32, start: Float32, h: np.float32, parts: tuple[int, int], gate: np.float32, turn: Float32
+        self,
+        r: Float32,
+        start: Float32,
+        h: np.float32,
+        parts: tuple[int, int],
+        gate: np.float32,
+        turn: Float32,
+        observer: Float32 | None = None,
     ) -> None:
-        """pvid_refine_pass_begin_f32."""
+        """pvid_refine_pass_begin_f32; observer [outputs, states]."""
         self.h, self.gate, self.turn = h, gate, turn
+        if observer is not None:
+            self.observer = observer
         self.some_parts, self.fine_parts = parts
         self.parts = self.fine_parts if self.shape.signs else self.some_parts
         self.part, self.part_s = 0, h / _F(self.parts)
@@ -400,8 +409,22 @@ class Pass:
                 row[:] = 0
             self.row[self.rows + i] = row
         self.rows += shape.outputs
+        if shape.observer:
+            self._correct()
         self.at = 0
         self.step += 1
+
+    def _correct(self) -> None:
+        """The observer's states and columns behind a big step."""
+        shape = self.shape
+        rows = self.row[self.rows - shape.outputs : self.rows]
+        correction = np.zeros(shape.states, _F)
+        for gain, row in zip(self.observer, rows, strict=True):
+            correction = correction + gain * row[-1]
+            self.column = self.column - np.multiply.outer(row[: shape.columns], gain)
+        self.state = self.state + correction
+        for i in range(self.q):
+            self.last = self.last - self.output_column[0][:, i] * correction[i]
 
     def _add_rows(self) -> None:
         products = np.multiply.outer(self.row[0], self.row[0])

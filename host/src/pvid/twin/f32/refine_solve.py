@@ -13,6 +13,7 @@ _F = np.float32
 _LEAST_PART = _F(2e-6)
 _MOST_HALVINGS = 12
 _ROTATIONS = 4
+_WIDTH_STEP = _F(0.7)
 
 
 class Solution(Enum):
@@ -153,6 +154,9 @@ class Solve:
                 return False
             step[k] = total / self.triangle[k, k]
             self.reduction = self.reduction + self.right[k] * self.right[k]
+            if self.steps.is_width[k]:
+                step[k] = _WIDTH_STEP if step[k] > _WIDTH_STEP else step[k]
+                step[k] = -_WIDTH_STEP if step[k] < -_WIDTH_STEP else step[k]
             size = (-step[k] if step[k] < 0 else step[k]) / prior_sd[k]
             longest = longest if size <= longest else size
             if self.steps.is_width[k]:
