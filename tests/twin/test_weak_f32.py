@@ -62,7 +62,7 @@ def starts(rig: EngineRig) -> list[EstimatorConfig]:
     return lanes
 
 
-@pytest.mark.parametrize(("name", "compensation"), [("kapitza", False), ("two_link_arm", True)])
+@pytest.mark.parametrize(("name", "compensation"), [("kapitza", False), ("rigid_body", True)])
 def test_lanes_with_other_starts_and_forgetting_equal_the_twin(name: str, compensation: bool) -> None:
     rig = engine_rig(name)
     config = replace(rig.config, gate=NO_GATE, compensation=compensation)

@@ -26,6 +26,12 @@ static inline bool pvid_gate_accept_f32(pvid_gate_f32 *self, float square)
     return true;
 }
 
+/* Forgets the usual size: the next residuals are accepted, as the first ones were. */
+static inline void pvid_gate_begin_anew_f32(pvid_gate_f32 *self)
+{
+    self->judged = 0.0f;
+}
+
 /* pvid_gate_passes_f32: inlined for a finite residual while the memory fills, and for one of usual size behind that. */
 static inline bool pvid_gate_judges_f32(pvid_gate_f32 *self, float square)
 {

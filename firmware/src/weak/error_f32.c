@@ -22,10 +22,10 @@
 #define RISES 10.0f
 #define FALLS 0.25f
 
-/* A window below or above these parts of the mean begins a new one: by chance the mean square of 9 residuals is that
- * far from its expectation once in 10^6 windows. */
-#define FAR_BELOW 0.05f
-#define FAR_ABOVE 20.0f
+/* A window below or above these parts of the mean begins a new one: a motion that the equations describe badly, or a p
+ * on its way, has residuals of all sizes. By chance two mean squares of 9 residuals are that far apart once in 40. */
+#define FAR_BELOW 0.2f
+#define FAR_ABOVE 5.0f
 
 /* Largest v: its share in D_h is finite. */
 #define VARIANCE_MAX 1.0e30f

@@ -18,7 +18,7 @@
 #define FALLS (ONE / 4)
 
 /* A window below or above these parts of the mean begins a new one. */
-#define FAR 20
+#define FAR 5
 
 /* Largest exponent of a variance. */
 #define EXPONENT_MAX 1000

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "judge/gate_f32.h"
 #include "judge/trust_f32.h"
 #include "number/count.h"
 #include "number/exact.h"
@@ -16,6 +17,7 @@
 #include "solve/products_f32.h"
 #include "solve/staged_f32.h"
 #include "weak/columns_f32.h"
+#include "weak/error.h"
 #include "weak/error_f32.h"
 #include "weak/scores_f32.h"
 #include "weak/steps.h"
@@ -542,6 +544,9 @@ PVID_COLD static void take_error(pvid_weak_f32 *self)
     const float residual = finish->rss / ((float)design->functions - (float)finish->live);
     const float share = pvid_weak_white_error_share_f32(&finish->white, design, kind);
     const float left = pvid_weak_error_take_f32(&finish->error[kind], design->error_variance[kind], residual, share);
+    if (left < 1.0f) {
+        pvid_gate_begin_anew_f32(&finish->gate[kind]);
+    }
     finish->left = (left < finish->left) ? left : finish->left;
 }
 
@@ -557,7 +562,7 @@ PVID_SELDOM static bool add_stage(pvid_weak_f32 *self)
     pvid_information_block_f32(model, finish->theta, &block);
     if (finish->index == thetas) {
         pvid_products_end_f32(&self->estimator, &block, work->theta, finish->rss, (uint32_t)rows_of(self));
-        if (self->trust.arrived) {
+        if (pvid_weak_error_follows(self->design->model->kinds) && self->trust.arrived) {
             take_error(self);
         }
         end_kind(self);
@@ -702,7 +707,7 @@ PVID_COLD static bool publish_stage(pvid_weak_f32 *self)
     finish->report = (uint8_t)pvid_trust_publish_f32(&self->trust, &self->estimator, (pvid_reason)finish->verdict,
                                                      finish->reason, &finish->candidate);
     finish->stage = STAGE_IDLE;
-    if (finish->left < 1.0f) {
+    if (pvid_weak_error_follows(self->design->model->kinds) && (finish->left < 1.0f)) {
         begin_anew(self);
     }
     return false;

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "judge/gate_q31.h"
 #include "number/count.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
@@ -11,6 +12,7 @@
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
 #include "weak/columns_q31.h"
+#include "weak/error.h"
 #include "weak/error_q31.h"
 #include "weak/mirror_q31.h"
 #include "weak/noise_q31.h"
@@ -248,8 +250,14 @@ static void explain(pvid_weak_q31 *self)
         pvid_weak_noise_error_share_q31(design, finish->kind, finish->work.rows.parts.noise.share);
     finish->known.sensors =
         pvid_scaled_plus_q31(finish->known.sensors, pvid_weak_noise_sensors_q31(design, error->variance, share));
+    if (!pvid_weak_error_follows(design->model->kinds)) {
+        return;
+    }
     const pvid_scaled_q31 before = error->variance;
     const int32_t left = pvid_weak_error_change_q31(error, design->error_variance[finish->kind], share);
+    if (left < INT32_MAX) {
+        pvid_gate_begin_anew_q31(&finish->gate[finish->kind]);
+    }
     finish->left = (left < finish->left) ? left : finish->left;
     if ((error->variance.m != before.m) || (error->variance.e != before.e)) {
         finish->known.age = NOISE_WINDOWS; /* the next window computes the noise anew */
@@ -441,7 +449,7 @@ static bool passes(pvid_weak_q31 *self)
         begin_anew(self);
     }
     const pvid_scaled_q31 least = self->design->error_variance[finish->kind];
-    if (finish->known.used && self->trust.arrived &&
+    if (pvid_weak_error_follows(self->design->model->kinds) && finish->known.used && self->trust.arrived &&
         pvid_weak_error_take_q31(&finish->error[finish->kind], least, ratio)) {
         finish->known.age = NOISE_WINDOWS; /* the next window computes the noise anew */
     }

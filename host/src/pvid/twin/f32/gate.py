@@ -37,6 +37,10 @@ class Gate:
         """Whether it looks at anything."""
         return bool(self.limit > 0)
 
+    def begin_anew(self, lanes: Mask) -> None:
+        """Forgets the usual size in these lanes: the next residuals are accepted, as the first ones were."""
+        self.judged = np.where(lanes, np.float32(0), self.judged)
+
     def passes(self, square: Float32) -> Mask:
         """Which lanes let a residual of this square in [lanes]."""
         if not self.is_on:

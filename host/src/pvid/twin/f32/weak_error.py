@@ -12,7 +12,7 @@ Float32 = npt.NDArray[np.float32]
 _F = np.float32
 _FEWEST, _MOST = 4, 16
 _RISES, _FALLS = _F(10), _F(0.25)
-_FAR_BELOW, _FAR_ABOVE = _F(0.05), _F(20)
+_FAR_BELOW, _FAR_ABOVE = _F(0.2), _F(5)
 _VARIANCE_MAX = _F(1e30)
 
 

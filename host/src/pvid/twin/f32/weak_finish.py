@@ -57,6 +57,7 @@ class Finish:
         self.scores = Scores(len(estimator.p), estimator.forgetting_s * windows_hz)
         self._left = np.ones(lanes, np.float32)  # of the older rows' information, behind a window
         self.errors = [OwnError(_F(one), lanes) for one in design.error_variance]
+        self._follows = design.model.kinds > 1  # the errors follow the residuals
         self.alone = False
         self.candidate: Candidate = np.zeros_like(trust.estimate)
 
@@ -200,7 +201,8 @@ class Finish:
             yield from self._pull(white, block, score)
             expected = expected + white.sensors()
             with np.errstate(all="ignore"):
-                left = self.errors[kind].take(self.trust.arrived, rss / freedom, white.error_share())
+                left = self.errors[kind].take(self.trust.arrived & self._follows, rss / freedom, white.error_share())
+            self.gates[kind].begin_anew(left < 1)
             self._left = np.where(left < self._left, left, self._left)
             yield from self._add(kind, np.concatenate([n, e[None]]), squares, score[block], rss)
         if used == 0:

@@ -30,6 +30,10 @@ class GateQ31:
         self.memory = max(memory, 1)
         self.judged = np.zeros(np.shape(floor.m), np.int64)
 
+    def begin_anew(self, lanes: Mask) -> None:
+        """Forgets the usual size in these lanes: the next residuals are accepted, as the first ones were."""
+        self.judged = np.where(lanes, 0, self.judged)
+
     def passes(self, square: Scaled, asked: Mask | None = None) -> Mask:
         """Lanes that accept a residual of this square [lanes]; those outside `asked` do."""
         if not self.is_on:

@@ -15,7 +15,7 @@ _BITS = 8
 _ONE = 1 << _BITS
 _MEAN_MAX = 1 << 29
 _RISES, _FALLS = 10 * _ONE, _ONE // 4
-_FAR = 20
+_FAR = 5
 _EXPONENT_MAX = 1000
 
 

@@ -149,14 +149,15 @@ class NoiseOfWindows:
 
     def take_residuals(self, kind: int, asked: Mask, residual: Scaled) -> None:
         """Of a window's rows, in the lanes asked: mean square over its expectation [lanes]."""
-        if self.is_used and of_all_lanes(self.errors[kind].take(asked, residual)):
+        if self.is_used and len(self.errors) > 1 and of_all_lanes(self.errors[kind].take(asked, residual)):
             self._age = _NOISE_WINDOWS
 
-    def explain(self, kind: int, first: int, theta: Scaled, formats: tuple[Sequence[int], int]) -> None:
+    def explain(self, kind: int, first: int, theta: Scaled, formats: tuple[Sequence[int], int], gate: GateQ31) -> None:
         """What the sensors explain of a kind's rows; a variance of its own error that does not fit them is changed."""
         before = self.errors[kind].variance
         white = self.white[kind]
         left = self.known.take(white, white.design, kind, first, theta, formats, self.errors[kind])
+        gate.begin_anew(left < NOTHING_LOST)
         self.left = np.minimum(self.left, left)
         after = self.errors[kind].variance
         if of_all_lanes((after.m != before.m) | (after.e != before.e)):
@@ -170,13 +171,14 @@ def _take_noise(
     first: int,
     theta: Scaled,
     formats: tuple[Sequence[int], int],
+    gate: GateQ31,
 ) -> Work:
     """Of a kind, behind its rows, where it is computed anew."""
     if renewed and noise.is_used:
         design = noise.white[place].design
         if not place:
             noise.known.begin(design)
-        noise.explain(place, first, theta, formats)
+        noise.explain(place, first, theta, formats, gate)
         for _ in range(_noise_stages(design)):
             yield None
 
@@ -233,7 +235,7 @@ def stages(
             if not of_all_lanes(passes):
                 estimator.counters["rejected_outlier"] += 1
                 yield np.full(lanes, Reason.REJECTED_OUTLIER, np.uint8)
-                yield from _take_noise(noise, renewed, place, first, theta, formats)
+                yield from _take_noise(noise, renewed, place, first, theta, formats, gate)
                 first += kind.thetas
                 continue
             if of_all_lanes(opens):
@@ -248,7 +250,7 @@ def stages(
         for k in range(live, design.functions):
             added = estimator.take_row(n[k], innovations[k], ~saturated, place)
             yield None if (added == Reason.ACCUMULATED).all() else added
-        yield from _take_noise(noise, renewed, place, first, theta, formats)
+        yield from _take_noise(noise, renewed, place, first, theta, formats, gate)
         first += kind.thetas
         if noise.compensates:
             estimator.add_to_b(_of_kind(known.pull, own, ~saturated))
