@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Branch coverage of the C core and the link by the quick tests: the CMocka programs, what tests/playback.py plays
-through the shared library, and the tests of MECHANISMS, which compile the core with the generated C of mechanisms.
+through the shared library, and what compiles the core with the generated C of mechanisms: the tests of MECHANISMS and
+tests/playback_engine.py.
 
     build/venv/bin/python tools/coverage.py
 
@@ -37,9 +38,13 @@ FIRMWARE = ROOT / "firmware"
 INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
+# a function that is inlined even so would count once for each of its callers
+COUNTED = ("--coverage", "-Dalways_inline=unused")
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
+PYTHONPATH = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
 PLAY = "import playback; from pvid.core.native import Native; list(playback.digests(Native()))"
+PLAY_ENGINE = "import playback_engine; [list(one.digests(one.library)) for one in playback_engine.subjects()]"
 # The weak engine in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
     *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_bits_q31", "weak_snapshot_q31", "weak_rows_q31")),
@@ -48,12 +53,20 @@ MECHANISMS = (
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
     "tests/core/test_weak_valid_q31.py",
 )
-# A compiler that counts branches; each call has a folder of its own, since objects of several builds have one name.
+# A compiler that counts branches, but not those of a sanitizer; each call has a folder of its own, since objects of
+# several builds have one name.
 COUNTING = """#!/bin/sh
 for one; do
     [ "$one" != -E ] || exec "{gcc}" "$@"
 done
-exec "{gcc}" "$@" -O0 --coverage -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
+for one; do
+    shift
+    case $one in
+    -fsanitize*) ;;
+    *) set -- "$@" "$one" ;;
+    esac
+done
+exec "{gcc}" "$@" -O0 {options} -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
 """
 
 
@@ -88,11 +101,11 @@ def build() -> list[Path]:
     core = [*sources.core_sources(), FIRMWARE / "link" / "link.c"]
     tests = playback.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))
-    jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, "--coverage"]) for path in core]
-    jobs += [(BUILD / "native" / f"{path.stem}.o", path, [*NATIVE, "--coverage"]) for path in core]
+    jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, *COUNTED]) for path in core]
+    jobs += [(BUILD / "native" / f"{path.stem}.o", path, [*NATIVE, *COUNTED]) for path in core]
     jobs += [(BUILD / "native" / f"{path.stem}.o", path, NATIVE) for path in plain]
     # a test has the core's inline functions in it
-    jobs += [(BUILD / "tests" / f"{path.stem}.o", path, [*FLAGS, "--coverage"]) for path in tests]
+    jobs += [(BUILD / "tests" / f"{path.stem}.o", path, [*FLAGS, *COUNTED]) for path in tests]
     for name in ("unit", "native", "tests"):
         (BUILD / name).mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(2) as pool:
@@ -107,12 +120,13 @@ def build() -> list[Path]:
 
 
 def play_mechanisms() -> None:
-    """Runs the tests of mechanisms with a compiler that counts."""
+    """Runs the tests of mechanisms, and plays their engines, with a compiler that counts."""
     tools, counts = BUILD / "bin", BUILD / "counts"
     for folder in (tools, counts):
         folder.mkdir()
     for name in ("gcc", "cc"):
-        (tools / name).write_text(COUNTING.format(gcc=shutil.which(name), folder=counts), encoding="utf-8")
+        text = COUNTING.format(gcc=shutil.which(name), options=" ".join(COUNTED), folder=counts)
+        (tools / name).write_text(text, encoding="utf-8")
         (tools / name).chmod(0o755)
     kept = (
         ROOT / "build" / "cache" / "models"
@@ -120,14 +134,10 @@ def play_mechanisms() -> None:
     before = set(kept.iterdir()) if kept.is_dir() else set()
     options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q")
     path = os.pathsep.join((str(tools), os.environ["PATH"]))
-    compiler = tools / "gcc"
+    given = {"PATH": path, "CC": str(tools / "gcc"), "CCACHE_DISABLE": "1"}
     try:
-        run(
-            *(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS),
-            PATH=path,
-            CC=str(compiler),
-            CCACHE_DISABLE="1",
-        )
+        run(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS, **given)
+        run(sys.executable, "-c", PLAY_ENGINE, PYTHONPATH=PYTHONPATH, **given)
     finally:
         for made in set(kept.iterdir()) - before:
             shutil.rmtree(made)
@@ -180,9 +190,9 @@ def report_of(files: list[File]) -> str:
     return f"""# Branch coverage
 
 {taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
-are taken by the CMocka programs, by what `tests/playback.py` plays, and by {len(MECHANISMS)} files of tests
-that compile the core with a mechanism, as gcov counts them at -O0: every operand of a `&&` or `||` has
-two. Other tests do not count. PVID_ASSERT, which ends the program,
+are taken by the CMocka programs, by what `tests/playback.py` and `tests/playback_engine.py` play, and by
+{len(MECHANISMS)} files of tests that compile the core with a mechanism, as gcov counts them at -O0: every operand of
+a `&&` or `||` has two. Other tests do not count. PVID_ASSERT, which ends the program,
 was compiled out. Missed:
 
 | where | line | branches | why |
@@ -196,8 +206,7 @@ def main() -> int:
         raise SystemExit("missing: gcovr (Debian's name); ./tools/test installs it")
     for program in build():
         run(program)
-    path = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
-    run(sys.executable, "-c", PLAY, PYTHONPATH=path, PVID_NATIVE_LIBRARY=str(BUILD / "libnative.so"))
+    run(sys.executable, "-c", PLAY, PYTHONPATH=PYTHONPATH, PVID_NATIVE_LIBRARY=str(BUILD / "libnative.so"))
     play_mechanisms()
     files = measured()
     print("| file | branches taken | of |\n|---|---:|---:|")

@@ -63,7 +63,8 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def _sources(engine: EngineCore, refined: bool) -> list[Path]:
+def core_of(engine: EngineCore, refined: bool) -> list[Path]:
+    """Sources beside the generated ones. refined: with the second stage."""
     rooms = (*_ROOMS, engine.room, *(["refine"] if refined else []))
     found = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in rooms]
     replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if refined else [])]
@@ -102,7 +103,7 @@ def _build(
             (folder / name).write_text(text, encoding="utf-8")
         options = [*_FLAGS, *definitions, f"-I{folder.name}", *INCLUDES, f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
-        objects = objects_of(compiler, options, [*code, *_sources(engine, _REFINED in texts)], Path(made))
+        objects = objects_of(compiler, options, [*code, *core_of(engine, _REFINED in texts)], Path(made))
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
         declared = _declarations(compiler, headers, options, Path(made), engine)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
