@@ -113,6 +113,9 @@ def strong_variants() -> list[Variant]:
         "five points, forgetting": with_settings(five_points, forgetting_s=0.5),
         "five points, the paper's law": with_settings(five_points, law="pseudovelocity"),
         "five points, divider": with_settings(five_points, divider=3),
+        "five points, in stages": with_settings(five_points, divider=16),
+        "five points, in stages, forgetting": with_settings(five_points, divider=24, forgetting_s=0.5),
+        "five points, in stages, the paper's law": with_settings(five_points, divider=32, law="pseudovelocity"),
         "smooth": with_settings(FINE, **smooth),
         "smooth, feedback, forgetting": with_settings(FINE, **smooth, forgetting_s=2.0, feedback_hz=30.0),
     }.items():

@@ -14,11 +14,14 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,9 +40,9 @@ REASONS = ROOT / "tests" / "coverage.toml"
 FIRMWARE = ROOT / "firmware"
 INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
 # the counts of one process: nothing else runs while it does
-FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
+FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", *INCLUDES]
 # a function that is inlined even so would count once for each of its callers
-COUNTED = ("--coverage", "-Dalways_inline=unused")
+COUNTED = ("--coverage", "-Dalways_inline=unused", "-DPVID_ASSERT(condition)=((void)0)")
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
 PYTHONPATH = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
@@ -53,21 +56,26 @@ MECHANISMS = (
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
     "tests/core/test_weak_valid_q31.py",
 )
-# A compiler that counts branches, but not those of a sanitizer; each call has a folder of its own, since objects of
-# several builds have one name.
+# A compiler that counts branches, but not those of a sanitizer. Each call has a folder of its own, since objects of
+# several builds have one name; generated headers are kept there, without which gcovr leaves an object out.
 COUNTING = """#!/bin/sh
 for one; do
     [ "$one" != -E ] || exec "{gcc}" "$@"
 done
+own=$(mktemp -d "{folder}/XXXXXXXX")
 for one; do
     shift
     case $one in
     -fsanitize*) ;;
+    -I[!/]*) cp -r "${{one#-I}}" "$own/headers" && set -- "$@" "-I$own/headers" ;;
     *) set -- "$@" "$one" ;;
     esac
 done
-exec "{gcc}" "$@" -O0 {options} -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
+exec "{gcc}" "$@" -O0 {options} -dumpdir "$own/"
 """
+# What tests compile and keep, under build/.
+KEPT = ("matrix", "cache/models", "cache/plants")
+ASIDE = ROOT / "build" / "aside"
 
 
 @dataclass(frozen=True)
@@ -119,28 +127,44 @@ def build() -> list[Path]:
     return programs
 
 
+def put_back() -> None:
+    """Builds that were set aside replace those of the counting compiler, also of a run that was ended."""
+    for place in KEPT:
+        if (ASIDE / place).exists():
+            shutil.rmtree(ROOT / "build" / place, ignore_errors=True)
+            (ASIDE / place).rename(ROOT / "build" / place)
+
+
+@contextmanager
+def set_aside() -> Iterator[None]:
+    """Without the builds of other tests, which would not count, and whose places those that count must not keep."""
+    put_back()
+    for place in KEPT:
+        own = ROOT / "build" / place
+        own.mkdir(parents=True, exist_ok=True)
+        (ASIDE / place).parent.mkdir(parents=True, exist_ok=True)
+        own.rename(ASIDE / place)
+    try:
+        yield
+    finally:
+        put_back()
+
+
 def play_mechanisms() -> None:
     """Runs the tests of mechanisms, and plays their engines, with a compiler that counts."""
     tools, counts = BUILD / "bin", BUILD / "counts"
     for folder in (tools, counts):
         folder.mkdir()
     for name in ("gcc", "cc"):
-        text = COUNTING.format(gcc=shutil.which(name), options=" ".join(COUNTED), folder=counts)
+        text = COUNTING.format(gcc=shutil.which(name), options=shlex.join(COUNTED), folder=counts)
         (tools / name).write_text(text, encoding="utf-8")
         (tools / name).chmod(0o755)
-    kept = (
-        ROOT / "build" / "cache" / "models"
-    )  # libraries are kept by the name of their compiler: those of the last run
-    before = set(kept.iterdir()) if kept.is_dir() else set()
     options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q")
     path = os.pathsep.join((str(tools), os.environ["PATH"]))
     given = {"PATH": path, "CC": str(tools / "gcc"), "CCACHE_DISABLE": "1"}
-    try:
+    with set_aside():
         run(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS, **given)
         run(sys.executable, "-c", PLAY_ENGINE, PYTHONPATH=PYTHONPATH, **given)
-    finally:
-        for made in set(kept.iterdir()) - before:
-            shutil.rmtree(made)
 
 
 def measured() -> list[File]:
