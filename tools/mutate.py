@@ -492,7 +492,7 @@ Judge = Callable[[tuple[Mutant, Baseline]], str | None]
 
 class Memory:
     """Who was killed before, in a file: asked again is only who lived, or whose source has changed since. Tests are
-    added to, so that a kill stays one."""
+    added to, so that a kill stays one; builds, too, so that what compiles to the same code is asked again."""
 
     def __init__(self, path: Path | None) -> None:
         self._path = path
@@ -504,12 +504,12 @@ class Memory:
         return hashlib.sha256(f"{mutant.file} {mutant.text()}".encode()).hexdigest()
 
     def killer(self, mutant: Mutant) -> str | None:
-        """What killed it, or that it is none; None if it is to be asked."""
+        """What killed it; None if it is to be asked."""
         return self._killers.get(self._key(mutant))
 
     def keep(self, mutant: Mutant, by: str | None) -> None:
         """A verdict."""
-        if by is not None and self._path is not None:
+        if by is not None and by != "no mutant" and self._path is not None:
             self._killers[self._key(mutant)] = by
             self._path.write_text(json.dumps(self._killers, indent=0), encoding="utf-8")
 
@@ -525,13 +525,13 @@ def campaign(
     results: list[tuple[Mutant, str | None]] = []
 
     def judge(asked: Judge, mutants: list[Mutant]) -> Iterator[str | None]:
-        fresh = [mutant for mutant in mutants if known.killer(mutant) is None]
-        verdicts: dict[Mutant, str | None] = {}
-        for mutant, by in zip(fresh, pool.map(asked, [(one, base) for one in fresh]), strict=True):
-            known.keep(mutant, by)
-            verdicts[mutant] = by
-        for mutant in mutants:
-            yield known.killer(mutant) or verdicts[mutant]
+        before = [known.killer(mutant) for mutant in mutants]
+        fresh = pool.map(asked, [(one, base) for one, by in zip(mutants, before, strict=True) if by is None])
+        for mutant, by in zip(mutants, before, strict=True):
+            found = by or next(fresh)
+            if by is None:
+                known.keep(mutant, found)
+            yield found
 
     with ProcessPoolExecutor(2) as pool:
         while True:
