@@ -32,14 +32,16 @@ from pvid.settings.enums import Law
 from pvid.settings.f32 import GateConfig, TrustConfig
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
 
-# Steps of Runge-Kutta but for the rigid body's, which are Adams's.
+# Steps of Runge-Kutta but for those of the pendulum and the rigid body, which are Adams's.
 BOTH_STAGES = (
+    "kapitza",  # of order 2, an integral of second order, nuisances, a skew
     "rigid_body",  # of order 1, inputs that are held
     "battery_2rc",  # hidden coordinates, the integral of an input, an output by an algebraic equation
     "two_mass_drive",  # a hidden coordinate, an angle that turns, a sign of friction
     "two_link_arm",  # two signs
 )
 IN_FIXED_POINT = (
+    "two_link_arm",  # two kinds
     "dc_motor",  # signs
     "battery_2rc",  # a running integral
     "kapitza",  # decimation

@@ -75,6 +75,8 @@ static void counts_of_a_model(void **state)
     assert_int_equal(pvid_weak_valid_f32(NULL), PVID_BAD_DESIGN);
     GIVES(design.model = NULL, PVID_BAD_MODEL);
     GIVES(model.samples = 0, PVID_BAD_MODEL);
+    GIVES(model.samples = 1; own.signal[1].sample = 0, PVID_OK);
+    GIVES(model.signals = 1; own.jet[1].signal = 0, PVID_OK);
     GIVES(model.samples = PVID_MAX_SAMPLES, PVID_OK);
     GIVES(model.samples = PVID_MAX_SAMPLES + 1, PVID_BAD_MODEL);
     GIVES(model.signals = 0, PVID_BAD_MODEL);
