@@ -283,6 +283,24 @@ static void a_window_takes_the_stages_that_init_counts_with(void **state)
     }
 }
 
+/* By the compensation, the check for noise, or an error of the first kind's own; else it would be computed in vain. */
+static void the_noise_is_computed_where_it_is_used(void **state)
+{
+    (void)state;
+    static const pvid_scaled_q31 own_error[1] = {{1 << 29, -40}};
+    start();
+    assert_true(identifier.finish.known.used);
+    config.compensation = false;
+    start();
+    assert_true(identifier.finish.known.used);
+    config.estimator.noise_margin = 0;
+    start();
+    assert_false(identifier.finish.known.used);
+    design.error_variance = own_error;
+    start();
+    assert_true(identifier.finish.known.used);
+}
+
 /* Seven harmonics of two half windows are joined one at a tick, or four at a tick where a step is one. */
 static void ticks_behind_the_join_are_those_without_harmonics(void **state)
 {
@@ -362,6 +380,7 @@ int main(void)
         cmocka_unit_test_setup(the_gate_keeps_a_jolt_out, start_again),
         cmocka_unit_test_setup(random_counts_keep_every_bound, start_again),
         cmocka_unit_test_setup(a_window_takes_the_stages_that_init_counts_with, start_again),
+        cmocka_unit_test_setup(the_noise_is_computed_where_it_is_used, start_again),
         cmocka_unit_test_setup(ticks_behind_the_join_are_those_without_harmonics, start_again),
         cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
         cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
