@@ -12,6 +12,7 @@ branch is misuse, and ends the program.
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shlex
@@ -19,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections import defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -38,6 +40,7 @@ BUILD = ROOT / "build" / "coverage"
 REPORT = ROOT / "build" / "coverage.md"
 REASONS = ROOT / "tests" / "coverage.toml"
 FIRMWARE = ROOT / "firmware"
+COUNTED_FOLDERS = tuple(f"{FIRMWARE / name}{os.sep}" for name in ("src", "models", "link"))
 INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
 # the counts of one process: nothing else runs while it does
 FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", *INCLUDES]
@@ -55,23 +58,22 @@ MECHANISMS = (
     *(f"tests/twin/test_{name}.py" for name in ("estimator_q31", "gate", "misfit")),
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
     "tests/core/test_weak_valid_q31.py",
+    "tests/codegen/test_fitted_sizes.py",  # builds for one design
 )
-# A compiler that counts branches, but not those of a sanitizer. Each call has a folder of its own, since objects of
-# several builds have one name; generated headers are kept there, without which gcovr leaves an object out.
+# A compiler that counts branches, but not those of a sanitizer; each call has a folder of its own, since objects of
+# several builds have one name.
 COUNTING = """#!/bin/sh
 for one; do
     [ "$one" != -E ] || exec "{gcc}" "$@"
 done
-own=$(mktemp -d "{folder}/XXXXXXXX")
 for one; do
     shift
     case $one in
     -fsanitize*) ;;
-    -I[!/]*) cp -r "${{one#-I}}" "$own/headers" && set -- "$@" "-I$own/headers" ;;
     *) set -- "$@" "$one" ;;
     esac
 done
-exec "{gcc}" "$@" -O0 {options} -dumpdir "$own/"
+exec "{gcc}" "$@" -O0 {options} -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
 """
 # What tests compile and keep, under build/.
 KEPT = ("matrix", "cache/models", "cache/plants")
@@ -167,23 +169,36 @@ def play_mechanisms() -> None:
         run(sys.executable, "-c", PLAY_ENGINE, PYTHONPATH=PYTHONPATH, **given)
 
 
+def counts_of(counters: Path) -> Iterator[tuple[str, int, list[int]]]:
+    """File of the core, line and how often each of its branches was taken, of the counters of one object."""
+    told = subprocess.run(
+        ["gcov", "--branch-probabilities", "--branch-counts", "--json-format", "--stdout", counters.name],
+        cwd=counters.parent,
+        capture_output=True,
+        check=True,
+    )
+    of_object: dict[str, Any] = json.loads(told.stdout)
+    for one in of_object["files"]:
+        path = os.path.normpath(os.path.join(of_object["current_working_directory"], one["file"]))
+        if path.startswith(COUNTED_FOLDERS):
+            for line in one["lines"]:
+                yield os.path.relpath(path, ROOT), line["line_number"], [x["count"] for x in line["branches"]]
+
+
 def measured() -> list[File]:
-    """What the counters of all runs say."""
-    filters = [
-        *("--filter", "firmware/src", "--filter", "firmware/models", "--filter", "firmware/link"),
-        "--exclude-unreachable-branches",
-    ]
-    run("gcovr", "-r", ".", "--object-directory", BUILD, *filters, "--json", BUILD / "coverage.json", BUILD)
-    with (BUILD / "coverage.json").open(encoding="utf-8") as file:
-        found: dict[str, Any] = json.load(file)
+    """What the counters of all runs say: a branch is the n-th of its line in every build."""
+    taken: dict[str, dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+    with ThreadPoolExecutor(2) as pool:
+        for found in pool.map(lambda path: list(counts_of(path)), sorted(BUILD.rglob("*.gcda"))):
+            for name, line, counts in found:
+                before = taken[name][line]
+                pairs = itertools.zip_longest(before, counts, fillvalue=0)
+                taken[name][line] = [mine + other for mine, other in pairs]
     files = []
-    for one in found["files"]:
-        branches = [(line["line_number"], branch["count"]) for line in one["lines"] for branch in line["branches"]]
-        missed: dict[int, int] = {}
-        for line, times in branches:
-            if times == 0:
-                missed[line] = missed.get(line, 0) + 1
-        files.append(File(one["file"], len(branches), len(branches) - sum(missed.values()), missed))
+    for name, lines in sorted(taken.items()):
+        missed = {line: counts.count(0) for line, counts in lines.items() if 0 in counts}
+        branches = sum(map(len, lines.values()))
+        files.append(File(name, branches, branches - sum(missed.values()), missed))
     return files
 
 
@@ -226,8 +241,6 @@ was compiled out. Missed:
 
 
 def main() -> int:
-    if shutil.which("gcovr") is None:
-        raise SystemExit("missing: gcovr (Debian's name); ./tools/test installs it")
     for program in build():
         run(program)
     run(sys.executable, "-c", PLAY, PYTHONPATH=PYTHONPATH, PVID_NATIVE_LIBRARY=str(BUILD / "libnative.so"))
