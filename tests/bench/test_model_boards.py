@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from conftest import ROOT
 
 from bench.model_boards import HEADER, differs, played, row_of, rows
 from pvid.board.boards import BOARDS
@@ -15,20 +14,6 @@ def test_a_board_of_each_instruction_set_has_a_row_for_each_core() -> None:
     assert {core for _, core in rows()} == {"f32", "q31"} and len(rows()) == 2 * len({one.name for one, _ in rows()})
     others = {one.core for one in BOARDS.values()} - {one.core for one, _ in rows()}
     assert others == {"Cortex-M7F", "ATmega328P"}  # an M4F's instructions; too little memory for any mechanism
-
-
-def test_the_table_of_the_page_has_every_row_and_equal_bits() -> None:
-    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
-    lines = page.partition("<!-- model-boards -->\n")[2].partition("\n<!-- /model-boards -->")[0].splitlines()
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    assert tuple(cells[0]) == HEADER
-    assert [row[:2] for row in cells[2:]] == [[f"{board.core} ({board.name})", core] for board, core in rows()]
-    for row in cells[2:]:
-        assert len(row) == len(HEADER)
-        found = [cell for cell in row[2:-1] if cell.isdigit()]
-        assert row[-1] == ("equal" if found else "-"), row
-        assert all(cell.isdigit() or cell in ("no room", "no float32") for cell in row[2:-1]), row
-        assert len(found) == len(row) - 3 or row[0].startswith("AT") or "no room" in row, row
 
 
 @pytest.mark.slow
