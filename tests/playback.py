@@ -107,12 +107,18 @@ def strong_variants() -> list[Variant]:
 
     five: dict[str, Any] = {"form": "strong", "differentiator": "finite-difference", "stride": 20}
     smooth: dict[str, Any] = {"form": "strong", "differentiator": "savitzky-golay"}
+    blocks = with_settings(FINE, **smooth, block=5)
     five_points = with_settings(FINE, **five)
     for name, rig in {
         "five points": five_points,
         "five points, forgetting": with_settings(five_points, forgetting_s=0.5),
         "five points, the paper's law": with_settings(five_points, law="pseudovelocity"),
         "five points, divider": with_settings(five_points, divider=3),
+        "five points, in stages": with_settings(five_points, divider=16),
+        "five points, in stages, forgetting": with_settings(five_points, divider=24, forgetting_s=0.5),
+        "five points, in stages, the paper's law": with_settings(five_points, divider=32, law="pseudovelocity"),
+        "smooth, blocks": blocks,
+        "five points, in stages, at most": with_settings(five_points, divider=64),
         "smooth": with_settings(FINE, **smooth),
         "smooth, feedback, forgetting": with_settings(FINE, **smooth, forgetting_s=2.0, feedback_hz=30.0),
     }.items():

@@ -111,7 +111,6 @@ missing_packages() {
         need doxygen command -v doxygen
         need frama-c-base command -v frama-c
         need g++ command -v g++
-        need gcovr command -v gcovr
         need libclang-rt-dev links_with clang -fsanitize=address,undefined
         need llvm command -v opt
         need libcmocka-dev test -e /usr/include/cmocka.h

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Branch coverage of the C core and the link by the quick tests: the CMocka programs, what tests/playback.py plays
-through the shared library, and the tests of MECHANISMS, which compile the core with the generated C of mechanisms.
+through the shared library, and what compiles the core with the generated C of mechanisms: the tests of MECHANISMS and
+tests/playback_engine.py.
 
     build/venv/bin/python tools/coverage.py
 
@@ -11,13 +12,18 @@ branch is misuse, and ends the program.
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
 import tomllib
+from collections import defaultdict
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,12 +40,17 @@ BUILD = ROOT / "build" / "coverage"
 REPORT = ROOT / "build" / "coverage.md"
 REASONS = ROOT / "tests" / "coverage.toml"
 FIRMWARE = ROOT / "firmware"
+COUNTED_FOLDERS = tuple(f"{FIRMWARE / name}{os.sep}" for name in ("src", "models", "link"))
 INCLUDES = [*sources.INCLUDES, f"-I{FIRMWARE / 'link'}"]
 # the counts of one process: nothing else runs while it does
-FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-DPVID_ASSERT(condition)=((void)0)", *INCLUDES]
+FLAGS = ["-std=c99", "-O0", "-ffp-contract=off", "-fPIC", "-w", *INCLUDES]
+# a function that is inlined even so would count once for each of its callers
+COUNTED = ("--coverage", "-Dalways_inline=unused", "-DPVID_ASSERT(condition)=((void)0)")
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
+PYTHONPATH = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
 PLAY = "import playback; from pvid.core.native import Native; list(playback.digests(Native()))"
+PLAY_ENGINE = "import playback_engine; [list(one.digests(one.library)) for one in playback_engine.subjects()]"
 # The weak engine in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
     *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_bits_q31", "weak_snapshot_q31", "weak_rows_q31")),
@@ -47,14 +58,26 @@ MECHANISMS = (
     *(f"tests/twin/test_{name}.py" for name in ("estimator_q31", "gate", "misfit")),
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
     "tests/core/test_weak_valid_q31.py",
+    "tests/codegen/test_fitted_sizes.py",  # builds for one design
 )
-# A compiler that counts branches; each call has a folder of its own, since objects of several builds have one name.
+# A compiler that counts branches, but not those of a sanitizer; each call has a folder of its own, since objects of
+# several builds have one name.
 COUNTING = """#!/bin/sh
 for one; do
     [ "$one" != -E ] || exec "{gcc}" "$@"
 done
-exec "{gcc}" "$@" -O0 --coverage -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
+for one; do
+    shift
+    case $one in
+    -fsanitize*) ;;
+    *) set -- "$@" "$one" ;;
+    esac
+done
+exec "{gcc}" "$@" -O0 {options} -dumpdir "$(mktemp -d "{folder}/XXXXXXXX")/"
 """
+# What tests compile and keep, under build/.
+KEPT = ("matrix", "cache/models", "cache/plants")
+ASIDE = ROOT / "build" / "aside"
 
 
 @dataclass(frozen=True)
@@ -88,11 +111,11 @@ def build() -> list[Path]:
     core = [*sources.core_sources(), FIRMWARE / "link" / "link.c"]
     tests = playback.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))
-    jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, "--coverage"]) for path in core]
-    jobs += [(BUILD / "native" / f"{path.stem}.o", path, [*NATIVE, "--coverage"]) for path in core]
+    jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, *COUNTED]) for path in core]
+    jobs += [(BUILD / "native" / f"{path.stem}.o", path, [*NATIVE, *COUNTED]) for path in core]
     jobs += [(BUILD / "native" / f"{path.stem}.o", path, NATIVE) for path in plain]
     # a test has the core's inline functions in it
-    jobs += [(BUILD / "tests" / f"{path.stem}.o", path, [*FLAGS, "--coverage"]) for path in tests]
+    jobs += [(BUILD / "tests" / f"{path.stem}.o", path, [*FLAGS, *COUNTED]) for path in tests]
     for name in ("unit", "native", "tests"):
         (BUILD / name).mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(2) as pool:
@@ -106,50 +129,76 @@ def build() -> list[Path]:
     return programs
 
 
+def put_back() -> None:
+    """Builds that were set aside replace those of the counting compiler, also of a run that was ended."""
+    for place in KEPT:
+        if (ASIDE / place).exists():
+            shutil.rmtree(ROOT / "build" / place, ignore_errors=True)
+            (ASIDE / place).rename(ROOT / "build" / place)
+
+
+@contextmanager
+def set_aside() -> Iterator[None]:
+    """Without the builds of other tests, which would not count, and whose places those that count must not keep."""
+    put_back()
+    for place in KEPT:
+        own = ROOT / "build" / place
+        own.mkdir(parents=True, exist_ok=True)
+        (ASIDE / place).parent.mkdir(parents=True, exist_ok=True)
+        own.rename(ASIDE / place)
+    try:
+        yield
+    finally:
+        put_back()
+
+
 def play_mechanisms() -> None:
-    """Runs the tests of mechanisms with a compiler that counts."""
+    """Runs the tests of mechanisms, and plays their engines, with a compiler that counts."""
     tools, counts = BUILD / "bin", BUILD / "counts"
     for folder in (tools, counts):
         folder.mkdir()
     for name in ("gcc", "cc"):
-        (tools / name).write_text(COUNTING.format(gcc=shutil.which(name), folder=counts), encoding="utf-8")
+        text = COUNTING.format(gcc=shutil.which(name), options=shlex.join(COUNTED), folder=counts)
+        (tools / name).write_text(text, encoding="utf-8")
         (tools / name).chmod(0o755)
-    kept = (
-        ROOT / "build" / "cache" / "models"
-    )  # libraries are kept by the name of their compiler: those of the last run
-    before = set(kept.iterdir()) if kept.is_dir() else set()
     options = ("-c", "host/pyproject.toml", "--rootdir=.", "-q")
     path = os.pathsep.join((str(tools), os.environ["PATH"]))
-    compiler = tools / "gcc"
-    try:
-        run(
-            *(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS),
-            PATH=path,
-            CC=str(compiler),
-            CCACHE_DISABLE="1",
-        )
-    finally:
-        for made in set(kept.iterdir()) - before:
-            shutil.rmtree(made)
+    given = {"PATH": path, "CC": str(tools / "gcc"), "CCACHE_DISABLE": "1"}
+    with set_aside():
+        run(sys.executable, "-P", "-m", "pytest", *options, *MECHANISMS, **given)
+        run(sys.executable, "-c", PLAY_ENGINE, PYTHONPATH=PYTHONPATH, **given)
+
+
+def counts_of(counters: Path) -> Iterator[tuple[str, int, list[int]]]:
+    """File of the core, line and how often each of its branches was taken, of the counters of one object."""
+    told = subprocess.run(
+        ["gcov", "--branch-probabilities", "--branch-counts", "--json-format", "--stdout", counters.name],
+        cwd=counters.parent,
+        capture_output=True,
+        check=True,
+    )
+    of_object: dict[str, Any] = json.loads(told.stdout)
+    for one in of_object["files"]:
+        path = os.path.normpath(os.path.join(of_object["current_working_directory"], one["file"]))
+        if path.startswith(COUNTED_FOLDERS):
+            for line in one["lines"]:
+                yield os.path.relpath(path, ROOT), line["line_number"], [x["count"] for x in line["branches"]]
 
 
 def measured() -> list[File]:
-    """What the counters of all runs say."""
-    filters = [
-        *("--filter", "firmware/src", "--filter", "firmware/models", "--filter", "firmware/link"),
-        "--exclude-unreachable-branches",
-    ]
-    run("gcovr", "-r", ".", "--object-directory", BUILD, *filters, "--json", BUILD / "coverage.json", BUILD)
-    with (BUILD / "coverage.json").open(encoding="utf-8") as file:
-        found: dict[str, Any] = json.load(file)
+    """What the counters of all runs say: a branch is the n-th of its line in every build."""
+    taken: dict[str, dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+    with ThreadPoolExecutor(2) as pool:
+        for found in pool.map(lambda path: list(counts_of(path)), sorted(BUILD.rglob("*.gcda"))):
+            for name, line, counts in found:
+                before = taken[name][line]
+                pairs = itertools.zip_longest(before, counts, fillvalue=0)
+                taken[name][line] = [mine + other for mine, other in pairs]
     files = []
-    for one in found["files"]:
-        branches = [(line["line_number"], branch["count"]) for line in one["lines"] for branch in line["branches"]]
-        missed: dict[int, int] = {}
-        for line, times in branches:
-            if times == 0:
-                missed[line] = missed.get(line, 0) + 1
-        files.append(File(one["file"], len(branches), len(branches) - sum(missed.values()), missed))
+    for name, lines in sorted(taken.items()):
+        missed = {line: counts.count(0) for line, counts in lines.items() if 0 in counts}
+        branches = sum(map(len, lines.values()))
+        files.append(File(name, branches, branches - sum(missed.values()), missed))
     return files
 
 
@@ -180,9 +229,9 @@ def report_of(files: list[File]) -> str:
     return f"""# Branch coverage
 
 {taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
-are taken by the CMocka programs, by what `tests/playback.py` plays, and by {len(MECHANISMS)} files of tests
-that compile the core with a mechanism, as gcov counts them at -O0: every operand of a `&&` or `||` has
-two. Other tests do not count. PVID_ASSERT, which ends the program,
+are taken by the CMocka programs, by what `tests/playback.py` and `tests/playback_engine.py` play, and by
+{len(MECHANISMS)} files of tests that compile the core with a mechanism, as gcov counts them at -O0: every operand of
+a `&&` or `||` has two. Other tests do not count. PVID_ASSERT, which ends the program,
 was compiled out. Missed:
 
 | where | line | branches | why |
@@ -192,12 +241,9 @@ was compiled out. Missed:
 
 
 def main() -> int:
-    if shutil.which("gcovr") is None:
-        raise SystemExit("missing: gcovr (Debian's name); ./tools/test installs it")
     for program in build():
         run(program)
-    path = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
-    run(sys.executable, "-c", PLAY, PYTHONPATH=path, PVID_NATIVE_LIBRARY=str(BUILD / "libnative.so"))
+    run(sys.executable, "-c", PLAY, PYTHONPATH=PYTHONPATH, PVID_NATIVE_LIBRARY=str(BUILD / "libnative.so"))
     play_mechanisms()
     files = measured()
     print("| file | branches taken | of |\n|---|---:|---:|")

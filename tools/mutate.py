@@ -4,10 +4,11 @@
     build/venv/bin/python tools/mutate.py                  240 mutants; writes build/mutants.md; a quarter of an hour
     build/venv/bin/python tools/mutate.py --count 10       ten of them; writes nothing
 
-The quick tests are two: what tests/playback.py plays through the shared library, under every setting of every form
-and core, whose bits the suite compares with the numpy twin; and the CMocka programs of tests/unit, as they are, then
-those that take less than a second under clang's address and undefined-behaviour sanitizers. A crash and a loop without
-an end are noticed, too. A change that leaves the object code as it was is no mutant.
+The quick tests are two: what tests/playback.py plays of the strong form and tests/playback_engine.py of the weak engine
+and its second stage with the generated C of mechanisms, whose bits the suite compares with the numpy twin; and the
+CMocka programs of tests/unit, as they are, then those that take less than a second under clang's address and
+undefined-behaviour sanitizers. A crash and a loop without an end are noticed, too. A change that leaves the object code
+of every build as it was is no mutant.
 
 A survivor stands in tests/mutants.toml with its reason, or the command fails. `equivalent = true` there says that no
 test could see it, and why; such a mutant is left out of the second of the two rates.
@@ -30,15 +31,18 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import playback  # noqa: E402 - of tests
+import playback_engine  # noqa: E402 - of tests
 
 from pvid.core import sources  # noqa: E402
+from pvid.core.headers import HEADERS  # noqa: E402
 from pvid.core.native import Native  # noqa: E402
 from pvid.settings.bounds import SIZES  # noqa: E402
 
@@ -49,10 +53,9 @@ REASONS = ROOT / "tests" / "mutants.toml"
 FIRMWARE = sources.FIRMWARE
 INCLUDES = [*sources.PUBLIC_INCLUDES, f"-I{FIRMWARE / 'link'}"]
 PRIVATE = [path.relative_to(FIRMWARE) for path in (sources.SRC, sources.MODEL)]
-BESIDES = (  # of the shared library, beside the core
-    *(ROOT / "host" / "native").glob("[lr]*.c"),
-    FIRMWARE / "link" / "link.c",
-)
+LINK = FIRMWARE / "link" / "link.c"
+BESIDES = (*(ROOT / "host" / "native").glob("[lr]*.c"), LINK)  # of the shared library, beside the core
+ENGINE = re.compile(r"^(refine|weak)_|_(refine|weak)_")  # names of files that the strong form does without
 COUNT = 240
 LONGEST = 60  # seconds of processor time for what takes one
 QUICK = 1.0  # seconds that a test may take to be asked under sanitizers as well
@@ -84,6 +87,9 @@ TOKEN = re.compile(
 )
 
 # ---- mutants ----
+
+
+CORE = frozenset(sources.core_sources())
 
 
 def files_of_core() -> list[Path]:
@@ -186,12 +192,13 @@ def shares(sizes: dict[str, int], count: int) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class Kit:
-    """A compiler and its options; `name` is the folder of what it makes."""
+    """A compiler and its options; `name` is the folder of what it makes of `sources`."""
 
     name: str
     compiler: str
     options: tuple[str, ...]
     checks: tuple[str, ...] = ()  # options of the linker as well
+    sources: tuple[Path, ...] = (*sources.core_sources(), LINK)
 
     def compiles(self, target: Path, source: Path, top: Path = FIRMWARE) -> bool:
         """Compiles a file whose private headers are those under `top`."""
@@ -213,11 +220,35 @@ class Kit:
 
 COMMON = ("-O1", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-w")
 MUTANT = (*SIZES, '-DPVID_NATIVE_BUILD="mutant"')
-NATIVE = Kit("native", "gcc", ("-std=c99", *MUTANT))
+NATIVE = Kit("native", "gcc", ("-std=c99", *MUTANT), sources=(*sources.core_sources(), *BESIDES))
 PLAIN = Kit("plain", "gcc", ("-std=c99",))
 WRAPS = f"-fsanitize-ignorelist={ROOT / 'tests' / 'sanitizers.ignore'}"
 CHECKS = "-fsanitize=address,undefined,float-cast-overflow,integer"
 SANITIZERS = (Kit("address", "clang", ("-std=c11", WRAPS), (CHECKS, "-fno-sanitize-recover=all")),)
+
+
+Digests = Callable[[Path], Iterator[tuple[str, str]]]
+
+
+@cache
+def playbacks() -> dict[Kit, Digests]:
+    """The builds that are played, and what one shows by variant."""
+    playback.variants()
+    found: dict[Kit, Digests] = {NATIVE: lambda library: playback.digests(Native(library))}
+    for one in playback_engine.subjects():
+        folder = one.library.parent
+        options = ("-std=c99", *one.definitions, f"-I{folder}", f"-I{ROOT / 'host' / 'native'}")
+        kit = Kit(one.name, "gcc", options, sources=(*one.sources, *sorted(folder.glob("*.c"))))
+        shutil.copy(folder / HEADERS, emptied(BUILD / kit.name) / HEADERS)
+        found[kit] = one.digests
+    return found
+
+
+def emptied(folder: Path) -> Path:
+    """A new folder."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
 
 
 def ran(command: Sequence[str | Path]) -> bool:
@@ -225,11 +256,11 @@ def ran(command: Sequence[str | Path]) -> bool:
     return subprocess.run([str(part) for part in command], capture_output=True, check=False).returncode == 0
 
 
-def made(kit: Kit, sources: list[Path]) -> list[Path]:
+def made(kit: Kit) -> list[Path]:
     """Objects of the files as they are, in the kit's folder."""
-    targets = [BUILD / kit.name / f"{path.stem}.o" for path in sources]
+    targets = [BUILD / kit.name / f"{path.stem}.o" for path in kit.sources]
     with ThreadPoolExecutor(2) as pool:
-        for source, compiled in zip(sources, pool.map(kit.compiles, targets, sources), strict=True):
+        for source, compiled in zip(kit.sources, pool.map(kit.compiles, targets, kit.sources), strict=True):
             if not compiled:
                 raise SystemExit(f"{source} does not compile with {kit.name}")
     return targets
@@ -238,9 +269,9 @@ def made(kit: Kit, sources: list[Path]) -> list[Path]:
 def tests_of(kit: Kit) -> dict[str, float]:
     """Builds the core and the CMocka programs with a kit and runs these; seconds that each takes."""
     folder = BUILD / kit.name
-    kit.links(folder / "libpvidcore.so", made(kit, [*sources.core_sources(), BESIDES[-1]]))
+    kit.links(folder / "libpvidcore.so", made(kit))
     seconds = {}
-    for test in made(Kit(f"{kit.name}/tests", kit.compiler, kit.options, kit.checks), playback.unit_tests()):
+    for test in made(replace(kit, name=f"{kit.name}/tests", sources=tuple(playback.unit_tests()))):
         before = time.monotonic()
         if not kit.links_test(test.with_suffix(""), folder) or not passes(test.with_suffix(""), folder):
             raise SystemExit(f"{test.stem} fails with the core as it is ({kit.name})")
@@ -250,18 +281,21 @@ def tests_of(kit: Kit) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Baseline:
-    """The core as it is: what its playback shows, which sources include which header, how long each test takes."""
+    """The core as it is: what its playbacks show, which sources include which header, how long each test takes."""
 
-    digests: dict[str, str]
-    including: dict[str, frozenset[str]]
+    digests: dict[Kit, dict[str, str]]
+    including: dict[Kit, dict[str, tuple[Path, ...]]]  # with the options of a kit
     seconds: dict[str, float]
 
-    def dependents(self, file: str) -> tuple[list[str], list[str]]:
-        """Sources of the core and tests that a change of a file reaches, by their stems."""
+    def reached(self, kit: Kit, file: str) -> tuple[Path, ...]:
+        """Sources of a kit whose objects a change of a file reaches."""
         if file.endswith(".c"):
-            return [Path(file).stem], []
-        found = sorted(self.including.get(file, ()))
-        return [one for one in found if not one.startswith("test_")], [one for one in found if one.startswith("test_")]
+            return tuple(path for path in kit.sources if path.name == file)
+        return self.including[kit].get(file, ())
+
+    def tests_anew(self, file: str) -> set[str]:
+        """CMocka programs that include a file."""
+        return {path.stem for path in self.including[TESTS].get(file, ())}
 
     def nearest_first(self, file: str) -> list[str]:
         """The CMocka programs: those named like the file, then the others, the quick before the slow."""
@@ -269,27 +303,44 @@ class Baseline:
         return sorted(self.seconds, key=lambda test: (stem not in test, self.seconds[test]))
 
 
-def headers_of(source: Path) -> set[str]:
+TESTS = replace(PLAIN, name="plain/tests", sources=tuple(playback.unit_tests()))
+
+
+def headers_of(kit: Kit, source: Path) -> set[str]:
     """The private headers that a source includes, also by way of others."""
-    command = ["gcc", *INCLUDES, *(f"-I{FIRMWARE / folder}" for folder in PRIVATE), "-MM", str(source)]
+    includes = [*INCLUDES, *(f"-I{FIRMWARE / folder}" for folder in PRIVATE)]
+    command = [kit.compiler, *kit.options, *includes, "-MM", str(source)]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     private = {str(path) for path in files_of_core()}
     return {Path(word).name for word in told.split() if word in private and word.endswith(".h")}
 
 
+def including(kit: Kit) -> dict[str, tuple[Path, ...]]:
+    """The sources of a kit that include each private header."""
+    found: dict[str, list[Path]] = defaultdict(list)
+    with ThreadPoolExecutor(2) as pool:
+        for path, headers in zip(kit.sources, pool.map(lambda one: headers_of(kit, one), kit.sources), strict=True):
+            for header in headers:
+                found[header].append(path)
+    return {name: tuple(paths) for name, paths in found.items()}
+
+
 def baseline() -> Baseline:
     """Builds the core as it is and the CMocka programs; runs them once."""
     shutil.rmtree(BUILD, ignore_errors=True)
-    core = sources.core_sources()
-    library = NATIVE.links(BUILD / "libbaseline.so", made(NATIVE, [*core, *BESIDES]))
-    including: dict[str, set[str]] = defaultdict(set)
-    for path in (*core, *playback.unit_tests()):
-        for header in headers_of(path):
-            including[header].add(path.stem)
-    digests = digests_apart(library, None)
-    if not digests or digests != digests_apart(library, None):
-        raise SystemExit("the core as it is does not give the same bits twice")
-    return Baseline(digests, {name: frozenset(stems) for name, stems in including.items()}, tests_of(PLAIN))
+    playbacks.cache_clear()
+    digests = {}
+    for kit in playbacks():
+        library = kit.links(BUILD / kit.name / "libbaseline.so", made(kit))
+        digests[kit] = digests_apart(kit, library, None)
+        if not digests[kit] or digests[kit] != digests_apart(kit, library, None):
+            raise SystemExit(f"the core as it is does not give the same bits twice ({kit.name})")
+    for one in playback_engine.subjects():
+        own = next(shown for kit, shown in digests.items() if kit.name == one.name)
+        if own != dict(one.digests(one.library)):
+            raise SystemExit(f"{one.name}: other bits than those of the library of pvid")
+    kits = (*playbacks(), PLAIN, TESTS)
+    return Baseline(digests, {kit: including(kit) for kit in kits}, tests_of(PLAIN))
 
 
 # ---- verdicts ----
@@ -303,10 +354,10 @@ def passes(program: Path, folder: Path) -> bool:
     return done.returncode == 0
 
 
-def digests_apart(library: Path, expected: dict[str, str] | None) -> dict[str, str]:
+def digests_apart(kit: Kit, library: Path, expected: dict[str, str] | None) -> dict[str, str]:
     """What a library shows, by variant, from a process of its own: a mutant may crash, or never end. Ends at the first
     that is not what is expected, when something is."""
-    playback.variants()  # made here, once
+    shows = playbacks()[kit]
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
@@ -314,7 +365,7 @@ def digests_apart(library: Path, expected: dict[str, str] | None) -> dict[str, s
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         with os.fdopen(writer, "w") as pipe:
             try:
-                for name, shown in playback.digests(Native(library)):
+                for name, shown in shows(library):
                     pipe.write(f"{name}\t{shown}\n")
                     if expected is not None and shown != expected[name]:
                         break
@@ -338,7 +389,7 @@ def first_difference(shown: dict[str, str], expected: dict[str, str]) -> str | N
 
 def code_of(path: Path) -> bytes:
     """Code and data of an object, without the name of its source."""
-    stripped = path.with_suffix(".stripped")
+    stripped = path.with_suffix(f".{os.getpid()}")
     subprocess.run(["objcopy", "--strip-unneeded", "--remove-section=.comment", path, stripped], check=True)
     return stripped.read_bytes()
 
@@ -364,14 +415,37 @@ def workshop(mutant: Mutant) -> Iterator[Path]:
 
 def changed_library(kit: Kit, mutant: Mutant, base: Baseline, folder: Path, name: str) -> tuple[Path, bool] | None:
     """The core's library with the mutant in it, and whether its code is another; None if it does not compile."""
-    stems, _ = base.dependents(mutant.file)
-    replaced = [folder / kit.name / f"{stem}.o" for stem in stems]
-    changed = [folder / place(f"{stem}.c").relative_to(FIRMWARE) for stem in stems]
+    # sanitizers see what the plain build does
+    reached = base.reached(kit if kit in base.including else PLAIN, mutant.file)
+    replaced = [folder / kit.name / f"{path.stem}.o" for path in reached]
+    changed = [folder / path.relative_to(FIRMWARE) if path in CORE else path for path in reached]
     if not all(kit.compiles(*pair, folder) for pair in zip(replaced, changed, strict=True)):
         return None
     differs = any(code_of(path) != code_of(BUILD / kit.name / path.name) for path in replaced)
-    kept = [path for path in (BUILD / kit.name).glob("*.o") if path.stem not in stems]
+    stems = {path.stem for path in reached}
+    kept = [BUILD / kit.name / f"{path.stem}.o" for path in kit.sources if path.stem not in stems]
+    (folder / kit.name).mkdir(exist_ok=True)
     return kit.links(folder / kit.name / name, sorted(kept) + replaced), differs
+
+
+def killed_by_bits(mutant: Mutant, base: Baseline, folder: Path) -> str | None:
+    """The first variant of a playback that is another; "no mutant" when no build's code is, or it does not compile."""
+    kits = sorted(playbacks(), key=lambda kit: (kit is NATIVE) == bool(ENGINE.search(mutant.file)))
+    differs = False
+    for kit in kits:
+        if not base.reached(kit, mutant.file):
+            continue
+        library = changed_library(kit, mutant, base, folder, f"{mutant.rank(0)[:16]}.so")
+        if library is None:
+            return "no mutant"
+        if library[1]:
+            differs = True
+            if kit is not NATIVE:
+                (library[0].with_name(HEADERS)).symlink_to(BUILD / kit.name / HEADERS)
+            shown = first_difference(digests_apart(kit, library[0], base.digests[kit]), base.digests[kit])
+            if shown is not None:
+                return shown
+    return None if differs else "no mutant"
 
 
 def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> str | None:
@@ -379,7 +453,7 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
     library = changed_library(kit, mutant, base, folder, "libpvidcore.so")
     if library is None:
         raise SystemExit(f"does not compile with {kit.name}: {mutant.describe()}")
-    _, anew = base.dependents(mutant.file)
+    anew = base.tests_anew(mutant.file)
     for test in base.nearest_first(mutant.file):
         if kit is not PLAIN and base.seconds[test] > QUICK:
             continue
@@ -399,11 +473,7 @@ def verdict(job: tuple[Mutant, Baseline]) -> str | None:
     """What killed it, "no mutant" when it does not compile or compiles to the same code, None when it lives."""
     mutant, base = job
     with workshop(mutant) as folder:
-        library = changed_library(NATIVE, mutant, base, folder, f"{mutant.rank(0)[:16]}.so")
-        if library is None or not library[1]:
-            return "no mutant"
-        shown = first_difference(digests_apart(library[0], base.digests), base.digests)
-        return shown or killed_by_tests(PLAIN, mutant, base, folder)
+        return killed_by_bits(mutant, base, folder) or killed_by_tests(PLAIN, mutant, base, folder)
 
 
 def verdict_under_sanitizers(job: tuple[Mutant, Baseline]) -> str | None:
@@ -422,7 +492,7 @@ Judge = Callable[[tuple[Mutant, Baseline]], str | None]
 
 class Memory:
     """Who was killed before, in a file: asked again is only who lived, or whose source has changed since. Tests are
-    added to, so that a kill stays one."""
+    added to, so that a kill stays one; builds, too, so that what compiles to the same code is asked again."""
 
     def __init__(self, path: Path | None) -> None:
         self._path = path
@@ -434,12 +504,12 @@ class Memory:
         return hashlib.sha256(f"{mutant.file} {mutant.text()}".encode()).hexdigest()
 
     def killer(self, mutant: Mutant) -> str | None:
-        """What killed it, or that it is none; None if it is to be asked."""
+        """What killed it; None if it is to be asked."""
         return self._killers.get(self._key(mutant))
 
     def keep(self, mutant: Mutant, by: str | None) -> None:
         """A verdict."""
-        if by is not None and self._path is not None:
+        if by is not None and by != "no mutant" and self._path is not None:
             self._killers[self._key(mutant)] = by
             self._path.write_text(json.dumps(self._killers, indent=0), encoding="utf-8")
 
@@ -455,13 +525,13 @@ def campaign(
     results: list[tuple[Mutant, str | None]] = []
 
     def judge(asked: Judge, mutants: list[Mutant]) -> Iterator[str | None]:
-        fresh = [mutant for mutant in mutants if known.killer(mutant) is None]
-        verdicts: dict[Mutant, str | None] = {}
-        for mutant, by in zip(fresh, pool.map(asked, [(one, base) for one in fresh]), strict=True):
-            known.keep(mutant, by)
-            verdicts[mutant] = by
-        for mutant in mutants:
-            yield known.killer(mutant) or verdicts[mutant]
+        before = [known.killer(mutant) for mutant in mutants]
+        fresh = pool.map(asked, [(one, base) for one, by in zip(mutants, before, strict=True) if by is None])
+        for mutant, by in zip(mutants, before, strict=True):
+            found = by or next(fresh)
+            if by is None:
+                known.keep(mutant, found)
+            yield found
 
     with ProcessPoolExecutor(2) as pool:
         while True:
@@ -567,8 +637,8 @@ def report_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
 file's number of them: one operator, sign or constant changed. {told.killed} were killed:
 {100 * told.killed / told.mutants:.1f} % of all, and {100 * told.rate:.1f} % of the {could} that are not
 equivalent. {told.by_bits} of them by the bits of a few seconds of data
-(`tests/playback.py`), the others by a CMocka program. The slower tests (every build against the twin over 40 000
-ticks, oracles, accuracy) were not asked.
+(`tests/playback.py`, `tests/playback_engine.py`), the others by a CMocka program. The slower tests (every build against
+the twin over 40 000 ticks, oracles, accuracy) were not asked.
 
 ## Survivors that a test could kill
 

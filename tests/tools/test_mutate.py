@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
 
+import playback_engine
 import pytest
 from conftest import ROOT
+
+from pvid.codegen import files_refine
+from pvid.codegen.build import refine_functions
+from pvid.models.mechanisms import compiled_of
 
 CODE = """/* a < b + 1 */
 #define N 4
@@ -76,6 +82,16 @@ def test_reasons_speak_of_lines_that_stand_there(mutate: ModuleType) -> None:
     for reason in mutate.reasons():
         assert len(reason.why) >= 20
         assert any(reason.is_of(mutant) for mutant in known), f"{reason.file}: {reason.line}"
+
+
+def test_what_is_played_has_both_kinds_of_steps_and_all_that_a_mechanism_may_have() -> None:
+    """What a shape leaves out is not compiled: a change there would be no mutant."""
+    shapes = [files_refine.shape(refine_functions(compiled_of(name)), "a test") for name in playback_engine.BOTH_STAGES]
+    numbers = [dict(re.findall(r"^#define PVID_REFINE_(\w+) +(\d+)", shape, re.MULTILINE)) for shape in shapes]
+    for name in ("RUNGE_KUTTA", "HIDDEN", "INTEGRALS", "TURNING", "SIGNS", "WIDTHS"):
+        assert {int(one[name]) > 0 for one in numbers} == {False, True}, name
+    assert {one["OUTPUT_LINEAR"] for one in numbers} == {"0", "1"}
+    assert max(int(one["SIGNS"]) for one in numbers) > 1
 
 
 @pytest.mark.long

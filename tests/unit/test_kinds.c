@@ -105,6 +105,14 @@ static void blocks_lie_behind_each_other(void **state)
 }
 
 /* M of some rows of integers by the estimator's sums, and dense in double. */
+static void the_first_kind_begins_at_the_first_theta(void **state)
+{
+    (void)state;
+    static const uint8_t ends[2] = {1, 4};
+    assert_int_equal(pvid_kind_first(ends, 0), 0);
+    assert_int_equal(pvid_kind_first(ends, 1), 1);
+}
+
 static void rows_go_to_the_block_of_their_kind(void **state)
 {
     (void)state;
@@ -489,12 +497,18 @@ static void formats_of_theta_follow_the_start(void **state)
     assert_int_equal(estimator.theta_bits[0], 36);
     pvid_estimator_place_q31(&estimator, 0, (int64_t)9 << 24);
     assert_true(estimator.theta[0] == ((int64_t)9 << 36));
+    fresh.start[0] = 8 << 24; /* larger than what a standard deviation changes it by */
+    fresh.start_sd[0] = 1 << 20;
+    assert_int_equal(pvid_estimator_init_q31(&estimator, &fresh), PVID_OK);
+    assert_int_equal(estimator.theta_bits[0], 36);
+    assert_int_equal(estimator.c_exponent[0], 10 - 24); /* y_bits less p_bits: a number has its own exponent */
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(blocks_lie_behind_each_other),
+        cmocka_unit_test(the_first_kind_begins_at_the_first_theta),
         cmocka_unit_test(rows_go_to_the_block_of_their_kind),
         cmocka_unit_test(products_with_blocks_equal_dense_products),
         cmocka_unit_test(kinds_divide_theta_or_are_refused),

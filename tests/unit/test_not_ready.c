@@ -121,7 +121,34 @@ static void null_is_an_answer(void **state)
     call_all(NULL, NULL, NULL, NULL);
     assert_null(pvid_weak_estimate_f32(NULL));
     assert_null(pvid_weak_estimate_q31(NULL));
+    assert_null(pvid_weak_candidate_f32(NULL));
     assert_int_equal(pvid_snapshot_choose(NULL, NULL, 1000).newest, -1);
+}
+
+static void estimators_before_init_do_nothing(void **state)
+{
+    (void)state;
+    static pvid_estimator_f32 estimator;
+    static pvid_estimator_q31 estimator_q31;
+    const pvid_estimate_f32 none = {.kappa = 0.0f};
+    const pvid_estimate_q31 none_q31 = {.kappa = 0};
+    pvid_estimate_f32 estimate;
+    pvid_estimate_q31 estimate_q31;
+    memset(&estimate, 0x5A, sizeof estimate);
+    memset(&estimate_q31, 0x5A, sizeof estimate_q31);
+    pvid_estimator_assess_f32(&estimator, &estimate);
+    pvid_estimator_assess_q31(&estimator_q31, &estimate_q31);
+    assert_memory_equal(&estimate, &none, sizeof none);
+    assert_memory_equal(&estimate_q31, &none_q31, sizeof none_q31);
+    pvid_estimator_assess_f32(&estimator, NULL);
+    pvid_estimator_assess_q31(&estimator_q31, NULL);
+}
+
+static void a_missing_reading_is_not_ready(void **state)
+{
+    (void)state;
+    assert_int_equal(pvid_weak_init_q31(&weak_q31, &kapitza_config_q31), PVID_OK);
+    assert_int_equal(pvid_weak_step_q31(&weak_q31, NULL), PVID_NOT_READY);
 }
 
 static void init_refuses_null(void **state)
@@ -279,6 +306,8 @@ int main(void)
         cmocka_unit_test(static_objects_before_init_do_nothing),
         cmocka_unit_test(null_is_an_answer),
         cmocka_unit_test(init_refuses_null),
+        cmocka_unit_test(estimators_before_init_do_nothing),
+        cmocka_unit_test(a_missing_reading_is_not_ready),
         cmocka_unit_test(estimate_is_read_from_a_ready_object_only),
         cmocka_unit_test(a_refused_init_leaves_an_object_that_does_nothing),
         cmocka_unit_test(estimators_and_differentiators_do_nothing_either),

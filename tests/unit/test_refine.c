@@ -15,6 +15,7 @@
 #include "refine/refine_front_f32.h"
 #include "refine/refine_pass_f32.h"
 #include "refine/refine_solve_f32.h"
+#include "refine_model_f32.h"
 
 #define N PVID_REFINE_PARAMETERS
 #define STEPS 240u /* of 8 ms */
@@ -304,6 +305,28 @@ static void test_init_refuses(void **state)
                                                              {0, 2, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
     static const pvid_refine_signal_f32 no_range[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 3.3f, 0.0f},
                                                        {0, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 integral[2] = {{1, -1, PVID_SIGNAL_SAMPLED, 3.3f, 100.0f},
+                                                       {0, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 integral_of_held[2] = {{1, -1, PVID_SIGNAL_HELD, 3.3f, 100.0f},
+                                                               {0, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 integrated_output[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 3.3f, 100.0f},
+                                                                {0, -1, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 held_output[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 3.3f, 100.0f},
+                                                          {0, 0, PVID_SIGNAL_HELD, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 no_source[2] = {{1, 0, PVID_SIGNAL_JUMP, 3.3f, 100.0f},
+                                                        {0, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const pvid_refine_signal_f32 huge[2] = {{1, 2, PVID_SIGNAL_SAMPLED, 2.0e9f, 100.0f},
+                                                   {0, 0, PVID_SIGNAL_SAMPLED, 1.0f, 1.0f}};
+    static const float no_weights[17] = {2.0e12f};
+    REFUSES(signal, integral, PVID_BAD_DESIGN); /* the pendulum has none */
+    REFUSES(signal, integral_of_held, PVID_BAD_DESIGN);
+    REFUSES(signal, integrated_output, PVID_BAD_DESIGN);
+    REFUSES(signal, held_output, PVID_BAD_DESIGN);
+    REFUSES(signal, no_source, PVID_BAD_DESIGN);
+    REFUSES(signal, huge, PVID_BAD_DESIGN);
+    REFUSES(second, no_weights, PVID_BAD_DESIGN);
+    REFUSES(first_block, 7, PVID_BAD_WINDOW);
+    REFUSES(most_passes, 17, PVID_BAD_ITERATIONS);
     REFUSES(sample_rate_hz, nan, PVID_BAD_SAMPLE_RATE);
     REFUSES(ratio, 0, PVID_BAD_DECIMATION);
     REFUSES(second, NULL, PVID_BAD_DESIGN);
@@ -336,6 +359,50 @@ static void test_init_refuses(void **state)
     assert_int_equal(pvid_refine_init_f32(&refinement, &config, 1), PVID_BAD_DESIGN); /* it needs two */
     assert_int_equal(pvid_refine_init_f32(NULL, &config, 2), PVID_BAD_POINTER);
     assert_int_equal(pvid_refine_init_f32(&refinement, &config, 2), PVID_OK);
+}
+
+static void test_before_its_init_it_does_nothing(void **state)
+{
+    (void)state;
+    static const pvid_refine_f32 zero;
+    static pvid_refine_f32 none;
+    const float sample[2] = {0.1f, 0.0f};
+    pvid_refine_estimate_f32 estimate;
+    pvid_estimate_f32 weak;
+    memset(&weak, 0, sizeof weak);
+    for (int i = 0; i < 2; i++) {
+        pvid_refine_f32 *one = (i == 0) ? &none : NULL;
+        assert_int_equal(pvid_refine_step_f32(one, sample, NULL, false), PVID_NOT_READY);
+        assert_int_equal(pvid_refine_reason_f32(one), PVID_NOT_READY);
+        assert_false(pvid_refine_read_f32(one, &estimate, NULL));
+        assert_null(pvid_refine_latest_f32(one));
+        pvid_refine_gap_f32(one);
+        pvid_refine_freeze_f32(one, true);
+        assert_int_equal(pvid_refine_best_f32(one, &weak, &weak), PVID_STAGE_WEAK);
+    }
+    assert_memory_equal(&none, &zero, sizeof none);
+    const pvid_refine_config_f32 config = good();
+    assert_int_equal(pvid_refine_init_f32(&none, &config, 2), PVID_OK);
+    assert_int_equal(pvid_refine_step_f32(&none, NULL, NULL, false), PVID_NOT_READY);
+    assert_false(pvid_refine_read_f32(&none, NULL, NULL));
+    pvid_refine_gap_f32(&none); /* while it waits */
+    assert_int_equal(pvid_refine_reason_f32(&none), PVID_WARMING_UP);
+}
+
+static void test_the_region_of_the_pendulum_is_that_of_positive_parameters(void **state)
+{
+    (void)state;
+    float r[N];
+    to_floats(truth, r, N);
+    assert_true(pvid_refine_region(r));
+    for (int i = 0; i < 3; i++) {
+        to_floats(truth, r, N);
+        r[i] = -r[i];
+        assert_false(pvid_refine_region(r));
+    }
+    to_floats(truth, r, N);
+    r[1] = r[2] + 0.5f; /* d1 - d2 is above 1 */
+    assert_false(pvid_refine_region(r));
 }
 
 static void test_it_waits_for_the_weak_form(void **state)
@@ -830,6 +897,8 @@ int main(void)
         cmocka_unit_test(test_a_row_beyond_the_gate_or_without_residual_is_left_out),
         cmocka_unit_test(test_sine_and_cosine),
         cmocka_unit_test(test_init_refuses),
+        cmocka_unit_test(test_before_its_init_it_does_nothing),
+        cmocka_unit_test(test_the_region_of_the_pendulum_is_that_of_positive_parameters),
         cmocka_unit_test(test_it_waits_for_the_weak_form),
         cmocka_unit_test(test_a_search_grows_in_its_first_samples),
         cmocka_unit_test(test_a_longer_block_of_used_samples_is_judged_by_its_own_level),

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "first_order.h"
+#include "keep/fingerprint_parts_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 
@@ -229,6 +230,20 @@ static void a_table_that_changed_is_another_design(void **state)
 
 static uint8_t slot[2][PVID_SNAPSHOT_WEAK_F32];
 
+/* The strong form, which has no theta, does not read y_bits. */
+static void the_format_of_rows_counts_where_there_are_rows(void **state)
+{
+    (void)state;
+    pvid_estimator_config_q31 one;
+    memset(&one, 0, sizeof one);
+    pvid_estimator_config_q31 other = one;
+    other.y_bits = 3;
+    for (size_t n_theta = 0; n_theta < 3u; n_theta++) {
+        const uint32_t hash = pvid_fingerprint_estimator_q31(1u, &one, n_theta, 3);
+        assert_int_equal(hash == pvid_fingerprint_estimator_q31(1u, &other, n_theta, 3), n_theta == 0u);
+    }
+}
+
 static void slots_are_used_in_turn(void **state)
 {
     (void)state;
@@ -311,6 +326,7 @@ int main(void)
         cmocka_unit_test(every_length_that_is_too_short_is_refused),
         cmocka_unit_test(snapshot_of_another_object_names_its_kind),
         cmocka_unit_test(a_table_that_changed_is_another_design),
+        cmocka_unit_test(the_format_of_rows_counts_where_there_are_rows),
         cmocka_unit_test(slots_are_used_in_turn),
         cmocka_unit_test(generations_go_round),
         cmocka_unit_test(a_power_cut_at_any_byte_leaves_the_older_snapshot),

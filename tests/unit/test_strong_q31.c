@@ -1,8 +1,10 @@
 /* The fixed-point strong form: rows against their formulas in wide integers, and the identifier's edges. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -131,6 +133,130 @@ static void rows_of_a_model_identify_it(void **state)
         assert_in_range((uintmax_t)estimate.se[a], 0, (uintmax_t)most);
     }
     assert_int_equal(estimate.weight, 400);
+}
+
+/* ---- rows and innovations of any size against double ---- */
+
+static uint32_t drawn = 1;
+
+/* Of a random length up to `bits`, with a random sign. */
+static int32_t any(uint32_t bits)
+{
+    drawn = (drawn * 1664525u) + 1013904223u;
+    const uint32_t length = (drawn >> 8) % (bits + 1u);
+    drawn = (drawn * 1664525u) + 1013904223u;
+    const int32_t size = (length == 0u) ? 0 : (int32_t)((drawn >> 2) >> (30u - length));
+    drawn = (drawn * 1664525u) + 1013904223u;
+    return ((drawn >> 31) == 0u) ? size : -size;
+}
+
+/* Whether every number is below its limit: 1 surely, 0 surely not, -1 near a limit. */
+static int fits(const double x[], const double limit[], size_t n)
+{
+    int all = 1;
+    for (size_t i = 0; i < n; i++) {
+        const double part = fabs(x[i]) / limit[i];
+        if (part > 1.001) {
+            return 0;
+        }
+        all = (part > 0.999) ? -1 : all;
+    }
+    return all;
+}
+
+static void a_row_of_any_size_is_the_formula_or_refused(void **state)
+{
+    (void)state;
+    const double rate = (double)RATE(1);
+    int count[2] = {0, 0};
+    for (int i = 0; i < 60000; i++) {
+        const int32_t phi[PVID_ORDERS] = {any(30), any(30), any(30), any(30), any(30)};
+        const int32_t u[PVID_Y_ORDERS_Q31] = {any(29), any(30), any(30)};
+        int32_t row[PVID_KAPITZA_ROW_Q31];
+        const double g = (double)u[0] / rate;
+        const double bracket =
+            (((double)u[2] * (double)phi[2]) + (2.0 * (double)u[1] * (double)phi[3])) / rate - (g * (double)phi[4]);
+        const double u1_phi2 = (double)phi[2] * (double)u[1] / rate;
+        double entry[12] = {bracket - (g * (double)phi[4]), -(double)phi[4]};
+        for (int k = 0; k < 4; k++) {
+            entry[2 + k] = -(double)phi[2] * pow(g, (double)(3 - k));
+        }
+        for (int k = 0; k < 5; k++) {
+            entry[6 + k] = -(double)phi[0] * pow(g, (double)(4 - k));
+        }
+        entry[11] = (2.0 * (double)u[1] * u1_phi2 / rate) - (g * bracket);
+        const double limit = (double)PVID_ROW_LIMIT_Q31;
+        const double of[15] = {bracket,  u1_phi2,  entry[0], entry[1], entry[2],  entry[3],  entry[4],      entry[5],
+                               entry[6], entry[7], entry[8], entry[9], entry[10], entry[11], (double)phi[3]};
+        const double most[15] = {4.0 * limit, 4.0 * limit, limit, limit, limit, limit, limit, limit,
+                                 limit,       limit,       limit, limit, limit, limit, limit};
+        const int wanted = fits(of, most, 15);
+        const bool fitted = pvid_kapitza_strong_row_q31(&exact, phi, u, row);
+        assert_true((wanted < 0) || (fitted == (wanted == 1)));
+        count[fitted ? 1 : 0]++;
+        /* each factor of a product is rounded: half a unit times |G|^k or |u'| */
+        const double off = 1.0 + (fabs(g) * (1.0 + fabs(g)) * (1.0 + fabs(g))) + (2.0 * fabs((double)u[1]) / rate);
+        for (int k = 0; fitted && (k < 11); k++) {
+            assert_true(fabs((double)row[k] - entry[k]) <= off);
+        }
+        assert_true(!fitted || (fabs((double)row[PVID_KAPITZA_ROW_Y] - entry[11]) <= off));
+    }
+    assert_true((count[0] > 5000) && (count[1] > 5000));
+}
+
+static void an_innovation_of_any_size_is_the_formula_or_refused(void **state)
+{
+    (void)state;
+    static pvid_kapitza_estimator_q31 self;
+    const double rate = (double)RATE(1);
+    int count[2] = {0, 0};
+    assert_int_equal(pvid_kapitza_estimator_init_q31(&self, &of_estimator, &exact), PVID_OK);
+    for (int i = 0; i < 60000; i++) {
+        int32_t row[PVID_KAPITZA_ROW_Q31];
+        for (int k = 0; k < PVID_KAPITZA_ROW_Q31; k++) {
+            row[k] = any(28);
+        }
+        row[PVID_KAPITZA_ROW_G] = any(30);
+        self.p[0] = (int32_t)((uint32_t)any(30) & ~1u); /* whole in the unit of a rate */
+        self.p[1] = abs(any(30));
+        self.p[2] = abs(any(30));
+        const double d = (double)self.p[0] / (2.0 * rate);
+        const double g = ((double)row[PVID_KAPITZA_ROW_G] / rate) + d;
+        const double d1 = (double)self.p[1] / (double)(1 << 24);
+        const double d2 = (double)self.p[2] / (double)(1 << 24);
+        const double x = (double)row[5];
+        const double z = (double)row[10];
+        const double of_e = (double)row[1] * d;
+        const double inner = (double)row[0] + of_e;
+        const double of_w = inner * d;
+        const double of_d1 = d1 * x * g * g * g;
+        const double of_d2 = d2 * z * g * g * g * g;
+        const double slopes[2] = {3.0 * d1 * x * g * g, 4.0 * d2 * z * g * g * g};
+        const double rest = (double)row[PVID_KAPITZA_ROW_Y] - (of_w + of_d1 + of_d2);
+        const double slope = inner + of_e + slopes[0] + slopes[1];
+        const double limit = (double)PVID_ROW_LIMIT_Q31;
+        const double of[16] = {
+            g,    g * x, g * g * x, g * g * g * x, g * z,     g * g * z, g * g * g * z, g * g * g * g * z,
+            of_e, of_w,  of_d1,     of_d2,         slopes[0], slopes[1], rest,          slope};
+        const double most[16] = {64.0,        limit,       limit,       limit,       limit,       limit,
+                                 limit,       limit,       2.0 * limit, 2.0 * limit, 2.0 * limit, 2.0 * limit,
+                                 2.0 * limit, 2.0 * limit, limit,       4.0 * limit};
+        int32_t e = 0;
+        int32_t gradient[PVID_KAPITZA_P] = {0, 0, 0};
+        const int wanted = fits(of, most, 16);
+        const bool fitted = pvid_kapitza_estimator_innovate_q31(&self, row, &e, gradient);
+        assert_true((wanted < 0) || (fitted == (wanted == 1)));
+        count[fitted ? 1 : 0]++;
+        const double powers = 1.0 + (fabs(g) * (1.0 + fabs(g)) * (1.0 + fabs(g)));
+        const double off = 3.0 + fabs(d) + (powers * ((4.0 * d1) + (5.0 * d2)));
+        if (fitted) {
+            assert_true(fabs((double)e - rest) <= off);
+            assert_true(fabs((double)gradient[0] - slope) <= off);
+            assert_true(fabs((double)gradient[1] - (g * g * g * x)) <= powers);
+            assert_true(fabs((double)gradient[2] - (g * g * g * g * z)) <= (powers * (1.0 + fabs(g))));
+        }
+    }
+    assert_true((count[0] > 5000) && (count[1] > 5000));
 }
 
 static void wrong_formats_are_refused(void **state)
@@ -286,6 +412,8 @@ static void a_restored_run_continues_bit_for_bit(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_row_of_any_size_is_the_formula_or_refused),
+        cmocka_unit_test(an_innovation_of_any_size_is_the_formula_or_refused),
         cmocka_unit_test(a_row_is_the_formula),
         cmocka_unit_test(a_row_has_its_formats),
         cmocka_unit_test(a_row_that_does_not_fit_is_refused),

@@ -18,6 +18,7 @@
 #include "weak/sums_f32.h"
 #include "weak/white_f32.h"
 #include "pvid/pvid.h"
+#include "pvid/snapshot_refine.h"
 #include "solve/products_f32.h"
 #include "solve/state_f32.h"
 
@@ -695,6 +696,17 @@ static void an_object_before_its_init_does_nothing(void **state)
     assert_false(pvid_weak_read_f32(&self, NULL, NULL));
 }
 
+static void without_a_second_stage_there_is_no_snapshot_of_one(void **state)
+{
+    (void)state;
+    static uint8_t image[PVID_SNAPSHOT_REFINE_F32];
+    pvid_weak_design_f32 design;
+    pvid_weak_config_f32 config;
+    start(&design, &config);
+    assert_int_equal(pvid_snapshot_save_refine_f32(&self, &config, 1, image, sizeof image), 0);
+    assert_int_equal(pvid_snapshot_restore_refine_f32(&self, &config, image, sizeof image), PVID_SNAPSHOT_NOT_READY);
+}
+
 /* ---- nuisances ---- */
 
 static void a_nuisance_that_those_before_it_explain_is_skipped(void **state)
@@ -735,6 +747,7 @@ int main(void)
         cmocka_unit_test(outliers_are_rejected_by_the_gate),
         cmocka_unit_test(init_names_what_is_out_of_range),
         cmocka_unit_test(an_object_before_its_init_does_nothing),
+        cmocka_unit_test(without_a_second_stage_there_is_no_snapshot_of_one),
         cmocka_unit_test(a_nuisance_that_those_before_it_explain_is_skipped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "engine_q31.h"
+#include "weak/collect_q31.h"
 #include "weak/weak_finish_q31.h"
 #include "pvid/little_endian.h"
 #include "pvid/pvid_q31.h"
@@ -282,6 +283,35 @@ static void a_window_takes_the_stages_that_init_counts_with(void **state)
     }
 }
 
+/* By the compensation, the check for noise, or an error of the first kind's own; else it would be computed in vain. */
+static void the_noise_is_computed_where_it_is_used(void **state)
+{
+    (void)state;
+    static const pvid_scaled_q31 own_error[1] = {{1 << 29, -40}};
+    start();
+    assert_true(identifier.finish.known.used);
+    config.compensation = false;
+    start();
+    assert_true(identifier.finish.known.used);
+    config.estimator.noise_margin = 0;
+    start();
+    assert_false(identifier.finish.known.used);
+    design.error_variance = own_error;
+    start();
+    assert_true(identifier.finish.known.used);
+}
+
+/* Seven harmonics of two half windows are joined one at a tick, or four at a tick where a step is one. */
+static void ticks_behind_the_join_are_those_without_harmonics(void **state)
+{
+    (void)state;
+    assert_int_equal(pvid_weak_ticks_behind_join_q31(&design), (4 * 23) - 14);
+    design.decimation = 1;
+    assert_int_equal(pvid_weak_ticks_behind_join_q31(&design), 0);
+    design.decimation = 3; /* eight ticks, two at a tick */
+    assert_int_equal(pvid_weak_ticks_behind_join_q31(&design), 1);
+}
+
 /* ---- snapshots ---- */
 
 static uint8_t image[PVID_SNAPSHOT_WEAK_Q31];
@@ -350,6 +380,8 @@ int main(void)
         cmocka_unit_test_setup(the_gate_keeps_a_jolt_out, start_again),
         cmocka_unit_test_setup(random_counts_keep_every_bound, start_again),
         cmocka_unit_test_setup(a_window_takes_the_stages_that_init_counts_with, start_again),
+        cmocka_unit_test_setup(the_noise_is_computed_where_it_is_used, start_again),
+        cmocka_unit_test_setup(ticks_behind_the_join_are_those_without_harmonics, start_again),
         cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
         cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
     };

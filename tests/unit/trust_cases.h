@@ -75,6 +75,18 @@ static void held_group_keeps_the_published_estimate_with_reason(void **state)
     assert_int_equal(judge(PVID_UPDATED, 1.02e-4, true, 1.0, candidate(1.0e-6, 1.0e-2)), PVID_HELD_UNCERTAIN);
 }
 
+static void a_condition_at_its_limit_is_met(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        (void)judge_good(1.0);
+    }
+    an_estimate least = candidate(0.02, 1.0e-2);
+    least.kappa = trust.config.kappa_min;
+    least.least_pivot = trust.config.kappa_min;
+    assert_int_equal(judge(PVID_UPDATED, 0.0, true, 1.0, least), PVID_UPDATED);
+}
+
 static void after_sixteen_refusals_p_goes_back(void **state)
 {
     (void)state;
@@ -292,6 +304,7 @@ static void neglected_terms_hold_nothing(void **state)
 #define TRUST_CASES                                                                                                    \
     cmocka_unit_test_setup(the_first_groups_are_never_published, start_again),                                         \
         cmocka_unit_test_setup(held_group_keeps_the_published_estimate_with_reason, start_again),                      \
+        cmocka_unit_test_setup(a_condition_at_its_limit_is_met, start_again),                                          \
         cmocka_unit_test_setup(after_sixteen_refusals_p_goes_back, start_again),                                       \
         cmocka_unit_test_setup(a_step_ends_the_refusals, start_again),                                                 \
         cmocka_unit_test_setup(large_residuals_raise_the_alarm_and_small_ones_end_it, start_again),                    \

@@ -15,6 +15,7 @@ import click
 
 from pvid.base.console import DIFFERENT, DONE, progress_bar, write_stderr
 from pvid.base.errors import PvidError
+from pvid.board.boards import BOARDS
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
 
@@ -315,13 +316,21 @@ def bench_build_choices(update: Path | None) -> int:
 
 
 @bench.command(name="model-boards")
+@click.option(
+    "--board",
+    "boards",
+    type=click.Choice(list(BOARDS)),
+    multiple=True,
+    help="May be given again; by default one board of each instruction set.",
+)
 @UPDATE
-def bench_model_boards(update: Path | None) -> int:
-    """The weak form of every mechanism on every emulated board, in both cores: its bits and the cost of a tick."""
+def bench_model_boards(boards: tuple[str, ...], update: Path | None) -> int:
+    """The weak form of every mechanism on emulated boards, in both cores: its bits and the cost of a tick."""
     from bench import model_boards
 
-    with progress_bar("boards", len(model_boards.ROWS)) as advance:
-        rows = list(model_boards.rows_of(progress=advance))
+    names = boards or model_boards.USUAL
+    with progress_bar("boards", len(model_boards.rows(names))) as advance:
+        rows = list(model_boards.rows_of(names, advance))
     put_table(update, "model-boards", markdown(model_boards.HEADER, rows))
     return DONE
 

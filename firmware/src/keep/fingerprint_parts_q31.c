@@ -29,15 +29,6 @@ uint32_t pvid_fingerprint_table(uint32_t hash, const PVID_TABLE int32_t *values,
     return running;
 }
 
-uint32_t pvid_fingerprint_short_table(uint32_t hash, const PVID_TABLE int16_t *values, size_t n)
-{
-    uint32_t running = hash;
-    for (size_t i = 0; i < n; i++) {
-        running = pvid_fnv_word(running, (uint32_t)(int32_t)values[i]);
-    }
-    return running;
-}
-
 uint32_t pvid_fingerprint_estimator_q31(uint32_t hash, const pvid_estimator_config_q31 *config, size_t n_theta,
                                         size_t n_p)
 {

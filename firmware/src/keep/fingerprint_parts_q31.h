@@ -15,7 +15,6 @@ uint32_t pvid_fingerprint_formats(uint32_t hash, const int8_t values[], size_t n
 
 /* Tables may be in their own address space. */
 uint32_t pvid_fingerprint_table(uint32_t hash, const PVID_TABLE int32_t *values, size_t n);
-uint32_t pvid_fingerprint_short_table(uint32_t hash, const PVID_TABLE int16_t *values, size_t n);
 
 uint32_t pvid_fingerprint_estimator_q31(uint32_t hash, const pvid_estimator_config_q31 *config, size_t n_theta,
                                         size_t n_p);

@@ -190,8 +190,8 @@ static pvid_status sizes_are_valid(const pvid_weak_design_f32 *design)
 /* Every number of the tables. */
 static pvid_status tables_are_valid(const pvid_weak_design_f32 *design)
 {
-    const bool given = (design->compensator != NULL) && (design->circle != NULL) && (design->error_order != NULL) &&
-                       (design->error_variance != NULL) && ((design->noise != NULL) || (design->n_noise == 0u)) &&
+    const bool given = (design->circle != NULL) && (design->error_order != NULL) && (design->error_variance != NULL) &&
+                       ((design->noise != NULL) || (design->n_noise == 0u)) &&
                        ((design->sign_width != NULL) || (design->model->signs == 0u));
     if (!given || !filters_are_valid(design) || !all_within(design->circle, (5u * (size_t)design->hop) / 2u, -1.0f) ||
         !all_within(design->sign_width, design->model->signs, 0.0f)) {
@@ -218,6 +218,9 @@ PVID_COLD pvid_status pvid_weak_valid_f32(const pvid_weak_design_f32 *design)
     status = sizes_are_valid(design);
     if (status != PVID_OK) {
         return status;
+    }
+    if (design->compensator == NULL) {
+        return PVID_BAD_DESIGN;
     }
     if ((PVID_EXACT != 0) && !is_exact(design)) {
         return PVID_BAD_DESIGN;

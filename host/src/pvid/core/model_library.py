@@ -65,7 +65,8 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def _sources(engine: EngineCore, refined: bool) -> list[Path]:
+def core_of(engine: EngineCore, refined: bool) -> list[Path]:
+    """Sources beside the generated ones. refined: with the second stage."""
     rooms = (*_ROOMS, engine.room, *(["refine"] if refined else []))
     found = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in rooms]
     replays = [*([] if engine.replay is None else [engine.replay]), *(["replay_refine"] if refined else [])]
@@ -105,7 +106,7 @@ def _build(
         options = [*_FLAGS, *definitions, f"-I{folder.name}", *INCLUDES, f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
         if _REFINED in texts:
-            objects = objects_of(compiler, options, [*code, *_sources(engine, True)], Path(made))
+            objects = objects_of(compiler, options, [*code, *core_of(engine, True)], Path(made))
         else:
             objects = objects_of(compiler, options, code, Path(made))
             objects += _core_objects(compiler, definitions, engine, library.parent.parent)
@@ -121,7 +122,7 @@ def _build(
 
 def _core_objects(compiler: str, definitions: list[str], engine: EngineCore, cache_folder: Path) -> list[str]:
     """Of the core without the second stage: those of one size are the same for every mechanism."""
-    sources = _sources(engine, False)
+    sources = core_of(engine, False)
     named = [str(one) for one in sources]
     key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, *named, _core_hash()]).encode())
     place = cache_folder / f"core-{engine.name}-{key.hexdigest()[:20]}"

@@ -80,6 +80,8 @@ class Native:
 
     Attributes
     ----------
+    path
+        The library.
     headers
         The declarations that the library was built with.
     library
@@ -92,12 +94,12 @@ class Native:
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        path = path or default_library()
-        self.headers = Headers.of(path)
+        self.path = path or default_library()
+        self.headers = Headers.of(self.path)
         try:
-            self.library: Any = self.headers.ffi.dlopen(str(path))
+            self.library: Any = self.headers.ffi.dlopen(str(self.path))
         except OSError as error:
-            raise PvidError(f"cannot load the C core {path}: {error}; build it with ./tools/pvid") from error
+            raise PvidError(f"cannot load the C core {self.path}: {error}; build it with ./tools/pvid") from error
 
     @property
     def build(self) -> str:
