@@ -106,14 +106,17 @@ typedef struct pvid_refine_config_f32 {
     float gate;         /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */
     float chi_max;      /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
     float clash_max;    /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
-    float step_max;     /* limit of its last step [prior_sd], > 0; with signs a twentieth of it behind the second block;
-                           recommended: 0.02 */
-    float step_limit;   /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 1.8 at most;
-                           recommended: 2 */
-    float se_max;       /* largest relative standard error of a published estimate, > 0 */
-    float distance; /* relative distance from the weak form's estimate that the bias of its equations explains, >= 0.
-                       0: the weak form has the same equations; an estimate is then published only if the geometric
-                       mean of its standard errors is below that of the weak form */
+    float step_max;     /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
+#if PVID_REFINE_SIGNS > 0
+    float step_fine; /* the same behind the second block, > 0; recommended: a twentieth of step_max, or step_max where
+                        coordinates are hidden and no observer follows them */
+#endif
+    float step_limit; /* longest step of a pass [prior_sd], > 0; prior_sd of a logarithm times it is 1.8 at most;
+                         recommended: 2 */
+    float se_max;     /* largest relative standard error of a published estimate, > 0 */
+    float distance;   /* relative distance from the weak form's estimate that the bias of its equations explains, >= 0.
+                         0: the weak form has the same equations; an estimate is then published only if the geometric
+                         mean of its standard errors is below that of the weak form */
 } pvid_refine_config_f32;
 
 /* An estimate; all numbers are finite. */

@@ -78,6 +78,9 @@ uint32_t pvid_fingerprint_refine_f32(uint32_t hash, const pvid_refine_config_f32
     const uint8_t parts[] = {config->parts, config->fine_parts};
     running = pvid_fingerprint_bytes(running, parts, sizeof parts);
 #endif
+#if PVID_REFINE_SIGNS > 0
+    running = pvid_fingerprint_float(running, config->step_fine);
+#endif
 #if PVID_REFINE_OBSERVER
     running = pvid_fingerprint_floats(running, config->observer, PVID_REFINE_OUTPUTS * PVID_REFINE_STATES);
 #endif

@@ -70,10 +70,8 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
  * standard error that the sensors' noise gives it. */
 #define SETTLED 0.25f
 
-/* With signs: part of the limit of a block's last step below which its linearization is exact enough. Blocks with a
- * longer one are taken only up to the second, and this part of their triangle remains: the others are to outweigh their
- * error. */
-#define FINE 0.05f
+/* With signs a block whose last step is above step_fine is taken only up to the second, and this part of its triangle
+ * remains: the others are to outweigh the error of its linearization. */
 #define ROUGHLY 0.25f
 
 /* Least variance of a row over that of the sensors: the errors of reversals in the finest steps are alike from block to
@@ -329,7 +327,7 @@ static bool is_sane(const pvid_refine_f32 *self)
  * reversals make the motion jump with each step. */
 static bool is_fine(const pvid_refine_f32 *self)
 {
-    return (self->solve.size < (FINE * self->config.step_max)) ||
+    return (self->solve.size < self->config.step_fine) ||
            (self->solve.reduction < (SETTLED * (self->config.sd[0] * self->config.sd[0])));
 }
 #endif

@@ -99,6 +99,11 @@ static pvid_status limits_are_valid(const pvid_refine_config_f32 *config)
     if (!pvid_within_f32(config->step_limit, 1.0e-6f, 1.0e6f) || !pvid_within_f32(config->step_max, 1.0e-9f, 1.0e6f)) {
         return PVID_BAD_STEP_LIMIT;
     }
+#if PVID_REFINE_SIGNS > 0
+    if (!pvid_within_f32(config->step_fine, 1.0e-9f, 1.0e6f)) {
+        return PVID_BAD_STEP_LIMIT;
+    }
+#endif
     if (!pvid_within_f32(config->se_max, 1.0e-9f, 1.0e9f)) {
         return PVID_BAD_SE_MAX;
     }

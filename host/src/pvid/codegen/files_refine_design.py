@@ -70,6 +70,7 @@ def tables(settings: RefineConfig, name: str) -> list[str]:
     }
     for name_of, value in (("parts", settings.parts), ("fine_parts", settings.fine_parts)):
         fields |= {} if value is None else {name_of: value}
+    fields |= {} if settings.step_fine is None else {"step_fine": number(settings.step_fine)}
     fields |= {} if settings.observer is None else {"observer": _row(settings.observer)}
     fields |= {} if settings.width is None else {"width": _row(settings.width)}
     return [

@@ -71,6 +71,7 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0, outlier_gate: float
         parts=parts if rig.runge_kutta else None,
         fine_parts=fine if rig.runge_kutta else None,
         width=_as_float32(np.asarray(rig.jumps) * h / fine) if len(rig.jumps) else None,
+        step_fine=rig.step_fine,
     )
 
 

@@ -36,6 +36,7 @@ _STATES = 40  # of the run that are looked at
 _WITH_SIGNS, _WITHOUT = 0.75, 0.95  # part of them for which the step is short enough
 _A_PERIOD = 48.0  # steps in a period
 _SHARP, _SOFT = 1e-6, 1e6  # widths of signs
+_STEP_FREE, _STEP_FINE = 0.02, 0.001  # limits of a block's last step, in prior_sd
 _REVERSAL = 4.0  # of the noise of a sample: the error is a small part of the jump
 _HALF_TURN = 32767 / 4  # resolutions: an output that turns is kept in quarters of one
 _RICCATI = 2000  # big steps until the filter's gain is steady
@@ -142,6 +143,7 @@ def refine_settings(
         ring=files_refine.ring_of(made),
         fine_s=_fine_s(made, jumps, block_s),
         jumps=jumps,
+        step_fine=_step_fine(made),
     )
     settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
     if made.observer:
@@ -175,6 +177,7 @@ def with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> Ref
         ring=files_refine.ring_of(made),
         fine_s=_fine_s(made, jumps, 2.0 / rig.slow_hz),
         jumps=jumps,
+        step_fine=_step_fine(made),
     )
 
 
@@ -312,6 +315,14 @@ def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[
         change = _slopes(motion, r, still, v) - _slopes(motion, soft, still, v)  # of rank 1
         found.append(2 * _SHARP * abs(float(np.trace(change))))
     return tuple(found)
+
+
+def _step_fine(made: RefineFunctions) -> float | None:
+    """Limit of a block's last step behind the second block, with signs. Where hidden coordinates begin anew in each block,
+    few blocks have a finer one: with it a pendulum with dry friction is published half as long, with larger errors."""
+    if not signs_of(made.model):
+        return None
+    return _STEP_FREE if made.hidden and not made.observer else _STEP_FINE
 
 
 def _fine_s(made: RefineFunctions, jumps: Sequence[float], block_s: float) -> float:

@@ -57,6 +57,7 @@ class RefineConfig:
     forgetting_s : time constant; 0: none
     outlier_gate : means of samples that stand out by more than this multiple of the usual are left out; 0: no gate
     gate, chi_max, clash_max, step_max, step_limit, se_max, distance : limits
+    step_fine : with signs step_max behind the second block; None: there are none
     parts, fine_parts
         steps of Runge-Kutta in a step of the motion, in one in which a sign may change; None: steps are Adams's
     width : where the widths of the signs start [widths]; None: none is refined
@@ -92,6 +93,7 @@ class RefineConfig:
     fine_parts: int | None = None
     width: Float32 | None = None
     observer: Float32 | None = None
+    step_fine: float | None = None
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,7 @@ class RefineRig:
     ring : entries
     fine_s : longest step of Runge-Kutta where a sign may change [s]
     jumps : of the rates of the signs' arguments at their reversals [widths]
+    step_fine : as of the settings
     """
 
     sample_rate: float
@@ -126,6 +129,7 @@ class RefineRig:
     ring: int = 512
     fine_s: float = math.inf
     jumps: Sequence[float] = ()
+    step_fine: float | None = None
 
     @property
     def inputs(self) -> tuple[RefineSignal, ...]:

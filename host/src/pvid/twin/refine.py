@@ -34,7 +34,7 @@ _SHORT = _F(0.25)
 _SHARPEST, _REVERSALS = _F(0.25), _F(4)
 _PRIOR_ERRORS, _LEAST_PRIOR = _F(10), _F(1e-6)
 _SETTLED = _F(0.25)
-_FINE, _ROUGHLY = _F(0.05), _F(0.25)
+_ROUGHLY = _F(0.25)
 _JOBS = 9
 _FIRST_JOBS = 16
 _SOLVE_TICKS = 45
@@ -328,7 +328,7 @@ class RefineTwin:
         return _F(self.solve.residual / (freedom * (_WHITENESS * self.variance)))
 
     def _is_fine(self) -> bool:
-        short = self.solve.size < _FINE * _F(self.config.step_max)
+        short = self.solve.size < _F(self.config.step_fine)
         return bool(short or self.solve.reduction < _SETTLED * self.variance)
 
     def _is_settled(self) -> bool:
