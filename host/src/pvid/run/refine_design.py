@@ -318,8 +318,11 @@ def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[
 
 
 def _step_fine(made: RefineFunctions) -> float | None:
-    """Limit of a block's last step behind the second block, with signs. Where hidden coordinates begin anew in each block,
-    few blocks have a finer one: with it a pendulum with dry friction is published half as long, with larger errors."""
+    """Limit of a block's last step behind the second block, with signs.
+
+    Where hidden coordinates begin anew in each block, few blocks have a finer one: with it a pendulum with dry friction
+    is published half as long, with larger errors.
+    """
     if not signs_of(made.model):
         return None
     return _STEP_FREE if made.hidden and not made.observer else _STEP_FINE
