@@ -8,8 +8,8 @@ twin by test_weak_f32, test_weak_bits_q31, test_second_stage and test_refine_mec
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,7 +20,9 @@ import numpy.typing as npt
 from pvid.board.refined_image import RefinedRun, refined_run
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.core import snapshot
 from pvid.core.model_library import core_of
+from pvid.core.native import Publisher
 from pvid.core.sizes import raised, roomy
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
@@ -77,9 +79,30 @@ def defined(sizes: Mapping[str, int]) -> tuple[str, ...]:
     return ("-DPVID_PLAIN_NAMES", *(f"-D{macro}={size}" for macro, size in sorted(raised(sizes).items())))
 
 
-def pieces(samples: npt.NDArray[Any]) -> Iterator[tuple[int, npt.NDArray[Any]]]:
-    """Of a run, numbered."""
-    yield from enumerate(np.array_split(samples, PIECES))
+def played(core: Publisher, kind: str, size: int, run: Callable[[Any], Any], samples: npt.NDArray[Any]) -> str:
+    """What a build records, estimates and keeps in snapshots: a gap before the fourth piece, the third is frozen.
+
+    Parameters
+    ----------
+    kind, size : of the snapshots
+    run : steps through samples
+    """
+    told = hashlib.sha256()
+    for place, piece in enumerate(np.array_split(samples, PIECES)):
+        core.freeze(place == 2)
+        if place == 3:
+            core.gap()
+        record = run(piece)
+        for one in fields(record):
+            told.update(np.ascontiguousarray(getattr(record, one.name)).tobytes())
+        best = core.best if isinstance(core, RefinedIdentifier) else ()
+        told.update(repr((sorted(core.counters.items()), core.misfit, best[:1])).encode())
+        for estimate in (core.assess(), core.estimate, *best[1:]):
+            told.update(estimate.tobytes())
+        image = snapshot.save_as(kind, core, size)
+        told.update(image)
+        told.update(repr((len(image), snapshot.restore_as(kind, core, image))).encode())
+    return told.hexdigest()[:16]
 
 
 # ---- float32, both stages ----
@@ -130,7 +153,9 @@ class BothStages:
     def digests(self, library: Path) -> Iterator[tuple[str, str]]:
         native = WeakNative(self.run.weak.name, library)
         for variant, (weak, refine, samples) in self._variants().items():
-            yield f"{self.name}, {variant}", played(native.refined_of(weak, refine), samples)
+            core = native.refined_of(weak, refine)
+            size = len(core.state_bytes) + native.headers.ffi.sizeof(core.refinement[0])
+            yield f"{self.name}, {variant}", played(core, "refine_f32", size, core.run_both, samples)
 
     def _variants(self) -> dict[str, Any]:
         """Settings of both stages and samples."""
@@ -158,28 +183,6 @@ class BothStages:
             "limits": (limited, replace(settings, passes=1, most_passes=3), wrong(samples)),
             "no gate": (replace(own, trust=early), replace(settings, outlier_gate=0.0), wrong(samples)),
         }
-
-
-def played(core: RefinedIdentifier, samples: npt.NDArray[np.float32]) -> str:
-    """What both stages record, estimate and keep: a gap before the fourth piece, the third is frozen."""
-    told = hashlib.sha256()
-    ffi, library = core.native.headers.ffi, core.native.library
-    image = ffi.new("uint8_t[]", ffi.sizeof(core.state[0]) + ffi.sizeof(core.refinement[0]) + 200)
-    for place, piece in pieces(samples):
-        core.freeze(place == 2)
-        if place == 3:
-            core.gap()
-        record = core.run_both(piece)
-        for name in ("told", "busy", "weak_p", "weak_se", "r", "se", "hash"):
-            told.update(getattr(record, name).tobytes())
-        told.update(repr((sorted(core.counters.items()), core.best[0], core.misfit)).encode())
-        for estimate in (core.assess(), core.estimate, core.best[1]):
-            told.update(estimate.tobytes())
-        n = library.pvid_snapshot_save_refine_f32(core.state, core.config_pointer, 1, image, len(image))
-        told.update(bytes(ffi.buffer(image, n)))
-        status = library.pvid_snapshot_restore_refine_f32(core.state, core.config_pointer, image, n)
-        told.update(repr((n, status)).encode())
-    return told.hexdigest()[:16]
 
 
 # ---- fixed point ----
@@ -227,7 +230,7 @@ class InFixedPoint:
             kept = [set_in(core, name, value) for name, value in settings.items()]
             if core.initialise():
                 raise SystemExit(f"{self.name}, {variant}: refused")
-            yield f"{self.name}, {variant}", played_q31(core, counts)
+            yield f"{self.name}, {variant}", played(core, "weak_q31", len(core.state_bytes), core.run_samples, counts)
             del kept
 
     def _variants(self) -> dict[str, tuple[dict[str, Any], npt.NDArray[np.int32]]]:
@@ -263,28 +266,6 @@ def set_in(core: WeakIdentifierQ31, name: str, value: Any) -> Any:
     table = core.native.headers.ffi.new("int32_t[]", value) if isinstance(value, list) else value
     setattr(holder, field, table)
     return table
-
-
-def played_q31(core: WeakIdentifierQ31, counts: npt.NDArray[np.int32]) -> str:
-    """What it records, estimates and keeps: a gap before the fourth piece, the third is frozen."""
-    told = hashlib.sha256()
-    ffi, library = core.native.headers.ffi, core.native.library
-    image = ffi.new("uint8_t[]", len(core.state_bytes) + 200)
-    for place, piece in pieces(counts):
-        core.freeze(place == 2)
-        if place == 3:
-            core.gap()
-        record = core.run_samples(piece)
-        for name in ("p", "sums", "exponent", "reason", "published", "published_se", "hash"):
-            told.update(np.ascontiguousarray(getattr(record, name)).tobytes())
-        told.update(repr((sorted(core.counters.items()), core.misfit)).encode())
-        for estimate in (core.assess(), core.estimate):
-            told.update(estimate.tobytes())
-        n = library.pvid_snapshot_save_weak_q31(core.state, core.config_pointer, 1, image, len(image))
-        told.update(bytes(ffi.buffer(image, n)))
-        status = library.pvid_snapshot_restore_weak_q31(core.state, core.config_pointer, image, n)
-        told.update(repr((n, status)).encode())
-    return told.hexdigest()[:16]
 
 
 @cache

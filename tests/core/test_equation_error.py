@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from bench.board_engine import FixedBoard, FloatBoard
+from bench.engine import rms
 from pvid.models.mechanisms import compiled_of
-from pvid.models.simulated_rig import simulated_rig
-from pvid.oracle.weak.identify import ready
 from pvid.run.engine_design import config_for_simulated_rig, engine_config, simulated_run_of
 from pvid.run.engine_design_q31 import engine_for_simulated_rig
 from pvid.settings.enums import Core
 from pvid.sim.imperfections import Imperfections
-from pvid.sim.simulated_run import RigSimulation
+from pvid.sim.simulated_run import simulation_of
 
 RUNS = 8
 
 # White torque about the first axis of a body [N m / sqrt(Hz)]; white torque of the pendulum's joint of a cart.
 CASES = {"rigid_body": Imperfections(process={0: 1e-3}), "cart_pendulum": Imperfections(process={1: 1e-3})}
-
-
-def rms(errors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Over the runs, of each parameter."""
-    return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
 
 
 @pytest.mark.parametrize("core", ["f32", "q31"])
@@ -35,10 +28,8 @@ def test_a_disturbance_of_one_equation_does_not_spoil_the_others(name: str, core
     With the design's own variance the errors are ten to a thousand times as large: 20 % of Ixz, 10 % of the cart's
     mass.
     """
-    compiled, imperfect = compiled_of(name), CASES[name]
-    simulation = RigSimulation.of(compiled, simulated_rig(name))
-    of_rig = dict(zip(simulation.model.p_names, simulation.truth, strict=True))
-    truth = np.array([of_rig.get(one, 0.0) for one in ready(compiled).model.p_names])
+    compiled, imperfect, simulation = compiled_of(name), CASES[name], simulation_of(name)
+    truth = simulation.truth
     config = config_for_simulated_rig(compiled)
     _, design, p = simulated_run_of(compiled)
     informed = engine_config(compiled, simulation.run(99, imperfect), design, p)

@@ -32,6 +32,8 @@ static pvid_model_f32 theta;
 static pvid_weak_model_f32 model;
 static pvid_weak_design_f32 design;
 
+#include "weak_valid_cases.h"
+
 static void start_again(void)
 {
     design = design_of(&mechanism);
@@ -46,66 +48,35 @@ static void start_again(void)
     memcpy(own.filter, filters, sizeof own.filter);
     memcpy(own.noise, noise, sizeof own.noise);
     memcpy(own.circle, circle, sizeof own.circle);
-    model.signal = own.signal;
-    model.jet = own.jet;
-    model.channel = own.channel;
-    model.term = own.term;
-    model.kind = own.kind;
-    model.model = &theta;
-    design.model = &model;
+    point_at_own();
     design.compensator = own.filter;
-    design.noise = own.noise;
-    design.error_order = own.order;
-    design.error_variance = own.variance;
     design.sign_width = own.width;
     design.circle = own.circle;
 }
 
-#define GIVES(change, status)                                                                                          \
-    do {                                                                                                               \
-        start_again();                                                                                                 \
-        change;                                                                                                        \
-        assert_int_equal(pvid_weak_valid_f32(&design), status);                                                        \
-    } while (0)
+static pvid_status validity(void)
+{
+    return pvid_weak_valid_f32(&design);
+}
 
 static void counts_of_a_model(void **state)
 {
     (void)state;
-    GIVES((void)0, PVID_OK);
     assert_int_equal(pvid_weak_valid_f32(NULL), PVID_BAD_DESIGN);
-    GIVES(design.model = NULL, PVID_BAD_MODEL);
-    GIVES(model.samples = 0, PVID_BAD_MODEL);
     GIVES(model.samples = 1; own.signal[1].sample = 0, PVID_OK);
     GIVES(model.signals = 1; own.jet[1].signal = 0, PVID_OK);
     GIVES(model.samples = PVID_MAX_SAMPLES, PVID_OK);
-    GIVES(model.samples = PVID_MAX_SAMPLES + 1, PVID_BAD_MODEL);
-    GIVES(model.signals = 0, PVID_BAD_MODEL);
-    GIVES(model.jets = 0, PVID_BAD_MODEL);
     GIVES(model.jets = PVID_MAX_INPUTS - 1, PVID_BAD_MODEL); /* with a run and a sign */
     GIVES(model.runs = PVID_MAX_INTEGRANDS, PVID_OK);
     GIVES(model.runs = PVID_MAX_INTEGRANDS + 1, PVID_BAD_MODEL);
     GIVES(model.signs = PVID_MAX_INTEGRANDS + 1, PVID_BAD_MODEL);
-    GIVES(model.gains = 0, PVID_BAD_MODEL);
-    GIVES(model.gains = PVID_MAX_CHANNELS, PVID_OK);
-    GIVES(model.gains = PVID_MAX_CHANNELS + 1, PVID_BAD_MODEL);
     GIVES(model.integrands = PVID_MAX_INTEGRANDS, PVID_OK);
-    GIVES(model.integrands = PVID_MAX_INTEGRANDS + 1, PVID_BAD_MODEL);
-    GIVES(model.channels = 0, PVID_BAD_MODEL);
-    GIVES(model.kinds = 0, PVID_BAD_MODEL);
-    GIVES(model.kinds = PVID_MAX_KINDS + 1, PVID_BAD_MODEL);
 }
 
 static void pointers_of_a_model(void **state)
 {
     (void)state;
-    GIVES(model.signal = NULL, PVID_BAD_MODEL);
-    GIVES(model.jet = NULL, PVID_BAD_MODEL);
-    GIVES(model.channel = NULL, PVID_BAD_MODEL);
-    GIVES(model.term = NULL, PVID_BAD_MODEL);
-    GIVES(model.kind = NULL, PVID_BAD_MODEL);
-    GIVES(model.values = NULL, PVID_BAD_MODEL);
     GIVES(model.form = NULL, PVID_BAD_MODEL);
-    GIVES(model.model = NULL, PVID_BAD_MODEL);
     GIVES(model.prepare = NULL, PVID_BAD_MODEL);
     GIVES((model.prepare = NULL, model.runs = 0), PVID_BAD_MODEL);
     GIVES((model.prepare = NULL, model.signs = 0), PVID_BAD_MODEL);
@@ -115,10 +86,8 @@ static void pointers_of_a_model(void **state)
 static void signals_and_jets(void **state)
 {
     (void)state;
-    GIVES(own.signal[1].sample = 2, PVID_BAD_MODEL);
     GIVES(own.signal[0].source = PVID_SIGNAL_JUMP, PVID_OK);
     GIVES(own.signal[0].source = PVID_SIGNAL_JUMP + 1, PVID_BAD_MODEL);
-    GIVES(own.jet[1].signal = 2, PVID_BAD_MODEL);
     GIVES(own.jet[0].order = PVID_MAX_POWER + 1, PVID_BAD_MODEL);
 }
 
@@ -160,14 +129,10 @@ static void terms_and_kinds(void **state)
     GIVES(own.term[4].order = POWER - 2, PVID_OK);
     GIVES(own.term[4].order = POWER - 1, PVID_BAD_MODEL);
     GIVES(own.term[0].factor = INFINITY, PVID_BAD_MODEL);
-    GIVES(own.kind[0].thetas = 0, PVID_BAD_MODEL);
     GIVES(own.kind[0].thetas = 3, PVID_BAD_MODEL); /* theta has four */
     GIVES(own.kind[0].nuisances = FUNCTIONS, PVID_BAD_MODEL);
     GIVES(own.kind[0].nuisances = PVID_MAX_COLUMNS - 4, PVID_BAD_MODEL);
-    GIVES(own.kind[0].first = 1, PVID_BAD_MODEL);
-    GIVES(own.kind[0].end = 0, PVID_BAD_MODEL);
     GIVES(theta.n_kinds = 1, PVID_OK);
-    GIVES(theta.n_kinds = 2, PVID_BAD_MODEL);
     GIVES(theta.n_theta = 5, PVID_BAD_MODEL);
     static pvid_weak_kind two[2] = {{2, 0, 0, 2}, {2, 0, 2, 5}};
     static pvid_weak_term_f32 of_two[TERMS] = {
@@ -193,15 +158,10 @@ static void terms_and_kinds(void **state)
 static void sizes_of_a_design(void **state)
 {
     (void)state;
-    GIVES(design.decimation = 0, PVID_BAD_DECIMATION);
     GIVES(design.decimation = PVID_MAX_DECIMATION, PVID_OK);
-    GIVES(design.decimation = PVID_MAX_DECIMATION + 1, PVID_BAD_DECIMATION);
     GIVES(design.power = 0, PVID_BAD_DESIGN);
     GIVES(design.power = POWER + 1, PVID_BAD_DESIGN);
     GIVES(design.power = PVID_MAX_POWER + 2, PVID_BAD_DESIGN);
-    GIVES(design.functions = 4, PVID_OK);
-    GIVES(design.functions = 3, PVID_BAD_FUNCTIONS);
-    GIVES(design.functions = PVID_MAX_FUNCTIONS + 1, PVID_BAD_FUNCTIONS);
     GIVES(design.hop = 8, PVID_BAD_WINDOW); /* less than twice the harmonics */
     GIVES(design.hop = 16, PVID_OK);
     GIVES(design.hop = 0, PVID_BAD_WINDOW);
@@ -217,10 +177,6 @@ static void tables_of_a_design(void **state)
 {
     (void)state;
     GIVES(design.compensator = NULL, PVID_BAD_DESIGN);
-    GIVES(design.circle = NULL, PVID_BAD_DESIGN);
-    GIVES(design.error_order = NULL, PVID_BAD_DESIGN);
-    GIVES(design.error_variance = NULL, PVID_BAD_DESIGN);
-    GIVES(design.noise = NULL, PVID_BAD_DESIGN);
     GIVES(design.noise = NULL; design.n_noise = 0; own.variance[0] = 1.0f, PVID_OK);
     GIVES(design.n_noise = 0, PVID_BAD_DESIGN);
     GIVES(design.sign_width = NULL, PVID_BAD_DESIGN);
@@ -247,9 +203,13 @@ static void tables_of_a_design(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(counts_of_a_model),  cmocka_unit_test(pointers_of_a_model),
-        cmocka_unit_test(signals_and_jets),   cmocka_unit_test(channels_and_their_integrals),
-        cmocka_unit_test(terms_and_kinds),    cmocka_unit_test(sizes_of_a_design),
+        cmocka_unit_test(what_either_core_refuses),
+        cmocka_unit_test(counts_of_a_model),
+        cmocka_unit_test(pointers_of_a_model),
+        cmocka_unit_test(signals_and_jets),
+        cmocka_unit_test(channels_and_their_integrals),
+        cmocka_unit_test(terms_and_kinds),
+        cmocka_unit_test(sizes_of_a_design),
         cmocka_unit_test(tables_of_a_design),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

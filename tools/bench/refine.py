@@ -24,7 +24,7 @@ from pvid.oracle.weak.rows import WeakRows
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.mechanism import model_of
-from pvid.run.refine_design import with_options
+from pvid.run.refine_design import rig_with_options
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak import config_of, design_tables, for_engine
@@ -196,7 +196,7 @@ def engine_of(bits: int, options: tuple[str, ...] = ()) -> Engine:
     guess = Pendulum(L1, nominal.l2, nominal.rho2, nominal.g).linear
     about = refine_rig(RATE_HZ, L1, guess, sample_sd(bits), y_gain_sd=0.0, samples=("y", "phi"))
     equations = refine_functions(compiled_of("kapitza").with_options(options))
-    about = with_options(equations, about, np.append(guess, 0.0))
+    about = rig_with_options(equations, about, np.append(guess, 0.0))
     return Engine(weak_native(model, weak.design, equations), weak, refine_config(about), equations)
 
 

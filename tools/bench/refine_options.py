@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from bench.engine import rms
 from bench.refine import L1, RELEASE, table_of
 from bench.refine_imperfect import BITS, Fault, Published, run_fault, truth_of
 from pvid.board.boards import BOARDS
@@ -46,19 +47,16 @@ def _cases(angle: float) -> list[Fault]:
 CASES = tuple(case for angle in RELEASE for case in _cases(angle))
 
 
-def _rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 def _of_options(fault: Fault, runs: Sequence[Published]) -> tuple[str, str]:
     """RMS errors of the frictions, in % of the true one where there is any, and of the slant's sine."""
     rig = STANDARD_PENDULUM
     true = fault.dry * rig.g * rig.l2 / L1**2
     frictions, slant = "-", "-"
     if fault.dry and fault.options:
-        frictions = " / ".join(f"{100 * _rms([one.extras[k] / true - 1 for one in runs]):.2g}" for k in ("f1", "f2"))
+        found = np.array([[one.extras[name] for name in ("f1", "f2")] for one in runs])
+        frictions = " / ".join(f"{100 * error:.2g}" for error in rms(found / true - 1))
     if "slant" in fault.options:
-        slant = f"{1e3 * _rms([one.extras['slant'] - np.sin(fault.slant) for one in runs]):.2g}"
+        slant = f"{1e3 * rms(np.array([one.extras['slant'] - np.sin(fault.slant) for one in runs])):.2g}"
     return frictions, slant
 
 
@@ -74,7 +72,7 @@ def row_of(fault: Fault, runs: Sequence[Published]) -> tuple[str, ...]:
         *head,
         available,
         f"{np.median([one.first for one in done]):.1f}",
-        " / ".join(f"{100 * one:.2g}" for one in np.sqrt(np.mean(error**2, axis=0))),
+        " / ".join(f"{100 * one:.2g}" for one in rms(error)),
         f"{100 * np.mean(np.abs(error) < 2 * se):.0f}",
         f"{max(np.abs(one.error / one.se).max() for one in done):.1f}",
         *_of_options(fault, done),

@@ -54,7 +54,7 @@ from pvid.run.engine_design import (
 )
 from pvid.run.mechanism import model_of
 from pvid.run.nominal_run import model_of_rig_file, nominal_run
-from pvid.run.refine_design import refine_design, with_options
+from pvid.run.refine_design import refine_design, rig_with_options
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
@@ -380,7 +380,7 @@ def _refine_of_rig_file(rig: RigFile, compiled: CompiledModel, config: WeakConfi
         y_gain_sd=rig.sensor.y_gain_sd,
         samples=("y", "phi"),
     )
-    about = with_options(refine_functions(compiled), about, guess)
+    about = rig_with_options(refine_functions(compiled), about, guess)
     return refine_config(about, compiled.following.forgetting_s, compiled.following.outlier_gate)
 
 

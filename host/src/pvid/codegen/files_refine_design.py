@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,20 @@ from pvid.codegen.files_f32 import guarded
 from pvid.codegen.files_refine import refine_id
 from pvid.codegen.refine import RefineFunctions
 from pvid.settings.refine import BIG_STEP, RefineConfig
+
+
+def _row(values: npt.ArrayLike | Sequence[float]) -> str:
+    return "{" + ", ".join(number(float(one)) for one in np.asarray(values)) + "}"
+
+
+# Fields that not every build has, and how they are written.
+_OPTIONAL: Mapping[str, Callable[[Any], str]] = {
+    "parts": str,
+    "fine_parts": str,
+    "step_fine": number,
+    "observer": _row,
+    "width": _row,
+}
 
 
 def header(made: RefineFunctions, settings: RefineConfig, command: str) -> str:
@@ -68,11 +83,9 @@ def tables(settings: RefineConfig, name: str) -> list[str]:
             )
         },
     }
-    for name_of, value in (("parts", settings.parts), ("fine_parts", settings.fine_parts)):
-        fields |= {} if value is None else {name_of: value}
-    fields |= {} if settings.step_fine is None else {"step_fine": number(settings.step_fine)}
-    fields |= {} if settings.observer is None else {"observer": _row(settings.observer)}
-    fields |= {} if settings.width is None else {"width": _row(settings.width)}
+    for one, written in _OPTIONAL.items():
+        value = getattr(settings, one)
+        fields |= {} if value is None else {one: written(value)}
     return [
         *second,
         f"static const pvid_refine_signal_f32 {name}_signal[] = {{",
@@ -81,7 +94,3 @@ def tables(settings: RefineConfig, name: str) -> list[str]:
         "",
         initialised(f"static const pvid_refine_config_f32 {name}", fields),
     ]
-
-
-def _row(values: npt.ArrayLike | Sequence[float]) -> str:
-    return "{" + ", ".join(number(float(one)) for one in np.asarray(values)) + "}"

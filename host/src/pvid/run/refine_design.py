@@ -129,7 +129,6 @@ def refine_settings(
     motion, states, r = GeneratedRefine(made), list(_states(made, run, rate)), r_of(made, p)
     if made.runge_kutta and model.refinement.equations:  # whose motion is not that of the weak form's windows
         block_s = min(block_s, _slow_s(motion, r))
-    jumps = _jumps(motion, r, states)
     rig = RefineRig(
         sample_rate=rate,
         slow_hz=2.0 / block_s,
@@ -139,19 +138,15 @@ def refine_settings(
         prior_sd=tuple(one.prior_sd for one in made.parameters),
         gain_sd=(0.0,) * len(made.parameters),
         state_limit=_state_limit(made, run, rate),
-        runge_kutta=made.runge_kutta,
-        ring=files_refine.ring_of(made),
-        fine_s=_fine_s(made, jumps, block_s),
-        jumps=jumps,
-        step_fine=_step_fine(made),
     )
+    rig = _with_steps(rig, made, _jumps(motion, r, states), block_s)
     settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
     if made.observer:
         settings = _with_observer(settings, motion, r, states)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
 
 
-def with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> RefineRig:
+def rig_with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> RefineRig:
     """What the pendulum's refinement with options depends on.
 
     Parameters
@@ -169,13 +164,18 @@ def with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> Ref
         return rig
     n = len(made.coordinates)
     angles, rates = rig.state_limit[: n // 2], rig.state_limit[n // 2 :]
+    rig = replace(rig, state_limit=tuple(limit for pair in zip(angles, rates, strict=True) for limit in pair))
     jumps = _jumps(GeneratedRefine(made), r_of(made, p), [_at_rest(made)])
+    return _with_steps(rig, made, jumps, 2.0 / rig.slow_hz)
+
+
+def _with_steps(rig: RefineRig, made: RefineFunctions, jumps: Sequence[float], block_s: float) -> RefineRig:
+    """With what the steps of the motion depend on."""
     return replace(
         rig,
-        state_limit=tuple(limit for pair in zip(angles, rates, strict=True) for limit in pair),
-        runge_kutta=True,
+        runge_kutta=made.runge_kutta,
         ring=files_refine.ring_of(made),
-        fine_s=_fine_s(made, jumps, 2.0 / rig.slow_hz),
+        fine_s=_fine_s(made, jumps, block_s),
         jumps=jumps,
         step_fine=_step_fine(made),
     )

@@ -164,6 +164,12 @@ class NoiseOfWindows:
             self._age = _NOISE_WINDOWS
 
 
+def _begin_anew(trust: TrustQ31, scores: Scores) -> None:
+    """The rows so far count no more."""
+    trust.begin_anew()
+    scores.begin_anew()
+
+
 def _take_noise(
     noise: NoiseOfWindows,
     renewed: bool,
@@ -239,8 +245,7 @@ def stages(
                 first += kind.thetas
                 continue
             if of_all_lanes(opens):
-                trust.begin_anew()
-                scores.begin_anew()
+                _begin_anew(trust, scores)
         noise.take_residuals(place, trust.arrived & ~saturated, residual)
         yield None
         if used:
@@ -282,6 +287,5 @@ def stages(
         scores.widen(candidate, estimator, rows)
     reported = trust.judge(reason, size, above_noise, ratio, candidate)
     if of_all_lanes(noise.left < NOTHING_LOST):
-        trust.begin_anew()
-        scores.begin_anew()
+        _begin_anew(trust, scores)
     yield reported
