@@ -1,4 +1,5 @@
-"""Imports what the commands of pvid import, and for each line of standard input executes one in a fork of itself.
+"""Imports what the commands of pvid import, compiles the model that most of them use, and for each line of standard
+input executes a command in a fork of itself.
 
 A line is JSON: folder, words of the command, and the files for its standard output and standard error. What is printed
 for each is the exit code. tests/program.py starts it.
@@ -14,10 +15,13 @@ import sys
 from importlib import import_module
 
 from pvid.cli.main import main
+from pvid.models.mechanisms import compiled_of
+from pvid.models.registry import DEFAULT
 
 IMPORTED = [
     *(f"pvid.cli.{name}" for name in ("compare", "export", "identify", "log", "model", "simulate", "verify")),
     *("pvid.run.advice", "pvid.run.engine_identify", "pvid.run.mechanism_core"),
+    *("scipy.integrate", "scipy.interpolate", "scipy.signal"),
 ]
 TIMEOUT_S = 300
 
@@ -44,6 +48,7 @@ def next_command() -> bool:
 if __name__ == "__main__":
     for name in IMPORTED:
         import_module(name)
+    compiled_of(DEFAULT)
     gc.collect()
     gc.freeze()
     if next_command():

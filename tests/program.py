@@ -17,7 +17,7 @@ FORKS = Path(__file__).with_name("forks.py")
 def pvid(folder: Path, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs `pvid ARGUMENTS` in a folder, in this environment and what is given besides; in a process of its own.
 
-    That is a fork of one that has imported pvid and done nothing else: importing takes as long as many a command.
+    That is a fork of one that has imported pvid and compiled one model, which takes as long as many a command.
     Where something is given besides, which may matter at an import, it is a new one.
     """
     words = [str(one) for one in arguments]

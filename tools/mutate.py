@@ -104,6 +104,12 @@ def place(name: str) -> Path:
     return found
 
 
+@cache
+def source_text(name: str) -> str:
+    """What the file of this name holds."""
+    return place(name).read_text(encoding="utf-8")
+
+
 @dataclass(frozen=True, order=True)
 class Mutant:
     """`old` at an offset of a file becomes `new`; the `place`-th such token of its line."""
@@ -116,14 +122,14 @@ class Mutant:
 
     def text(self) -> str:
         """The file with the change."""
-        code = place(self.file).read_text(encoding="utf-8")
+        code = source_text(self.file)
         return code[: self.offset] + self.new + code[self.offset + len(self.old) :]
 
     def line(self) -> tuple[int, str]:
         """Number and text of its line as it is."""
-        code = place(self.file).read_text(encoding="utf-8")
-        number = code.count("\n", 0, self.offset)
-        return number + 1, code.splitlines()[number].strip()
+        code = source_text(self.file)
+        start = code.rfind("\n", 0, self.offset) + 1
+        return code.count("\n", 0, start) + 1, code[start:].partition("\n")[0].strip()
 
     def rank(self, seed: int) -> str:
         """Where a draw has it, whatever the other lines are: an edit elsewhere leaves the draw as it was."""

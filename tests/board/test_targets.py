@@ -77,7 +77,7 @@ def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -
     assert report.hash == int(expected[-1])
 
 
-@pytest.mark.ticks(short=sizes.TICKS, long=40_000)
+@pytest.mark.ticks(short=1500, long=40_000)
 @pytest.mark.parametrize("core", CORES)
 def test_the_host_computes_the_bits_of_the_strong_twin(core: str, native: Native, ticks: int) -> None:
     replay = standard_run(ticks, core)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
-from bench.board_engine import FixedBoard, FloatBoard
+from bench.board_engine import Answer, BoardEngine, FixedBoard, Float, FloatBoard, Signals
 from bench.engine import rms
 from pvid.models.mechanisms import compiled_of
 from pvid.run.engine_design import config_for_simulated_rig, engine_config, simulated_run_of
@@ -14,10 +16,24 @@ from pvid.settings.enums import Core
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import simulation_of
 
-RUNS = 8
+RUNS = 6
 
 # White torque about the first axis of a body [N m / sqrt(Hz)]; white torque of the pendulum's joint of a cart.
 CASES = {"rigid_body": Imperfections(process={0: 1e-3}), "cart_pendulum": Imperfections(process={1: 1e-3})}
+
+
+@cache
+def informed(name: str) -> tuple[list[Signals], list[Float], list[Answer]]:
+    """Runs, starts, and the answers of float32 with a design that contains the disturbance."""
+    compiled, imperfect, simulation = compiled_of(name), CASES[name], simulation_of(name)
+    _, design, p = simulated_run_of(compiled)
+    config = engine_config(compiled, simulation.run(99, imperfect), design, p)
+    own = config_for_simulated_rig(compiled).design
+    assert (config.design.error_variance > 30 * own.error_variance).any()
+    starts = [simulation.truth * np.random.default_rng(seed).uniform(0.7, 1.4, len(p)) for seed in range(RUNS)]
+    runs = [simulation.run(seed, imperfect) for seed in range(RUNS)]
+    board = FloatBoard(compiled, config)
+    return runs, starts, [board.answer(run, start) for run, start in zip(runs, starts, strict=True)]
 
 
 @pytest.mark.parametrize("core", ["f32", "q31"])
@@ -28,18 +44,14 @@ def test_a_disturbance_of_one_equation_does_not_spoil_the_others(name: str, core
     With the design's own variance the errors are ten to a thousand times as large: 20 % of Ixz, 10 % of the cart's
     mass.
     """
-    compiled, imperfect, simulation = compiled_of(name), CASES[name], simulation_of(name)
-    truth = simulation.truth
-    config = config_for_simulated_rig(compiled)
-    _, design, p = simulated_run_of(compiled)
-    informed = engine_config(compiled, simulation.run(99, imperfect), design, p)
-    assert (informed.design.error_variance > 30 * config.design.error_variance).any()
-    board = FixedBoard(engine_for_simulated_rig(compiled)) if core == "q31" else FloatBoard(compiled, config)
-    best = FloatBoard(compiled, informed)
-    starts = [truth * np.random.default_rng(seed).uniform(0.7, 1.4, len(truth)) for seed in range(RUNS)]
-    runs = [simulation.run(seed, imperfect) for seed in range(RUNS)]
+    runs, starts, wanted = informed(name)
+    compiled, truth = compiled_of(name), simulation_of(name).truth
+    board: BoardEngine = (
+        FixedBoard(engine_for_simulated_rig(compiled))
+        if core == "q31"
+        else FloatBoard(compiled, config_for_simulated_rig(compiled))
+    )
     found = [board.answer(run, start) for run, start in zip(runs, starts, strict=True)]
-    wanted = [best.answer(run, start) for run, start in zip(runs, starts, strict=True)]
     assert all(one.published for one in found)
     size = np.where(truth != 0, truth, 1.0)
     errors, least = (rms(np.array([(one.p - truth) / size for one in answers])) for answers in (found, wanted))

@@ -65,10 +65,12 @@ def test_a_draw_is_the_same_again_and_an_edit_elsewhere_leaves_it(
 ) -> None:
     (tmp_path / "f.c").write_text(CODE, encoding="utf-8")
     monkeypatch.setattr(mutate, "files_of_core", lambda: [tmp_path / "f.c"])
+    mutate.source_text.cache_clear()
     before = [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
     assert before == [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
     assert before != [(m.old, m.new, m.line()[1]) for m in mutate.ranked(2)["f.c"]]
     (tmp_path / "f.c").write_text("static int g;\n\n" + CODE, encoding="utf-8")
+    mutate.source_text.cache_clear()
     assert before == [(m.old, m.new, m.line()[1]) for m in mutate.ranked(1)["f.c"]]
 
 

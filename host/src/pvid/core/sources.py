@@ -44,7 +44,7 @@ def left_out(form: str, core: str, *also: str) -> str:
     """
     rooms = "|".join(room for room in _FORMS if room not in (form, *also))
     cores = "|".join(other for other in _CORES if other != f"_{core}")
-    return rf"/src/({rooms})/|/models/[^/]*/({rooms})_|({cores})\.c$"
+    return rf"/src/({rooms})/|[/_]({rooms})_[^/]*\.c$|({cores})\.c$"
 
 
 def source(name: str) -> Path:

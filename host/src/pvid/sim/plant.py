@@ -226,7 +226,7 @@ class Plant:
         out = np.empty((samples * (substeps if every_step else 1), nx + n))
         fault = self._run(
             _pointer(state),
-            modes.ctypes.data_as(ctypes.POINTER(ctypes.c_int)),
+            _pointer(modes),
             int(fresh),
             _pointer(np.ascontiguousarray(inputs)),
             int(smooth),
@@ -278,5 +278,6 @@ class Plant:
         return Trajectory(self.motion, np.arange(len(out)) / rate, out[:, :nx], out[:, nx:], inputs)
 
 
-def _pointer(array: Float) -> ctypes.Array[ctypes.c_double]:
-    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))  # type: ignore[return-value]
+def _pointer(array: Float | npt.NDArray[np.int32]) -> ctypes.c_void_p:
+    """Without its type, which takes as long as a step of the plant."""
+    return ctypes.c_void_p(array.ctypes.data)

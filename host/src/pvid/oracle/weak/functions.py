@@ -82,21 +82,6 @@ class TestFunctions:
         """omega_h = 2 pi h/T [rad/s], h = -H..H."""
         return np.asarray(2 * math.pi * np.arange(-self.highest, self.highest + 1) / self.length)
 
-    def values(self, order: int) -> Float:
-        """chi^(order) at the samples 0..2 hop - 1 [2 hop, K]; for covariances of neighbours."""
-        if order not in self._values:
-            # S_h of a unit sample at t_j is e^(i w_h t_j): its real and imaginary parts, as in `joined`.
-            places = np.outer(np.arange(2 * self.hop), np.arange(1, self.highest + 1)) % (2 * self.hop)
-            turn = math.pi / self.hop * np.arange(2 * self.hop)
-            parts = np.empty((2 * self.hop, 2 * self.highest + 1))
-            parts[:, 0], parts[:, 1::2], parts[:, 2::2] = 1.0, np.cos(turn)[places], np.sin(turn)[places]
-            self._values[order] = parts @ self.combine(order)
-        return self._values[order]
-
-    @cached_property
-    def _values(self) -> dict[int, Float]:
-        return {}
-
     def combine(self, order: int) -> Float:
         """[2 H + 1, K]: sum chi^(order) psi = (S_0, Re S_1, Im S_1, Re S_2, ...) @ combine."""
         if order not in self._combined:
@@ -107,9 +92,12 @@ class TestFunctions:
     def _combined(self) -> dict[int, Float]:
         return {}
 
+    def _rated(self, order: int) -> Complex:
+        """Coefficients of chi^(order)."""
+        return np.asarray(self.coefficients * ((1j * self.rates) ** order)[:, np.newaxis])
+
     def _combine(self, order: int) -> Float:
-        top = self.highest
-        weights = self.coefficients * ((1j * self.rates) ** order)[:, np.newaxis]
+        top, weights = self.highest, self._rated(order)
         out = np.empty((2 * top + 1, self.count))
         out[0] = np.real(weights[top])
         out[1::2] = np.real(weights[top + 1 :] + weights[:top][::-1])
@@ -118,15 +106,35 @@ class TestFunctions:
 
     def gram(self, first: int, second: int) -> Float:
         """Sum over the samples of chi^(first) chi^(second)^T [K, K], from the harmonics alone."""
-        energy = np.full(2 * self.highest + 1, 0.5)
-        energy[0] = 1.0
-        return np.asarray(
-            2 * self.hop * self.combine(first).T @ (energy[:, np.newaxis] * self.combine(second)), np.float64
-        )
+        if (first, second) not in self._grams:
+            energy = np.full(2 * self.highest + 1, self.hop, np.float64)
+            energy[0] = 2 * self.hop
+            self._grams[first, second] = self.combine(first).T @ (energy[:, np.newaxis] * self.combine(second))
+        return self._grams[first, second]
+
+    @cached_property
+    def _grams(self) -> dict[tuple[int, int], Float]:
+        return {}
 
     def overlap(self, first: int, second: int) -> Float:
         """The same over the half that two neighbours share: chi^(first) of the earlier, chi^(second) of the later."""
-        return np.asarray(self.values(first)[self.hop :].T @ self.values(second)[: self.hop])
+        if (first, second) not in self._overlaps:
+            self._overlaps[first, second] = np.real(self._rated(first).T @ self._shared @ self._rated(second))
+        return self._overlaps[first, second]
+
+    @cached_property
+    def _overlaps(self) -> dict[tuple[int, int], Float]:
+        return {}
+
+    @cached_property
+    def _shared(self) -> Complex:
+        """Sum over j < hop of e^(pi i (h (j + hop) + g j)/hop), h and g = -H..H."""
+        h = np.arange(-self.highest, self.highest + 1)
+        both = h[:, np.newaxis] + h
+        out = np.where(both % (2 * self.hop) == 0, self.hop, 0).astype(np.complex128)
+        odd = both % 2 != 0
+        out[odd] = 2 / (1 - np.exp(1j * math.pi / self.hop * both[odd]))
+        return out * ((-1.0) ** h)[:, np.newaxis]
 
     @cached_property
     def circle(self) -> Complex:

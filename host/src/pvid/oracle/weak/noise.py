@@ -126,8 +126,6 @@ class NoiseModel:
                 )
             )
         self._pairs: dict[tuple[int, int], list[_Pairs]] = {}
-        self._gram: dict[tuple[int, int], Float] = {}
-        self._overlap: dict[tuple[int, int], Float] = {}
 
     @cached_property
     def _orders(self) -> int:
@@ -171,18 +169,6 @@ class NoiseModel:
                         out[(m + n) // 2, one.columns[i], one.columns[j]] += sign * one.products[i, j]
         return out
 
-    def gram(self, m: int, n: int) -> Float:
-        """Of the test functions."""
-        if (m, n) not in self._gram:
-            self._gram[m, n] = self.functions.gram(m, n)
-        return self._gram[m, n]
-
-    def overlap(self, m: int, n: int) -> Float:
-        """Of the test functions of neighbours."""
-        if (m, n) not in self._overlap:
-            self._overlap[m, n] = self.functions.overlap(m, n)
-        return self._overlap[m, n]
-
     def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
         """R0 [K, K] of two row kinds in one window."""
         return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._grams)
@@ -204,12 +190,12 @@ class NoiseModel:
     @cached_property
     def _grams(self) -> Float:
         """Of all pairs of orders [orders, orders, K, K]."""
-        return self._of_all(self.gram)
+        return self._of_all(self.functions.gram)
 
     @cached_property
     def _overlaps(self) -> Float:
         """The same of neighbours."""
-        return self._of_all(self.overlap)
+        return self._of_all(self.functions.overlap)
 
     def _of_all(self, of: Callable[[int, int], Float]) -> Float:
         orders = range(self._orders)

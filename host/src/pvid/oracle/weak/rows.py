@@ -164,7 +164,7 @@ class WeakRows:
         blocks = [[self.noise.covariance(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
         for place, kind in enumerate(kinds):
             error = errors[kind]
-            blocks[place][place] = blocks[place][place] + error.variance * self.noise.gram(error.order, error.order)
+            blocks[place][place] = blocks[place][place] + error.variance * self.functions.gram(error.order, error.order)
         return np.block(blocks)
 
     def with_next(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
@@ -172,7 +172,9 @@ class WeakRows:
         blocks = [[self.noise.with_next(a, theta[a], b, theta[b]) for b in kinds] for a in kinds]
         for place, kind in enumerate(kinds):
             error = errors[kind]
-            blocks[place][place] = blocks[place][place] + error.variance * self.noise.overlap(error.order, error.order)
+            blocks[place][place] = blocks[place][place] + error.variance * self.functions.overlap(
+                error.order, error.order
+            )
         return np.block(blocks)
 
     @property
@@ -200,7 +202,7 @@ class WeakRows:
             if diagonal[place] == 0.0:
                 diagonal[place] = float(np.mean(self.columns[kind][:, :-1] ** 2)) * 1e-12
                 own = slice(place * k, (place + 1) * k)
-                r[own, own] += diagonal[place] * self.noise.gram(0, 0)
+                r[own, own] += diagonal[place] * self.functions.gram(0, 0)
         r = r + np.diag(np.repeat(_RIDGE * diagonal, k))
         return Whitener.of_covariance(r, self.directions(kinds, theta))
 

@@ -262,7 +262,7 @@ def error_of(rows: WeakRows, kind: int, theta: Sequence[Float]) -> EquationError
     whitener = plain.whitener.base
     without = _unlikely(plain, e)
     for order in range(rows.compiled.channels.rows_top(kind) + 1):
-        white = whitener @ rows.noise.gram(order, order) @ whitener.T
+        white = whitener @ rows.functions.gram(order, order) @ whitener.T
         if not np.isfinite(white).all():  # sensors of no size that a number holds
             continue
         q, u = np.linalg.eigh(white)
@@ -296,7 +296,7 @@ def sharpened(
 
     Where the likelihood is at its maximum, sum e^T R^-1 Q R^-1 e = sum tr(R^-1 Q): v is scaled by their ratio.
     """
-    q = rows.noise.gram(error.order, error.order)
+    q = rows.functions.gram(error.order, error.order)
     for _ in range(steps):
         errors = [error] * rows.kinds
         white = rows.white((kind,), theta, errors)

@@ -49,5 +49,5 @@ def _of_order_0(fit: Fit, error: EquationError) -> EquationError:
     """With the same variance of the rows."""
     if not error.order:
         return error
-    power = [float(np.trace(fit.rows.noise.gram(order, order))) for order in (error.order, 0)]
+    power = [float(np.trace(fit.rows.functions.gram(order, order))) for order in (error.order, 0)]
     return EquationError(error.variance * power[0] / power[1], 0)
