@@ -579,6 +579,25 @@ static void test_a_longer_block_of_used_samples_is_judged_by_its_own_level(void 
     assert_true(fabsf(refinement.level - 1.7f) < 1.0e-4f);
 }
 
+/* The past then has a sixteenth of its weight: a clash of 1 with it is one of 256 with all of it; the limit is 25. */
+static void test_behind_a_refused_longer_block_the_whole_past_is_clashed_with(void **state)
+{
+    (void)state;
+    const float variance = 1.0e-4f * 1.0e-4f;
+    for (int refused = 0; refused < 2; refused++) {
+        begin_run();
+        uint32_t tick = run_until(is_again_at_its_end, 0);
+        refinement.solve.residual = (refused != 0) ? 1.0f : refinement.solve.residual;
+        tick = run_until(has_left_the_end, tick);
+        assert_int_equal(refinement.refused, refused);
+        tick = run_until(is_at_its_end, tick);
+        assert_false(refinement.again);
+        refinement.solve.clash = (float)PVID_REFINE_PARAMETERS * variance;
+        (void)run_until(has_left_the_end, tick);
+        assert_int_equal(refinement.taken, (refused != 0) ? 0 : 2);
+    }
+}
+
 static void test_a_search_behind_a_lost_track_remembers_the_refusals(void **state)
 {
     (void)state;
@@ -902,6 +921,7 @@ int main(void)
         cmocka_unit_test(test_it_waits_for_the_weak_form),
         cmocka_unit_test(test_a_search_grows_in_its_first_samples),
         cmocka_unit_test(test_a_longer_block_of_used_samples_is_judged_by_its_own_level),
+        cmocka_unit_test(test_behind_a_refused_longer_block_the_whole_past_is_clashed_with),
         cmocka_unit_test(test_a_search_behind_a_lost_track_remembers_the_refusals),
         cmocka_unit_test(test_an_estimate_that_disagrees_is_held_and_the_published_one_withdrawn),
         cmocka_unit_test(test_the_published_estimate_outlives_one_refused_block_and_not_the_loss_of_the_track),

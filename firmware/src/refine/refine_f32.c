@@ -234,9 +234,7 @@ static void begin_search(pvid_refine_f32 *self)
     self->taken = 0;
     self->refused = 0;
     self->level = 0.0f;
-#if PVID_REFINE_SIGNS > 0
     self->kept = 1.0f;
-#endif
 }
 
 /* Takes a new estimate of the weak form if it is in the region; until a block has been taken it is the prior's mean. */
@@ -380,11 +378,12 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         lengthen(self, began);
         fade = self->again ? KEPT : fade;
     }
+    float counts = 1.0f;
 #if PVID_REFINE_SIGNS > 0
-    const float counts = is_fine(self) ? 1.0f : ROUGHLY;
+    counts = is_fine(self) ? 1.0f : ROUGHLY;
+#endif
     self->kept = self->again ? (KEPT * counts) : counts;
     fade *= counts;
-#endif
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
     }
@@ -485,23 +484,13 @@ static float mean_square(const pvid_refine_f32 *self)
     return self->solve.residual / (freedom * (WHITENESS * variance));
 }
 
-/* Part of the triangle that remains of the past, beside forgetting: the clash is to be that with all of it. */
-static float kept_of_past(const pvid_refine_f32 *self)
-{
-#if PVID_REFINE_SIGNS > 0
-    return self->kept;
-#else
-    return self->again ? KEPT : 1.0f;
-#endif
-}
-
 /* Takes the block or not. */
 static void end_block(pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
     const float square = mean_square(self);
-    const float kept = kept_of_past(self);
-    const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * (kept * kept));
+    const float past = self->kept * self->kept; /* the clash is to be that with all of it */
+    const float clash = self->solve.clash / (((float)N * (config->sd[0] * config->sd[0])) * past);
     self->sane = is_sane(self);
     const float room = at_least_one(self->level);
     const bool again = self->again;

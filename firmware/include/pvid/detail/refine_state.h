@@ -146,9 +146,7 @@ struct pvid_refine_f32 {
     pvid_refine_config_f32 config;
     float h;    /* a step of the motion [s] */
     float fade; /* forgetting of a full block, on the triangle */
-#if PVID_REFINE_SIGNS > 0
     float kept; /* part of the triangle behind the last block that was taken, beside forgetting */
-#endif
     float weight[PVID_REFINE_OUTPUTS]; /* of the rows of an output, relative to the first one */
     bool renewed;                      /* the weak form has given an estimate since the search began from one */
     bool frozen;

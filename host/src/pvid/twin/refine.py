@@ -270,10 +270,9 @@ class RefineTwin:
         if self.length < config.block:
             self._lengthen(began)
             fade = _KEPT if self.again else fade
-        if self.shape.signs:
-            counts = _F(1) if self._is_fine() else _ROUGHLY
-            self.kept = _KEPT * counts if self.again else counts
-            fade = fade * counts
+        counts = _F(1) if not self.shape.signs or self._is_fine() else _ROUGHLY
+        self.kept = _KEPT * counts if self.again else counts
+        fade = fade * counts
         self.triangle = self.solve.triangle * fade
         for i in range(self.shape.widths):
             self.triangle[i] = 0
@@ -339,10 +338,7 @@ class RefineTwin:
 
     def _end_block(self) -> None:
         config, square = self.config, self._mean_square()
-        kept = _KEPT if self.again else _F(1)
-        if self.shape.signs:
-            kept = self.kept
-        past = kept * kept
+        past = self.kept * self.kept
         clash = self.solve.clash / ((_F(self.shape.parameters) * self.variance) * past)
         self.sane = self._is_sane()
         room, again = _at_least_one(self.level), self.again
