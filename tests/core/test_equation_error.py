@@ -31,7 +31,7 @@ def informed(name: str) -> tuple[list[Signals], list[Float], list[Answer]]:
     own = config_for_simulated_rig(compiled).design
     assert (config.design.error_variance > 30 * own.error_variance).any()
     starts = [simulation.truth * np.random.default_rng(seed).uniform(0.7, 1.4, len(p)) for seed in range(RUNS)]
-    runs = [simulation.run(seed, imperfect) for seed in range(RUNS)]
+    runs: list[Signals] = [simulation.run(seed, imperfect) for seed in range(RUNS)]
     board = FloatBoard(compiled, config)
     return runs, starts, [board.answer(run, start) for run, start in zip(runs, starts, strict=True)]
 

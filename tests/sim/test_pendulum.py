@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from bench.campaign.motion import accelerations, integrate, relative_angle, step_of
+from bench.campaign.pivot import PivotMotion
 from pvid.base.errors import PvidError
+from pvid.core.native import Native
 from pvid.design.fir import savitzky_golay
 from pvid.sim.pendulum import (
+    SLIP,
     STANDARD_DRIVE,
     STANDARD_PENDULUM,
     STANDARD_RELEASE,
@@ -69,6 +74,15 @@ def test_impossible_pendulums_are_refused(name: str, value: float) -> None:
     given = {"l1": 0.3, "l2": 0.12, "rho2": 0.08, "g": 9.5, name: value}
     with pytest.raises(PvidError, match=f"pendulum's {name} must be"):
         Pendulum(**given)
+
+
+@pytest.mark.parametrize(
+    ("rough", "sentence"),
+    [({"dry1": -1.0}, "dry1 must be"), ({"dry2": math.nan}, "dry2 must be"), ({"slant": 1.6}, "slant must be within")],
+)
+def test_impossible_frictions_and_slants_are_refused(rough: dict[str, float], sentence: str) -> None:
+    with pytest.raises(PvidError, match=sentence):
+        replace(STANDARD_PENDULUM, **rough)
 
 
 def test_starts_are_within_half_of_the_truth_and_physical() -> None:
@@ -133,6 +147,25 @@ def test_motion_agrees_with_another_derivation_and_method(truth: str) -> None:
     expected = reference(STANDARD_PENDULUM, STANDARD_DRIVE, truth, 5.0)
     # LSODA's global error at 1e-11 a step
     np.testing.assert_allclose(simulation.state[-1, :2], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize(("dry", "slant"), [(0.0, 0.05), (1e-3, 0.0), (3e-3, 0.05)])
+def test_dry_friction_and_a_slanted_slide_move_it_as_the_equations_in_c_do(
+    dry: float, slant: float, native: Native
+) -> None:
+    """Of host/native/pendulum.c, by Runge-Kutta in fixed steps, whose errors are those of its reversals."""
+    pendulum = replace(STANDARD_PENDULUM, damping1=1e-4, damping2=2e-4, dry1=dry, dry2=dry / 2, slant=slant)
+    motion = PivotMotion(np.array([[one.amplitude_m, one.frequency_hz, one.phase_rad] for one in STANDARD_DRIVE]))
+    steps, step_s = step_of(pendulum, 4.1, motion, (dry, dry / 2), SLIP, 6.0)
+    rough: dict[str, Any] = {"dry": (dry, dry / 2), "slip": SLIP, "slant": slant}
+    drive = accelerations(motion, steps, step_s)
+    expected = integrate(native, pendulum, [*STANDARD_RELEASE, 0.0, 0.0], drive, step_s, **rough)
+    simulation = simulate(pendulum, sensors=EXACT, truth="full", duration=6.0)
+    smooth = simulate(replace(pendulum, dry1=0.0, dry2=0.0, slant=0.0), sensors=EXACT, truth="full", duration=6.0)
+    assert expected is not None
+    angle = relative_angle(expected, step_s, simulation.run.t)
+    np.testing.assert_allclose(simulation.run.phi, angle, atol=2e-5)
+    assert np.max(np.abs(simulation.run.phi - smooth.run.phi)) > 5e-3
 
 
 def test_tolerances_leave_nothing_to_gain() -> None:
@@ -337,6 +370,8 @@ def test_the_truth_cannot_be_spoiled() -> None:
         ({"truth": "quadratic"}, "linear"),
         ({"seed": -1}, "seed"),
         ({"sample_rate": 6.0}, "4.1 Hz"),
+        ({"pendulum": replace(STANDARD_PENDULUM, dry2=1e-3)}, "are in the full equations: choose the truth 'full'"),
+        ({"pendulum": replace(STANDARD_PENDULUM, slant=1e-3)}, "are in the full equations: choose the truth 'full'"),
     ],
 )
 def test_impossible_requests_are_refused(request_: dict[str, object], sentence: str) -> None:

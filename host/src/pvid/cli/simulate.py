@@ -59,6 +59,8 @@ def tone(text: str) -> Tone:
 @click.option(
     "--damping", default=0.0, show_default=True, help="Viscous friction of both joints per unit mass [m^2/s]."
 )
+@click.option("--dry", default=0.0, show_default=True, help="Dry friction of both joints per unit mass [m^2/s^2].")
+@click.option("--slant", default=0.0, show_default=True, help="Of the pivot's slide against the vertical [rad].")
 @click.option("--seed", default=0, show_default=True)
 @click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
 def command(**options: Any) -> int:
@@ -70,6 +72,9 @@ def command(**options: Any) -> int:
         g=options["gravity"],
         damping1=options["damping"],
         damping2=options["damping"],
+        dry1=options["dry"],
+        dry2=options["dry"],
+        slant=options["slant"],
     ).tilted(options["tilt"])
     sensors = standard_sensors(options["bits"])
     if options["exact"]:

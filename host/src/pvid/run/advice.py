@@ -488,7 +488,8 @@ def _remaining(case: Case, result: Identification) -> Iterator[str]:
     elif excitation.fading > _FADING:
         yield (
             f"the swing decays (to {100 / excitation.fading:.0f} % of its start): friction in the joints "
-            f"leaves too little motion: reduce it, or drive the pivot harder"
+            f"leaves too little motion: reduce it, drive the pivot harder, or, if it is dry, set dry_friction = true "
+            f"under [refine] in the rig file and use --core f32 --refine"
         )
     elif result.status == Reason.HELD_UNCERTAIN.text:
         yield "the standard errors are too large: record longer, drive the pivot harder, or use a finer encoder"

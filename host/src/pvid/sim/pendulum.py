@@ -38,6 +38,8 @@ _LEAST_M, _MOST_M = 1e-6, 1e6
 _MOST_GRAVITY = 1e3
 _LEAST_RATIO = 1e-5
 
+# Dry friction has its full size from some of this rate on [rad/s]: a thousandth of the fastest of the standard rig.
+SLIP = 1e-3
 _MAX_SAMPLES = 10_000_000  # 10 hours at 278 Hz; beyond, the request is a slip of units
 
 
@@ -58,6 +60,11 @@ class Pendulum:
     damping1, damping2 : float
         Viscous torque at the pivot and at the joint, per unit of angular rate and of body 2's mass [m^2/s],
         >= 0. The linear parameters do not contain it.
+    dry1, dry2 : float
+        Dry friction at the pivot and at the joint, per unit of body 2's mass [m^2/s^2], >= 0: the torque turns with the
+        sign of the rate, softly within some SLIP. Full equations only.
+    slant : float
+        Of the pivot's slide against the vertical [rad], within +-pi/2. Full equations only.
     """
 
     l1: float
@@ -66,16 +73,21 @@ class Pendulum:
     g: float
     damping1: float = 0.0
     damping2: float = 0.0
+    dry1: float = 0.0
+    dry2: float = 0.0
+    slant: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("l1", "l2", "rho2", "g"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise PvidError(f"The pendulum's {name} must be a positive number, not {value:g}.")
-        for name in ("damping1", "damping2"):
+        for name in ("damping1", "damping2", "dry1", "dry2"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise PvidError(f"The pendulum's {name} must be zero or a positive number, not {value:g}.")
+        if not abs(self.slant) < math.pi / 2:
+            raise PvidError(f"The slide's slant must be within +-pi/2 rad, not {self.slant:g}.")
 
     @property
     def linear(self) -> FloatArray:
@@ -374,6 +386,8 @@ def simulate(
     if sensors is None:
         sensors = standard_sensors()
     check_lengths(pendulum)
+    if truth == "linear" and (pendulum.dry1 or pendulum.dry2 or pendulum.slant):
+        raise PvidError("Dry friction and a slanted slide are in the full equations: choose the truth 'full'.")
     _check_request(drive, sample_rate, duration, release, truth, seed)
     state, exact = _truth(
         pendulum, drive, float(sample_rate), float(duration), (float(release[0]), float(release[1])), truth
@@ -522,6 +536,8 @@ def _equations_of_motion(
     l1, l2 = pendulum.l1, pendulum.l2
     c1, c2 = pendulum.damping1, pendulum.damping2
     m11, m22 = l1 * l1, l2 * l2 + pendulum.rho2**2
+    rough = pendulum.dry1 > 0 or pendulum.dry2 > 0 or pendulum.slant != 0
+    up, across = math.cos(pendulum.slant), math.sin(pendulum.slant)
     acceleration = _pivot_acceleration(drive)
 
     def linear(t: float, x: FloatArray) -> tuple[float, float, float, float]:
@@ -535,10 +551,15 @@ def _equations_of_motion(
 
     def full(t: float, x: FloatArray) -> tuple[float, float, float, float]:
         a1, a2, v1, v2 = x.tolist()
-        gravity = pendulum.g + acceleration(t)
+        along = acceleration(t)
+        gravity = pendulum.g + along * up
         centrifugal = l1 * l2 * math.sin(a1 - a2)
         torque1 = -centrifugal * v2 * v2 - gravity * l1 * math.sin(a1) - c1 * v1 + c2 * (v2 - v1)
         torque2 = centrifugal * v1 * v1 - gravity * l2 * math.sin(a2) - c2 * (v2 - v1)
+        if rough:
+            aside, joint = along * across, pendulum.dry2 * math.tanh((v2 - v1) / SLIP)
+            torque1 -= aside * l1 * math.cos(a1) + pendulum.dry1 * math.tanh(v1 / SLIP) - joint
+            torque2 -= aside * l2 * math.cos(a2) + joint
         m12 = l1 * l2 * math.cos(a1 - a2)
         det = m11 * m22 - m12 * m12
         return v1, v2, (m22 * torque1 - m12 * torque2) / det, (m11 * torque2 - m12 * torque1) / det
