@@ -15,8 +15,8 @@ from pvid.core.sources import SRC
 
 TIMEOUT_S = 60.0
 FAULT = 112
-# A port needs nothing of the core. The build of all of it, without an FPU, shows that firmware/cmake/no_float.cmake finds
-# no floating point in the fixed-point core (as tests/core/test_core_q31.py does for each compiler).
+# A port needs nothing of the core. The build of all of it, without an FPU, shows that firmware/cmake/no_float.cmake
+# finds no floating point in the fixed-point core (as tests/core/test_core_q31.py does for each compiler).
 WITH_THE_CORE = "microbit"
 
 boards = pytest.mark.parametrize("board", BOARDS.values(), ids=lambda board: board.name)
