@@ -13,8 +13,8 @@ from pvid.oracle.weak.identify import ready
 from pvid.rig.run import Recording
 from pvid.run.engine_design_q31 import engine_to_identify
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
-from pvid.run.mechanism_core import identify_in_c
-from pvid.run.refined_core import refined_in_c
+from pvid.run.mechanism_core import CoreAnswer, identify_in_c
+from pvid.run.refined_core import RefinedCoreAnswer, refined_in_c
 from pvid.run.refined_inputs import smooth
 from pvid.run.refined_mechanism import RefinedMechanism, refine_mechanism
 
@@ -51,7 +51,14 @@ def motion(rate: Callable[[Float, float], Float], start: Float, u: Float, dt: fl
 
 def recorded(dt: float, **signals: Float) -> Recording:
     n = len(next(iter(signals.values())))
-    return Recording(np.arange(n) * dt, signals, 1 / dt)
+    return Recording(np.asarray(np.arange(n) * dt, np.float64), signals, 1 / dt)
+
+
+def of_core(found: CoreAnswer | RefinedCoreAnswer, name: str) -> tuple[float, float]:
+    """Value and standard error."""
+    one = found.values[name]
+    assert one.value is not None and one.se is not None
+    return one.value, one.se
 
 
 def errors_over_se(found: RefinedMechanism, truth: dict[str, float]) -> Float:
@@ -62,7 +69,7 @@ def test_a_sampled_input_is_a_cubic_between_its_samples() -> None:
     """Of a sine with 20 samples a period a straight line is up to 1.2 % short, the cubic 0.02 %."""
     w = 2 * np.pi / 20
     k = np.arange(60)
-    found = smooth(np.sin(w * k), 2).reshape(60, 2, 3)
+    found = smooth(np.asarray(np.sin(w * k), np.float64), 2).reshape(60, 2, 3)
     place = k[:, None, None] + np.array([[0, 0.25, 0.5], [0.5, 0.75, 1]])
     assert np.abs(found - np.sin(w * place))[1:-2].max() < 3e-4
     assert np.abs(found - np.sin(w * place))[:-1].max() < 5e-3  # at the ends a parabola
@@ -149,7 +156,8 @@ def test_a_drive_of_steps_is_refined_in_c() -> None:
     found = refined_in_c(identify_mechanism(recording, model.compiled("circuit")))
     assert found.adopted and found.level is not None and found.level < 1.3
     for name, one in truth.items():
-        assert abs(found.values[name].value - one) < 3.5 * found.values[name].se
+        value, se = of_core(found, name)
+        assert abs(value - one) < 3.5 * se
 
 
 def test_an_input_that_is_known_exactly_costs_fixed_point_no_digits() -> None:
@@ -173,8 +181,9 @@ def test_an_input_that_is_known_exactly_costs_fixed_point_no_digits() -> None:
     single, fixed = identify_in_c(answer, "f32"), identify_in_c(answer, "q31")
     assert fixed.misfit is not None and fixed.misfit < 1.3
     for name, one in truth.items():
-        assert fixed.values[name].se < 1.5 * single.values[name].se
-        assert abs(fixed.values[name].value - one) < 3.5 * fixed.values[name].se
+        value, se = of_core(fixed, name)
+        assert se < 1.5 * of_core(single, name)[1]
+        assert abs(value - one) < 3.5 * se
     engine = engine_to_identify(answer.model, answer.recording, answer.ranking)
     place_of_u = engine.sample_names.index("u")
     assert engine.lsb[place_of_u] < ready(answer.model).model.signal("u").reach / 2**15
