@@ -364,6 +364,16 @@ def test_how_a_motion_is_integrated(name: str, runge_kutta: bool, turning: tuple
     assert (made.runge_kutta, made.turning, made.hidden) == (runge_kutta, turning, hidden)
 
 
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_held_input_that_may_jump_is_not_for_adams(smooth: bool) -> None:
+    model = Model("test")
+    F, x = model.input("F", "N", hold="zoh", smooth=smooth), model.sensor("x", "m", noise=1e-3)
+    m, k = model.unknown("m", "kg", 1.0), model.unknown("k", "N/m", 1.0)
+    model.equation(m * x.d(2) + k * x - F)
+    made = refine_functions_of(model.compiled("test"), {})
+    assert (made.runge_kutta, made.order) == ((False, 2) if smooth else (True, 1))
+
+
 def test_the_description_of_a_refinement_is_checked() -> None:
     model = Model("test")
     F, x = model.input("F", "N", hold="zoh"), model.sensor("x", "m", noise=1e-3)

@@ -64,7 +64,14 @@ FLOAT = Real(
 DOUBLE = Real(
     "double",
     lambda value: repr(float(value)),
-    {"abs": "fabs({})", "sqrt": "sqrt({})", "neg": "-{}", "sin": "sin({})", "cos": "cos({})"},
+    {
+        "abs": "fabs({})",
+        "sqrt": "sqrt({})",
+        "neg": "-{}",
+        "sign": "(double)(({0} > 0.0) - ({0} < 0.0))",
+        "sin": "sin({})",
+        "cos": "cos({})",
+    },
     "",
 )
 

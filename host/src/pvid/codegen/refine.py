@@ -236,7 +236,8 @@ class _Refine:
             )
         top = {name: max(jet.order for jet in found if jet.of == name) for name in free}
         self.highest = [Jet(name, top[name]) for name in free]
-        self.runge_kutta = widths is not None and (bool(signs) or len(set(top.values())) > 1)
+        jumps = any(one.hold == "zoh" and not one.smooth for one in model.signals)  # which spoil the steps of Adams
+        self.runge_kutta = widths is not None and (bool(signs) or len(set(top.values())) > 1 or jumps)
         self.order = 2 if all(n == 2 for n in top.values()) and not self.runge_kutta else 1
         if self.order == 2:
             self.q = [Jet(name) for name in free]

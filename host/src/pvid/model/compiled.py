@@ -30,6 +30,7 @@ class Signal:
     noise : standard deviation of its white noise, in resolutions (in its unit where resolution is 0)
     reach : largest absolute value
     hold : "zoh": the value set at t_k holds until t_(k+1); "sampled": the value at t_k
+    smooth : what a held input is set to never jumps: the refinement in C may take steps of several samples
     driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
     gain_sd : relative standard deviation of its gain; part of the standard errors, because a run seldom shows it
     neglected
@@ -47,6 +48,7 @@ class Signal:
     driven: bool = False
     gain_sd: float = 0.0
     neglected: float = 0.0
+    smooth: bool = False
 
     @property
     def name(self) -> str:

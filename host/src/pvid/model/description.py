@@ -96,17 +96,24 @@ class Model:
         return jet
 
     def input(
-        self, name: str, unit: str, hold: Literal["zoh", "sampled"], reach: float = 1.0, gain_sd: float | None = None
+        self,
+        name: str,
+        unit: str,
+        hold: Literal["zoh", "sampled"],
+        reach: float = 1.0,
+        gain_sd: float | None = None,
+        smooth: bool = False,
     ) -> Jet:
         """A signal that is known exactly but for its gain (relative standard deviation gain_sd, 0.01).
 
-        hold "zoh": the value set at t_k holds until t_(k+1); "sampled": it is a value at t_k.
+        hold "zoh": the value set at t_k holds until t_(k+1); "sampled": it is a value at t_k. smooth: the drive never
+        makes the held value jump; the refinement in C then takes steps of several samples, which cost less.
         """
         if hold not in ("zoh", "sampled"):
             raise self._refused(f'{name}: hold is "{hold}", it must be "zoh" or "sampled"')
         jet = self._signal(name, unit, reach)
         gain = self._gain(name, gain_sd, driven=True)
-        self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, True, gain))
+        self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, True, gain, smooth=smooth))
         return jet
 
     def _gain(self, name: str, gain_sd: float | None, driven: bool) -> float:

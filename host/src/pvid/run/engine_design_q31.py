@@ -24,7 +24,7 @@ from pvid.rig.run import Recording
 from pvid.run.engine_design import Run, design_and_p, engine_tables, neglected_part, simulated_run_of
 from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak import drive_min_of, with_soft_widths
-from pvid.setup.weak_q31 import config_of_q31, row_formats
+from pvid.setup.weak_q31 import config_of_q31, row_formats, with_noisy_means
 
 _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
 _HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
@@ -128,7 +128,7 @@ def fixed_engine(
     tops = [max(_FULL_SCALE * known[one].reach, top) for one, top in zip(functions.samples, largest, strict=True)]
     if between_counts:
         lsb = tuple(
-            _finer(step, run[one], limit / (top / step)) if known[one].resolution > 0 else step
+            _finer(step, run[one], limit / (top / step))
             for one, step, top, limit in zip(functions.samples, lsb, tops, limits, strict=True)
         )
     full_scale = tuple(
@@ -140,7 +140,7 @@ def fixed_engine(
     made = fixed_weak(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
     parameters_of = found.rows.compiled.parameters
     parameters = _parameters(functions, parameters_of)
-    sizes = with_soft_widths(found.tables, soft_signs or {})
+    sizes = with_noisy_means(with_soft_widths(found.tables, soft_signs or {}), found.rows, found.p)
     tables = fixed_design(made.model, sizes, Sensing(lsb, full_scale, design.sample_rate), made.formats)
     formats = row_formats(found.rows, found.p, found.errors)
     config = config_of_q31(

@@ -103,7 +103,10 @@ class RefinedCoreAnswer:
     def text(self) -> str:
         """Which estimate it is, in a clause."""
         if not self.adopted:
-            return f"not refined: {self.reason.text}; the estimate is that of the weak form"
+            own = self.weak.oracle.model.refinement.equations
+            beaten = self.reason == Reason.HELD_UNCERTAIN and self.first_s is not None and not own
+            why = ", the weak form's standard errors are smaller" if beaten else ""
+            return f"not refined: {self.reason.text}{why}; the estimate is that of the weak form"
         held = "" if self.reason == Reason.UPDATED else f", held since: {self.reason.text}"
         return (
             f"refined by the second stage, first after {self.first_s:.3g} s{held}; residual level {self.level:.2g}, "

@@ -19,6 +19,26 @@ def held(values: Float, sub: int) -> Float:
     return np.repeat(values, sub)[:, None] * np.ones(3)
 
 
+def smooth(values: Float, sub: int) -> Float:
+    """An input that is the cubic through four samples between the middle two, at the steps [steps, 3].
+
+    A straight line is short of the curvature: of a sine with 20 samples a period by 0.8 % in the mean.
+    """
+    x = np.concatenate([[_before(values[:3])], values, [_before(values[:-4:-1])], values[-1:]])
+    share = (np.arange(sub)[:, None] + np.array([0.0, 0.5, 1.0])) / sub
+    a, b, c = share + 1, share - 1, share - 2
+    weights = (-share * b * c / 6, a * b * c / 2, -a * share * c / 2, a * share * b / 6)
+    n = len(values)
+    return np.asarray(sum(x[k : k + n, None, None] * weight for k, weight in enumerate(weights)), np.float64).reshape(
+        -1, 3
+    )
+
+
+def _before(three: Float) -> float:
+    """The sample before three, of their parabola."""
+    return float(three @ np.array([3.0, -3.0, 1.0]))
+
+
 def straight(values: Float, sub: int) -> Float:
     """An input that is straight between samples, at the steps [steps, 3]."""
     after = np.append(values[1:], values[-1])
@@ -48,4 +68,4 @@ def _input(model: CompiledModel, jet: Jet, signals: Mapping[str, Float], rate: f
     signal = model.signal(jet.of)
     if signal.hold == "zoh":
         return held(signals[jet.of], sub)
-    return straight(signals[jet.of], sub)
+    return smooth(signals[jet.of], sub)

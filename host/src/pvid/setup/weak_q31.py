@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.rows import EquationError, WeakRows
 from pvid.settings.f32 import GateConfig
 from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.settings.weak import WeakDesign32
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
 from pvid.setup.q31 import forgetting_groups_q31, gate_config_q31
 
@@ -21,6 +23,7 @@ _ROW_BITS = 28  # of an entry of a row
 _MARGIN_BITS = 3  # that the entries of a run leave free
 _MOST_Y_BITS = 12
 _LEAST_Y_BITS = 0  # a row's noise is one standard deviation: rounding by one of them is too much
+_MEAN_BITS = 24  # of the mean of a column in standard deviations: its block of 26 bits then rounds to a quarter of one
 
 
 def row_formats(rows: WeakRows, p: Float, errors: Sequence[EquationError] | None = None) -> tuple[tuple[int, ...], int]:
@@ -52,6 +55,34 @@ def row_formats(rows: WeakRows, p: Float, errors: Sequence[EquationError] | None
             " too much for the rows of the fixed-point core"
         )
     return tuple(n_bits), y_bits
+
+
+def with_noisy_means(sizes: WeakDesign32, rows: WeakRows, p: Float) -> WeakDesign32:
+    """With an error of each equation that is large enough for the block of a column in fixed point.
+
+    Where only derivatives of a row have noise, as in J x'' + b x' = u, its mean (h = 0) has none. The weight of the
+    mean of u would be so large that the entries of the other harmonics lose their digits beside it.
+    """
+    theta = rows.compiled.parameters.theta(p)
+    means = np.abs(rows.record.sums(rows.functions)[:, :, 0])
+    variance = sizes.error_variance.copy()
+    for kind, plan in enumerate(rows.compiled.channels.rows):
+        own = np.append(theta[kind], -1.0)
+        largest = max(
+            (
+                abs(one.factor * own[one.column]) * float(np.nanmax(means[one.channel]))
+                for one in plan.terms
+                if not one.order and one.column < len(own)
+            ),
+            default=0.0,
+        )
+        least = (largest / 2.0**_MEAN_BITS) ** 2 / (2 * sizes.hop)
+        known = sum(
+            float(one.factor) * own[one.a] * own[one.b] for one in sizes.noise if one.kind == kind and not one.power
+        )
+        if not sizes.error_order[kind]:
+            variance[kind] = max(variance[kind], np.float32(least - known))
+    return replace(sizes, error_variance=variance)
 
 
 def _bits(largest: float) -> int:

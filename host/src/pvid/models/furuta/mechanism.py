@@ -5,7 +5,7 @@ from math import pi
 from pvid.model import Model, cos, sin
 
 model = Model("rotary pendulum, motor voltage")
-V, kv = model.input("V", "V", hold="zoh", reach=12), model.known("kv", "N*m/V", 0.005)  # torque at rest
+V, kv = model.input("V", "V", hold="zoh", reach=12, smooth=True), model.known("kv", "N*m/V", 0.005)  # torque at rest
 th = model.sensor("th", "rad", resolution=2 * pi / 2**12, reach=10)
 a = model.sensor("a", "rad", resolution=2 * pi / 2**12, reach=4)
 J0, Jp = model.unknown("J0", "kg*m^2", 2e-3), model.unknown("Jp", "kg*m^2", 1.2e-3)
