@@ -1,4 +1,4 @@
-"""Would a systematic error of one sensor, or a soft friction, explain the residuals, and how far would it move p?
+"""Would a systematic error of one sensor, or a friction, explain the residuals, and how far would it move p?
 
 An error a f(t) in a recorded signal z moves the residuals by a c, c = (e(z + step f) - e(z))/step. Residuals e are then
 fitted by J dp + a c: a and its standard error show whether the error is there, dp how far p moves with it. Errors that
@@ -30,7 +30,7 @@ from pvid.oracle.weak.solve import Fit, inverse
 from pvid.oracle.weak.verdict import Reason
 from pvid.sim.imperfections import with_play
 
-Kind = Literal["delay", "play", "eccentric", "gain", "friction"]
+Kind = Literal["delay", "play", "eccentric", "gain", "friction", "lacking"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
@@ -51,7 +51,7 @@ _LONGEST = 0.25  # delay [windows]
 
 _WIDTHS = (0.03, 0.055, 0.1, 0.18, 0.3, 0.55, 1.0)  # of a soft friction, over the root mean square of the speed
 _WHOLE = (0.4, 2.5)  # a friction that is soft has a column of size 1
-_SMOOTHED = 21  # samples, for the direction of a play
+_SMOOTHED = 21  # samples, for the direction of a motion
 _PLAY = 3.0  # width of the play that is tried [resolutions]
 _PART = 1e-3  # of a resolution or of a signal's size: steps of the differences
 
@@ -62,13 +62,14 @@ class SensorError:
 
     Attributes
     ----------
-    signal : name; of a friction the argument of sgn
-    kind : what it is
+    signal : name; of a soft friction the argument of sgn
+    kind : what it is; "lacking": a friction that turns with the signal's rate
     size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal], gain less 1; width over
-        which a friction changes its sign [unit of the argument]
+        which a friction changes its sign [unit of the argument]; a lacking friction [unit of the equation]
     certainty : size over its standard error
     unit : of the signal; of a friction that of the argument, "" where it is not one signal's rate
     shift : by how much p moves when the error is taken off [n_p]
+    row : of a lacking friction: the equation's name
     """
 
     signal: str
@@ -77,6 +78,7 @@ class SensorError:
     certainty: float
     shift: Float
     unit: str = ""
+    row: str = ""
 
     @property
     def text(self) -> str:
@@ -86,6 +88,9 @@ class SensorError:
             return f"{self.signal} seems to be {shifted} by {abs(self.size):.2g} s"
         if self.kind == "friction":
             return f"the friction seems to be soft: sgn({self.signal}) changes over a width of about {self._size}"
+        if self.kind == "lacking":
+            term = f"{abs(self.size):.2g}*sgn({self.signal}.d())"
+            return f"{self.row} seems to lack a friction of {self.signal}, of about {term}"
         if self.kind == "gain":
             than = "larger" if self.size < 0 else "smaller"
             return f"{self.signal} seems to be {100 * abs(self.size):.2g} % {than} than recorded"
@@ -137,6 +142,7 @@ class SensorErrors:
                 if signal.unit == "rad" and np.ptp(self.run[signal.name]) > _TURNS:
                     yield self._test(name, "eccentric", self._eccentric(signal), _LARGEST * signal.resolution)
         yield from self._frictions()
+        yield from self._lacking()
 
     def by_gain(self, signal: Signal) -> Float:
         """What p is off by if a signal is recorded (1 + g) times as large as it is, over g [n_p]."""
@@ -164,6 +170,23 @@ class SensorErrors:
                 size=width,
                 certainty=found.certainty if whole and found.certainty > _CERTAIN_OF_FRICTION else 0.0,
             )
+
+    def _lacking(self) -> Iterator[SensorError]:
+        """A dry friction in each equation, of each coordinate whose sign the model does not have."""
+        functions, grid = self.fit.rows.functions, self.fit.rows.record.grid
+        known = set[Jet]().union(*(one.atoms(Jet) for one in self.fit.rows.compiled.channels.signs))
+        rate = polynomial_weights(_SMOOTHED, 2, 1)
+        for signal in self.model.signals:
+            if signal.kind != "sensor" or signal.driven or Jet(signal.name, 1) in known or signal.name not in self.run:
+                continue
+            halves = functions.half_sums(functions.halves(np.sign(filtered(self.run[signal.name], rate))[grid.places]))
+            whole = functions.joined(halves[:-1], halves[1:]) @ functions.combine(0)
+            for kind, row in enumerate(self.model.rows):
+                change = [np.zeros((self.fit.rows.windows, functions.count)) for _ in self.model.rows]
+                change[kind] = whole[self.fit.rows.numbers]
+                found = self._test(signal.name, "lacking", [self._whitened(change)], np.inf)
+                certain = found.certainty > _CERTAIN_OF_FRICTION
+                yield replace(found, row=row.name, certainty=found.certainty if certain else 0.0)
 
     def _test(self, signal: str, kind: Kind, columns: list[Float], largest: float) -> SensorError:
         c = np.stack(columns, axis=-1)
@@ -213,7 +236,10 @@ class SensorErrors:
         """How the whitened residuals move [windows, rows of all kinds] per unit of an error."""
         record = record_of(self.fit.rows.compiled, {**self.run, **changed}, design or self.design)
         moved = self._raw([one[self.fit.rows.numbers] for one in record.columns(self.fit.rows.functions)])
-        change = [(now - before) / step for now, before in zip(moved, self._bare, strict=True)]
+        return self._whitened([(now - before) / step for now, before in zip(moved, self._bare, strict=True)])
+
+    def _whitened(self, change: list[Float]) -> Float:
+        """Of the change of each kind's raw residuals [windows, K]."""
         out = []
         for white in self.fit.white:
             own = np.concatenate([change[kind] for kind in white.kinds], axis=1)
@@ -241,7 +267,7 @@ def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> li
         return []
     names = [model.p_names[k] for k in np.argsort(-np.abs(error.shift) / se) if abs(error.shift[k]) > _MOVES * se[k]]
     text = f"{error.text} ({error.certainty:.0f} standard errors from 0). This error biases {listed(names)}."
-    return [Reason("friction" if error.kind == "friction" else "sensor", text)]
+    return [Reason("friction" if error.kind in ("friction", "lacking") else "sensor", text)]
 
 
 def of_scale(model: CompiledModel, by_gain: Mapping[str, Float], p: Float, se: Float) -> list[Reason]:
