@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from bench.model_boards import HEADER, differs, played, row_of, rows
+from bench.model_boards import HEADER, USUAL, differs, played, reason_for_no_figure, row_of, rows
+from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
+from pvid.core.sources import ROOT
 
 
 def test_a_board_of_each_instruction_set_has_a_row_for_each_core() -> None:
@@ -23,13 +25,14 @@ def test_a_board_of_each_instruction_set_has_a_row_for_each_core() -> None:
         ("mps2-an505", "f32", ("furuta",)),
         ("mps3-an547", "q31", ("cart_pendulum",)),
         ("atmega2560", "f32", ("kapitza",)),
+        ("atmega2560", "q31", ("furuta", "rigid_body")),  # variables; the samples, an array above 32 767 bytes
     ],
 )
 def test_a_row_has_the_cost_of_each_mechanism_and_equal_bits(board: str, core: str, names: tuple[str, ...]) -> None:
     row = row_of(BOARDS[board], core, names)  # type: ignore[arg-type]
     assert len(row) == len(HEADER) - 8 + len(names)
     if board == "atmega2560":
-        assert row[2:] == ("no float32", "-")
+        assert row[2:] == (*["no float32" if core == "f32" else "no room"] * len(names), "-")
     else:
         assert all(int(cell) > 100 for cell in row[2:-1]) and row[-1] == "equal"
 
@@ -39,3 +42,21 @@ def test_a_wrong_bit_is_found() -> None:
     assert not differs(report, expected)
     assert differs(replace(report, hash=report.hash ^ 1), expected)
     assert differs(replace(report, ticks=report.ticks - 1), expected)
+
+
+@pytest.mark.parametrize("fault", ["the build failed: error: x", "the image stopped", "float32 is not installed"])
+def test_a_fault_is_no_reason_for_a_missing_figure(fault: str) -> None:
+    with pytest.raises(PvidError, match=fault):
+        reason_for_no_figure(PvidError(f"mps2-an386: {fault}"))
+
+
+def test_the_page_has_every_row_and_equal_bits() -> None:
+    page = (ROOT / "host" / "docs" / "benchmarks" / "cost.md").read_text(encoding="utf-8")
+    lines = page.partition("<!-- model-boards -->\n")[2].partition("\n<!-- /model-boards -->")[0].splitlines()
+    head, _, *shown = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    assert tuple(head) == HEADER
+    assert [row[:2] for row in shown] == [[f"{board.core} ({board.name})", core] for board, core in rows(USUAL)]
+    for row in shown:
+        played_cells = [cell for cell in row[2:-1] if not cell.startswith("no ")]
+        assert row[-1] == ("equal" if played_cells else "-") and all(int(cell) > 100 for cell in played_cells)
+        assert len(played_cells) == len(row) - 3 or row[0].startswith("ATmega")

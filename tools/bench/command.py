@@ -332,7 +332,7 @@ def bench_model_boards(boards: tuple[str, ...], update: Path | None) -> int:
     with progress_bar("boards", len(model_boards.rows(names))) as advance:
         rows = list(model_boards.rows_of(names, advance))
     put_table(update, "model-boards", markdown(model_boards.HEADER, rows))
-    return DONE
+    return DIFFERENT if any(row[-1] == "DIFFERENT" for row in rows) else DONE
 
 
 @bench.command(name="strong-schedules")

@@ -32,6 +32,7 @@ USUAL = (
     "atmega2560",
 )
 TIMEOUT_S = 600.0
+_NO_FIGURE = {"the image does not fit": "no room", "float32 has no bits of the twin": "no float32"}
 
 
 def differs(report: ReplayReport, expected: npt.NDArray[np.uint32]) -> bool:
@@ -56,7 +57,7 @@ def played(board: Board, name: str, core: Core) -> tuple[ReplayReport, npt.NDArr
     Raises
     ------
     PvidError
-        Where it does not fit.
+        Where it does not fit, or the board's float32 is another one.
     """
     if core == "f32":
         image, _ = build_mechanism_image(board, mechanism_run(name))
@@ -65,14 +66,28 @@ def played(board: Board, name: str, core: Core) -> tuple[ReplayReport, npt.NDArr
     return play(board, image, TIMEOUT_S), expected(name, core)
 
 
+def reason_for_no_figure(error: PvidError) -> str:
+    """In a word; an error that is a fault of the image or of the machine is raised again."""
+    for sentence, word in _NO_FIGURE.items():
+        if sentence in str(error):
+            return word
+    raise error
+
+
 def row_of(board: Board, core: Core, names: tuple[str, ...] = tuple(mechanisms.names())) -> tuple[str, ...]:
-    """Mean instructions of a tick (an AVR: clock cycles) of each mechanism, and whether all bits are the twin's."""
+    """Mean instructions of a tick (an AVR: clock cycles) of each mechanism, and whether all bits are the twin's.
+
+    Raises
+    ------
+    PvidError
+        Where an image fails.
+    """
     cells, equal = [], "-"
     for name in names:
         try:
             report, wanted = played(board, name, core)
         except PvidError as error:
-            cells.append("no room" if "fit" in str(error) else "no float32")
+            cells.append(reason_for_no_figure(error))
             continue
         cells.append(f"{report.instructions_mean:.0f}")
         equal = "DIFFERENT" if differs(report, wanted) or equal == "DIFFERENT" else "equal"

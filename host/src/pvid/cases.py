@@ -96,11 +96,8 @@ class Case(ABC):
         """What a user should know of the settings; none in float32."""
         return []
 
-    def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
-        """Macros of pvid/config.h that the settings need.
-
-        exact: the smallest sizes that suffice, for a board with little memory.
-        """
+    def sizes(self, config: Any) -> dict[str, str]:
+        """Macros of pvid/config.h that the settings need."""
         return {"PVID_MAX_WINDOW": str(max(config.bank.memory, 5))}
 
     def alike_from(self, ticks: int) -> int:
@@ -279,15 +276,6 @@ class _Fixed(Case):
     def facts(self, config: Any) -> list[str]:
         spare = ", ".join(f"{name} {bits:.2f}" for name, bits in config.design.margins.items())
         return [f"bits to spare at full scale: {spare}"]
-
-    def sizes(self, config: Any, exact: bool = False) -> dict[str, str]:
-        n_theta = len(config.estimator.n_bits)
-        more = {
-            "PVID_MAX_THETA_Q31": str(n_theta),
-            "PVID_MAX_MOMENTS_Q31": str(n_theta * (n_theta + 1) // 2),
-            "PVID_MAX_C_Q31": str(2 * n_theta),
-        }
-        return super().sizes(config, exact) | (more if exact else {})
 
     def samples(self, rig: RigFile, run: Run) -> tuple[Samples, Samples]:
         return fixed.counts_of(rig, run)

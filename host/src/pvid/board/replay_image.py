@@ -299,7 +299,7 @@ def build_image(target: Board, run: ReplayRun, macros: Mapping[str, str] | None 
     folder = BUILD / "runs" / name
     keep_header(folder, "replay_run.h", text)
     options = {"PVID_REPLAY_RUN": str(folder), "PVID_LEAVE_OUT": left_out(run.form, run.core)}
-    options |= case_of(run.config).sizes(run.config, exact=target.toolchain == "avr")
+    options |= case_of(run.config).sizes(run.config)
     if run.form == "strong":
         options["PVID_DEAD_ZONE"] = str(int(run.config.estimator.dead_zone > 0))
     options |= macros or {}
