@@ -15,6 +15,7 @@ from pvid.oracle.weak.identify import ready
 from pvid.rig.run import Recording
 from pvid.run.engine_design_q31 import engine_to_identify
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
+from pvid.run.mechanism_advice import advice_on
 from pvid.run.mechanism_core import CoreAnswer, identify_in_c
 from pvid.run.refined_core import RefinedCoreAnswer, refined_in_c
 from pvid.run.refined_inputs import smooth
@@ -192,24 +193,33 @@ def test_an_input_that_is_known_exactly_costs_fixed_point_no_digits() -> None:
     assert engine.lsb[place_of_u] < ready(answer.model).model.signal("u").reach / 2**15
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.4])
-def test_a_dry_friction_that_the_equations_lack_is_named(friction: float) -> None:
-    """It counts as 35 % more viscous friction, 14 standard errors; the residuals are an error of the equation."""
+SPRING = {"m": 1.3, "c": 3.0, "k": 400.0}
+
+
+def spring_run(friction: float = 0.0) -> dict[str, Float]:
+    """A mass on a spring, pushed by steps, 20 s at 1 kHz."""
+    force = held_at_random(20_000, 50, 500, 10.0, 11)
+
+    def rate(state: Float, now: float) -> Float:
+        brake = SPRING["c"] * state[1] + friction * np.tanh(state[1] / 2e-3)
+        return np.array([state[1], (now - brake - SPRING["k"] * state[0]) / SPRING["m"]])
+
+    return {"F": force, "x": read(motion(rate, np.zeros(2), force, 1e-3, 2)[:, 0], 0.1 / 2**12, 12)}
+
+
+def spring_answer(signals: dict[str, Float]) -> MechanismAnswer:
     model = Model("mass and spring")
     F = model.input("F", "N", hold="zoh", reach=10, gain_sd=0)
     x = model.sensor("x", "m", resolution=0.1 / 2**12, reach=0.1)
     m, c, k = model.unknown("m", "kg", 1.0), model.unknown("c", "N*s/m", 4.0), model.unknown("k", "N/m", 300.0)
     model.equation(m * x.d(2) + c * x.d() + k * x - F)
-    truth = {"m": 1.3, "c": 3.0, "k": 400.0}
-    force = held_at_random(20_000, 50, 500, 10.0, 11)
+    return identify_mechanism(recorded(1e-3, **signals), model.compiled("spring"))
 
-    def rate(state: Float, now: float) -> Float:
-        brake = truth["c"] * state[1] + friction * np.tanh(state[1] / 2e-3)
-        return np.array([state[1], (now - brake - truth["k"] * state[0]) / truth["m"]])
 
-    place = motion(rate, np.zeros(2), force, 1e-3, 2)[:, 0]
-    found = identify_mechanism(recorded(1e-3, F=force, x=read(place, 0.1 / 2**12, 12)), model.compiled("spring"))
-    warning = found.found.verdict.warning
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_a_dry_friction_that_the_equations_lack_is_named(friction: float) -> None:
+    """It counts as 35 % more viscous friction, 14 standard errors; the residuals are an error of the equation."""
+    warning = spring_answer(spring_run(friction)).found.verdict.warning
     if not friction:
         assert warning is None
     else:
@@ -217,3 +227,18 @@ def test_a_dry_friction_that_the_equations_lack_is_named(friction: float) -> Non
         named = re.search(r"equation 1 seems to lack a friction of x, of about ([0-9.]+)\*sgn\(x\.d\(\)\)", warning)
         assert named is not None and abs(float(named[1]) / friction - 1) < 0.1
         assert "biases c" in warning
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "sentence"),
+    [
+        ("F", 1.0, None),
+        ("F", -1.0, "F seems to have the opposite sign: --columns F=F:-1"),
+        ("x", 1e3, "x seems to be in mm, not m: --columns x=x:mm"),
+        ("F", 0.0, "F is 0 in every sample: is it the column of the drive?"),
+    ],
+)
+def test_a_sign_or_a_unit_that_is_wrong_is_named(name: str, factor: float, sentence: str | None) -> None:
+    run = spring_run()
+    found = spring_answer({**run, name: factor * run[name]})
+    assert advice_on(found) == ((sentence,) if sentence else ())

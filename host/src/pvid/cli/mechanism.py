@@ -142,6 +142,10 @@ def identify_run(
         click.echo(f"figure: {figure}")
     for one in (core.verdict if core is not None else answer.found.verdict).reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
+    from pvid.run.mechanism_advice import advice_on  # for a bad answer
+
+    for sentence in advice_on(answer):
+        write_stderr(f"pvid: advice: {sentence}")
     if not shown.identified:
         reason = f": {core.reason.text}" if core is not None and not core.published else ""
         write_stderr(f"pvid: nothing identified{reason}")

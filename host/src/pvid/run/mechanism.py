@@ -102,6 +102,7 @@ def model_of(rig: MechanismRig) -> CompiledModel:
     return rig.applied(compiled_of(rig.model))
 
 
+@np.errstate(all="ignore")  # what diverges is judged, and told in words
 def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weights = "residuals") -> MechanismAnswer:
     """Parameters of a mechanism from a recording without missing samples.
 
