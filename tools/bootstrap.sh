@@ -329,7 +329,12 @@ build_core() {
 # ---- another user's clone ----
 
 # What somebody else has prepared, root for instance, is used as it is.
-is_ours() { [[ ! -e $build || -w $build && -w $build/log && (! -e $build/.lock || -w $build/.lock) ]]; }
+is_ours() {
+    local part
+    for part in "" /log /.lock; do
+        [[ ! -e $build$part || -w $build$part ]] || return 1
+    done
+}
 
 # use_as_it_is PROFILE: ends the program when something is missing or older than its sources.
 use_as_it_is() {
