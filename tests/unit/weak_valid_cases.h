@@ -6,7 +6,7 @@
 /* A valid design, of tables in `own` that a case may spoil. */
 static void start_again(void);
 
-/* What the core says of the design. */
+/* The status that pvid_weak_valid_f32 or pvid_weak_valid_q31 returns for the design. */
 static pvid_status validity(void);
 
 #define GIVES(change, status)                                                                                          \

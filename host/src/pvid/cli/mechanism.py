@@ -28,6 +28,7 @@ from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.compare import Comparison
 from pvid.run.engine_identify import ALL_ALIKE
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
+from pvid.run.mechanism_advice import advice_on
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
 
@@ -142,8 +143,6 @@ def identify_run(
         click.echo(f"figure: {figure}")
     for one in (core.verdict if core is not None else answer.found.verdict).reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
-    from pvid.run.mechanism_advice import advice_on  # for a bad answer
-
     for sentence in advice_on(answer):
         write_stderr(f"pvid: advice: {sentence}")
     if not shown.identified:

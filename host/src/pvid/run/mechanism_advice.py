@@ -8,20 +8,21 @@ import numpy as np
 
 from pvid.model.compiled import Signal
 from pvid.oracle.weak.choice import score_of
-from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
+from pvid.rig.columns import Columns
+from pvid.rig.mechanism_file import channels_of
 from pvid.run.mechanism import MechanismAnswer
 
 # Residuals over what the sensors explain, above which a mistake is sought.
 _MISFIT = 20.0
 # A mistake is named if the run then leaves less than this part of them, and determines every parameter.
 _PART = 1 / 30
-# By unit: what a column may be in instead, and its factor.
+# By unit: what a column may be in instead, and what to type for it.
 _UNITS = {
-    "rad": (("deg", np.pi / 180), ("rev", 2 * np.pi)),
-    "rad/s": (("deg/s", np.pi / 180),),
-    "m": (("mm", 1e-3), ("cm", 1e-2)),
-    **{unit: ((f"m{unit}", 1e-3),) for unit in ("A", "V", "N")},
+    "rad": {"deg": "deg", "rev": "rev"},
+    "rad/s": {"deg/s": f"{np.pi / 180:.9g}"},
+    "m": {"mm": "mm", "cm": "cm"},
+    **{unit: {f"m{unit}": f"m{unit}"} for unit in ("A", "V", "N")},
 }
 
 
@@ -46,19 +47,21 @@ def _tried(answer: MechanismAnswer) -> Iterator[tuple[float, str]]:
     model, signals, design = ready(answer.model), answer.recording.signals, answer.found.design
     before = score_of(model, signals, design, None, False)
     most = np.inf if before is None or not before.known else _PART * before.chi2
+    channels = channels_of(answer.model)
     for signal in answer.model.signals:
-        if signal.name not in signals:
+        name = signal.name
+        if name not in signals:
             continue
-        for factor, said, unit in _mistakes(signal):
-            changed: dict[str, Float] = {**signals, signal.name: factor * np.asarray(signals[signal.name], np.float64)}
+        for said, unit in _mistakes(signal):
+            typed = f"{name}={name}:{unit}"
+            changed = {**signals, name: Columns.parse(typed, channels)[name].in_si(signals[name])}
             one = score_of(model, changed, design, None, False)
             if one is not None and one.known and one.chi2 < min(most, _MISFIT):
-                yield one.chi2, f"{said}: --columns {signal.name}={signal.name}:{unit}"
+                yield one.chi2, f"{said}: --columns {typed}"
 
 
-def _mistakes(signal: Signal) -> Iterator[tuple[float, str, str]]:
-    """Factor, sentence, and what to type behind the column."""
-    yield -1.0, f"{signal.name} seems to have the opposite sign", "-1"
-    for unit, factor in _UNITS.get(signal.unit, ()):
-        typed = unit if "/" not in unit else f"{factor:.9g}"
-        yield factor, f"{signal.name} seems to be in {unit}, not {signal.unit}", typed
+def _mistakes(signal: Signal) -> Iterator[tuple[str, str]]:
+    """What is said of a signal, and what to type behind its column."""
+    yield f"{signal.name} seems to have the opposite sign", "-1"
+    for unit, typed in _UNITS.get(signal.unit, {}).items():
+        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", typed

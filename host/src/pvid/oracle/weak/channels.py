@@ -300,10 +300,9 @@ class Record:
     def sums(self, functions: TestFunctions) -> Float:
         """(S_0, Re S_1, Im S_1, ...) of every channel and window [channels, windows, 2 H + 1]."""
         plain = [k for k, one in enumerate(self.channels.channels) if one.fold == 0]
-        halves = functions.half_sums(functions.halves(self.gains[plain]))
-        windows = halves.shape[1] - 1
-        out = np.empty((len(self.gains), windows, 2 * functions.highest + 1))
-        out[plain] = functions.joined(halves[:, :-1], halves[:, 1:])
+        of_plain = functions.window_sums(self.gains[plain])
+        out = np.empty((len(self.gains), *of_plain.shape[1:]))
+        out[plain] = of_plain
         for k, one in enumerate(self.channels.channels):
             if one.fold:
                 out[k] = self._integral_sums(k, one.fold, functions)

@@ -165,3 +165,8 @@ class TestFunctions:
         out[..., 1::2] = whole[..., 1:].real
         out[..., 2::2] = whole[..., 1:].imag
         return out
+
+    def window_sums(self, x: Float) -> Float:
+        """(S_0, Re S_1, Im S_1, ...) of every window of samples x [..., n]: [..., windows, 2 H + 1]."""
+        halves = self.half_sums(self.halves(x))
+        return self.joined(halves[..., :-1, :], halves[..., 1:, :])

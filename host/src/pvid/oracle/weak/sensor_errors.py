@@ -179,8 +179,8 @@ class SensorErrors:
         for signal in self.model.signals:
             if signal.kind != "sensor" or signal.driven or Jet(signal.name, 1) in known or signal.name not in self.run:
                 continue
-            halves = functions.half_sums(functions.halves(np.sign(filtered(self.run[signal.name], rate))[grid.places]))
-            whole = functions.joined(halves[:-1], halves[1:]) @ functions.combine(0)
+            turns = np.sign(filtered(self.run[signal.name], rate))[grid.places]
+            whole = functions.window_sums(turns) @ functions.combine(0)
             for kind, row in enumerate(self.model.rows):
                 change = [np.zeros((self.fit.rows.windows, functions.count)) for _ in self.model.rows]
                 change[kind] = whole[self.fit.rows.numbers]

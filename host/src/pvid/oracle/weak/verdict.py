@@ -277,8 +277,7 @@ def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
     chi = functions.combine(0)
 
     def sums(x: Float) -> Float:
-        halves = functions.half_sums(functions.halves(x))
-        return np.asarray((functions.joined(halves[:-1], halves[1:]) @ chi)[rows.numbers].reshape(-1))
+        return np.asarray((functions.window_sums(x) @ chi)[rows.numbers].reshape(-1))
 
     outputs = [np.ones(grid.size)]
     for one in model.signals:
