@@ -105,11 +105,17 @@ def native() -> Native:
 
 
 @pytest.fixture(scope="session")
-def matrix() -> dict[str, Native]:
-    """The core at -O0, -O2 and -O3 by gcc and by clang, by name (gcc-O0 ...)."""
-    done = subprocess.run([ROOT / "tools" / "build-matrix"], capture_output=True, text=True, check=False)
+def matrix(request: pytest.FixtureRequest, native: Native) -> dict[str, Native]:
+    """The core by gcc and by clang, by name (gcc-O2 ...): as it is shipped and at -O3; in the long form at all levels."""
+    names = ["gcc-O3", "clang-O3"]
+    if request.config.getoption("--long"):
+        names += ["gcc-O0", "clang-O0", "clang-O2"]
+    command = [ROOT / "tools" / "build-matrix", *names]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return {Path(line).parent.name: Native(Path(line)) for line in done.stdout.splitlines()}
+    built = {Path(line).parent.name: Native(Path(line)) for line in done.stdout.splitlines()}
+    assert list(built) == names
+    return {"gcc-O2": native, **built}
 
 
 @pytest.fixture(scope="session")

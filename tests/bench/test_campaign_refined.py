@@ -37,8 +37,12 @@ def recorded(native: Native, rig: RandomRig) -> SimulatedRig:
 @pytest.mark.parametrize(
     ("imperfections", "found"),
     [
-        ({"dry": (_DRY, _DRY)}, {"f1": _DRY / _PENDULUM.l1**2, "f2": _DRY / _PENDULUM.l1**2}),
-        ({"backlash": 4e-3}, {"play": 2e-3}),
+        pytest.param(
+            {"dry": (_DRY, _DRY)},
+            {"f1": _DRY / _PENDULUM.l1**2, "f2": _DRY / _PENDULUM.l1**2},
+            marks=pytest.mark.long,
+        ),
+        pytest.param({"backlash": 4e-3}, {"play": 2e-3}, marks=pytest.mark.long),
         ({"dry": (_DRY, _DRY), "backlash": 4e-3}, {"f2": _DRY / _PENDULUM.l1**2, "play": 2e-3}),
     ],
     ids=["dry friction", "a play", "both"],

@@ -124,7 +124,7 @@ def test_a_gain_that_is_no_number_is_refused(masses: Case) -> None:
     ("name", "ticks"),
     [
         ("dc_motor", 2500),  # an input that is held for a step, an angle without whole turns, two outputs
-        ("cart_pendulum", 3600),  # an input that is held within a step
+        pytest.param("cart_pendulum", 3600, marks=pytest.mark.long),  # an input that is held within a step
         ("two_mass_drive", 1700),  # a hidden coordinate
         ("battery_2rc", 6800),  # the integral of an input, relaxations, an output by an algebraic equation
     ],

@@ -23,7 +23,7 @@ TICKS = 2500
     ("board", "name"),
     [
         ("mps2-an386", "cart_pendulum"),
-        ("virt-rv32imac", "battery_2rc"),
+        pytest.param("virt-rv32imac", "battery_2rc", marks=pytest.mark.long),
         *(pytest.param("mps2-an386", name, marks=pytest.mark.long) for name in mechanisms.names()),
         *(pytest.param(board, "two_link_arm", marks=pytest.mark.long) for board in ("mps3-an547", "virt-rv32imafc")),
     ],

@@ -91,7 +91,7 @@ def sources() -> Path:
     "name",
     [
         "microbit",
-        "mps2-an386",
+        pytest.param("mps2-an386", marks=pytest.mark.long),
         pytest.param("mps3-an547", marks=pytest.mark.long),
         pytest.param("virt-rv32imac", marks=pytest.mark.long),
     ],

@@ -17,7 +17,7 @@ TIMEOUT_S = 60.0
     [
         ("rigid_body", 4500, "mps2-an386"),  # of order 1, steps of Adams
         ("dc_motor", 3000, "mps2-an386"),  # sharp friction, steps of Runge-Kutta
-        ("dc_motor", 2400, "mps2-an385"),  # without a floating point unit
+        pytest.param("dc_motor", 2400, "mps2-an385", marks=pytest.mark.long),  # without a floating point unit
     ],
 )
 def test_a_board_refines_a_mechanism_with_the_bits_of_this_computer(name: str, ticks: int, board: str) -> None:

@@ -46,7 +46,7 @@ def run() -> Run:
 @every_case
 def test_the_core_equals_its_twin(case: Case, law: str, native: Native, run: Run) -> None:
     rig = rig_with(form=case.form, dead_zone=1.5, forgetting_s=4.0, **LAWS[law])
-    phi, y = (x[:1400] for x in case.samples(rig, run))
+    phi, y = (x[:900] for x in case.samples(rig, run))
     (lane,) = assert_lanes_equal([native], case.settings(rig, 1000.0), phi, y)
     assert lane.counters["at_rest"] > 0 or law == "paper"  # whose F does not decay
 
