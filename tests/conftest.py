@@ -106,7 +106,7 @@ def native() -> Native:
 
 @pytest.fixture(scope="session")
 def matrix(request: pytest.FixtureRequest, native: Native) -> dict[str, Native]:
-    """The core by gcc and by clang, by name (gcc-O2 ...): as it is shipped and at -O3; in the long form at all levels."""
+    """The core by compiler and level (gcc-O2 ...): as it is shipped, and at -O3; in the long form at all levels."""
     names = ["gcc-O3", "clang-O3"]
     if request.config.getoption("--long"):
         names += ["gcc-O0", "clang-O0", "clang-O2"]
