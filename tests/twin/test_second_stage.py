@@ -77,7 +77,10 @@ def test_the_twin_has_the_bits_of_a_first_order_model() -> None:
     assert Reason.UPDATED in record.told
 
 
-@pytest.mark.parametrize(("options", "ticks"), [(("slant",), 10_000), (("dry_friction", "slant"), 7000)])
+@pytest.mark.parametrize(
+    ("options", "ticks"),
+    [(("dry_friction", "slant"), 7000), pytest.param(("slant",), 10_000, marks=pytest.mark.long)],
+)
 def test_the_twin_has_the_bits_of_the_pendulum_with_options(options: tuple[str, ...], ticks: int) -> None:
     """Dry friction of hidden angles, a skew and derived inputs, with steps of Runge-Kutta."""
     run = refined_pendulum(ticks, BOARDS["mps2-an386"], options)
