@@ -47,14 +47,10 @@ GCC = {  # by family: the compiler, and what it needs to be told of the processo
 }
 PLATFORMS = {"host": "unix64", "cortex_m": "unix32", "riscv": "unix32", "avr": "avr8"}  # cppcheck's
 
-# cppcheck reads a source once for every set of macros that it or a header asks for, which takes MISRA's rules half a
-# second each. All are read without these; with them besides the sources that name one, and those of WHOLE, which
-# include the headers that do.
-HIDDEN = (
-    *("__GNUC__", "__clang__", "__AVR__"),
-    *("__ARM_ARCH_6M__", "__ARM_FEATURE_CLZ", "__ARM_SIZEOF_MINIMAL_ENUM"),
-)
-WHOLE = ("weak_step_f32.c", "integer_q31.c")
+# cppcheck reads a source once for every set of macros that it or a header chooses by, which takes MISRA's rules half a
+# second each. Headers choose alike for every source: all are read with the macros that they choose by themselves, under
+# the names that they use (pvid/sized.h), and these, which include every header that chooses, once more with all macros.
+WHOLE = ("values_q31.c", "weak_step_f32.c", "strong_f32.c", "strong_q31.c")
 FEWER_PATHS = ("-Xclang", "-analyzer-config", "-Xclang", "max-nodes=75000")  # of 225000, of each function
 UNUSED = ("2.3", "2.4", "2.5")  # MISRA's rules of what a program never uses: of some sources they say nothing
 PACKAGES = {
@@ -169,14 +165,8 @@ def clang_tidy(unit: Unit, quick: bool) -> set[Finding]:
     )
 
 
-def depends(unit: Unit) -> bool:
-    """Whether it is read with the hidden macros, too."""
-    text = unit.source.read_text(encoding="utf-8")
-    return unit.source.name in WHOLE or any(macro in text for macro in HIDDEN)
-
-
-def cppcheck(alike: list[Unit], hidden: tuple[str, ...] = HIDDEN) -> set[Finding]:
-    """Of sources with the same options, read without the hidden macros.
+def cppcheck(alike: list[Unit], whole: bool = False) -> set[Finding]:
+    """Of sources with the same options; whole: with the macros that headers choose by, too.
 
     MISRA's rules have the tool's name "misra": their texts are not free, so that a number is all there is.
     """
@@ -184,7 +174,7 @@ def cppcheck(alike: list[Unit], hidden: tuple[str, ...] = HIDDEN) -> set[Finding
     options = [option for option in first.common if option.startswith(("-I", "-D"))]
     # cppcheck keeps a file's findings while its preprocessed text stays; lines of comments in headers are not in it.
     headers = "\n".join(path.read_text(encoding="utf-8") for path in sorted(FIRMWARE.rglob("*.h")))
-    folder = BUILD / hashlib.sha256("\n".join([first.machine, *options, *hidden, headers]).encode()).hexdigest()[:8]
+    folder = BUILD / hashlib.sha256("\n".join([first.machine, *options, str(whole), headers]).encode()).hexdigest()[:8]
     folder.mkdir(parents=True, exist_ok=True)
     checks = [
         "--std=c99",
@@ -195,8 +185,9 @@ def cppcheck(alike: list[Unit], hidden: tuple[str, ...] = HIDDEN) -> set[Finding
         f"--platform={PLATFORMS[first.machine]}",
         f"-j{os.cpu_count() or 1}",
     ]
-    # A macro that a user may define as the name of a header; cppcheck would invent a value for it.
-    checks += [f"-U{macro}" for macro in ("PVID_CONFIG_HEADER", *hidden)]
+    checks += ["-UPVID_CONFIG_HEADER"]  # the name of a user's header; cppcheck would invent a value for it
+    if not whole and not any(option.startswith("-D") for option in options):  # with definitions it reads once anyhow
+        checks += ["-DPVID_PLAIN_NAMES", "--force", f"--config-exclude={FIRMWARE}/"]
     checks += [f"--cppcheck-build-dir={folder}"]
     template = "--template={file}:{line}:{id}:{message}"
     output = run(["cppcheck", *checks, template, *options, *(str(unit.source) for unit in alike)])
@@ -211,9 +202,9 @@ def cppcheck(alike: list[Unit], hidden: tuple[str, ...] = HIDDEN) -> set[Finding
 
 
 def with_all_macros(alike: list[Unit]) -> set[Finding]:
-    """Of those among sources with the same options that are read with the hidden macros, too."""
-    these = [unit for unit in alike if depends(unit)]
-    found = cppcheck(these, ()) if these else set()
+    """Of those of WHOLE among sources with the same options."""
+    these = [unit for unit in alike if unit.source.name in WHOLE]
+    found = cppcheck(these, whole=True) if these else set()
     return {one for one in found if one.rule not in UNUSED}
 
 

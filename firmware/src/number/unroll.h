@@ -42,7 +42,7 @@
 
 /* A condition that nearly every tick meets: gcc keeps the other case out of its way. */
 #if defined(__GNUC__)
-#define PVID_USUALLY(condition) __builtin_expect((condition), true)
+#define PVID_USUALLY(condition) (__builtin_expect((condition), true) != 0)
 #else
 #define PVID_USUALLY(condition) (condition)
 #endif
