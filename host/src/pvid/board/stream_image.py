@@ -12,9 +12,10 @@ import numpy as np
 
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import StreamRig
-from pvid.core.host_compiler import objects_of, run_compiler
-from pvid.core.sizes import raised, roomy
-from pvid.core.sources import FIRMWARE, FOLDERS, core_sources, left_out
+from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
+from pvid.core.model_library import core_options, of_second_stage
+from pvid.core.sizes import roomy
+from pvid.core.sources import FIRMWARE, core_sources, left_out
 from pvid.design.c_tables import float_literal
 from pvid.link.frames import Configuration, Source
 from pvid.link.names import names_of
@@ -177,7 +178,7 @@ def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
 
 
 def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
-    """With the options of the core (firmware/cmake/PvidCompile.cmake); without what it does not link. This computer has
+    """Compiled like a mechanism's library (pvid.core.model_library); without what it does not link. This computer has
     the memory for larger arrays than needed, with which most images are linked from the same objects."""
     application = FIRMWARE / "apps" / "stream"
     needless = re.compile(made.left_out)
@@ -193,19 +194,24 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
     inputs = [*core, *sources, *folder.glob("**/*.h"), *FIRMWARE.glob("**/*.h")]
     if image.exists() and image.stat().st_mtime > max(one.stat().st_mtime for one in inputs):
         return image
-    includes = [*FOLDERS, FIRMWARE / "link", FIRMWARE / "ports"]
-    options = ["-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", f'-DPVID_BOARD_NAME="{HOST}"']
-    sizes = raised(roomy({name: int(value) for name, value in made.sizes.items()}))
-    options += [f"-D{name}={value}" for name, value in sizes.items()] + [f"-I{one}" for one in includes]
+    compiler = host_compiler("a board that this computer plays")
+    sizes = roomy({name: int(value) for name, value in made.sizes.items()})
+    options = core_options(f"-D{name}={value}" for name, value in sizes.items())
     tree.mkdir(parents=True, exist_ok=True)
     rig = tree / "rig"  # by the same name in every tree, so that ccache finds the objects of another without reading
     if not rig.is_symlink():
         rig.symlink_to(folder)
-    own = [f"-I{rig.name}", *options]
-    # The same of every rig with these sizes, but for the second stage, whose shape stands before the core's header.
-    objects = objects_of("gcc", own if made.refined else options, core, tree)
-    objects += objects_of("gcc", own, sources, tree)
+    own = [
+        f"-I{rig.name}",
+        *options,
+        *(f"-I{FIRMWARE / one}" for one in ("link", "ports")),
+        f'-DPVID_BOARD_NAME="{HOST}"',
+    ]
+    # The core is the same of every rig with these sizes, but for the second stage, whose shape is the rig's.
+    shaped = [one for one in core if made.refined and of_second_stage(one)]
+    objects = objects_of(compiler, options, [one for one in core if one not in shaped], tree)
+    objects += objects_of(compiler, own, [*shaped, *sources], tree)
     fresh = tree / "stream.new"
-    run_compiler(["gcc", *objects, "-lm", "-o", str(fresh)])
+    run_compiler([compiler, *objects, "-lm", "-o", str(fresh)])
     fresh.replace(image)
     return image

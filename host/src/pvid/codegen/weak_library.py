@@ -7,7 +7,7 @@ from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.model_library import model_library
-from pvid.core.sizes import raised, roomy
+from pvid.core.sizes import roomy
 from pvid.core.weak_native import WeakNative
 from pvid.model.compiled import CompiledModel
 from pvid.settings.weak import WeakDesign32
@@ -33,4 +33,4 @@ def weak_native(
     if refine is not None:
         texts["pvid/refine_shape.h"] = files_refine.shape(refine, "identification")
         texts["refine_model_f32.h"] = files_refine.header(refine, "identification")
-    return WeakNative(made.name, model_library(made.name, texts, raised(roomy(needed))))
+    return WeakNative(made.name, model_library(made.name, texts, roomy(needed)))

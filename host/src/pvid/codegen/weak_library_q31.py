@@ -6,7 +6,7 @@ from pvid.codegen import files_weak_q31
 from pvid.codegen.parameters_q31 import ParametersQ31
 from pvid.codegen.weak_q31 import FixedWeak
 from pvid.core.model_library import model_library
-from pvid.core.sizes import raised
+from pvid.core.sizes import roomy
 from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.settings.engine_cores import FIXED
 from pvid.settings.weak_q31 import WeakConfigQ31
@@ -34,4 +34,4 @@ def weak_native_q31(made: FixedWeak, parameters: ParametersQ31, config: WeakConf
         "configuration.h": f'#include "pvid/weak_q31.h"\nextern const pvid_weak_config_q31 *{name}_settings_q31;\n',
     }
     headers = ("configuration.h",)
-    return WeakNativeQ31(name, model_library(name, texts, raised(needed), FIXED, headers), config)
+    return WeakNativeQ31(name, model_library(name, texts, roomy(needed), FIXED, headers), config)

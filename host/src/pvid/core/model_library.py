@@ -74,6 +74,16 @@ def core_of(engine: EngineCore, refined: bool) -> list[Path]:
     return [*kept, *(NATIVE / f"{name}.c" for name in replays)]
 
 
+def of_second_stage(source: Path) -> bool:
+    """Whether a source or an object of the core depends on the shape of the mechanism's second stage."""
+    return "refine" in source.stem
+
+
+def core_options(definitions: Iterable[str]) -> list[str]:
+    """The compiler's for the core on this computer: with the same ones ccache finds the objects of another program."""
+    return [*_FLAGS, *definitions, *INCLUDES]
+
+
 @cache
 def _core_hash() -> str:
     """Of everything in the core that may be compiled or included."""
@@ -96,20 +106,20 @@ def _build(
     """Whole or not at all: several processes may build the same."""
     with tempfile.TemporaryDirectory(dir=library.parent.parent) as made:
         # Its name is that of the headers in it, and the options have no other path of here: ccache finds the objects
-        # of another mechanism, but for headers that one of these stands before (pvid/refine_shape.h).
+        # of another mechanism, but for those of the second stage, whose shape is one of these (pvid/refine_shape.h).
         headers_here = sorted(name for name in texts if name.endswith(".h"))
         folder = Path(made) / hashlib.sha256("\0".join(headers_here).encode()).hexdigest()[:8]
         folder.mkdir()
         for name, text in texts.items():
             (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")
-        options = [*_FLAGS, *definitions, f"-I{folder.name}", *INCLUDES, f"-I{NATIVE}"]
+        options = [f"-I{folder.name}", *core_options(definitions), f"-I{NATIVE}"]
         code = [folder / name for name in sorted(texts) if name.endswith(".c")]
+        core = _core_objects(compiler, definitions, engine, library.parent.parent)
         if _REFINED in texts:
-            objects = objects_of(compiler, options, [*code, *core_of(engine, True)], Path(made))
-        else:
-            objects = objects_of(compiler, options, code, Path(made))
-            objects += _core_objects(compiler, definitions, engine, library.parent.parent)
+            core = [one for one in core if not of_second_stage(Path(one))]
+            code += [one for one in core_of(engine, True) if of_second_stage(one)]
+        objects = [*core, *objects_of(compiler, options, code, Path(made))]
         run_compiler([compiler, "-shared", *objects, "-o", str(folder / library.name), "-lm"])
         declared = _declarations(compiler, headers, options, Path(made), engine)
         (folder / HEADERS).write_text(declared, encoding="utf-8")
@@ -131,8 +141,7 @@ def _core_objects(compiler: str, definitions: list[str], engine: EngineCore, cac
             with tempfile.TemporaryDirectory(dir=cache_folder) as made:
                 folder = Path(made) / "objects"
                 folder.mkdir()
-                options = [*_FLAGS, *definitions, *INCLUDES, f"-I{NATIVE}"]
-                objects_of(compiler, options, sources, folder)
+                objects_of(compiler, core_options(definitions), sources, folder)
                 folder.rename(place)
     return sorted(map(str, place.glob("*.o")))
 

@@ -47,5 +47,8 @@ def raised(needed: Mapping[str, int]) -> dict[str, int]:
 
 
 def roomy(needed: Mapping[str, int]) -> dict[str, int]:
-    """The same or more, of few kinds: designs of several recordings share a build, which takes seconds to compile."""
-    return {macro: _STEPS.get(macro, 1) * -(-size // _STEPS.get(macro, 1)) for macro, size in needed.items()}
+    """For this computer, those that exceed the defaults: what is needed or more, of few kinds, by name. Libraries and
+    stream programs of several designs are then linked from the same objects, which take seconds to compile."""
+    wanted = {**{macro: default_sizes()[macro] for macro in _STEPS}, **needed}
+    sizes = {macro: _STEPS.get(macro, 1) * -(-size // _STEPS.get(macro, 1)) for macro, size in wanted.items()}
+    return dict(sorted(raised(sizes).items()))
