@@ -103,7 +103,7 @@ TAKEN_OF_STRONG_SUMS = (*("pvid_kapitza_project_q31", "pvid_kapitza_exponents_q3
 PROOFS = (
     Proof(
         "integer_q31",
-        "every function, every argument, an octave of magnitudes at a time",
+        "every function, every argument",
         ("src/number/integer_q31.c",),
         ("-eva-auto-loop-unroll", "200", "-eva-min-loop-unroll", "33"),
     ),

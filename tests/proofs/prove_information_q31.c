@@ -66,8 +66,9 @@ void main(void)
 {
     pvid_model_q31 model = {.n_theta = PVID_MAX_THETA_Q31};
     for (uint32_t groups = 4; groups < 1024u; groups++) { /* where the block depends on them */
-        pvid_information_init_q31(&sums, &model, groups, 65536);
-        /*@ assert 0 < sums.retention; */
+        uint16_t block;
+        const int32_t retention = pvid_information_retention_q31(groups, &block);
+        /*@ assert 0 < retention && 1 <= block <= 64; */
     }
     pvid_information_init_q31(&sums, &model, any_u32(1024, (uint32_t)1 << 24), 65536);
     for (uint8_t n_theta = 1; n_theta <= PVID_MAX_THETA_Q31; n_theta++) {

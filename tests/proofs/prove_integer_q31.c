@@ -1,4 +1,4 @@
-/* integer_q31: every argument that integer_q31.h allows, magnitudes an octave at a time, both signs, all shifts. */
+/* integer_q31: every argument that integer_q31.h allows, both signs, all shifts. */
 #include "prove.h"
 
 #include "contracts.h"
@@ -20,12 +20,37 @@ static void any_length(uint32_t bits, bool negative)
     const int64_t x = of_bits(bits, negative);
     const uint32_t length = pvid_bit_length_q31(pvid_magnitude_q31(x));
     /*@ assert length == bits; */
-    for (int32_t s = -64; s <= 64; s++) {
-        const int64_t y = pvid_scale_q31(x, s);
-        /*@ assert -0x4000000000000000 <= y <= 0x4000000000000000; */
-    }
     const int64_t product = pvid_times_q31(x, any_i32(-INT32_MAX, INT32_MAX));
     /*@ assert -0x4000000000000000 <= product <= 0x4000000000000000; */
+}
+
+static void any_scaled(int64_t x, int32_t s)
+{
+    const int64_t y = pvid_scale_q31(x, s);
+    /*@ assert -0x4000000000000000 <= y <= 0x4000000000000000; */
+}
+
+/* Of both signs. */
+static void any_between(int64_t low, int64_t high, int32_t s)
+{
+    if (low <= high) {
+        any_scaled(any_i64(low, high), s);
+        any_scaled(any_i64(-high, -low), s);
+    }
+}
+
+/* Every number within PVID_WIDE, parted where a shift to the left begins to saturate, and at 2^31, below which the
+ * contract promises more. */
+static void any_shift(int32_t s)
+{
+    const int64_t saturates = (s >= 0) ? PVID_WIDE : ((s < -62) ? 1 : (PVID_WIDE >> -s));
+    const int64_t narrow = (int64_t)1 << 31;
+    const int64_t first = (saturates < narrow) ? saturates : narrow;
+    const int64_t second = (saturates < narrow) ? narrow : saturates;
+    any_scaled(0, s);
+    any_between(1, first - 1, s);
+    any_between(first, second - 1, s);
+    any_between(second, PVID_WIDE, s);
 }
 
 static void any_far_shift(int64_t x)
@@ -64,8 +89,7 @@ void main(void)
     any_far_shift(any_i64(PVID_WIDE + 1, INT64_MAX - 1));
     any_far_shift(any_i64(-INT64_MAX, -PVID_WIDE - 1));
     for (int32_t s = -64; s <= 64; s++) {
-        (void)pvid_scale_q31(PVID_WIDE, s);
-        (void)pvid_scale_q31(-PVID_WIDE, s);
+        any_shift(s);
         (void)pvid_scale_q31(any_i64(PVID_WIDE + 1, INT64_MAX - 1), s);
         (void)pvid_scale_q31(any_i64(-INT64_MAX, -PVID_WIDE - 1), s);
     }
