@@ -250,9 +250,9 @@ def executed(line: str, folder: Path, full: bool) -> Printed:
         line = line if full else short_form(line)
         with contextlib.chdir(folder):
             return pvid(shlex.split(re.sub(*ON_THIS_COMPUTER, line))[1:])
-    # Three pages build the same package, each in a folder of its own.
-    once = {**compiled_once(), "CCACHE_BASEDIR": str(folder)}
-    if shutil.which("ccache"):
+    # Three pages build the same package, each in a folder of its own; without optimisation, which changes no bit.
+    once = {**compiled_once(), "CCACHE_BASEDIR": str(folder), "CMAKE_BUILD_TYPE": "None"}
+    if shutil.which("ccache") and "--preset" not in line:  # a board's objects are those of one page alone
         once["CMAKE_C_COMPILER_LAUNCHER"] = "ccache"
     pipe = subprocess.PIPE
     done = subprocess.run(

@@ -14,6 +14,7 @@ from pathlib import Path
 import pyarrow.parquet
 import pytest
 from processes import heed_interrupts
+from program import pvid
 
 from bench.campaign.judge import COLUMNS, Record, identify_rig
 from bench.campaign.population import parse
@@ -42,7 +43,7 @@ def command(*arguments: str | Path) -> list[str]:
 
 
 def called(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(*arguments), capture_output=True, text=True, check=False)
+    return pvid(Path.cwd(), "campaign", *arguments)
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from pvid.core.sources import public_headers
 CONSUMER = ROOT / "tests" / "consumer"
 SOURCES = ("CMakeLists.txt", "LICENSE", "firmware")  # all that a user's build needs
 QUICK = "-DCMAKE_BUILD_TYPE=None"  # no optimisation: how it is linked is not changed by that, nor a bit
+LINKED = "-DPVID_LEAVE_OUT=refine|snapshot|fingerprint"  # what no consumer links; `prefix` has all of the core
 HARMONICS = 17  # not the default: the definition must reach whoever links the library
 
 
@@ -42,7 +43,7 @@ def built(build: Path, *options: str) -> list[str]:
 
 def install(prefix: Path, build: Path, *options: str) -> None:
     call(
-        *("cmake", "-S", ROOT, "-B", build, "-G", "Ninja", f"-DCMAKE_INSTALL_PREFIX={prefix}"),
+        *("cmake", "-S", ROOT, "-B", build, "-G", "Ninja", QUICK, f"-DCMAKE_INSTALL_PREFIX={prefix}"),
         *("-DPVID_BUILD_TESTS=OFF", "-DPVID_BUILD_NATIVE=OFF", *options),
     )
     call("ninja", "-C", build, "install")
@@ -67,11 +68,7 @@ class Printed:
 def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A tree that pvid was installed into, and that was moved since."""
     folder = tmp_path_factory.mktemp("installed")
-    install(
-        folder / "first",
-        folder / "build",
-        f"-DPVID_MAX_HARMONICS={HARMONICS}",
-    )
+    install(folder / "first", folder / "build", f"-DPVID_MAX_HARMONICS={HARMONICS}")
     shutil.rmtree(folder / "build")
     return (folder / "first").rename(folder / "moved here")
 
@@ -112,7 +109,7 @@ def test_fetch_content(by_package: list[str], tmp_path: Path) -> None:
             file.add(ROOT / name, f"pvid-1/{name}")
     url = archive.as_uri()
     printed = built(
-        *(tmp_path / "build", QUICK, "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}"),
+        *(tmp_path / "build", QUICK, LINKED, "-DPVID_BY=FetchContent", f"-DPVID_ARCHIVE={url}"),
         f"-DPVID_MAX_HARMONICS={HARMONICS}",
     )
     assert printed == by_package
@@ -122,7 +119,7 @@ def test_add_subdirectory(by_package: list[str], tmp_path: Path) -> None:
     for name in SOURCES:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
-    options = (QUICK, "-DPVID_BY=add_subdirectory", f"-DPVID_SOURCES={tmp_path}")
+    options = (QUICK, LINKED, "-DPVID_BY=add_subdirectory", f"-DPVID_SOURCES={tmp_path}")
     printed = Printed.of(built(tmp_path / "build", *options)[0])
     assert printed.harmonics == 13  # the default
     assert printed.hash == Printed.of(by_package[0]).hash  # sizes change no bit
@@ -171,7 +168,7 @@ def test_a_header_of_sizes_travels_too(tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "my_sizes.h").write_text("#define PVID_MAX_HARMONICS 19\n", encoding="utf-8")
-    options = (QUICK, "-DPVID_CONFIG_HEADER=my_sizes.h", f"-DCMAKE_C_FLAGS=-I{mine}")
+    options = (LINKED, "-DPVID_CONFIG_HEADER=my_sizes.h", f"-DCMAKE_C_FLAGS=-I{mine}")
     install(tmp_path / "prefix", tmp_path / "build", *options)
     compiled = tmp_path / "consumer"
     both = flags(tmp_path / "prefix", "--cflags", "--libs")

@@ -30,6 +30,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
             if (ROOT / name).exists():
                 shutil.copy(ROOT / name, place / "source" / name)
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index", "--no-build-isolation"]
+    command += ["--config-settings", "cmake.build-type=None"]  # no optimisation, which changes no bit
     subprocess.run([*command, "-w", str(place), str(place / "source" / "host")], check=True, cwd=place)
     (found,) = place.glob("*.whl")
     return found
@@ -98,19 +99,29 @@ def run(python: Path, code: str, folder: Path) -> str:
     return done.stdout
 
 
+def commands(*lines: str) -> str:
+    """Code that executes command lines of pvid, one after the other."""
+    return f"""import sys
+from pvid.cli.main import main
+for words in {[line.split() for line in lines]}:
+    sys.argv[1:] = words
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code
+"""
+
+
 def test_the_installed_package_compares_its_own_core_with_the_twin(bare: Path, tmp_path: Path) -> None:
-    main = "import sys; from pvid.cli.main import main; sys.argv[1:] = {!r}; main()"
-    run(bare, main.format(["simulate", "run.csv", "--duration", "8"]), tmp_path)
-    assert "equal" in run(bare, main.format(["compare", "run.csv"]), tmp_path)
+    assert "equal" in run(bare, commands("simulate run.csv --duration 8", "compare run.csv"), tmp_path)
 
 
 def test_a_mechanism_is_compiled_with_the_sources_in_the_wheel(
     bare: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    main = "import sys; from pvid.cli.main import main; sys.argv[1:] = {!r}; main()"
-    run(bare, main.format(["model", "simulate", "dc_motor", "motor.csv", "--duration", "10"]), tmp_path)
-    told = run(bare, main.format(["identify", "motor.csv", "--core", "f32", "--json"]), tmp_path)
+    made, asked = "model simulate dc_motor motor.csv --duration 10", "identify motor.csv --core f32 --json"
+    told = run(bare, commands(made, asked), tmp_path)
     assert '"identified": true' in told
     assert list((tmp_path / "cache" / "pvid").glob("cache/models/dc_motor*")) or (tmp_path / "cache").exists()
 
@@ -118,9 +129,8 @@ def test_a_mechanism_is_compiled_with_the_sources_in_the_wheel(
 def test_without_termios_every_command_but_the_link_works(bare: Path, tmp_path: Path) -> None:
     """As on Windows."""
     block = "import sys; sys.modules['termios'] = None; sys.modules['fcntl'] = sys.modules['resource'] = None\n"
-    main = "from pvid.cli.main import main; sys.argv[1:] = ['simulate', 'run.csv', '--duration', '8']; main()"
-    run(bare, block + main, tmp_path)
-    assert "g = 9." in run(bare, block + "import pvid; print(pvid.identify('run.csv'))", tmp_path)
+    asked = "import pvid; print(pvid.identify('run.csv'))"
+    assert "g = 9." in run(bare, block + commands("simulate run.csv --duration 8") + asked, tmp_path)
 
 
 def test_a_missing_extra_is_named(bare: Path, tmp_path: Path) -> None:
@@ -131,10 +141,17 @@ def test_a_missing_extra_is_named(bare: Path, tmp_path: Path) -> None:
     assert done.returncode == 2 and "pip install 'pvid[plot]'" in done.stderr and "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("python", interpreters(), ids=lambda path: f"python{_version(path)}")
+@pytest.mark.parametrize(
+    "python",
+    [
+        pytest.param(python, id=f"python{_version(python)}", marks=[pytest.mark.long] * (0 < place < len(found) - 1))
+        for found in [interpreters()]
+        for place, python in enumerate(found)
+    ],
+)
 def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel: Path, tmp_path: Path) -> None:
     """By pip, into an environment of its own that finds the dependencies in another one: for the version that the tests
-    themselves run in, in theirs."""
+    themselves run in, in theirs. The oldest and the newest; those between them in the long form."""
     version = _version(python)
 
     def make(folder: Path) -> None:
