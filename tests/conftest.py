@@ -110,7 +110,7 @@ def matrix(request: pytest.FixtureRequest, native: Native) -> dict[str, Native]:
     names = ["gcc-O3", "clang-O3"]
     if request.config.getoption("--long"):
         names += ["gcc-O0", "clang-O0", "clang-O2"]
-    command = [ROOT / "tools" / "build-matrix", *names]
+    command = [str(ROOT / "tools" / "build-matrix"), *names]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     built = {Path(line).parent.name: Native(Path(line)) for line in done.stdout.splitlines()}
