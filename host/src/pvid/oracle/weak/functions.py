@@ -119,18 +119,8 @@ class TestFunctions:
     def overlap(self, first: int, second: int) -> Float:
         """The same over the half that two neighbours share: chi^(first) of the earlier, chi^(second) of the later."""
         if (first, second) not in self._overlaps:
-            self._overlaps[first, second] = np.real(self._earlier(first) @ self._rated(second))
+            self._overlaps[first, second] = np.real(self._rated(first).T @ self._shared @ self._rated(second))
         return self._overlaps[first, second]
-
-    def _earlier(self, order: int) -> Complex:
-        """chi^(order) of the earlier neighbour, summed over the shared half with each harmonic of the later one."""
-        if order not in self._earlier_ones:
-            self._earlier_ones[order] = self._rated(order).T @ self._shared
-        return self._earlier_ones[order]
-
-    @cached_property
-    def _earlier_ones(self) -> dict[int, Complex]:
-        return {}
 
     @cached_property
     def _overlaps(self) -> dict[tuple[int, int], Float]:
