@@ -14,7 +14,7 @@ from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.board.stream_rig import StreamRig
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.model_library import core_options, of_second_stage
-from pvid.core.sizes import roomy
+from pvid.core.sizes import options_of, roomy
 from pvid.core.sources import FIRMWARE, core_sources, left_out
 from pvid.design.c_tables import float_literal
 from pvid.link.frames import Configuration, Source
@@ -196,7 +196,7 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
         return image
     compiler = host_compiler("a board that this computer plays")
     sizes = roomy({name: int(value) for name, value in made.sizes.items()})
-    options = core_options(f"-D{name}={value}" for name, value in sizes.items())
+    options = core_options(options_of(sizes))
     tree.mkdir(parents=True, exist_ok=True)
     rig = tree / "rig"  # by the same name in every tree, so that ccache finds the objects of another without reading
     if not rig.is_symlink():
@@ -208,9 +208,8 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
         f'-DPVID_BOARD_NAME="{HOST}"',
     ]
     # The core is the same of every rig with these sizes, but for the second stage, whose shape is the rig's.
-    shaped = [one for one in core if made.refined and of_second_stage(one)]
-    objects = objects_of(compiler, options, [one for one in core if one not in shaped], tree)
-    objects += objects_of(compiler, own, [*shaped, *sources], tree)
+    objects = objects_of(compiler, options, [one for one in core if not of_second_stage(one)], tree)
+    objects += objects_of(compiler, own, [*filter(of_second_stage, core), *sources], tree)
     fresh = tree / "stream.new"
     run_compiler([compiler, *objects, "-lm", "-o", str(fresh)])
     fresh.replace(image)

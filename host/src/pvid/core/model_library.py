@@ -15,6 +15,7 @@ from filelock import FileLock
 
 from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
+from pvid.core.sizes import options_of
 from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
 from pvid.settings.engine_cores import FLOAT, EngineCore
 
@@ -49,7 +50,7 @@ def model_library(
         When there is no compiler, or it refuses the code.
     """
     compiler = host_compiler(_WHAT)
-    definitions = [f"-D{macro}={size}" for macro, size in sorted(sizes.items())]
+    definitions = options_of(sizes)
     key = hashlib.sha256("\0".join([compiler, *_FLAGS, *definitions, _core_hash(), *_flat(texts)]).encode())
     folder = build_folder() / "cache" / "models" / f"{name}-{engine.name}-{key.hexdigest()[:20]}"
     library = folder / f"lib{name}.so"

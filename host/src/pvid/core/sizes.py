@@ -47,8 +47,13 @@ def raised(needed: Mapping[str, int]) -> dict[str, int]:
 
 
 def roomy(needed: Mapping[str, int]) -> dict[str, int]:
-    """For this computer, those that exceed the defaults: what is needed or more, of few kinds, by name. Libraries and
-    stream programs of several designs are then linked from the same objects, which take seconds to compile."""
-    wanted = {**{macro: default_sizes()[macro] for macro in _STEPS}, **needed}
-    sizes = {macro: _STEPS.get(macro, 1) * -(-size // _STEPS.get(macro, 1)) for macro, size in wanted.items()}
-    return dict(sorted(raised(sizes).items()))
+    """For this computer, those that exceed the defaults: what is needed or more, of few kinds. Libraries and stream
+    programs of several designs are then linked from the same objects, which take seconds to compile."""
+    wanted = {**default_sizes(), **needed}
+    steps = {macro: _STEPS.get(macro, 1) for macro in wanted}
+    return raised({macro: steps[macro] * -(-size // steps[macro]) for macro, size in wanted.items()})
+
+
+def options_of(sizes: Mapping[str, int]) -> list[str]:
+    """The compiler's, by name: equal sizes are equal options."""
+    return [f"-D{macro}={size}" for macro, size in sorted(sizes.items())]
