@@ -107,9 +107,8 @@ def native() -> Native:
 @pytest.fixture(scope="session")
 def matrix(request: pytest.FixtureRequest, native: Native) -> dict[str, Native]:
     """The core by compiler and level (gcc-O2 ...): as it is shipped, and at -O3; in the long form at all levels."""
-    names = ["gcc-O3", "clang-O3"]
-    if request.config.getoption("--long"):
-        names += ["gcc-O0", "clang-O0", "clang-O2"]
+    others = ["gcc-O0", "clang-O0", "clang-O2"] if request.config.getoption("--long") else []
+    names = ["gcc-O3", "clang-O3", *others]
     command = [str(ROOT / "tools" / "build-matrix"), *names]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -42,11 +42,12 @@ def run() -> Run:
     return simulate(sensors=standard_sensors(14), truth="linear", duration=2.0, seed=1).run
 
 
+@pytest.mark.ticks(short=900, long=1400)
 @pytest.mark.parametrize("law", LAWS)
 @every_case
-def test_the_core_equals_its_twin(case: Case, law: str, native: Native, run: Run) -> None:
+def test_the_core_equals_its_twin(case: Case, law: str, native: Native, run: Run, ticks: int) -> None:
     rig = rig_with(form=case.form, dead_zone=1.5, forgetting_s=4.0, **LAWS[law])
-    phi, y = (x[:900] for x in case.samples(rig, run))
+    phi, y = (x[:ticks] for x in case.samples(rig, run))
     (lane,) = assert_lanes_equal([native], case.settings(rig, 1000.0), phi, y)
     assert lane.counters["at_rest"] > 0 or law == "paper"  # whose F does not decay
 

@@ -94,7 +94,15 @@ def test_exact_derivatives_stationary_law_reaches_the_truth(
     assert np.abs(from_exact(native, config, *exact) / TRUTH - 1).max() < 1e-5
 
 
-@pytest.mark.parametrize(("law", "seed"), [("stationary", 0), ("pseudovelocity", 3)])
+@pytest.mark.parametrize(
+    ("law", "seed"),
+    [
+        ("stationary", 0),
+        ("pseudovelocity", 3),
+        pytest.param("stationary", 3, marks=pytest.mark.long),
+        pytest.param("pseudovelocity", 0, marks=pytest.mark.long),
+    ],
+)
 def test_exact_derivatives_end_within_a_twentieth_of_a_per_cent_of_float64(
     native: Native, exact: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]], law: Law, seed: int
 ) -> None:

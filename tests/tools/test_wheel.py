@@ -141,17 +141,19 @@ def test_a_missing_extra_is_named(bare: Path, tmp_path: Path) -> None:
     assert done.returncode == 2 and "pip install 'pvid[plot]'" in done.stderr and "Traceback" not in done.stderr
 
 
+FOUND = interpreters()
+
+
 @pytest.mark.parametrize(
-    "python",
+    "python",  # the oldest and the newest; those between them in the long form
     [
-        pytest.param(python, id=f"python{_version(python)}", marks=[pytest.mark.long] * (0 < place < len(found) - 1))
-        for found in [interpreters()]
-        for place, python in enumerate(found)
+        pytest.param(one, id=f"python{_version(one)}", marks=pytest.mark.long if one in FOUND[1:-1] else ())
+        for one in FOUND
     ],
 )
 def test_every_python_that_is_here_installs_it_and_identifies(python: str, wheel: Path, tmp_path: Path) -> None:
     """By pip, into an environment of its own that finds the dependencies in another one: for the version that the tests
-    themselves run in, in theirs. The oldest and the newest; those between them in the long form."""
+    themselves run in, in theirs."""
     version = _version(python)
 
     def make(folder: Path) -> None:
