@@ -136,6 +136,11 @@ def width_name(argument: sp.Expr) -> str:
     return f"width_{identifiers([str(argument)])[0]}"
 
 
+def width_of(model: CompiledModel, argument: sp.Expr) -> RefinedParameter:
+    """The width of the sign of this argument as a parameter."""
+    return RefinedParameter(width_name(argument), _unit_of(model, argument), True, -1, WIDTH_SD, str(argument))
+
+
 def signs_of(model: CompiledModel) -> tuple[sp.Expr, ...]:
     """Arguments of the signs in the equations of the refinement."""
     found = {one for equation in _equations(model) for one in equation.atoms(sgn)}
@@ -316,10 +321,7 @@ class _Refine:
                 place = model.unknowns.index(unknown)
                 self.parameters.append(RefinedParameter(name, unknown.unit, unknown.positive, place, sd))
             elif one in self.widths:
-                argument = self.widths[one]
-                self.parameters.append(
-                    RefinedParameter(name, _unit_of(model, argument), True, -1, WIDTH_SD, str(argument))
-                )
+                self.parameters.append(width_of(model, self.widths[one]))
             else:
                 self.parameters.append(RefinedParameter(name, extras[one].unit, False, -1, extras[one].sd))
         self.log = {one: entry.log for one, entry in zip(self.r, self.parameters, strict=True)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -109,7 +110,7 @@ def refinement_line(result: Identification) -> str | None:
     if found is None:
         return None
     extras = {} if found.outcome is None or not found.adopted else found.outcome.extras
-    shown = [f"{name} {value:.3g} +- {se:.1g}" for name, (value, se) in extras.items() if se > 0]
+    shown = [f"{name} {value:.3g} +- {se:.1g}" for name, (value, se) in extras.items() if 0 < se < math.inf]
     return "; ".join([found.text, *([", ".join(shown)] if shown else [])])
 
 

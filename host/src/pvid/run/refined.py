@@ -26,12 +26,14 @@ _LARGEST = 0.3  # step of a logarithm in one pass
 _HALVINGS = 6
 _DAMPINGS = (1e-3, 1e-2, 0.1, 1.0, 10.0)  # of a step that leads nowhere
 _SETTLED = 0.01  # standard errors: of the last step
+_NEARLY = 0.3  # of one from which rounding leads no farther
 _START_SD = 1e3  # of the outputs' spread: the starts are free
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
 _PARTS = (1, 2, 4, 8, 16, 32, 64)  # of a block, whose scores scatter
 _FEWEST_PARTS = 3  # times the unknowns: with fewer, the scatter is not estimated
 _LONG_S = 0.016  # residuals are averaged over this for the chi^2 of slow residuals
 
+GAINED = 25.0  # fall of the sum of squares over chi^2 that a further parameter needs
 GOOD = 3.0  # slow chi^2 up to which a refined answer is preferred to a published one
 
 
@@ -253,16 +255,23 @@ class Problem:
                 share /= 2
             else:
                 damped = self._damped(found.triangle, r, starts, prior, free, cut, use, cost)
-                if damped is None or relative < 0.3:
-                    converged = relative < 0.3  # rounding
+                if damped is None or relative < _NEARLY:
+                    converged = self._is_near(found.triangle, r, prior, free)  # rounding
                     break
                 near, begun, now = damped
             gained = cost - now
+            if gained < 1e-9 * now:
+                converged = self._is_near(found.triangle, r, prior, free)
             r, starts, cost, found = near, begun, now, None
             if gained < 1e-9 * cost:
-                converged = relative < 0.3
                 break
         return self._judged(r, prior, cut, starts, use, converged, passes, cost, found)
+
+    def _is_near(self, triangle: Float, r: Float, prior: Prior, free: npt.NDArray[np.intp]) -> bool:
+        """Whether a search that gains no more has arrived: r's step is small with the widths of signs as they are; the
+        sum of squares is rough along a width that the run hardly determines."""
+        others = free[~np.isin(free, self.kernel.widths)]
+        return self._step(triangle, r, prior, others)[3] < _NEARLY
 
     def _share(self, d_r: Float) -> float:
         """Of a step that a pass takes at most."""
@@ -387,8 +396,9 @@ class Problem:
             if length == 0 or many <= _FEWEST_PARTS * len(free):
                 continue
             sums = scores[:, : length * parts].reshape(many, length, len(free)).sum(1)
-            clustered = information @ (sums.T @ sums) @ information * many / (many - len(free))
-            out = np.maximum(out, np.diag(clustered))
+            with np.errstate(over="ignore", invalid="ignore"):  # of what nothing determines
+                clustered = information @ (sums.T @ sums) @ information * many / (many - len(free))
+                out = np.maximum(out, np.diag(clustered))
         return out
 
     def _slow_chi2(self, error: Float, use: Bool, parameters: int) -> float:
@@ -533,3 +543,14 @@ def without_outliers(problem: Problem, prior: Prior, found: Refined) -> Refined:
         return found
     again = problem.searched(found.r, prior, found.cut, found.starts, use)
     return replace(again, passes=found.passes + again.passes)
+
+
+def softened(problem: Problem, prior: Prior, found: Refined, use: Bool) -> tuple[Refined, Prior]:
+    """With the widths of the signs free, where that explains enough, and the prior of the outcome."""
+    r, free = prior.r.copy(), prior.free.copy()
+    widths = problem.kernel.widths
+    r[widths], free[widths] = found.r[widths], True
+    soft = Prior(r, prior.sd, free)
+    again = problem.searched(found.r, soft, found.cut, found.starts, use)
+    least = GAINED * max(again.chi2, again.slow_chi2, 1.0)
+    return (again, soft) if found.sum_of_squares - again.sum_of_squares > least else (found, prior)

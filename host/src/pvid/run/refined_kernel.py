@@ -11,13 +11,22 @@ import numpy.typing as npt
 
 from pvid.base.recent import Recent
 from pvid.codegen.files_refine import DOUBLE, function
-from pvid.codegen.refine import RefinedParameter, RefineFunctions, has_skew, refine_functions_of, without_optional
+from pvid.codegen.refine import (
+    RefinedParameter,
+    RefineFunctions,
+    has_skew,
+    refine_functions_of,
+    signs_of,
+    width_of,
+    without_optional,
+)
 from pvid.model.compiled import CompiledModel
 from pvid.sim.compiled_plant import loaded
 
 Float = npt.NDArray[np.float64]
 
 PLAY = "play"  # the parameter of PlayedKernel
+_MOVED = 0.1  # of the logarithm of a sign's width: its derivative is a difference
 
 
 class RefinedKernel:
@@ -25,14 +34,18 @@ class RefinedKernel:
 
     Attributes
     ----------
-    made : the functions, with settings: widths of signs and knowns
+    made : the functions; the widths of signs are the last parameters, knowns are settings
+    widths : places of those of the signs in r
     states : numbers in a start: q and, of order 2, v
     columns : derivatives by these, by the motion's parameters (and the skew) and by the rest of r
     """
 
     def __init__(self, model: CompiledModel) -> None:
-        self.made = refine_functions_of(model, None, has_skew(model))
-        self._library = loaded(_code(self.made))
+        made = refine_functions_of(model, None, has_skew(model))
+        self._library = loaded(_code(made))
+        widths = tuple(width_of(model, one) for one in signs_of(model))
+        self.widths = list(range(len(made.parameters), len(made.parameters) + len(widths)))
+        self.made = replace(made, parameters=(*made.parameters, *widths), settings=made.settings[len(widths) :])
         self.states = self.made.order * len(self.made.coordinates)
         self.columns = self.states + len(self.made.parameters)
 
@@ -68,7 +81,7 @@ class RefinedKernel:
         """
         made, n = self.made, len(first)
         z = np.empty((n, samples, len(made.outputs)))
-        jacobian = np.empty((*z.shape, self.columns)) if derivatives else None
+        jacobian = np.empty((*z.shape, self.columns - len(self.widths))) if derivatives else None
         ends = np.empty((n, self.states))
         self._library.refine_blocks(
             _pointer(r),
@@ -89,6 +102,12 @@ class RefinedKernel:
             moving = made.moving - made.skew
             part = slice(self.states, self.states + moving)
             jacobian[..., part] = jacobian[..., part] @ self.chart(r)
+        if jacobian is not None and self.widths:
+            near = np.tile(r, (len(self.widths), 1))
+            near[range(len(near)), self.widths] *= np.exp(_MOVED)
+            given = first, samples, sub, h, u, du, starts, False, coarse
+            moved = [self.blocks(one, *given)[0] for one in near]
+            jacobian = np.concatenate([jacobian, (np.stack(moved, -1) - z[..., None]) / _MOVED], -1)
         return z, jacobian, ends
 
     def derivatives(self, r: Float, q: Float, v: Float, u: Float) -> dict[str, Float]:
@@ -129,7 +148,7 @@ class PlayedKernel(RefinedKernel):
         self._inner, self._library, self.states = inner, inner._library, inner.states
         own = RefinedParameter(PLAY, unit, False, -1, 1.0)
         self.made = replace(inner.made, parameters=(*inner.made.parameters, own))
-        self._place = len(inner.made.parameters)
+        self._place, self.widths = len(inner.made.parameters), inner.widths
         self.columns = inner.columns + 1
 
     def blocks(

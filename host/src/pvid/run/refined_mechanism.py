@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.refine import LOG_SD, has_skew, signs_of, width_name
+from pvid.codegen.refine import LOG_SD, has_skew
 from pvid.model.compiled import CompiledModel
 from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import Nominal, RigFile, Sensor
 from pvid.rig.run import Run
 from pvid.run.mechanism import MechanismAnswer, refined_gains_of, values_of
-from pvid.run.refined import GOOD, Measured, Prior, Problem, Refined, refined, without_outliers
+from pvid.run.refined import GOOD, Measured, Prior, Problem, Refined, refined, softened, without_outliers
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
@@ -26,6 +26,9 @@ Float = npt.NDArray[np.float64]
 _STEP = 0.1  # of a step times the fastest eigenvalue: the error of RK4 is below 1e-7 of a period
 _MOST_SUB = 16
 _SIGN_SUB = 16  # steps a sample where there are signs: their width follows from these
+_ASKED = 1.3  # slow chi^2 from which softer signs are tried
+_WIDER = 8.0  # times a width
+_WIDENING_PASSES = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,20 +67,16 @@ def problem_of(
     """The problem, and r with widths of the signs."""
     kernel = kernel_of(model)
     made = kernel.made
-    signs = signs_of(model)
     r = r.copy()
-    names = list(made.settings)
-    places = {str(one): len(made.parameters) + names.index(width_name(one)) for one in signs}
     zero = np.zeros(kernel.states)
     u = np.zeros(len(made.inputs))
-    for place in places.values():
-        r[place] = 1e6  # out of the way
+    r[kernel.widths] = 1e6  # out of the way
     fastest = float(np.abs(np.linalg.eigvals(kernel.slopes(r, zero, u))).max())
     smooth = min(max(1, int(np.ceil(fastest / rate / _STEP))), _MOST_SUB)
-    coarse = max(2, _SIGN_SUB // smooth // 2 * 2) if signs else 1
+    coarse = max(2, _SIGN_SUB // smooth // 2 * 2) if kernel.widths else 1
     sub = smooth * coarse
-    for sign, place in places.items():
-        r[place] = (widths or {}).get(sign) or _width(kernel, r, place, sub, rate)
+    for place in kernel.widths:
+        r[place] = (widths or {}).get(made.parameters[place].sign) or _width(kernel, r, place, sub, rate)
     inputs = inputs_of(model, made, signals, rate, sub)
     measured = Measured(
         np.stack([signals[name] for name in made.outputs], -1),
@@ -115,11 +114,28 @@ def refine_mechanism(
     widths : of signs, by argument; from the sampling by default
     """
     problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
-    sd = np.array([LOG_SD if one.log else one.prior_sd for one in problem.kernel.made.parameters])
-    prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), np.ones(problem.n, bool))
+    made = problem.kernel.made
+    sd = np.array([LOG_SD if one.log and not one.sign else one.prior_sd for one in made.parameters])
+    is_width = np.isin(np.arange(problem.n), problem.kernel.widths)
+    prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~is_width)
     samples = max(8, round(block_s * rate))
     found = refined(problem, prior, (max(8, samples // 3), samples))
+    if problem.kernel.widths and found.slow_chi2 > _ASKED:
+        found, prior = _softer(problem, prior, found)
     return RefinedMechanism(problem, without_outliers(problem, prior, found))
+
+
+def _softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:
+    """With wider signs of the frictions as long as they explain more, and then with their widths free."""
+    use = problem.used(found.cut)
+    while np.isfinite(found.sum_of_squares):
+        r = found.r.copy()
+        r[problem.kernel.widths] *= _WIDER
+        again = problem.searched(r, prior, found.cut, found.starts, use, most=_WIDENING_PASSES)
+        if not again.sum_of_squares < found.sum_of_squares:
+            break
+        found = again
+    return softened(problem, prior, found, use)
 
 
 def _as_pendulum(answer: MechanismAnswer) -> RefinedPendulum:
@@ -181,6 +197,11 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
     p, covariance = refined.problem.values(found, made.places_of_p)
     values = values_of(model, p, covariance, refined_gains_of(model, weak), identified=answer.identified)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
+    for place in refined.problem.kernel.widths:
+        if found.covariance[place, place] > 0:
+            text += (
+                f"; sgn({made.parameters[place].sign}) changes over {found.r[place]:.2g} {made.parameters[place].unit}"
+            )
     return replace(answer, values=values), refined, text
 
 

@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.refine import LOG_SD
+from pvid.codegen.refine import LOG_SD, WIDTH_SD
 from pvid.design.second_derivative import second_derivative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.refined import (
+    GAINED,
     GOOD,
     Budget,
     Cut,
@@ -26,6 +27,7 @@ from pvid.run.refined import (
     Refined,
     gated,
     refined,
+    softened,
     without_outliers,
 )
 from pvid.run.refined_kernel import PLAY, PlayedKernel, kernel_of
@@ -49,7 +51,8 @@ _WIDTHS = (0.3, 0.1, 0.03, 0.01)  # of the sign of a dry friction, in turn: shar
 _FIRST = tuple(one.name for one in MODELS[DEFAULT].published)
 _OPTIONS: tuple[tuple[str, ...], ...] = ((PLAY,), ("slant",), ("f1", "f2"))  # tried one after another
 _EXTRAS = ("slant", "f1", "f2", PLAY)  # in the order of r
-_DRY = ("f1", "f2")
+_WIDTH_OF = {"f1": "width_a1_1", "f2": "width_a1_1_a2_1"}  # of the sign of a dry friction
+_DRY = tuple(_WIDTH_OF)
 _FRICTIONS = ("k1", "k2", *_DRY)
 _DRY_STARTS = 4  # of a search with them
 _NEAREST = 2  # of them from the shortest blocks
@@ -63,8 +66,6 @@ _UNSURE = 0.05  # standard error of a logarithm from which friction is searched 
 _ASKED = 1.3  # slow chi^2 from which options are tried
 _WORK = 1.2e9  # of one refinement: three to four minutes
 _RIVAL = 3.0  # standard errors by which another dry friction may differ that explains the run as well
-_GAINED = 25.0  # fall of the sum of squares over chi^2 that an option needs
-
 
 TOO_LONG = "the refinement needs too many steps: the run is long, or its guess has too fast a mode"
 
@@ -137,11 +138,10 @@ class RefinedPendulum:
     @property
     def extras(self) -> dict[str, tuple[float, float]]:
         """Those that the weak form does not have: value and standard error."""
-        sd = np.sqrt(np.diag(self.found.covariance))
-        made = self.problem.kernel.made
-        return {
-            one.name: (float(self.found.r[k]), float(sd[k])) for k, one in enumerate(made.parameters) if one.place < 0
-        }
+        places = [k for k, one in enumerate(self.problem.kernel.made.parameters) if one.place < 0]
+        values, covariance = self.problem.values(self.found, places)
+        errors = np.sqrt(np.diag(covariance))
+        return {self.names[k]: (float(value), float(sd)) for k, value, sd in zip(places, values, errors, strict=True)}
 
 
 class _Search:
@@ -196,18 +196,21 @@ class _Search:
 
     def with_width(self, problem: Problem, r: Float, share: float) -> Float:
         """r with this width of the signs."""
-        made, out = problem.kernel.made, r.copy()
-        for place, name in enumerate(made.settings, len(made.parameters)):
-            if name.startswith("width"):
-                out[place] = share * 2 * np.pi * self.fast * float(np.nanstd(self.run.phi))
+        out = r.copy()
+        out[problem.kernel.widths] = share * 2 * np.pi * self.fast * float(np.nanstd(self.run.phi))
         return out
 
     def prior(self, problem: Problem, r: Float, free: Sequence[str] | None = None) -> Prior:
-        """About r, wide; of these parameters, or of all."""
+        """About r, wide; of these parameters, or of all but the widths of signs."""
         made = problem.kernel.made
-        sd = np.array([3 * LOG_SD if one.log else _SD[one.name] for one in made.parameters])
-        searched = np.array([free is None or one.name in free for one in made.parameters])
+        sd = np.array([3 * (WIDTH_SD if one.sign else LOG_SD) if one.log else _SD[one.name] for one in made.parameters])
+        searched = np.array([one.name in free if free is not None else not one.sign for one in made.parameters])
         return Prior(r, sd, searched)
+
+    def prior_at(self, problem: Problem, found: Refined) -> Prior:
+        """About an outcome; of the parameters that were searched and determined."""
+        prior = self.prior(problem, found.r)
+        return Prior(found.r, prior.sd, np.diag(found.covariance) > 0)
 
     def nearest(self) -> list[dict[str, float]]:
         """Where the shortest blocks fit best: what no equation has moves their parameters least."""
@@ -267,7 +270,7 @@ def refine_pendulum(
         slow = model.modes_hz(found.r[:3])[0]
     found, rivals = _with_rivals(search, problem, found)
     if found.slow_chi2 > _ASKED:
-        found = _shorter(problem, search.prior(problem, found.r), found, search.lengths(slow, _SHORTER))
+        found = _shorter(problem, search.prior_at(problem, found), found, search.lengths(slow, _SHORTER))
     elif found.converged:
         found = _longer(search, problem, found)
     return RefinedPendulum(problem, found, search.first, rivals)
@@ -331,6 +334,7 @@ def _sharper(search: _Search, problem: Problem, prior: Prior, found: Refined) ->
         if not again.sum_of_squares < found.sum_of_squares:
             break
         found = again
+    found, prior = softened(problem, prior, found, problem.used(found.cut))
     return _without_push(problem, prior, found)
 
 
@@ -340,32 +344,35 @@ def _with_rivals(search: _Search, problem: Problem, found: Refined) -> tuple[Ref
     names = [one.name for one in problem.kernel.made.parameters]
     if "f1" not in names or not np.isfinite(found.sum_of_squares):
         return found, ()
-    prior = search.prior(problem, found.r)
-    prior = Prior(found.r, prior.sd, np.diag(found.covariance) > 0)
+    prior, widths = search.prior_at(problem, found), problem.kernel.widths
+    fixed = Prior(prior.r, prior.sd, prior.free & ~np.isin(np.arange(problem.n), widths))
     cut, use = found.cut, gated(problem, found) & problem.used(found.cut)
     tried = [problem.searched(found.r, prior, cut, found.starts, use, most=_OPTION_PASSES)]
     again = tried[0]
     for share in _WIDTHS[:-1]:
         r = search.with_width(problem, again.r, share)
-        again = problem.searched(r, prior, cut, again.starts, use, most=_OPTION_PASSES)
+        again = problem.searched(r, fixed, cut, again.starts, use, most=_OPTION_PASSES)
         tried.append(again)
     best = min(tried, key=lambda one: one.sum_of_squares)
     best = problem.searched(best.r, prior, cut, best.starts, use)
+    if not prior.free[widths].any():
+        best, prior = softened(problem, prior, best, use)
     best = _without_push(problem, prior, best)
     if not best.converged or best.sum_of_squares > tried[0].sum_of_squares:
         best = found if found.converged else tried[0]
-    most = best.sum_of_squares + _GAINED * max(best.chi2, best.slow_chi2, 1.0)
+    most = best.sum_of_squares + GAINED * max(best.chi2, best.slow_chi2, 1.0)
     return best, tuple(one for one in tried if one.sum_of_squares < most)
 
 
 def _without_push(problem: Problem, prior: Prior, found: Refined) -> Refined:
     """Without a dry friction that would push."""
     names = [one.name for one in problem.kernel.made.parameters]
-    negative = [place for place, name in enumerate(names) if name in _DRY and found.r[place] < 0]
+    negative = [name for name in _DRY if name in names and found.r[names.index(name)] < 0]
     if not negative:
         return found
     r, free = found.r.copy(), prior.free.copy()
-    r[negative], free[negative] = 0.0, False
+    r[[names.index(name) for name in negative]] = 0.0
+    free[[names.index(one) for name in negative for one in (name, _WIDTH_OF[name])]] = False
     within = Prior(prior.r, prior.sd, free)
     return problem.searched(r, within, found.cut, found.starts, problem.used(found.cut), most=_OPTION_PASSES)
 
@@ -400,8 +407,6 @@ def _with_extras(search: _Search, problem: Problem, prior: Prior, found: Refined
 
 def _shorter(problem: Problem, prior: Prior, found: Refined, lengths: Sequence[int]) -> Refined:
     """Shorter blocks, in which an error of the drive grows less, where the standard errors fall."""
-    free = np.diag(found.covariance) > 0
-    prior = Prior(prior.r, prior.sd, free)
     best = found
     for samples in lengths:
         again = refined(problem, prior, [samples], before=found, most=_OPTION_PASSES)
@@ -416,8 +421,8 @@ def _longer(search: _Search, problem: Problem, found: Refined) -> Refined:
     total, dry = len(problem.measured.z), [one.name in _DRY for one in problem.kernel.made.parameters]
     best, least = found, _largest_error(found)
     while len(found.cut.first) > 1 and not search.budget.is_spent:
-        prior = search.prior(problem, found.r)
-        prior = Prior(prior.r, prior.sd, (np.diag(found.covariance) > 0) | dry)
+        prior = search.prior_at(problem, found)
+        prior = Prior(prior.r, prior.sd, prior.free | dry)
         found = refined(problem, prior, [min(_LONGER * found.cut.samples, total)], before=found, most=_OPTION_PASSES)
         if not np.isfinite(found.chi2):
             break
@@ -481,14 +486,14 @@ def _with_options(
             other, prior, again = _with_option(search, problem, found, (*kept, *optional))
             factor = max(again.chi2, again.slow_chi2, 1.0)
             gained = found.sum_of_squares - again.sum_of_squares
-            if np.isfinite(again.chi2) and gained > _GAINED * factor * len(optional):
+            if np.isfinite(again.chi2) and gained > GAINED * factor * len(optional):
                 tried.append((other, prior, again, optional))
         if not tried:
             break
         problem, prior, found, optional = min(tried, key=lambda one: one[2].sum_of_squares)
         found, kept = without_outliers(problem, prior, found), (*kept, *optional)
     if not found.converged:
-        prior = search.prior(problem, found.r)
+        prior = search.prior_at(problem, found)
         found = problem.searched(found.r, prior, found.cut, found.starts, problem.used(found.cut))
         found = without_outliers(problem, prior, found)
     return problem, found
