@@ -26,6 +26,7 @@ Float = npt.NDArray[np.float64]
 _SCALES = (1.0, 0.45, 2.2)  # of the guessed lengths: starts
 BEARABLE = 30.0  # slow chi^2 up to which a refined answer is published, with a warning, where there is no other
 AGREE = 3.0  # standard errors by which two halves of a run may differ whose residuals are more than noise
+LARGEST_SKEW_S = 5e-3  # beyond it a skew may stand for another error
 LARGEST_SE = (0.05, 0.05, 0.1)  # relative, of w, d1, d2: beyond, the run does not determine them
 
 
@@ -124,6 +125,16 @@ def _apart(outcome: RefinedPendulum, weak: Identification) -> str:
     return f"; the two differ in {', '.join(far)}" if far else ""
 
 
+def _doubts(outcome: RefinedPendulum) -> Iterator[str]:
+    """Sentences on what was found beside the parameters."""
+    skew, se = outcome.extras["tau"]
+    if abs(skew) > max(LARGEST_SKEW_S, 3 * se):
+        yield (
+            f"The fit needs a delay of {1000 * skew:.3g} ms between the samples of y and phi: if they are sampled "
+            "together, the equations lack something else, such as a dry friction."
+        )
+
+
 def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVerdict) -> Identification:
     """The refined parameters with their errors, those of the scales among them."""
     assert verdict.outcome is not None
@@ -148,7 +159,7 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
         first_publication_s=weak.first_publication_s if weak.first_publication_s is not None else float(run.t[-1]),
         chi2=found.slow_chi2,
         alarm=found.slow_chi2 > GOOD,
-        doubts=None if weak.doubts is None else (),
+        doubts=None if weak.doubts is None else tuple(_doubts(outcome)),
         remarks=tuple(one for one in weak.remarks if one.startswith(NO_CORE)),
         status=Reason.UPDATED.text,
         largest_angle=largest_angle(run, value[model.offset_name]),

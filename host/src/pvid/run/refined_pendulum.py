@@ -45,6 +45,8 @@ _STEP = 0.1  # of a step times the fast mode's angular frequency
 _A_PERIOD = 60  # decimated samples in a period of the fast mode
 # what is known of the extras before: little
 _SD = {"k1": 0.5, "k2": 0.5, "tau": 5e-3, "c": 1.0, "f1": 1.0, "f2": 1.0, "slant": 0.1, PLAY: 5e-3}
+_ALIKE = 1.1  # times the least chi^2 of the searches: those up to it are told apart by longer blocks
+_MOST_ALIKE = 4
 _SAME = 0.02  # two searches agree: relative difference of all parameters
 _SIGN_COARSE = 8  # steps in a smooth one where dry friction may reverse
 _WIDTHS = (0.3, 0.1, 0.03, 0.01)  # of the sign of a dry friction, in turn: share of the joint's largest speed
@@ -65,7 +67,7 @@ _TOLD = 9.0  # fall of the sum of squares from which it is free in any case
 _UNSURE = 0.05  # standard error of a logarithm from which friction is searched where residuals are no noise
 _ASKED = 1.3  # slow chi^2 from which options are tried
 _WORK = 1.2e9  # of one refinement: three to four minutes
-_RIVAL = 3.0  # standard errors by which another dry friction may differ that explains the run as well
+_RIVAL = 3.0  # standard errors by which a fit may differ that explains the run as well
 
 TOO_LONG = "the refinement needs too many steps: the run is long, or its guess has too fast a mode"
 
@@ -78,7 +80,7 @@ class RefinedPendulum:
     ----------
     problem, found : the fit and the problem that it solves
     first : sample of the run that the problem starts at
-    rivals : fits with other dry friction that explain the run about as well as one in blocks before it
+    rivals : other fits that explain the run about as well
     """
 
     problem: Problem
@@ -122,10 +124,7 @@ class RefinedPendulum:
         apart = float(self.rivals_differ().max())
         if apart <= _RIVAL:
             return None
-        return (
-            f"another dry friction explains the run about as well, with parameters that differ by {apart:.2g} standard "
-            "errors"
-        )
+        return f"other parameters explain the run about as well, and differ by {apart:.2g} standard errors"
 
     def rivals_differ(self) -> Float:
         """By how many standard errors w, d1, d2 of the farthest rival differ [3]; 0 where there is none."""
@@ -255,10 +254,8 @@ def refine_pendulum(
     outcomes = _outcomes(search, problem, starts, sure)
     if not outcomes:
         raise PvidError(TOO_LONG if search.budget.is_spent else "the refinement finds no motion that is like the run's")
-    found = _likeliest(outcomes)
+    found, rivals = _of_outcomes(search, problem, outcomes)
     slow = model.modes_hz(found.r[:3])[0]
-    found, prior = _whole(search, problem, found, slow)
-    found = without_outliers(problem, prior, found)
     if found.slow_chi2 > _ASKED:
         problem, found = _with_options(search, problem, found)
     unsure = found.slow_chi2 > _ASKED and _largest_error(found) > _UNSURE
@@ -268,12 +265,14 @@ def refine_pendulum(
         about = reached[:1] if sure else [*search.nearest(), *reached, *starts][:_DRY_STARTS]
         problem, found = _with_friction(search, (problem, found), about)
         slow = model.modes_hz(found.r[:3])[0]
-    found, rivals = _with_rivals(search, problem, found)
+    found, rubbing = _with_rivals(search, problem, found)
     if found.slow_chi2 > _ASKED:
         found = _shorter(problem, search.prior_at(problem, found), found, search.lengths(slow, _SHORTER))
-    elif found.converged:
+    elif found.converged and not rivals:
         found = _longer(search, problem, found)
-    return RefinedPendulum(problem, found, search.first, rivals)
+    if np.isfinite(found.sum_of_squares):
+        found = _without_push(problem, search.prior_at(problem, found), found)
+    return RefinedPendulum(problem, found, search.first, (*rivals, *rubbing))
 
 
 def _outcomes(
@@ -294,10 +293,41 @@ def _outcomes(
             continue
         outcomes.append(found)
         best = _likeliest(outcomes)
-        agreeing = sum(bool((np.abs(one.r[:3] / best.r[:3] - 1) < _SAME).all()) for one in outcomes)
+        agreeing = sum(_is_same(one, best) for one in outcomes)
         if best.slow_chi2 < _BOUND and (sure or agreeing > 1):
             break
     return outcomes
+
+
+def _of_outcomes(search: _Search, problem: Problem, outcomes: Sequence[Refined]) -> tuple[Refined, tuple[Refined, ...]]:
+    """The best of the outcomes that explain the run about as well, in blocks of full length. Where several do, they are
+    told apart by longer blocks; then those that still explain it about as well, too."""
+    least = _likeliest(outcomes).chi2
+    alike = sorted((one for one in outcomes if one.chi2 <= _ALIKE * least), key=lambda one: one.chi2)
+    wholes: list[Refined] = []
+    for one in alike[:_MOST_ALIKE]:
+        whole, prior = _whole(search, problem, one, search.rig.mechanism.model.modes_hz(one.r[:3])[0])
+        whole = without_outliers(problem, prior, whole)
+        if not any(_is_same(whole, other) for other in wholes):
+            wholes.append(whole)
+    noise = [one for one in wholes if one.converged and one.slow_chi2 < _ASKED]
+    if len(noise) < 2:
+        return _likeliest(wholes), ()
+    ends = [_longer(search, problem, one) for one in noise]
+    longest = min(ends, key=lambda one: len(one.cut.first))
+    cut, use = longest.cut, gated(problem, longest) & problem.used(longest.cut)
+    there = [
+        problem.searched(one.r, search.prior_at(problem, one), cut, problem.starts_along(one.r, one, cut), use)
+        for one in ends
+    ]
+    best = min(there, key=lambda one: one.sum_of_squares)
+    most = best.sum_of_squares + GAINED * max(best.chi2, best.slow_chi2, 1.0)
+    return best, tuple(one for one in there if one.sum_of_squares < most)
+
+
+def _is_same(one: Refined, other: Refined) -> bool:
+    """Whether w, d1, d2 agree."""
+    return bool((np.abs(one.r[:3] / other.r[:3] - 1) < _SAME).all())
 
 
 def _likeliest(outcomes: Sequence[Refined]) -> Refined:
@@ -365,16 +395,19 @@ def _with_rivals(search: _Search, problem: Problem, found: Refined) -> tuple[Ref
 
 
 def _without_push(problem: Problem, prior: Prior, found: Refined) -> Refined:
-    """Without a dry friction that would push."""
+    """Without frictions that would push: dry ones, and viscous ones by more than their standard errors."""
     names = [one.name for one in problem.kernel.made.parameters]
-    negative = [name for name in _DRY if name in names and found.r[names.index(name)] < 0]
+    errors = np.sqrt(np.diag(found.covariance))
+    least = {name: 0.0 if name in _DRY else -errors[names.index(name)] for name in _FRICTIONS if name in names}
+    negative = [name for name, limit in least.items() if found.r[names.index(name)] < limit]
     if not negative:
         return found
     r, free = found.r.copy(), prior.free.copy()
     r[[names.index(name) for name in negative]] = 0.0
-    free[[names.index(one) for name in negative for one in (name, _WIDTH_OF[name])]] = False
+    free[[names.index(one) for name in negative for one in (name, _WIDTH_OF.get(name, name))]] = False
     within = Prior(prior.r, prior.sd, free)
-    return problem.searched(r, within, found.cut, found.starts, problem.used(found.cut), most=_OPTION_PASSES)
+    use = gated(problem, found) & problem.used(found.cut)
+    return problem.searched(r, within, found.cut, found.starts, use)
 
 
 def _whole(
@@ -423,7 +456,7 @@ def _longer(search: _Search, problem: Problem, found: Refined) -> Refined:
     while len(found.cut.first) > 1 and not search.budget.is_spent:
         prior = search.prior_at(problem, found)
         prior = Prior(prior.r, prior.sd, prior.free | dry)
-        found = refined(problem, prior, [min(_LONGER * found.cut.samples, total)], before=found, most=_OPTION_PASSES)
+        found = refined(problem, prior, [min(_LONGER * found.cut.samples, total)], before=found)
         if not np.isfinite(found.chi2):
             break
         found, prior = _with_extras(search, problem, prior, found)
