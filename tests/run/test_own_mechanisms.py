@@ -207,13 +207,13 @@ def spring_run(friction: float = 0.0) -> dict[str, Float]:
     return {"F": force, "x": read(motion(rate, np.zeros(2), force, 1e-3, 2)[:, 0], 0.1 / 2**12, 12)}
 
 
-def spring_answer(signals: dict[str, Float]) -> MechanismAnswer:
+def spring_answer(signals: dict[str, Float], step: float = 1e-3) -> MechanismAnswer:
     model = Model("mass and spring")
     F = model.input("F", "N", hold="zoh", reach=10, gain_sd=0)
     x = model.sensor("x", "m", resolution=0.1 / 2**12, reach=0.1)
     m, c, k = model.unknown("m", "kg", 1.0), model.unknown("c", "N*s/m", 4.0), model.unknown("k", "N/m", 300.0)
     model.equation(m * x.d(2) + c * x.d() + k * x - F)
-    return identify_mechanism(recorded(1e-3, **signals), model.compiled("spring"))
+    return identify_mechanism(recorded(step, **signals), model.compiled("spring"))
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
@@ -242,3 +242,9 @@ def test_a_sign_or_a_unit_that_is_wrong_is_named(name: str, factor: float, sente
     run = spring_run()
     found = spring_answer({**run, name: factor * run[name]})
     assert advice_on(found) == ((sentence,) if sentence else ())
+
+
+@pytest.mark.parametrize(("step", "unit"), [(1.0, "ms"), (1e3, "us")])
+def test_a_time_in_another_unit_is_named(step: float, unit: str) -> None:
+    """The motion fits as well, with other parameters: only their guesses tell."""
+    assert advice_on(spring_answer(spring_run(), step)) == (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)

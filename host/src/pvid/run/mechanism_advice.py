@@ -1,13 +1,15 @@
-"""What makes a recording that a mechanism's equations do not explain fit them: a sign, or a unit."""
+"""What makes a recording that a mechanism's equations do not explain fit them: a sign, or a unit; also of the time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from pvid.model.compiled import Signal
 from pvid.oracle.weak.choice import score_of
+from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
 from pvid.rig.columns import Columns
 from pvid.rig.mechanism_file import channels_of
@@ -18,6 +20,8 @@ _MISFIT = 20.0
 # A mistake is named if the run then leaves less than this part of them, and determines every parameter.
 _PART = 1 / 30
 # By unit: what a column may be in instead, and what to type for it.
+_TIMES = {"ms": 1e-3, "us": 1e-6}
+_FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: the time is doubted beyond the one, right within the other
 _UNITS = {
     "rad": {"deg": "deg", "rev": "rev"},
     "rad/s": {"deg/s": f"{np.pi / 180:.9g}"},
@@ -32,6 +36,8 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
 
     Each signal in turn has the other sign or another usual unit, with the design of the answer.
     """
+    if (unit := _unit_of_time(answer)) is not None:
+        return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
     if answer.identified and answer.found.chi2 < _MISFIT:
         return ()
     run = answer.recording.signals
@@ -40,6 +46,26 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
         return (f"{idle[0].name} is 0 in every sample: is it the column of the drive?",)
     found = min(_tried(answer), default=None)
     return () if found is None else (found[1],)
+
+
+def _unit_of_time(answer: MechanismAnswer) -> str | None:
+    """In which the parameters come near their guesses; None where they are near as it is, or in no unit. Residuals do
+    not tell: another unit of time gives a linear mechanism other parameters and the same motion."""
+    if _distance(answer, answer.found.p) < _FAR:
+        return None
+    model, signals, design = ready(answer.model), answer.recording.signals, answer.found.design
+    for unit, scale in _TIMES.items():
+        other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
+        one = score_of(model, signals, other, None, False)
+        if one is not None and one.known and _distance(answer, one.p) < _NEAR:
+            return unit
+    return None
+
+
+def _distance(answer: MechanismAnswer, p: Float) -> float:
+    """The largest factor between a positive parameter and its guess."""
+    of = [value / one.guess for value, one in zip(p, answer.model.unknowns, strict=True) if one.positive]
+    return max((max(ratio, 1 / ratio) if ratio > 0 else np.inf for ratio in of), default=1.0)
 
 
 def _tried(answer: MechanismAnswer) -> Iterator[tuple[float, str]]:

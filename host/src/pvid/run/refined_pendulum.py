@@ -407,7 +407,8 @@ def _without_push(problem: Problem, prior: Prior, found: Refined) -> Refined:
     free[[names.index(one) for name in negative for one in (name, _WIDTH_OF.get(name, name))]] = False
     within = Prior(prior.r, prior.sd, free)
     use = gated(problem, found) & problem.used(found.cut)
-    return problem.searched(r, within, found.cut, found.starts, use)
+    again = problem.searched(r, within, found.cut, found.starts, use)
+    return again if again.converged or not found.converged else found
 
 
 def _whole(
