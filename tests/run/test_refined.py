@@ -20,10 +20,10 @@ from pvid.run import refined_pendulum
 from pvid.run.answer import as_json, refinement_line
 from pvid.run.engine_identify import identify_by_engine
 from pvid.run.refined import GOOD, Cut, Prior
-from pvid.run.refined_identify import AGREE, BEARABLE, _judged, refined_identification
+from pvid.run.refined_identify import AGREE, BEARABLE, LARGEST_SKEW_S, _doubts, _judged, refined_identification
 from pvid.run.refined_kernel import PlayedKernel, kernel_of
 from pvid.run.refined_mechanism import refine_mechanism
-from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
+from pvid.run.refined_pendulum import RefinedPendulum, _without_push, refine_pendulum
 from pvid.sim.pendulum import SLIP, STANDARD_DRIVE, STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.sim.simulated_run import SOFT, simulation_of
 
@@ -260,6 +260,25 @@ def test_another_friction_that_explains_the_run_as_well_is_a_reason_to_hold() ->
     assert _judged(outcome, weak)[0]  # type: ignore[arg-type]
 
 
+def test_a_refined_answer_is_doubted_where_the_weak_one_and_its_residuals_contradict_it() -> None:
+    _, weak = answers()
+    outcome = refined()
+    far = replace(weak, trusted_s=1.0, value={**weak.value, "d2": 1.5 * TRUTH[2]}, se={**weak.se, "d2": 0.1})  # type: ignore[type-var, attr-defined]
+    noisy = replace(outcome, found=replace(outcome.found, slow_chi2=2.0))
+    (sentence,) = _doubts(noisy, far)  # type: ignore[arg-type]
+    assert "differ in d2 by -33 %" in sentence
+    assert not list(_doubts(outcome, far))  # type: ignore[arg-type]
+
+
+def test_a_delay_that_may_stand_for_another_error_is_doubted() -> None:
+    _, weak = answers()
+    found = refined(1e-3)
+    assert not list(_doubts(found, weak))  # type: ignore[arg-type]
+    r = np.where(np.array([*found.names, "l1"]) == "tau", 2 * LARGEST_SKEW_S, found.found.r)
+    (sentence,) = _doubts(replace(found, found=replace(found.found, r=r)), weak)  # type: ignore[arg-type]
+    assert "a delay of 10 ms" in sentence
+
+
 def test_a_refinement_ends_where_its_budget_is_spent(monkeypatch: pytest.MonkeyPatch) -> None:
     """By default at some minutes: without it a stiff guess of a long run takes half an hour."""
     given, weak = answers()
@@ -323,6 +342,26 @@ def test_the_second_derivative_is_exact_in_its_band_and_quiet_beyond() -> None:
     _, noise = front.apply(np.random.default_rng(0).normal(size=60_000), rate)
     white = np.sqrt(3 * 2.0**4) * rate**2 / np.sqrt(5)  # a plain second difference has sqrt(6) rate^2
     assert noise.std() < 1e-2 * white
+
+
+def test_a_friction_that_would_push_is_held_at_0() -> None:
+    """One that a search has made negative by more than its standard error."""
+    outcome = refined()
+    problem, found = outcome.problem, outcome.found
+    place = outcome.names.index("k1")
+    pushing = replace(found, r=np.where(np.arange(len(found.r)) == place, -0.05, found.r))
+    held = _without_push(problem, Prior(found.r, np.full(problem.n, 10.0), np.diag(found.covariance) > 0), pushing)
+    assert held.r[place] == 0 and held.covariance[place, place] == 0
+    assert _without_push(problem, Prior(found.r, np.full(problem.n, 10.0), np.ones(problem.n, bool)), found) is found
+
+
+def test_a_motion_that_runs_away_ends_a_pass() -> None:
+    outcome = refined()
+    problem, found = outcome.problem, outcome.found
+    use = problem.used(found.cut)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert problem.block(found.r, found.cut, found.starts * 1e120, use) is None
 
 
 def test_blocks_fill_the_run() -> None:

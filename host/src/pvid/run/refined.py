@@ -27,6 +27,7 @@ _HALVINGS = 6
 _DAMPINGS = (1e-3, 1e-2, 0.1, 1.0, 10.0)  # of a step that leads nowhere
 _SETTLED = 0.01  # standard errors: of the last step
 _NEARLY = 0.3  # of one from which rounding leads no farther
+_RUNS_AWAY = 1e100  # a reading, or its derivative: the square of a larger one overflows
 _START_SD = 1e3  # of the outputs' spread: the starts are free
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
 _PARTS = (1, 2, 4, 8, 16, 32, 64)  # of a block, whose scores scatter
@@ -199,14 +200,14 @@ class Problem:
         self.budget.left -= steps * columns
 
     def block(self, r: Float, cut: Cut, starts: Float, use: Bool) -> Block | None:
-        """One pass; None where the motion is no number."""
+        """One pass; None where the motion runs away."""
         m = self.measured
         self._spend(cut, 1 + self.kernel.columns)
         z, jacobian, _ = self.kernel.blocks(
             r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, True, m.coarse
         )
         assert jacobian is not None
-        if not (np.isfinite(z).all() and np.isfinite(jacobian).all()):
+        if not (np.abs(z).max() < _RUNS_AWAY and np.abs(jacobian).max() < _RUNS_AWAY):  # or is no number
             return None
         error = np.where(use, (cut.rows(m.z) - z) / m.sd, 0.0)
         jacobian /= m.sd[:, None]

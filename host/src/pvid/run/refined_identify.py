@@ -26,6 +26,7 @@ Float = npt.NDArray[np.float64]
 _SCALES = (1.0, 0.45, 2.2)  # of the guessed lengths: starts
 BEARABLE = 30.0  # slow chi^2 up to which a refined answer is published, with a warning, where there is no other
 AGREE = 3.0  # standard errors by which two halves of a run may differ whose residuals are more than noise
+NOISE = 1.3  # slow chi^2 up to which residuals are taken for noise
 LARGEST_SKEW_S = 5e-3  # beyond it a skew may stand for another error
 LARGEST_SE = (0.05, 0.05, 0.1)  # relative, of w, d1, d2: beyond, the run does not determine them
 
@@ -125,8 +126,10 @@ def _apart(outcome: RefinedPendulum, weak: Identification) -> str:
     return f"; the two differ in {', '.join(far)}" if far else ""
 
 
-def _doubts(outcome: RefinedPendulum) -> Iterator[str]:
-    """Sentences on what was found beside the parameters."""
+def _doubts(outcome: RefinedPendulum, weak: Identification) -> Iterator[str]:
+    """Sentences on what was found beside the parameters, and on a weak answer that residuals above noise contradict."""
+    if weak.identified and outcome.found.slow_chi2 > NOISE and (apart := _apart(outcome, weak)):
+        yield f"The refined answer is far from that of the weak form, and its residuals are more than noise{apart}."
     skew, se = outcome.extras["tau"]
     if abs(skew) > max(LARGEST_SKEW_S, 3 * se):
         yield (
@@ -159,7 +162,7 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
         first_publication_s=weak.first_publication_s if weak.first_publication_s is not None else float(run.t[-1]),
         chi2=found.slow_chi2,
         alarm=found.slow_chi2 > GOOD,
-        doubts=None if weak.doubts is None else tuple(_doubts(outcome)),
+        doubts=None if weak.doubts is None else tuple(_doubts(outcome, weak)),
         remarks=tuple(one for one in weak.remarks if one.startswith(NO_CORE)),
         status=Reason.UPDATED.text,
         largest_angle=largest_angle(run, value[model.offset_name]),
