@@ -266,7 +266,7 @@ def test_a_refined_answer_is_doubted_where_the_weak_one_and_its_residuals_contra
     far = replace(weak, trusted_s=1.0, value={**weak.value, "d2": 1.5 * TRUTH[2]}, se={**weak.se, "d2": 0.1})  # type: ignore[type-var, attr-defined]
     noisy = replace(outcome, found=replace(outcome.found, slow_chi2=2.0))
     (sentence,) = _doubts(noisy, far)  # type: ignore[arg-type]
-    assert "differ in d2 by -33 %" in sentence
+    assert "differ in d2 by -33.3 %" in sentence
     assert not list(_doubts(outcome, far))  # type: ignore[arg-type]
 
 

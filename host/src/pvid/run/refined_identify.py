@@ -122,7 +122,7 @@ def _apart(outcome: RefinedPendulum, weak: Identification) -> str:
         value = outcome.found.r[k]
         both = float(np.hypot(sd[k] * value, weak.se[name]))
         if abs(value - weak.value[name]) > 3 * both:
-            far.append(f"{name} by {100 * (value / weak.value[name] - 1):+.2g} %")
+            far.append(f"{name} by {100 * (value / weak.value[name] - 1):+.3g} %")
     return f"; the two differ in {', '.join(far)}" if far else ""
 
 
