@@ -19,9 +19,9 @@ from pvid.run.mechanism import MechanismAnswer
 _MISFIT = 20.0
 # A mistake is named if the run then leaves less than this part of them, and determines every parameter.
 _PART = 1 / 30
-# By unit: what a column may be in instead, and what to type for it.
 _TIMES = {"ms": 1e-3, "us": 1e-6}
 _FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: the time is doubted beyond the one, right within the other
+# By unit: what a column may be in instead, and what to type for it.
 _UNITS = {
     "rad": {"deg": "deg", "rev": "rev"},
     "rad/s": {"deg/s": f"{np.pi / 180:.9g}"},

@@ -272,6 +272,8 @@ def refine_pendulum(
         found = _longer(search, problem, found)
     if np.isfinite(found.sum_of_squares):
         found = _without_push(problem, search.prior_at(problem, found), found)
+    if problem is not search.problem():  # other parameters were freed since
+        rivals = ()
     return RefinedPendulum(problem, found, search.first, (*rivals, *rubbing))
 
 
