@@ -319,6 +319,17 @@ def test_sharp_friction_of_a_motor_is_refined_to_its_standard_errors() -> None:
     assert np.abs(z).max() < 4 and abs(found.values["Tc"] / truth[model.p_names.index("Tc")] - 1) < 5e-3
 
 
+def test_sharp_friction_of_two_joints_does_not_bias() -> None:
+    """By the width of its sign: with steps four times as long, two parameters are 4 standard errors off."""
+    simulation = simulation_of("two_link_arm")
+    model, truth = simulation.model, simulation.truth
+    p = truth * np.where([one.positive for one in model.unknowns], 1.03, 1.0)
+    signals = {name: values[:6000] for name, values in simulation.run(2).items()}
+    found = refine_mechanism(model, signals, simulation.rig.sample_rate, p, 1.0)
+    z = [(found.values[name] - truth[k]) / found.errors[name] for k, name in enumerate(model.p_names)]
+    assert found.found.converged and np.abs(z).max() < 3.5
+
+
 def test_soft_friction_of_a_motor_is_refined_with_its_width() -> None:
     """tanh(v / width), which is not the law that is assumed."""
     simulation = simulation_of("dc_motor")

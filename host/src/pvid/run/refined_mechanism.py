@@ -25,9 +25,10 @@ Float = npt.NDArray[np.float64]
 
 _STEP = 0.1  # of a step times the fastest eigenvalue: the error of RK4 is below 1e-7 of a period
 _MOST_SUB = 16
-_SIGN_SUB = 16  # steps a sample where there are signs: their width follows from these
+_SIGN_SUB = (16, 64)  # steps a sample where there are signs, whose width follows from these: a wide one biases
+_STEPS = 1e6  # of the run: inputs at each are kept
 _ASKED = 1.3  # slow chi^2 from which softer signs are tried
-_WIDER = 8.0  # times a width
+_WIDER = (8.0, 64.0, 512.0, 4096.0)  # times the sharp width
 _WIDENING_PASSES = 10
 
 
@@ -73,7 +74,9 @@ def problem_of(
     r[kernel.widths] = 1e6  # out of the way
     fastest = float(np.abs(np.linalg.eigvals(kernel.slopes(r, zero, u))).max())
     smooth = min(max(1, int(np.ceil(fastest / rate / _STEP))), _MOST_SUB)
-    coarse = max(2, _SIGN_SUB // smooth // 2 * 2) if kernel.widths else 1
+    samples = len(signals[made.outputs[0]])
+    fine = int(np.clip(_STEPS / samples, *_SIGN_SUB))
+    coarse = max(2, fine // smooth // 2 * 2) if kernel.widths else 1
     sub = smooth * coarse
     for place in kernel.widths:
         r[place] = (widths or {}).get(made.parameters[place].sign) or _width(kernel, r, place, sub, rate)
@@ -126,15 +129,16 @@ def refine_mechanism(
 
 
 def _softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:
-    """With wider signs of the frictions as long as they explain more, and then with their widths free."""
-    use = problem.used(found.cut)
-    while np.isfinite(found.sum_of_squares):
-        r = found.r.copy()
-        r[problem.kernel.widths] *= _WIDER
-        again = problem.searched(r, prior, found.cut, found.starts, use, most=_WIDENING_PASSES)
-        if not again.sum_of_squares < found.sum_of_squares:
-            break
-        found = again
+    """With the wider signs of the frictions that explain most, and then with their widths free."""
+    use, sharp = problem.used(found.cut), found.r[problem.kernel.widths]
+    again = found
+    for wider in _WIDER if np.isfinite(found.sum_of_squares) else ():
+        r = again.r.copy()
+        r[problem.kernel.widths] = wider * sharp
+        again = problem.searched(r, prior, found.cut, again.starts, use, most=_WIDENING_PASSES)
+        found = min(found, again, key=lambda one: one.sum_of_squares)
+        if not np.isfinite(again.sum_of_squares):
+            again = found
     return softened(problem, prior, found, use)
 
 

@@ -140,7 +140,9 @@ class Front:
         return _F(0)
 
     def _end_period(self) -> None:
-        if not self.postponed and np.any(np.abs(self.fourth[0]) > self.gate * self.usual):
+        with np.errstate(over="ignore"):  # before the first period has ended
+            stands_out = np.any(np.abs(self.fourth[0]) > self.gate * self.usual)
+        if not self.postponed and stands_out:
             self.postponed = True
             return
         self.postponed = False
