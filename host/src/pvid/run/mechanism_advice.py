@@ -19,7 +19,7 @@ from pvid.run.mechanism import MechanismAnswer
 _MISFIT = 20.0
 # A mistake is named if the run then leaves less than this part of them, and determines every parameter.
 _PART = 1 / 30
-_TIMES = {"ms": 1e-3, "us": 1e-6}
+_TIMES = ("ms", "us")
 _FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: the time is doubted beyond the one, right within the other
 # By unit: what a column may be in instead, and what to type for it.
 _UNITS = {
@@ -54,7 +54,8 @@ def _unit_of_time(answer: MechanismAnswer) -> str | None:
     if _distance(answer, answer.found.p) < _FAR:
         return None
     model, signals, design = ready(answer.model), answer.recording.signals, answer.found.design
-    for unit, scale in _TIMES.items():
+    for unit in _TIMES:
+        scale = float(Columns.parse(f"t=t:{unit}", channels_of(answer.model))["t"].in_si(np.ones(1))[0])
         other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
         one = score_of(model, signals, other, None, False)
         if one is not None and one.known and _distance(answer, one.p) < _NEAR:

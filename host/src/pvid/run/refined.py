@@ -34,7 +34,8 @@ _PARTS = (1, 2, 4, 8, 16, 32, 64)  # of a block, whose scores scatter
 _FEWEST_PARTS = 3  # times the unknowns: with fewer, the scatter is not estimated
 _LONG_S = 0.016  # residuals are averaged over this for the chi^2 of slow residuals
 
-GAINED = 25.0  # fall of the sum of squares over chi^2 that a further parameter needs
+NOISE = 1.3  # slow chi^2 up to which residuals are taken for noise
+_GAINED = 25.0  # fall of the sum of squares over chi^2 that a further parameter needs
 GOOD = 3.0  # slow chi^2 up to which a refined answer is preferred to a published one
 
 
@@ -155,6 +156,12 @@ class Refined:
     kept: float
     sum_of_squares: float
 
+    @property
+    def significant_fall(self) -> float:
+        """Of the sum of squares, to this outcome: what a further parameter needs. By less, another outcome explains the
+        run about as well."""
+        return _GAINED * max(self.chi2, self.slow_chi2, 1.0)
+
 
 class Problem:
     """A run under a model."""
@@ -163,6 +170,7 @@ class Problem:
         self.kernel, self.measured, self.budget = kernel, measured, budget or Budget()
         self.n = len(kernel.made.parameters)
         self.log = np.array([one.log for one in kernel.made.parameters])
+        self.is_width = np.array([bool(one.sign) for one in kernel.made.parameters])  # of a sign
 
     def moved(self, r: Float, step: Float) -> Float:
         """r after a step [parameters]."""
@@ -260,19 +268,18 @@ class Problem:
                     converged = self._is_near(found.triangle, r, prior, free)  # rounding
                     break
                 near, begun, now = damped
-            gained = cost - now
-            if gained < 1e-9 * now:
+            ends = cost - now < 1e-9 * now
+            if ends:
                 converged = self._is_near(found.triangle, r, prior, free)
             r, starts, cost, found = near, begun, now, None
-            if gained < 1e-9 * cost:
+            if ends:
                 break
         return self._judged(r, prior, cut, starts, use, converged, passes, cost, found)
 
     def _is_near(self, triangle: Float, r: Float, prior: Prior, free: npt.NDArray[np.intp]) -> bool:
         """Whether a search that gains no more has arrived: r's step is small with the widths of signs as they are; the
         sum of squares is rough along a width that the run hardly determines."""
-        others = free[~np.isin(free, self.kernel.widths)]
-        return self._step(triangle, r, prior, others)[3] < _NEARLY
+        return self._step(triangle, r, prior, free[~self.is_width[free]])[3] < _NEARLY
 
     def _share(self, d_r: Float) -> float:
         """Of a step that a pass takes at most."""
@@ -553,5 +560,9 @@ def softened(problem: Problem, prior: Prior, found: Refined, use: Bool) -> tuple
     r[widths], free[widths] = found.r[widths], True
     soft = Prior(r, prior.sd, free)
     again = problem.searched(found.r, soft, found.cut, found.starts, use)
-    least = GAINED * max(again.chi2, again.slow_chi2, 1.0)
-    return (again, soft) if found.sum_of_squares - again.sum_of_squares > least else (found, prior)
+    return (again, soft) if found.sum_of_squares - again.sum_of_squares > again.significant_fall else (found, prior)
+
+
+def explaining(tried: Sequence[Refined], best: Refined) -> tuple[Refined, ...]:
+    """Those that explain the run about as well as the best."""
+    return tuple(one for one in tried if one.sum_of_squares < best.sum_of_squares + best.significant_fall)

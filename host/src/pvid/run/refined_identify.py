@@ -16,7 +16,7 @@ from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
 from pvid.run.engine_identify import NO_CORE, held_if_wide
 from pvid.run.identify import Identification, largest_angle, parts_of
-from pvid.run.refined import GOOD
+from pvid.run.refined import GOOD, NOISE
 from pvid.run.refined_pendulum import TOO_LONG, RefinedPendulum, refine_pendulum
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start
@@ -26,7 +26,6 @@ Float = npt.NDArray[np.float64]
 _SCALES = (1.0, 0.45, 2.2)  # of the guessed lengths: starts
 BEARABLE = 30.0  # slow chi^2 up to which a refined answer is published, with a warning, where there is no other
 AGREE = 3.0  # standard errors by which two halves of a run may differ whose residuals are more than noise
-NOISE = 1.3  # slow chi^2 up to which residuals are taken for noise
 LARGEST_SKEW_S = 5e-3  # beyond it a skew may stand for another error
 LARGEST_SE = (0.05, 0.05, 0.1)  # relative, of w, d1, d2: beyond, the run does not determine them
 

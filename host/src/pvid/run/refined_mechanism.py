@@ -16,7 +16,7 @@ from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import Nominal, RigFile, Sensor
 from pvid.rig.run import Run
 from pvid.run.mechanism import MechanismAnswer, refined_gains_of, values_of
-from pvid.run.refined import GOOD, Measured, Prior, Problem, Refined, refined, softened, without_outliers
+from pvid.run.refined import GOOD, NOISE, Measured, Prior, Problem, Refined, refined, softened, without_outliers
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
@@ -27,7 +27,6 @@ _STEP = 0.1  # of a step times the fastest eigenvalue: the error of RK4 is below
 _MOST_SUB = 16
 _SIGN_SUB = (16, 64)  # steps a sample where there are signs, whose width follows from these: a wide one biases
 _STEPS = 1e6  # of the run: inputs at each are kept
-_ASKED = 1.3  # slow chi^2 from which softer signs are tried
 _WIDER = (8.0, 64.0, 512.0, 4096.0)  # times the sharp width
 _WIDENING_PASSES = 10
 
@@ -119,11 +118,10 @@ def refine_mechanism(
     problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
     made = problem.kernel.made
     sd = np.array([LOG_SD if one.log and not one.sign else one.prior_sd for one in made.parameters])
-    is_width = np.isin(np.arange(problem.n), problem.kernel.widths)
-    prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~is_width)
+    prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~problem.is_width)
     samples = max(8, round(block_s * rate))
     found = refined(problem, prior, (max(8, samples // 3), samples))
-    if problem.kernel.widths and found.slow_chi2 > _ASKED:
+    if problem.kernel.widths and found.slow_chi2 > NOISE:
         found, prior = _softer(problem, prior, found)
     return RefinedMechanism(problem, without_outliers(problem, prior, found))
 

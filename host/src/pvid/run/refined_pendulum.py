@@ -16,8 +16,8 @@ from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.refined import (
-    GAINED,
     GOOD,
+    NOISE,
     Budget,
     Cut,
     Inputs,
@@ -25,6 +25,7 @@ from pvid.run.refined import (
     Prior,
     Problem,
     Refined,
+    explaining,
     gated,
     refined,
     softened,
@@ -45,7 +46,7 @@ _STEP = 0.1  # of a step times the fast mode's angular frequency
 _A_PERIOD = 60  # decimated samples in a period of the fast mode
 # what is known of the extras before: little
 _SD = {"k1": 0.5, "k2": 0.5, "tau": 5e-3, "c": 1.0, "f1": 1.0, "f2": 1.0, "slant": 0.1, PLAY: 5e-3}
-_ALIKE = 1.1  # times the least chi^2 of the searches: those up to it are told apart by longer blocks
+_ALIKE = 1.1  # times the least chi^2 of the searches: longer blocks show which of those up to it is right
 _MOST_ALIKE = 4
 _SAME = 0.02  # two searches agree: relative difference of all parameters
 _SIGN_COARSE = 8  # steps in a smooth one where dry friction may reverse
@@ -65,7 +66,6 @@ _GROWN = 1.25  # of standard errors: by which those of two lengths of a block di
 _CHEAP = 1.3  # growth of the others' standard errors up to which an extra is free
 _TOLD = 9.0  # fall of the sum of squares from which it is free in any case
 _UNSURE = 0.05  # standard error of a logarithm from which friction is searched where residuals are no noise
-_ASKED = 1.3  # slow chi^2 from which options are tried
 _WORK = 1.2e9  # of one refinement: three to four minutes
 _RIVAL = 3.0  # standard errors by which a fit may differ that explains the run as well
 
@@ -256,9 +256,9 @@ def refine_pendulum(
         raise PvidError(TOO_LONG if search.budget.is_spent else "the refinement finds no motion that is like the run's")
     found, rivals = _of_outcomes(search, problem, outcomes)
     slow = model.modes_hz(found.r[:3])[0]
-    if found.slow_chi2 > _ASKED:
+    if found.slow_chi2 > NOISE:
         problem, found = _with_options(search, problem, found)
-    unsure = found.slow_chi2 > _ASKED and _largest_error(found) > _UNSURE
+    unsure = found.slow_chi2 > NOISE and _largest_error(found) > _UNSURE
     if found.slow_chi2 > GOOD or not found.converged or unsure:
         outcomes.sort(key=lambda one: one.chi2)
         reached = [_values_of(search.problem())(one) for one in outcomes[:2]]
@@ -266,7 +266,7 @@ def refine_pendulum(
         problem, found = _with_friction(search, (problem, found), about)
         slow = model.modes_hz(found.r[:3])[0]
     found, rubbing = _with_rivals(search, problem, found)
-    if found.slow_chi2 > _ASKED:
+    if found.slow_chi2 > NOISE:
         found = _shorter(problem, search.prior_at(problem, found), found, search.lengths(slow, _SHORTER))
     elif found.converged and not rivals:
         found = _longer(search, problem, found)
@@ -302,8 +302,8 @@ def _outcomes(
 
 
 def _of_outcomes(search: _Search, problem: Problem, outcomes: Sequence[Refined]) -> tuple[Refined, tuple[Refined, ...]]:
-    """The best of the outcomes that explain the run about as well, in blocks of full length. Where several do, they are
-    told apart by longer blocks; then those that still explain it about as well, too."""
+    """The best of the outcomes that explain the run about as well, in blocks of full length. Where several do,
+    blocks are lengthened, and those that then still explain it about as well are returned too."""
     least = _likeliest(outcomes).chi2
     alike = sorted((one for one in outcomes if one.chi2 <= _ALIKE * least), key=lambda one: one.chi2)
     wholes: list[Refined] = []
@@ -312,7 +312,7 @@ def _of_outcomes(search: _Search, problem: Problem, outcomes: Sequence[Refined])
         whole = without_outliers(problem, prior, whole)
         if not any(_is_same(whole, other) for other in wholes):
             wholes.append(whole)
-    noise = [one for one in wholes if one.converged and one.slow_chi2 < _ASKED]
+    noise = [one for one in wholes if one.converged and one.slow_chi2 < NOISE]
     if len(noise) < 2:
         return _likeliest(wholes), ()
     ends = [_longer(search, problem, one) for one in noise]
@@ -323,8 +323,7 @@ def _of_outcomes(search: _Search, problem: Problem, outcomes: Sequence[Refined])
         for one in ends
     ]
     best = min(there, key=lambda one: one.sum_of_squares)
-    most = best.sum_of_squares + GAINED * max(best.chi2, best.slow_chi2, 1.0)
-    return best, tuple(one for one in there if one.sum_of_squares < most)
+    return best, explaining(there, best)
 
 
 def _is_same(one: Refined, other: Refined) -> bool:
@@ -376,8 +375,8 @@ def _with_rivals(search: _Search, problem: Problem, found: Refined) -> tuple[Ref
     names = [one.name for one in problem.kernel.made.parameters]
     if "f1" not in names or not np.isfinite(found.sum_of_squares):
         return found, ()
-    prior, widths = search.prior_at(problem, found), problem.kernel.widths
-    fixed = Prior(prior.r, prior.sd, prior.free & ~np.isin(np.arange(problem.n), widths))
+    prior = search.prior_at(problem, found)
+    fixed = Prior(prior.r, prior.sd, prior.free & ~problem.is_width)
     cut, use = found.cut, gated(problem, found) & problem.used(found.cut)
     tried = [problem.searched(found.r, prior, cut, found.starts, use, most=_OPTION_PASSES)]
     again = tried[0]
@@ -387,26 +386,25 @@ def _with_rivals(search: _Search, problem: Problem, found: Refined) -> tuple[Ref
         tried.append(again)
     best = min(tried, key=lambda one: one.sum_of_squares)
     best = problem.searched(best.r, prior, cut, best.starts, use)
-    if not prior.free[widths].any():
+    if not prior.free[problem.is_width].any():
         best, prior = softened(problem, prior, best, use)
     best = _without_push(problem, prior, best)
     if not best.converged or best.sum_of_squares > tried[0].sum_of_squares:
         best = found if found.converged else tried[0]
-    most = best.sum_of_squares + GAINED * max(best.chi2, best.slow_chi2, 1.0)
-    return best, tuple(one for one in tried if one.sum_of_squares < most)
+    return best, explaining(tried, best)
 
 
 def _without_push(problem: Problem, prior: Prior, found: Refined) -> Refined:
     """Without frictions that would push: dry ones, and viscous ones by more than their standard errors."""
-    names = [one.name for one in problem.kernel.made.parameters]
+    place = {one.name: k for k, one in enumerate(problem.kernel.made.parameters)}
     errors = np.sqrt(np.diag(found.covariance))
-    least = {name: 0.0 if name in _DRY else -errors[names.index(name)] for name in _FRICTIONS if name in names}
-    negative = [name for name, limit in least.items() if found.r[names.index(name)] < limit]
-    if not negative:
-        return found
     r, free = found.r.copy(), prior.free.copy()
-    r[[names.index(name) for name in negative]] = 0.0
-    free[[names.index(one) for name in negative for one in (name, _WIDTH_OF.get(name, name))]] = False
+    for name in place.keys() & set(_FRICTIONS):
+        if found.r[place[name]] < (0.0 if name in _DRY else -errors[place[name]]):
+            r[place[name]] = 0.0
+            free[[place[name], place[_WIDTH_OF.get(name, name)]]] = False
+    if np.array_equal(r, found.r, equal_nan=True):
+        return found
     within = Prior(prior.r, prior.sd, free)
     use = gated(problem, found) & problem.used(found.cut)
     again = problem.searched(r, within, found.cut, found.starts, use)
@@ -464,7 +462,7 @@ def _longer(search: _Search, problem: Problem, found: Refined) -> Refined:
             break
         found, prior = _with_extras(search, problem, prior, found)
         found = without_outliers(problem, prior, _without_push(problem, prior, found))
-        if not (found.slow_chi2 < _ASKED and _largest_error(found) < _GROWN * least):
+        if not (found.slow_chi2 < NOISE and _largest_error(found) < _GROWN * least):
             break
         if found.converged:
             best, least = found, min(least, _largest_error(found))
@@ -514,15 +512,14 @@ def _with_options(
 ) -> tuple[Problem, Refined]:
     """With the optional extras that explain enough, beside those of `kept`: of each round the one that explains
     most."""
-    while found.slow_chi2 >= _ASKED and not search.budget.is_spent:
+    while found.slow_chi2 >= NOISE and not search.budget.is_spent:
         tried: list[tuple[Problem, Prior, Refined, tuple[str, ...]]] = []
         for optional in _OPTIONS:
-            if optional[0] in kept or any(one.slow_chi2 < _ASKED for _, _, one, _ in tried):
+            if optional[0] in kept or any(one.slow_chi2 < NOISE for _, _, one, _ in tried):
                 continue
             other, prior, again = _with_option(search, problem, found, (*kept, *optional))
-            factor = max(again.chi2, again.slow_chi2, 1.0)
             gained = found.sum_of_squares - again.sum_of_squares
-            if np.isfinite(again.chi2) and gained > GAINED * factor * len(optional):
+            if np.isfinite(again.chi2) and gained > again.significant_fall * len(optional):
                 tried.append((other, prior, again, optional))
         if not tried:
             break
