@@ -32,8 +32,8 @@ def pvid(*arguments: str | Path) -> Result:
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    """The standard rig, linear truth, 14 bits, 20 s at 1 kHz."""
-    return simulate(sensors=standard_sensors(14), truth="linear", duration=20.0, seed=4).run
+    """The standard rig, small angles, 14 bits, 20 s at 1 kHz."""
+    return simulate(sensors=standard_sensors(14), release=(0.02, 0.05), truth="full", duration=20.0, seed=4).run
 
 
 def write(path: Path, run: Run, rows: npt.NDArray[np.int64] | None = None, t: Float | None = None) -> Path:

@@ -27,16 +27,23 @@ static void echo(void)
     } while (byte != 0u);
 }
 
-/* 'c': what the counter makes of 1000 instructions. */
+/* 'c': what the counter makes of 1000 instructions. The smallest of two rounds, because an AVR's counter interrupts
+ * one of them when it wraps (every 65536 cycles, at a time that depends on when the letter came). */
 #define TEN(text) text text text text text text text text text text
 static void count_instructions(void)
 {
-    const uint32_t first = pvid_port_instructions();
-    const uint32_t second = pvid_port_instructions();
-    __asm__ volatile(TEN(TEN(TEN("nop\n\t"))));
-    const uint32_t third = pvid_port_instructions();
-    report_number("nothing", second - first);
-    report_number("thousand", third - second);
+    uint32_t nothing = UINT32_MAX;
+    uint32_t thousand = UINT32_MAX;
+    for (volatile uint8_t round = 0; round < 2u; round++) {
+        const uint32_t first = pvid_port_instructions();
+        const uint32_t second = pvid_port_instructions();
+        __asm__ volatile(TEN(TEN(TEN("nop\n\t"))));
+        const uint32_t third = pvid_port_instructions();
+        nothing = (second - first < nothing) ? second - first : nothing;
+        thousand = (third - second < thousand) ? third - second : thousand;
+    }
+    report_number("nothing", nothing);
+    report_number("thousand", thousand);
     report_number("counts_per_1024", pvid_port_counts_per_1024());
 }
 

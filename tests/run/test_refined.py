@@ -96,6 +96,23 @@ def test_a_pendulum_with_friction_at_0_4_rad_is_refined_to_its_standard_errors()
         assert abs(value - damping / l1**2) < 4 * error < damping / l1**2
 
 
+def test_gaps_lie_between_the_blocks_and_cost_what_they_cut_out() -> None:
+    """Behind a gap of y the motion is another one than that of a drive that is interpolated across it."""
+    run = run_of()
+    missing = np.zeros(len(run), bool)
+    for first in (1500, 9000, 16000):
+        missing[first : first + 300] = True
+    cut = Run(run.t, np.where(missing, np.nan, run.phi), np.where(missing, np.nan, run.y), run.sample_rate)
+    outcome = refine_pendulum(cut, rig(), [start(1.05)], sure=True)
+    found, se = outcome.found, np.sqrt(np.diag(outcome.found.covariance))[:3]
+    assert found.converged and found.slow_chi2 < 1.5 and len(outcome.problem.stretches) == 4
+    assert (np.abs(found.r[:3] / TRUTH - 1) < 3 * se).all()
+    assert (se < 1.7 * np.sqrt(np.diag(refined().found.covariance))[:3]).all()
+    every = round(run.sample_rate / outcome.problem.measured.rate)
+    for first in found.cut.first * every + outcome.first:
+        assert not missing[first : first + found.cut.samples * every].any()
+
+
 def test_a_skew_is_found_and_costs_no_accuracy() -> None:
     found = refined(1e-3)
     value, error = found.extras["tau"]
@@ -208,7 +225,7 @@ def test_where_residuals_are_noise_blocks_grow() -> None:
     outcome = refine_pendulum(run, RigFile.standard(), [start(1.05)], sure=True)
     found, problem = outcome.found, outcome.problem
     prior = Prior(found.r, np.full(problem.n, 10.0), np.diag(found.covariance) > 0)
-    cut = Cut.of(len(problem.measured.z), len(problem.measured.z) // 9)
+    cut = problem.cut(problem.longest // 9)
     starts = problem.starts_along(found.r, found, cut)
     in_blocks = problem.searched(found.r, prior, cut, starts, problem.used(cut))
     assert len(found.cut.first) < 4
@@ -378,5 +395,12 @@ def test_a_motion_that_runs_away_ends_a_pass() -> None:
 
 
 def test_blocks_fill_the_run() -> None:
-    cut = Cut.of(1000, 260)
+    cut = Cut.of([(0, 1000)], 260)
     assert cut.samples == 250 and cut.first.tolist() == [0, 250, 500, 750]
+
+
+def test_blocks_fill_the_stretches_between_gaps() -> None:
+    cut = Cut.of([(0, 1000), (1100, 1600), (1700, 1800)], 260)
+    assert cut.samples == 250 and cut.first.tolist() == [0, 250, 500, 750, 1100, 1350]
+    cut = Cut.of([(0, 400), (500, 799), (900, 1199)], 290)  # as blocks of 400 they would leave two stretches out
+    assert cut.samples == 200 and cut.first.tolist() == [0, 200, 500, 900]

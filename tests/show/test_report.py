@@ -161,13 +161,13 @@ def test_plot_format_follows_the_file_suffix(log: Path, tmp_path: Path, suffix: 
 
 
 def test_plot_of_a_run_identifies_it_first(tmp_path: Path) -> None:
-    run = simulate(sensors=standard_sensors(14), truth="linear", duration=10, seed=3).run
+    run = simulate(sensors=standard_sensors(14), release=(0.02, 0.05), truth="full", duration=10, seed=3).run
     write_run(tmp_path / "run.csv", run)
     RigFile.standard().write(tmp_path / "run.toml")
     arguments = ["plot", str(tmp_path / "run.csv"), "--rig", str(tmp_path / "run.toml"), "-o", str(tmp_path / "a.svg")]
     assert CliRunner().invoke(commands, arguments, standalone_mode=False).return_value == 0
     text = shown(tmp_path / "a.svg")
-    assert "run.csv: weak form, stationary law, core f32" in text and "10000 samples" in text
+    assert "run.csv: refinement in float64 after the weak form, stationary law, core f32" in text and "10000 samples" in text
     assert CliRunner().invoke(commands, arguments[:2], standalone_mode=False).return_value == 0  # run.toml is there
     assert (tmp_path / "run.png").is_file()
     (tmp_path / "run.toml").unlink()

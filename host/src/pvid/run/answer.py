@@ -64,9 +64,7 @@ def table(result: Identification, truths: dict[str, float] | None = None) -> Tab
     """The parameters, rounded to their errors; None if the run is not identified."""
     if not result.identified:
         return None
-    refined = result.refinement is not None and result.refinement.adopted
-    made = f"{result.form} form, {result.law} law, core {result.core} on {result.on}"
-    out = Table(title=f"refinement in float64 after the {made}" if refined else made)
+    out = Table(title=f"{result.method} on {result.on}")
     out.add_column("parameter")
     if truths:
         out.add_column("truth", justify="right")

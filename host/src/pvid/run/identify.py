@@ -164,6 +164,13 @@ class Identification:
     refinement: Any = None
 
     @property
+    def method(self) -> str:
+        """What made the answer, in words."""
+        made = f"{self.form} form, {self.law} law, core {self.core}"
+        refined = self.refinement is not None and self.refinement.adopted
+        return f"refinement in float64 after the {made}" if refined else made
+
+    @property
     def identified(self) -> bool:
         """Whether the run is identified: an estimate was published; in the strong form, the last reason is no refusal
         and the first parameter is accurate enough."""

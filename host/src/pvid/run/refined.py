@@ -20,6 +20,7 @@ Float = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
 Inputs = Callable[[float], tuple[Float, Float]]
+Stretch = tuple[int, int]  # first sample, last + 1
 
 PASSES = 40
 _LARGEST = 0.3  # step of a logarithm in one pass
@@ -29,6 +30,7 @@ _SETTLED = 0.01  # standard errors: of the last step
 _NEARLY = 0.3  # of one from which rounding leads no farther
 _RUNS_AWAY = 1e100  # a reading, or its derivative: the square of a larger one overflows
 _START_SD = 1e3  # of the outputs' spread: the starts are free
+_MORE = 1.05  # times the samples: what shorter blocks must cover
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
 _PARTS = (1, 2, 4, 8, 16, 32, 64)  # of a block, whose scores scatter
 _FEWEST_PARTS = 3  # times the unknowns: with fewer, the scatter is not estimated
@@ -52,6 +54,7 @@ class Measured:
     sub : steps a sample
     coarse : steps that are taken as one where no friction reverses
     grown : variance of a sample over that at low frequencies, sd^2: of samples that went through a filter
+    stretches : of the samples, in which the inputs are known; none: all of them
     """
 
     z: Float
@@ -61,6 +64,7 @@ class Measured:
     sub: int
     grown: float = 1.0
     coarse: int = 1
+    stretches: Sequence[Stretch] = ()
 
     @property
     def h(self) -> float:
@@ -85,11 +89,22 @@ class Cut:
     samples: int
 
     @classmethod
-    def of(cls, total: int, samples: int) -> Cut:
-        """As many whole blocks of about this length as fill the run."""
-        blocks = max(1, round(total / samples))
-        length = total // blocks
-        return cls(np.arange(blocks, dtype=np.int32) * np.int32(length), length)
+    def of(cls, stretches: Sequence[Stretch], samples: int) -> Cut:
+        """As many whole blocks of about this length as fill the longest stretch, and as fit into the others. Blocks are
+        shorter where that covers more of the others."""
+        sizes = np.array([end - first for first, end in stretches])
+        longest = int(sizes.max())
+        near = max(1, round(longest / samples))
+
+        def covered(length: int) -> int:
+            return int((sizes // length).sum()) * length
+
+        length = longest // near
+        best = max((longest // count for count in range(near, 3 * near // 2 + 2)), key=covered)
+        if covered(best) > _MORE * covered(length):
+            length = best
+        firsts = [np.arange(size // length) * length + first for (first, _), size in zip(stretches, sizes, strict=True)]
+        return cls(np.concatenate(firsts).astype(np.int32), length)
 
     def rows(self, values: Float) -> Float:
         """Samples by blocks [blocks, samples, ...]."""
@@ -171,6 +186,20 @@ class Problem:
         self.n = len(kernel.made.parameters)
         self.log = np.array([one.log for one in kernel.made.parameters])
         self.is_width = np.array([bool(one.sign) for one in kernel.made.parameters])  # of a sign
+
+    @property
+    def stretches(self) -> Sequence[Stretch]:
+        """In which the inputs are known."""
+        return self.measured.stretches or [(0, len(self.measured.z))]
+
+    @property
+    def longest(self) -> int:
+        """Samples of the longest stretch."""
+        return max(end - first for first, end in self.stretches)
+
+    def cut(self, samples: int) -> Cut:
+        """Blocks of about this length."""
+        return Cut.of(self.stretches, samples)
 
     def moved(self, r: Float, step: Float) -> Float:
         """r after a step [parameters]."""
@@ -483,14 +512,21 @@ class Problem:
         """Starts of other blocks, from the motion of those that are solved."""
         m, old, u = self.measured, before.cut, self.inputs(r)
         out = np.empty((len(cut.first), self.kernel.states))
+        begins = [first for first, _ in self.stretches]
+
+        def stretch(sample: int) -> int:
+            return int(np.searchsorted(begins, sample, side="right"))
+
         for k, first in enumerate(cut.first):
             b = int(np.clip(np.searchsorted(old.first, first, side="right") - 1, 0, len(old.first) - 1))
-            gap = int(first - old.first[b])
-            if gap <= 0:
+            after = int(first - old.first[b])
+            if after == 0:
                 out[k] = before.starts[b]
-                continue
-            at = old.first[b : b + 1]
-            out[k] = self.kernel.blocks(r, at, gap, m.sub, m.h, *u, before.starts[b : b + 1], False, m.coarse)[2][0]
+            elif after < 0 or stretch(int(first)) != stretch(int(old.first[b])):  # none of them is before it
+                out[k] = self.first_starts(Cut(cut.first[k : k + 1], cut.samples), r)[0]
+            else:
+                at = old.first[b : b + 1], after, m.sub, m.h
+                out[k] = self.kernel.blocks(r, *at, *u, before.starts[b : b + 1], False, m.coarse)[2][0]
         return out
 
 
@@ -522,16 +558,16 @@ def refined(
     Raises
     ------
     PvidError
-        When the run is shorter than a block.
+        When the run, or its longest stretch, is shorter than a block.
     """
-    total = len(problem.measured.z)
-    if total < lengths[0]:
-        raise PvidError(f"the run has {total} samples and a block of the refinement {lengths[0]}")
+    if problem.longest < lengths[0]:
+        of = "the longest stretch without a gap" if problem.measured.stretches else "the run"
+        raise PvidError(f"{of} has {problem.longest} samples and a block of the refinement {lengths[0]}")
     found = before
     if r is None:
         r = prior.r.copy() if found is None else found.r
     for samples in lengths:
-        cut = Cut.of(total, samples)
+        cut = problem.cut(samples)
         use = problem.used(cut)
         if found is None:
             starts = problem.first_starts(cut, r)

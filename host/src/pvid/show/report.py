@@ -216,8 +216,7 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     names = [name for name in result.model.p_names if name in result.value]
     advices = tuple(f"advice: {sentence}" for sentence in result.advice)
     return Recording(
-        title=f"{path.name}: {result.form} form, {result.law} law, core {result.core}, {run.sample_rate:g} samples per "
-        "second",
+        title=f"{path.name}: {result.method}, {run.sample_rate:g} samples per second",
         clock="of the run",
         rig=resolved(rig, given),  # as it was identified
         run=whole,
