@@ -119,7 +119,8 @@ def test_a_start_has_no_errors_of_scales() -> None:
 
 
 def test_identify_lists_the_parts_of_the_standard_errors(tmp_path: Path) -> None:
-    write_run(tmp_path / "run.csv", simulate(sensors=standard_sensors(14), release=(0.02, 0.05), truth="full", duration=15.0).run)
+    made = simulate(sensors=standard_sensors(14), release=(0.02, 0.05), truth="full", duration=15.0)
+    write_run(tmp_path / "run.csv", made.run)
     (tmp_path / "run.toml").write_text("l1 = 0.3\nl1_sd = 0.002\n[sensor]\ny_gain_sd = 0.01\n", encoding="utf-8")
     arguments = ["identify", str(tmp_path / "run.csv"), "--rig", str(tmp_path / "run.toml")]
     told = CliRunner().invoke(commands, arguments, standalone_mode=False)

@@ -167,7 +167,8 @@ def test_plot_of_a_run_identifies_it_first(tmp_path: Path) -> None:
     arguments = ["plot", str(tmp_path / "run.csv"), "--rig", str(tmp_path / "run.toml"), "-o", str(tmp_path / "a.svg")]
     assert CliRunner().invoke(commands, arguments, standalone_mode=False).return_value == 0
     text = shown(tmp_path / "a.svg")
-    assert "run.csv: refinement in float64 after the weak form, stationary law, core f32" in text and "10000 samples" in text
+    assert "run.csv: refinement in float64 after the weak form, stationary law, core f32" in text
+    assert "10000 samples" in text
     assert CliRunner().invoke(commands, arguments[:2], standalone_mode=False).return_value == 0  # run.toml is there
     assert (tmp_path / "run.png").is_file()
     (tmp_path / "run.toml").unlink()

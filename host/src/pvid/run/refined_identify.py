@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolved
@@ -27,6 +28,7 @@ _SCALES = (1.0, 0.45, 2.2)  # of the guessed lengths: starts
 BEARABLE = 30.0  # slow chi^2 up to which a refined answer is published, with a warning, where there is no other
 AGREE = 3.0  # standard errors by which two halves of a run may differ whose residuals are more than noise
 LARGEST_SKEW_S = 5e-3  # beyond it a skew may stand for another error
+_SHOWN = 3  # times of jumps
 LARGEST_SE = (0.05, 0.05, 0.1)  # relative, of w, d1, d2: beyond, the run does not determine them
 
 
@@ -137,6 +139,17 @@ def _doubts(outcome: RefinedPendulum, weak: Identification) -> Iterator[str]:
         )
 
 
+def _remarks(outcome: RefinedPendulum) -> Iterator[str]:
+    """Sentences on what the refinement left out."""
+    if outcome.breaks:
+        places = listed([f"{t:.4g} s" for t in outcome.breaks[:_SHOWN]])
+        more = f" and {len(outcome.breaks) - _SHOWN} other times" if len(outcome.breaks) > _SHOWN else ""
+        yield (
+            f"y jumps at {places}{more}: samples are lost there while t goes on, or its zero moves. The refinement "
+            "begins anew behind each."
+        )
+
+
 def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVerdict) -> Identification:
     """The refined parameters with their errors, those of the scales among them."""
     assert verdict.outcome is not None
@@ -162,7 +175,7 @@ def _answer(run: Run, rig: RigFile, weak: Identification, verdict: RefinementVer
         chi2=found.slow_chi2,
         alarm=found.slow_chi2 > GOOD,
         doubts=None if weak.doubts is None else tuple(_doubts(outcome, weak)),
-        remarks=tuple(one for one in weak.remarks if one.startswith(NO_CORE)),
+        remarks=(*(one for one in weak.remarks if one.startswith(NO_CORE)), *_remarks(outcome)),
         status=Reason.UPDATED.text,
         largest_angle=largest_angle(run, value[model.offset_name]),
         refinement=verdict,

@@ -13,8 +13,9 @@ from pvid.codegen.refine import LOG_SD, WIDTH_SD
 from pvid.design.second_derivative import second_derivative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT, MODELS
+from pvid.rig.breaks import breaks
 from pvid.rig.file import RigFile
-from pvid.rig.gaps import stretches
+from pvid.rig.gaps import bridge, stretches
 from pvid.rig.run import Run
 from pvid.run.refined import (
     GOOD,
@@ -45,6 +46,7 @@ _VAGUE = 0.1  # largest standard error of a logarithm from which a search goes o
 _BOUND = 1.5  # slow chi^2 of a search that needs no other start
 _KNOTS = 4  # of the spline through the drive: over as many it follows a wrong one
 _EDGE = 1.25  # times the drive's: the pass band
+HIGHEST = 0.25  # of the sample rate: a pass band that its filter is exact in to 1e-5
 _STEP = 0.1  # of a step times the fast mode's angular frequency
 _A_PERIOD = 60  # decimated samples in a period of the fast mode
 # what is known of the extras before: little
@@ -84,12 +86,14 @@ class RefinedPendulum:
     problem, found : the fit and the problem that it solves
     first : sample of the run that the problem starts at
     rivals : other fits that explain the run about as well
+    breaks : times at which the drive jumps, between the blocks [s]
     """
 
     problem: Problem
     found: Refined
     first: int
     rivals: tuple[Refined, ...] = ()
+    breaks: tuple[float, ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -155,10 +159,11 @@ class _Search:
         rate = run.sample_rate
         if not 2 * self.fast < rate:
             raise PvidError(f"{rate:g} samples a second are too few for a mode of {self.fast:.3g} Hz")
-        edge = max(_EDGE * drive_edge_hz(run, rig), self.slow)
-        front = second_derivative(rate, min(edge, 0.4 * rate))
-        there = np.isfinite(run.y)
-        y = np.interp(np.arange(len(run.y)), np.flatnonzero(there), run.y[there])
+        y, self.breaks = self._whole(run.y)
+        there = np.isfinite(y)
+        edge = max(_EDGE * drive_edge_hz(y, rate, rig), self.slow)
+        front = second_derivative(rate, min(edge, HIGHEST * rate))
+        y = np.interp(np.arange(len(y)), np.flatnonzero(there), y[there])
         times, acceleration = front.apply(y, rate)
         if len(times) < 12:
             raise PvidError(f"the run of {len(y) / rate:.3g} s is too short for the refinement")
@@ -172,6 +177,18 @@ class _Search:
         self.budget = Budget(_WORK)
         self._problems: dict[tuple[str, ...], Problem] = {}
         self.short: list[tuple[float, dict[str, float]]] = []  # chi^2 and values of the shortest blocks, of each start
+
+    def _whole(self, y: Float) -> tuple[Float, tuple[float, ...]]:
+        """The drive without wild samples, NaN about jumps; and the times of these [s]."""
+        rate, periods = self.run.sample_rate, len(y) / self.run.sample_rate * self.slow
+        broken = breaks(y, max(8, round(rate / self.slow)), NOISE_LSB * self.rig.sensor.y_lsb)
+        missing = np.isnan(y)
+        whole = np.where(broken, np.nan, y)
+        bridge([whole], rate)
+        firsts, _ = stretches(np.isnan(whole) & ~missing)
+        if len(firsts) > periods / _PERIODS:  # more than blocks: corners of the drive
+            return y, ()
+        return whole, tuple(self.run.t[firsts].tolist())
 
     def _stretches(self, there: npt.NDArray[np.bool_], reach: int) -> list[Stretch]:
         """In which the drive is known: its filter has no missing sample; none where no sample is missing."""
@@ -297,7 +314,7 @@ def refine_pendulum(
         found = _without_push(problem, search.prior_at(problem, found), found)
     if problem is not search.problem():  # other parameters were freed since
         rivals = ()
-    return RefinedPendulum(problem, found, search.first, (*rivals, *rubbing))
+    return RefinedPendulum(problem, found, search.first, (*rivals, *rubbing), search.breaks)
 
 
 def _outcomes(
@@ -587,16 +604,16 @@ def _inputs(t: Float, u: Float, rate: float, sub: int, samples: int) -> Inputs:
     return of
 
 
-def drive_edge_hz(run: Run, rig: RigFile) -> float:
-    """Up to where the drive's spectrum stands above its sensor's noise [Hz]."""
-    firsts, ends = stretches(np.isfinite(run.y))
+def drive_edge_hz(y: Float, rate: float, rig: RigFile) -> float:
+    """Up to where the spectrum of the drive's longest stretch stands above its sensor's noise [Hz]."""
+    firsts, ends = stretches(np.isfinite(y))
     longest = int(np.argmax(ends - firsts))
-    y = run.y[firsts[longest] : ends[longest]]
+    y = y[firsts[longest] : ends[longest]]
     n = len(y)
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((y - y.mean()) * window)) ** 2
     floor = (NOISE_LSB * rig.sensor.y_lsb) ** 2 * float(np.sum(window**2))
-    hz = np.fft.rfftfreq(n, 1 / run.sample_rate)
+    hz = np.fft.rfftfreq(n, 1 / rate)
     weighted = spectrum * hz**4
     shown = spectrum > 30 * floor
     above = np.flatnonzero(shown & (weighted > 1e-5 * weighted[shown].sum()))
