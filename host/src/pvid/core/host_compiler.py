@@ -33,11 +33,12 @@ def host_compiler(what: str) -> str:
 
 
 def compiled_once() -> Mapping[str, str]:
-    """The environment in which ccache, where it is installed, keeps the objects of all builds in the cache of builds.
+    """The environment in which ccache, where it is installed, keeps the objects of all builds: in CCACHE_DIR, or in the
+    cache of builds.
 
     Trees of one processor hold the same objects but for a macro or two.
     """
-    return {**os.environ, "CCACHE_DIR": str(build_folder() / "cache" / "ccache"), "CCACHE_NOHASHDIR": "true"}
+    return {"CCACHE_DIR": str(build_folder() / "cache" / "ccache"), **os.environ, "CCACHE_NOHASHDIR": "true"}
 
 
 def objects_of(compiler: str, options: Sequence[str], sources: Sequence[Path], folder: Path) -> list[str]:
