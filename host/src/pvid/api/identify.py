@@ -24,6 +24,7 @@ from pvid.run.advised import identified
 from pvid.run.mechanism import identify_mechanism, model_of
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.skew import aligned
+from pvid.run.wild_samples import without_wild_samples
 from pvid.settings.engine_cores import ENGINE_CORES
 
 Data = str | os.PathLike[str] | Mapping[str, npt.ArrayLike] | Any
@@ -81,7 +82,7 @@ def identify(
             recording = recording_of_log(path, [one.name for one in compiled.signals])
         else:
             recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
-        answer = identify_mechanism(recording.whole(), compiled)
+        answer = identify_mechanism(without_wild_samples(recording.whole(), compiled), compiled)
         engine = ENGINE_CORES.get(core or "")
         return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)

@@ -29,6 +29,7 @@ from pvid.run.compare import Comparison
 from pvid.run.engine_identify import ALL_ALIKE
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.run.mechanism_advice import advice_on
+from pvid.run.wild_samples import without_wild_samples
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
 
@@ -45,7 +46,8 @@ _LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
 
 def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
-    """The longest stretch of a recording without a missing sample, and the model with the values of the rig."""
+    """The longest stretch of a recording without a missing sample, its wild ones interpolated, and the model with the
+    values of the rig."""
     if isinstance(rig, RigFile):
         return _recording_of_own(path, rig, columns)
     model = model_of(rig)
@@ -58,7 +60,7 @@ def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -
     else:
         raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals, or a log")
     recording.refuse_damaged()
-    recording = recording.whole()
+    recording = without_wild_samples(recording.whole(), model)
     print_notes(recording.notes)
     return recording, model
 

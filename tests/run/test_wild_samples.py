@@ -1,0 +1,73 @@
+"""Wild samples of sensors are interpolated and told; nothing that a mechanism does is taken for one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from pvid.cli.mechanism import recording_of
+from pvid.log.mechanism_settings import mechanism_rig
+from pvid.models.mechanisms import compiled_of, names
+from pvid.rig.run import Recording
+from pvid.run.mechanism import identify_mechanism
+from pvid.run.wild_samples import without_wild_samples
+from pvid.sim.imperfections import Imperfections
+from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
+
+RECORDINGS = ROOT / "tests" / "data" / "recordings"
+
+
+def recorded(name: str, imperfections: Imperfections = PERFECT) -> Recording:
+    simulation = simulation_of(name)
+    signals = {key: values[:8000] for key, values in simulation.run(1, imperfections).items()}
+    rate = simulation.rig.sample_rate
+    return Recording(np.arange(len(next(iter(signals.values())))) / rate, signals, rate)
+
+
+@pytest.mark.parametrize("imperfections", [PERFECT, SOFT], ids=["sharp", "soft"])
+@pytest.mark.parametrize("name", names())
+def test_a_mechanism_has_none(name: str, imperfections: Imperfections) -> None:
+    recording = recorded(name, imperfections)
+    found = without_wild_samples(recording, compiled_of(name))
+    assert found.notes == ()
+    assert all(found.signals[key] is values for key, values in recording.signals.items())
+
+
+@pytest.mark.parametrize("name", ["bicycle_fork", "motor_generator", "torso_lift"])
+def test_a_real_recording_has_none(name: str) -> None:
+    path = RECORDINGS / name / "identify.csv.gz"
+    rig = mechanism_rig(path, None, (), str(RECORDINGS / f"{name}.py"))
+    assert rig is not None
+    recording, _ = recording_of(path, rig, None)
+    assert not [note for note in recording.notes if "wild" in note]
+
+
+def test_wild_samples_of_an_encoder_cost_no_answer() -> None:
+    """They spoilt two thirds of the windows, and nothing was identified."""
+    recording, model = recorded("dc_motor"), compiled_of("dc_motor")
+    phi = recording.signals["phi"].copy()
+    places = np.array([700, 1500, 2400, 3300, 4100, 5000, 6100, 7000])
+    phi[places] += 3.0
+    spoilt = replace(recording, signals={**recording.signals, "phi": phi})
+    cleaned = without_wild_samples(spoilt, model)
+    assert cleaned.notes == ("8 wild samples of phi (at 0.7 s): interpolated",)
+    own = model.signal("phi").sd
+    changed = np.flatnonzero(cleaned.signals["phi"] != phi)
+    assert set(places) <= set(changed) and np.abs(changed[:, None] - places).min(1).max() <= 2
+    assert np.abs(cleaned.signals["phi"] - recording.signals["phi"]).max() < 6 * own
+    clean, found = identify_mechanism(recording, model), identify_mechanism(cleaned, model)
+    assert clean.identified and found.identified
+    for name, one in found.values.items():
+        assert abs(one.value - clean.values[name].value) < one.se, name
+
+
+def test_a_jump_and_a_burst_are_no_wild_samples() -> None:
+    recording, model = recorded("dc_motor"), compiled_of("dc_motor")
+    phi = recording.signals["phi"].copy()
+    phi[4000:] += 1.0
+    phi[6000:6008] += 2.0
+    jumped = replace(recording, signals={**recording.signals, "phi": phi})
+    assert without_wild_samples(jumped, model).notes == ()
