@@ -15,7 +15,7 @@ T = np.arange(20_000) / 1000.0
 
 
 def noisy(y: Float) -> Float:
-    return y + np.random.default_rng(1).normal(0.0, NOISE, len(y))
+    return np.asarray(y + np.random.default_rng(1).normal(0.0, NOISE, len(y)), np.float64)
 
 
 def swept(y: Float, low: float, high: float) -> Float:

@@ -185,7 +185,7 @@ class _Search:
         missing = np.isnan(y)
         whole = np.where(broken, np.nan, y)
         bridge([whole], rate)
-        firsts, _ = stretches(np.isnan(whole) & ~missing)
+        firsts, _ = stretches(np.asarray(np.isnan(whole) & ~missing))
         if len(firsts) > periods / _PERIODS:  # more than blocks: corners of the drive
             return y, ()
         return whole, tuple(self.run.t[firsts].tolist())
