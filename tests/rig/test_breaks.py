@@ -15,17 +15,19 @@ T = np.arange(20_000) / 1000.0
 
 
 def noisy(y: Float) -> Float:
-    return np.asarray(y + np.random.default_rng(1).normal(0.0, NOISE, len(y)), np.float64)
+    found: Float = y + np.random.default_rng(1).normal(0.0, NOISE, len(y))
+    return found
 
 
-def swept(y: Float, low: float, high: float) -> Float:
-    return y + 5e-3 * np.sin(2 * np.pi * (low * T + (high - low) * T**2 / (2 * T[-1])))
+def swept(low: float, high: float) -> Float:
+    found: Float = 5e-3 * np.sin(2 * np.pi * (low * T + (high - low) * T**2 / (2 * T[-1])))
+    return found
 
 
 STILL = np.zeros(len(T))
 DRIVES = {
     "tones": 5e-3 * np.sin(2 * np.pi * 2.3 * T) + 4e-3 * np.sin(2 * np.pi * 4.1 * T + 1.0),
-    "sweep": swept(STILL, 1.0, 100.0),
+    "sweep": swept(1.0, 100.0),
     "onset": np.where(T > 7, 5e-3 * (1 - np.cos(2 * np.pi * 20 * (T - 7))), 0.0),
     "triangle": 5e-3 * 2 / np.pi * np.arcsin(np.sin(2 * np.pi * 3 * T)) * 0.3,
     "still": STILL,

@@ -185,7 +185,7 @@ class _Search:
         missing = np.isnan(y)
         whole = np.where(broken, np.nan, y)
         bridge([whole], rate)
-        firsts, _ = stretches(np.asarray(np.isnan(whole) & ~missing))
+        firsts, _ = stretches(np.isnan(whole) & ~missing)
         if len(firsts) > periods / _PERIODS:  # more than blocks: corners of the drive
             return y, ()
         return whole, tuple(self.run.t[firsts].tolist())
@@ -196,7 +196,7 @@ class _Search:
             return []
         missing = np.convolve(~there, np.ones(2 * reach + 1), "same") > 0.5
         averaged = missing[self.first :][: self.samples * self.mean].reshape(-1, self.mean)
-        firsts, ends = stretches(~averaged.any(1))
+        firsts, ends = stretches(np.asarray(~averaged.any(1)))
         if not len(firsts):
             raise PvidError("the gaps of the run leave nothing between them that the refinement can use")
         return [(int(first), int(end)) for first, end in zip(firsts, ends, strict=True)]
