@@ -77,6 +77,7 @@ TABLES = (
         "The pendulum through the weak engine: errors over 80 seeds, beside the Cramer-Rao bound.",
     ),
     ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
+    ("accidents", "accidents", "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them."),
 )
 
 

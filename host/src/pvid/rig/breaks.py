@@ -10,7 +10,7 @@ Bool = npt.NDArray[np.bool_]
 
 _ORDER = 4
 _GAIN = 70.0  # of the variance of white noise, by that difference: 1 + 16 + 36 + 16 + 1
-_BEYOND = 10.0  # standard deviations
+_BEYOND = 15.0  # standard deviations
 
 
 def breaks(x: Float, span: int, noise: float) -> Bool:
