@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bench.accidents import HEADER, OF_MOTOR, PENDULUM, SEEDS, Outcome, outcome_of, pendulum_with, row_of
 from conftest import ROOT
+
+from bench.accidents import HEADER, OF_MOTOR, PENDULUM, SEEDS, Outcome, outcome_of, pendulum_with, row_of
 
 
 @pytest.mark.parametrize("accident", PENDULUM + OF_MOTOR, ids=lambda one: one.label)

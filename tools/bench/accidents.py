@@ -185,10 +185,13 @@ def motor_with(accident: Accident, seed: int) -> Outcome:
     left = accident.happens(signals, np.random.default_rng(seed), rate) or signals
     recording = Recording(np.arange(len(left["V"])) / rate, left, rate).whole()
     found = identify_mechanism(without_wild_samples(recording, model), model)
-    values = {name: (one.value, one.se) for name, one in found.values.items()} if found.identified else {}
     truth = dict(zip(model.p_names, map(float, simulation.truth), strict=True))
-    own = {name: one for name, one in values.items() if name in truth}
-    return outcome_of(own, truth, found.found.verdict.warning is not None)
+    values = {
+        name: (one.value, one.se)
+        for name, one in found.values.items()
+        if name in truth and one.value is not None and one.se is not None
+    }
+    return outcome_of(values, truth, found.found.verdict.warning is not None)
 
 
 def row_of(mechanism: str, accident: Accident, outcomes: list[Outcome]) -> tuple[str, ...]:

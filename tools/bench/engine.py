@@ -33,6 +33,7 @@ HEADER = (
     "of the oracle",
     "largest ratio: of",
     "ratio",
+    "started at the truth",
     "engine - oracle, s.e.: RMS",
     "largest",
 )
@@ -60,6 +61,7 @@ class Errors:
     Attributes
     ----------
     engine, oracle : errors over the parameters' sizes [runs, n_p]
+    from_truth : of the engine that starts at the truth [runs, n_p]
     apart : engine less oracle in standard errors that the oracle predicts [runs, n_p]
     published : runs in which the engine published
     functions : K
@@ -67,6 +69,7 @@ class Errors:
 
     engine: Float
     oracle: Float
+    from_truth: Float
     apart: Float
     published: int
     functions: int
@@ -74,6 +77,10 @@ class Errors:
     def ratios(self) -> Float:
         """RMS error of the engine over that of the oracle [n_p]."""
         return np.asarray(rms(self.engine) / rms(self.oracle))
+
+    def ratios_from_truth(self) -> Float:
+        """The same of the engine that starts at the truth: without windows that are weighted at a wrong p [n_p]."""
+        return np.asarray(rms(self.from_truth) / rms(self.oracle))
 
 
 def cases(names: Sequence[str]) -> list[Case]:
@@ -98,25 +105,35 @@ def errors_of(case: Case, seeds: int, progress: Callable[[], object] | None = No
     made, model = ready(compiled), weak_model_of(compiled)
     design = for_engine(design_of(simulation, case.law))
     tables: Any = None
-    engine, oracle, apart, published = [], [], [], 0
+    engine, oracle, from_truth, apart, published = [], [], [], [], 0
     for seed in range(seeds):
         run, start = simulation.run(seed, case.law), start_of(simulation, seed)
         rows = WeakRows.of(made, run, design)
         tables = tables or design_tables(model, rows, simulation.truth)
         config = config_of(tables, design.sample_rate, made.parameters)
-        own = replace(config.estimator, start=np.clip(start, config.estimator.lower, config.estimator.upper))
-        core = weak_native(compiled, tables).identifier_of(replace(config, estimator=own))
-        record = core.run_samples(samples_of(config, run), sums=False, hashes=False)
+        core, p = _ran(compiled, config, run, start, tables)
         used = core.counters["rows"] // (design.functions * rows.kinds)
         fit = batch(rows.only(slice(0, used)) if used else rows, start, equation_error=False)
-        p, size = record.p[-1].astype(np.float64), size_of(simulation)
+        size = size_of(simulation)
         engine.append((p - simulation.truth) / size)
+        _, q = _ran(compiled, config, run, np.asarray(simulation.truth), tables)
+        from_truth.append((q - simulation.truth) / size)
         oracle.append((fit.p - simulation.truth) / size)
         apart.append((p - fit.p) / uncertainty(fit).predicted)
         published += core.is_published
         if progress is not None:
             progress()
-    return Errors(np.array(engine), np.array(oracle), np.array(apart), published, design.functions)
+    return Errors(
+        np.array(engine), np.array(oracle), np.array(from_truth), np.array(apart), published, design.functions
+    )
+
+
+def _ran(compiled: Any, config: Any, run: Any, begin: Float, tables: Any) -> tuple[Any, Float]:
+    """The engine after a run from a start, and its p."""
+    own = replace(config.estimator, start=np.clip(begin, config.estimator.lower, config.estimator.upper))
+    core = weak_native(compiled, tables).identifier_of(replace(config, estimator=own))
+    record = core.run_samples(samples_of(config, run), sums=False, hashes=False)
+    return core, record.p[-1].astype(np.float64)
 
 
 def row_of(case: Case, found: Errors) -> tuple[str, ...]:
@@ -133,6 +150,7 @@ def row_of(case: Case, found: Errors) -> tuple[str, ...]:
         f"{100 * np.sqrt(np.mean(found.oracle**2)):.3g}",
         simulation_of(case.name).model.p_names[worst],
         f"{ratios[worst]:.3f}",
+        f"{found.ratios_from_truth()[worst]:.3f}",
         f"{np.sqrt(np.mean(found.apart**2)):.2g}",
         f"{np.max(np.abs(found.apart)):.2g}",
     )
