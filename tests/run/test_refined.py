@@ -31,7 +31,7 @@ from pvid.run.refined_identify import (
 )
 from pvid.run.refined_kernel import PlayedKernel, kernel_of
 from pvid.run.refined_mechanism import RefinedMechanism, refine_mechanism
-from pvid.run.refined_pendulum import HIGHEST, RefinedPendulum, _without_push, refine_pendulum
+from pvid.run.refined_pendulum import HIGHEST, RefinedPendulum, _without_push, drive_edge_hz, refine_pendulum
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.pendulum import SLIP, STANDARD_DRIVE, STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.sim.simulated_run import PERFECT, SOFT, RigSimulation, simulation_of
@@ -137,6 +137,19 @@ def test_wild_samples_and_lost_ones_of_the_drive_leave_no_bias() -> None:
     assert outcome.breaks == pytest.approx((10.0,), abs=0.01)
     (sentence,) = _remarks(outcome)
     assert sentence.startswith("y jumps at 9.998 s: samples are lost there while t goes on, or its zero moves.")
+
+
+def test_the_drives_band_ends_where_its_noise_begins() -> None:
+    """Instants that jitter make more noise in y than its sensor: the band went up to Nyquist's frequency."""
+    rate, sensors = 1000.0, standard_sensors(14)
+    fastest = max(tone.frequency_hz for tone in STANDARD_DRIVE)
+    run = simulate(DAMPED, STANDARD_DRIVE, sensors, rate, 20.0, truth="full").run
+    clean = drive_edge_hz(run.y, rate, RigFile.standard())
+    late = np.random.default_rng(0).normal(0.0, 3e-4, len(run.y))
+    jittered = run.y + late * np.gradient(run.y) * rate
+    assert np.std(jittered - run.y) > 3 * RigFile.standard().sensor.y_lsb
+    assert fastest <= clean <= fastest + 0.2
+    assert fastest <= drive_edge_hz(jittered, rate, RigFile.standard()) <= fastest + 0.2
 
 
 def test_a_skew_is_found_and_costs_no_accuracy() -> None:

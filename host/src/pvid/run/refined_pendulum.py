@@ -605,7 +605,8 @@ def _inputs(t: Float, u: Float, rate: float, sub: int, samples: int) -> Inputs:
 
 
 def drive_edge_hz(y: Float, rate: float, rig: RigFile) -> float:
-    """Up to where the spectrum of the drive's longest stretch stands above its sensor's noise [Hz]."""
+    """Up to where the spectrum of the drive's longest stretch stands above its noise [Hz]: of the sensor, or of the
+    spectrum's upper half, where instants of sampling that jitter make more."""
     firsts, ends = stretches(np.isfinite(y))
     longest = int(np.argmax(ends - firsts))
     y = y[firsts[longest] : ends[longest]]
@@ -614,6 +615,7 @@ def drive_edge_hz(y: Float, rate: float, rig: RigFile) -> float:
     spectrum = np.abs(np.fft.rfft((y - y.mean()) * window)) ** 2
     floor = (NOISE_LSB * rig.sensor.y_lsb) ** 2 * float(np.sum(window**2))
     hz = np.fft.rfftfreq(n, 1 / rate)
+    floor = max(floor, float(np.median(spectrum[hz >= rate / 4])) / np.log(2))  # the mean, of white noise
     weighted = spectrum * hz**4
     shown = spectrum > 30 * floor
     above = np.flatnonzero(shown & (weighted > 1e-5 * weighted[shown].sum()))
