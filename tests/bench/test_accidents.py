@@ -1,4 +1,4 @@
-"""Accidents of a recording: the bench's kinds are what they say, and the page has no wrong answer that is not told."""
+"""Accidents of a recording: the bench's kinds are what they say, and the page has no wrong answer without a warning."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ def test_lost_samples_and_wild_ones_leave_the_answer() -> None:
         assert found.percent is not None and found.percent < 0.2
 
 
-def test_a_wrong_answer_counts_unless_it_is_told() -> None:
+def test_a_wrong_answer_counts_unless_it_has_a_warning() -> None:
     values, truth = {"a": (1.1, 0.01), "b": (2.0, 0.1)}, {"a": 1.0, "b": 2.1}
-    silent, told = (outcome_of(values, truth, told) for told in (False, True))
-    assert silent.is_wrong and not told.is_wrong and silent.z == pytest.approx(10.0)
+    silent, warned = (outcome_of(values, truth, warned) for warned in (False, True))
+    assert silent.is_wrong and not warned.is_wrong and silent.z == pytest.approx(10.0)
     nothing = outcome_of({}, truth, False)
     assert not nothing.is_wrong
-    row = dict(zip(HEADER, row_of("m", PENDULUM[0], [silent, told, nothing]), strict=True))
-    assert (row["answered"], row["told"], row["wrong, not told"]) == ("2 of 3", "1", "1")
+    row = dict(zip(HEADER, row_of("m", PENDULUM[0], [silent, warned, nothing]), strict=True))
+    assert (row["answered"], row["warned"], row["wrong, no warning"]) == ("2 of 3", "1", "1")
     assert row_of("m", PENDULUM[0], [Outcome(None, None, True)])[3:6] == ("-", "-", "-")
 
 
-def test_the_page_has_every_kind_and_no_wrong_answer_that_is_not_told() -> None:
+def test_the_page_has_every_kind_and_no_wrong_answer_without_a_warning() -> None:
     text = (ROOT / "host/docs/benchmarks/robustness.md").read_text(encoding="utf-8")
     lines = text.partition("<!-- accidents -->")[2].partition("<!-- /accidents -->")[0].strip().splitlines()
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]

@@ -31,8 +31,8 @@ HEADER = (
     "largest error: median, s.e.",
     "largest, s.e.",
     "largest, %",
-    "told",
-    "wrong, not told",
+    "warned",
+    "wrong, no warning",
 )
 _AT = 0.5  # of the run: where it happens
 
@@ -73,13 +73,13 @@ def _jump(name: str, by: float) -> Callable[[Signals, np.random.Generator, float
     return happens
 
 
-def _lost(samples: int, told: bool = False) -> Callable[[Signals, np.random.Generator, float], Signals | None]:
-    """Samples that are missing: t goes on as if there were none, or tells them (they are NaN)."""
+def _lost(samples: int, seen: bool = False) -> Callable[[Signals, np.random.Generator, float], Signals | None]:
+    """Samples that are missing: t goes on as if there were none, or shows them (they are NaN)."""
 
     def happens(x: Signals, _: np.random.Generator, __: float) -> Signals | None:
         first = int(_AT * len(next(iter(x.values()))))
         gone = slice(first, first + samples)
-        if told:
+        if seen:
             for values in x.values():
                 values[gone] = np.nan
             return None
@@ -116,7 +116,7 @@ COMMON = (
     Accident("10 samples lost, t goes on", _lost(10)),
     Accident("100 samples lost, t goes on", _lost(100)),
     Accident("2000 samples lost, t goes on", _lost(2000)),
-    Accident("0.5 s missing, t tells it", _lost(500, told=True)),
+    Accident("0.5 s missing, visible in t", _lost(500, seen=True)),
     Accident("200 samples twice (a buffer)", _repeated(200)),
 )
 PENDULUM = (
@@ -144,29 +144,30 @@ STEPS = SEEDS * (len(PENDULUM) + len(OF_MOTOR))
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one run: its largest error, in standard errors and in %; None where nothing is identified; what is told."""
+    """Of one run: its largest error, in standard errors and in %, None where nothing is identified; and whether the
+    answer has a warning."""
 
     z: float | None
     percent: float | None
-    told: bool
+    warned: bool
 
     @property
     def is_wrong(self) -> bool:
-        """Without a word about it."""
-        return self.z is not None and self.z > WRONG and not self.told
+        """Without a warning."""
+        return self.z is not None and self.z > WRONG and not self.warned
 
 
-def outcome_of(values: Mapping[str, tuple[float, float]], truth: Mapping[str, float], told: bool) -> Outcome:
+def outcome_of(values: Mapping[str, tuple[float, float]], truth: Mapping[str, float], warned: bool) -> Outcome:
     """Of values with their standard errors; none where nothing is identified."""
     if not values:
-        return Outcome(None, None, told)
+        return Outcome(None, None, warned)
     z = {name: abs(value - truth[name]) / se for name, (value, se) in values.items()}
     worst = max(z, key=lambda name: z[name])
-    return Outcome(z[worst], 100 * abs(values[worst][0] / truth[worst] - 1), told)
+    return Outcome(z[worst], 100 * abs(values[worst][0] / truth[worst] - 1), warned)
 
 
 def pendulum_with(accident: Accident, seed: int) -> Outcome:
-    """The standard rig, 14 bits, 40 s at 1 kHz, full equations, refined as by default; notes do not count as told."""
+    """The standard rig, 14 bits, 40 s at 1 kHz, full equations, refined as by default; a note is no warning."""
     run = simulate(sensors=standard_sensors(14), truth="full", duration=40.0, seed=seed).run
     signals = {"phi": run.phi.copy(), "y": run.y.copy()}
     left = accident.happens(signals, np.random.default_rng(seed), run.sample_rate) or signals
@@ -205,7 +206,7 @@ def row_of(mechanism: str, accident: Accident, outcomes: list[Outcome]) -> tuple
         accident.label,
         f"{len(answered)} of {len(outcomes)}",
         *figures,
-        f"{sum(one.told for one in outcomes)}",
+        f"{sum(one.warned for one in outcomes)}",
         f"{sum(one.is_wrong for one in outcomes)}",
     )
 

@@ -1,4 +1,4 @@
-"""Where a recorded signal is not one smooth motion: a wild sample, a jump, samples that t does not show to be lost."""
+"""Breaks of a recorded signal: wild samples, jumps, lost samples that do not show in t."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ Float = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 
 _ORDER = 4
-_GAIN = 70.0  # of the variance of white noise, by that difference: 1 + 16 + 36 + 16 + 1
+_GAIN = 70.0  # variance of the fourth difference of white noise of variance 1: 1 + 16 + 36 + 16 + 1
 _BEYOND = 15.0  # standard deviations
 
 
 def breaks(x: Float, span: int, noise: float) -> Bool:
     """Samples at which the fourth difference of a signal is far larger than elsewhere near it [n].
 
-    Of a wild sample all five about it are found, of a jump the four about it.
+    A wild sample marks itself and two neighbours on each side; a jump marks two samples on each side.
 
     Parameters
     ----------
-    x : [n]; NaN where there is none
+    x : [n]; NaN where a sample is missing
     span : samples over which the signal may change its character: onset of a drive, a sweep
-    noise : standard deviation of a sample, at least
+    noise : lower bound of the noise's standard deviation
     """
     difference = np.abs(np.diff(x, _ORDER))
     found = np.zeros(len(x), bool)

@@ -19,11 +19,11 @@ _MOST = 1e-3  # of the samples: where more are, they belong to the signal
 
 
 def without_wild_samples(recording: Recording, model: CompiledModel) -> Recording:
-    """The recording with the wild samples of its coordinates interpolated, and a note for each that has any.
+    """The recording with the wild samples of its coordinates interpolated, and a note for each changed signal.
 
-    A coordinate is a sensor whose acceleration is in the equations: nothing moves it for a single sample, as a pulse
-    moves a current. A sample is wild where the samples beside it lie on a smooth curve within their noise and it does
-    not. Jumps and corners have no such curve and stay, as do signals with many such samples.
+    A coordinate is a sensor whose acceleration is in the equations: unlike a current, it cannot jump for one sample. A
+    sample is wild if its neighbours lie on a smooth curve within their noise and it is off this curve. Jumps and
+    corners are kept, and so is a signal of which more than 0.1 % of the samples look wild.
     """
     changed = dict(recording.signals)
     notes = list(recording.notes)
