@@ -136,7 +136,9 @@ def test_wild_samples_and_lost_ones_of_the_drive_leave_no_bias() -> None:
     assert (se < 1.5 * np.sqrt(np.diag(refined().found.covariance))[:3]).all()
     assert outcome.breaks == pytest.approx((10.0,), abs=0.01)
     (sentence,) = _remarks(outcome)
-    assert sentence.startswith("y jumps at 9.998 s: samples are lost there while t goes on, or its zero moves.")
+    assert sentence.startswith(
+        "y jumps at 9.998 s: lost samples that do not show in t, a repeated buffer, or a changed"
+    )
 
 
 def test_the_drives_band_ends_where_its_noise_begins() -> None:
