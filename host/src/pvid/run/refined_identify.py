@@ -145,8 +145,8 @@ def _remarks(outcome: RefinedPendulum) -> Iterator[str]:
         places = listed([f"{t:.4g} s" for t in outcome.breaks[:_SHOWN]])
         more = f" and {len(outcome.breaks) - _SHOWN} other times" if len(outcome.breaks) > _SHOWN else ""
         yield (
-            f"y jumps at {places}{more}: lost samples that do not show in t, a repeated buffer, or a changed offset of y. "
-            "The refinement starts a new block after each jump."
+            f"y jumps at {places}{more}: lost samples that do not show in t, a repeated buffer, or a changed offset of "
+            "y. The refinement starts a new block after each jump."
         )
 
 
