@@ -26,6 +26,15 @@ def stretches(flags: npt.NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
     return edges[::2], edges[1::2]
 
 
+def longest_stretch(flags: npt.NDArray[np.bool_]) -> slice:
+    """The longest stretch of true flags; empty where there is none."""
+    firsts, ends = stretches(flags)
+    if not firsts.size:
+        return slice(0, 0)
+    longest = int(np.argmax(ends - firsts))
+    return slice(int(firsts[longest]), int(ends[longest]))
+
+
 def bridge(signals: Sequence[FloatArray], sample_rate: float) -> tuple[IntArray, IntArray]:
     """Interpolates the short gaps in place; returns first and last + 1 of all gaps.
 

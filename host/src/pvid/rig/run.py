@@ -27,7 +27,7 @@ from pvid.rig.array_table import read_npz, read_parquet, table_of, write_npz, wr
 from pvid.rig.clock import Uniform, uniform
 from pvid.rig.columns import Columns
 from pvid.rig.csv_table import read_csv, write_csv, write_csv_gz
-from pvid.rig.gaps import bridge, stretches
+from pvid.rig.gaps import bridge, longest_stretch
 from pvid.rig.table import Table, row_place
 from pvid.rig.turns import joined
 
@@ -92,11 +92,9 @@ class Recording:
         there = np.logical_and.reduce([np.isfinite(one) for one in self.signals.values()])
         if there.all():
             return self
-        firsts, ends = stretches(there)
-        longest = int(np.argmax(ends - firsts)) if firsts.size else 0
-        if not firsts.size or ends[longest] - firsts[longest] < MIN_ROWS:
+        part = longest_stretch(there)
+        if part.stop - part.start < MIN_ROWS:
             raise PvidError(f"the run has no {MIN_ROWS} samples in a row")
-        part = slice(int(firsts[longest]), int(ends[longest]))
         t = self.t[part]
         note = f"used is the longest stretch without a gap: {t[0]:.6g} s to {t[-1]:.6g} s"
         signals = {name: one[part] for name, one in self.signals.items()}

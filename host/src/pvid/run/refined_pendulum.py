@@ -15,7 +15,7 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.breaks import breaks
 from pvid.rig.file import RigFile
-from pvid.rig.gaps import bridge, stretches
+from pvid.rig.gaps import bridge, longest_stretch, stretches
 from pvid.rig.run import Run
 from pvid.run.refined import (
     GOOD,
@@ -607,9 +607,7 @@ def _inputs(t: Float, u: Float, rate: float, sub: int, samples: int) -> Inputs:
 def drive_edge_hz(y: Float, rate: float, rig: RigFile) -> float:
     """Up to where the spectrum of the drive's longest stretch stands above its noise [Hz]: of the sensor, or of the
     spectrum's upper half, where instants of sampling that jitter make more."""
-    firsts, ends = stretches(np.isfinite(y))
-    longest = int(np.argmax(ends - firsts))
-    y = y[firsts[longest] : ends[longest]]
+    y = y[longest_stretch(np.isfinite(y))]
     n = len(y)
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((y - y.mean()) * window)) ** 2
