@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.refine import HEADER, Case, bound_of, refine_table, row_of, run_case
+from bench.refine import HEADER, refine_table, row_of, run_case
+from bench.refine_cases import Case, bound_of, bound_of_measured
 from bench.refine_imperfect import HEADER as IMPERFECT
 from bench.refine_imperfect import Fault, imperfect_table, run_fault
 from bench.refine_options import HEADER as OPTIONS
@@ -40,6 +41,26 @@ def test_the_steps_of_the_motion_leave_no_bias() -> None:
 def test_the_bound_shrinks_with_the_encoders_noise() -> None:
     coarse, fine = (bound_of(Case(0.1, bits, duration=5.0)) for bits in (14, 16))
     np.testing.assert_allclose(coarse / fine, 4.0)
+
+
+def test_the_noise_of_the_drives_sensor_raises_the_bound_of_a_fine_encoder() -> None:
+    """A coarse encoder hides it; an exact drive has none."""
+    ratio = [
+        bound_of_measured(case) / bound_of(case)
+        for case in (
+            Case(0.3, bits, duration=10.0, exact_drive=exact) for bits, exact in ((10, False), (16, False), (16, True))
+        )
+    ]
+    assert np.all(ratio[0] > 1.0) and np.all(ratio[0] < 1.01)
+    assert np.all(ratio[1] > 1.15)
+    assert np.all(ratio[2] == 1.0)
+
+
+def test_the_standard_errors_hold_where_the_motion_has_decayed() -> None:
+    """The first blocks, with the largest motion and so the most noise of the drive, have all the information; the
+    scatter of the last ones alone gave errors of 1.4 standard errors (RMS)."""
+    runs = [run_case(Case(0.2, 16, (0.002, 0.0005)), seed) for seed in range(40)]
+    assert np.sqrt(np.mean([(one.error / one.se) ** 2 for one in runs])) < 1.25
 
 
 def test_the_tables_have_a_cell_for_each_column() -> None:
@@ -115,3 +136,11 @@ def test_disturbances_leave_nothing_that_is_not_finite_and_nothing_confidently_w
 def test_without_the_3_s_of_its_search_the_bound_with_friction_is_48_percent_larger() -> None:
     case = Case(0.3, 14, (0.002, 0.0005))
     np.testing.assert_allclose(bound_of(case, 3.0) / bound_of(case), 1.48, atol=0.02)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("case", "ratio"), [(Case(0.3, 14, (0.002, 0.0005)), 1.85), (Case(0.2, 16, (0.002, 0.0005)), 1.75)]
+)
+def test_with_the_drives_sensor_it_is_another_quarter_larger(case: Case, ratio: float) -> None:
+    np.testing.assert_allclose(bound_of_measured(case, 3.0) / bound_of(case), ratio, atol=0.02)

@@ -200,6 +200,18 @@ def test_the_options_of_a_rig_file_reach_the_second_stage_in_c_and_a_board(tmp_p
     assert board_of(board.text()).equations.parameters == board.equations.parameters  # type: ignore[union-attr]
 
 
+def test_a_small_motion_with_dry_friction_is_refined_behind_the_long_windows_of_its_weak_form(tmp_path: Path) -> None:
+    """The windows are chosen from the run, here 4 s; the blocks agree with one another."""
+    run = tmp_path / "run.csv"
+    assert pvid("simulate", run, "--dry", "0.0003", "--duration", "20").return_value == DONE
+    replace(RigFile.standard(), refine=Refine(dry_friction=True)).write(run.with_suffix(".toml"))
+    shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
+    assert shown["refinement"]["adopted"] and shown["refinement"]["clash"] < 4.0
+    for name in ("w", "d1", "d2"):
+        one = shown["parameters"][name]
+        assert abs(one["value"] - simulated_rig("kapitza").truth[name]) < 3.5 * one["se_noise"], name
+
+
 def test_where_nothing_is_refined_the_answer_is_that_of_the_weak_form_and_says_so(
     recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -91,6 +91,16 @@ def wild(given: Float, sizes: tuple[float, float], every: int) -> Float:
     return spoilt
 
 
+def test_a_drive_beyond_its_range_begins_anew() -> None:
+    """The pivot jumps by 0.3 m: its second derivative is far beyond the range for as long as the filter sees the jump."""
+    given = samples(12.0, 2.0).copy()
+    given[4000:, 1] += 0.3
+    core = both(given, configuration(), (0.01, -0.01, 0.01))
+    assert Reason.REJECTED_NOT_FINITE in core.reason[4000:4300]
+    assert Reason.UPDATED in core.reason[4300:]
+    assert np.max(np.abs(core.r[-1, :3] / TRUTH - 1)) < 2e-3
+
+
 @pytest.mark.parametrize("gate", [0.0, 2.0, 4.0])
 def test_wild_samples(gate: float) -> None:
     """1.9 rad and 25 mm every half second: without the gate no block fits."""

@@ -9,7 +9,8 @@ from pvid.board import mechanism_image, mechanism_image_q31
 from pvid.board.boards import BOARDS
 from pvid.board.mechanism_image import build_with, mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
-from pvid.board.sizes import Footprint, built_engine, measured
+from pvid.board.refined_image import build_refined_image
+from pvid.board.sizes import Footprint, built_engine, measured, refined_replay
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core
@@ -23,6 +24,7 @@ class Choice:
 
     title: str
     core: Core = "f32"
+    refined: bool = False
     sizes: Mapping[str, int] = field(default_factory=dict)
     options: Mapping[str, str] = field(default_factory=dict)
 
@@ -49,6 +51,9 @@ CHOICES = (
     Choice("and no second stage, no dead zone, no law with g < 1, no neglected terms: what `pvid model build` prints"),
     Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", options=_SELDOM),
     Choice("or all of it with `-Os` (`MinSizeRel`)", options=_SMALL),
+    Choice("both stages, as printed", refined=True),
+    Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", refined=True, options=_SELDOM),
+    Choice("or all of it with `-Os`", refined=True, options=_SMALL),
     Choice("fixed point, Cortex-M0, as printed", "q31"),
     Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", "q31", options=_SELDOM),
     Choice("or all of it with `-Os`", "q31", options=_SMALL),
@@ -58,6 +63,11 @@ CHOICES = (
 def footprint_of(choice: Choice, place: int) -> Footprint:
     """Builds and plays it."""
     board = BOARDS[choice.board]
+    choices = _USUAL | dict(choice.options)
+    if choice.refined:
+        both = refined_replay(board)
+        image, tree = build_refined_image(board, both, f"choice-{place}", choices)
+        return measured(board, built_engine(image, tree, both.weak.name))[0]
     if choice.core == "f32":
         run = mechanism_run(DEFAULT, long=True)
         name, files, fitted = run.name, mechanism_image.files_of(run), fitted_sizes(run.config)
@@ -65,7 +75,7 @@ def footprint_of(choice: Choice, place: int) -> Footprint:
         fixed = fixed_run(DEFAULT, long=True)
         name, files, fitted = fixed.name, mechanism_image_q31.files_of(fixed), fixed.sizes
     sizes = fitted | dict(choice.sizes)
-    image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=_USUAL | dict(choice.options))
+    image, tree = build_with(board, f"choice-{place}", files, sizes, choice.core, choices=choices)
     return measured(board, built_engine(image, tree, name))[0]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.pendulum import RIGS, design_for
+from bench.refine_cases import CASES, L1, RATE_HZ, RELEASE, TRUTH, Case, bound_of, bound_of_measured
 from pvid.codegen.build import refine_functions
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak_library import weak_native
@@ -42,10 +43,7 @@ Float = npt.NDArray[np.float64]
 Kind = TypeVar("Kind")
 Found = TypeVar("Found")
 
-RATE_HZ = 1000.0
 SEEDS = 80
-L1 = STANDARD_PENDULUM.l1
-TRUTH = STANDARD_PENDULUM.linear
 HEADER = (
     "rad",
     "bits",
@@ -53,83 +51,15 @@ HEADER = (
     "published",
     "w / d1 / d2 %",
     "over the bound",
+    "drive measured",
     "in 2 s.e.",
     "first after s",
     "median, worst at 3.5 s %",
+    "bound at 3.5 s %",
     "residual level",
 )
 
-# Of the standard release: the largest angles are those of the table.
-RELEASE = {0.1: 1.0, 0.2: 1.88, 0.3: 2.85}
 _SOON_S = 3.5
-_STEPS = np.array([1e-6] * 3 + [1e-5] * 2 + [1.0, 1e-6] + [1e-6] * 2)  # of log w, .., start, for the bound
-
-
-@dataclass(frozen=True)
-class Case:
-    """The standard rig, full equations, 40 s, starts of the weak form within +-50 %."""
-
-    angle: float
-    bits: int
-    damping: tuple[float, float] = (0.0, 0.0)  # [m^2/s]
-    skew_s: float = 0.0
-    duration: float = 40.0
-    exact_drive: bool = False
-
-    @property
-    def label(self) -> str:
-        """What is added to the standard rig."""
-        friction = f"friction {self.damping[0]:g}, {self.damping[1]:g} m^2/s" if any(self.damping) else ""
-        skew = f"skew {1e3 * self.skew_s:g} ms" if self.skew_s else ""
-        drive = "exact drive" if self.exact_drive else ""
-        return ", ".join(one for one in (friction, skew, drive) if one) or "standard"
-
-
-_FRICTION = (0.002, 0.0005)
-CASES = (
-    *(Case(angle, bits) for angle in RELEASE for bits in (12, 14, 16)),
-    *(Case(angle, 14, _FRICTION) for angle in RELEASE),
-    *(Case(angle, 14, skew_s=0.001) for angle in RELEASE),
-    Case(0.2, 14, _FRICTION, 0.001),
-    Case(0.2, 16, _FRICTION, 0.001),
-    Case(0.2, 16, exact_drive=True),
-    Case(0.3, 16, exact_drive=True),
-)
-
-
-def _angle(case: Case, change: Float) -> Float:
-    """The exact angle with changes of (log w, log d1, log d2, k1, k2, -, offset, angles of the start)."""
-    w, d1, d2 = TRUTH * np.exp(change[:3])
-    ratio = d1 - d2 - 1
-    l2 = L1 * ratio / d2
-    scale = RELEASE[case.angle]
-    pendulum = Pendulum(
-        l1=L1,
-        l2=l2,
-        rho2=l2 / np.sqrt(ratio),
-        g=w * L1,
-        damping1=case.damping[0] + change[3] * L1**2,
-        damping2=case.damping[1] + change[4] * L1**2,
-    )
-    release = (STANDARD_RELEASE[0] * scale + change[7], STANDARD_RELEASE[1] * scale + change[8])
-    state = simulate(pendulum, sensors=Sensors(), truth="full", release=release, duration=case.duration).state
-    return np.asarray(state[:, 1] - state[:, 0] + change[6])
-
-
-@lru_cache(4)
-def bound_of(case: Case, since_s: float = 0.0) -> Float:
-    """Relative standard deviations of w, d1, d2 [3]: all that the refinement estimates is unknown, the drive is known.
-
-    The start's rates are left out; that of the skew is the angle's own rate. Samples before `since_s` are not used.
-    """
-    exact = _angle(case, np.zeros(len(_STEPS)))
-    columns = [
-        (_angle(case, step * unit) - exact) / step for step, unit in zip(_STEPS, np.eye(len(_STEPS)), strict=True)
-    ]
-    columns[5] = np.gradient(exact, 1 / RATE_HZ)
-    jacobian = np.stack(columns, axis=1)[round(since_s * RATE_HZ) :]
-    covariance = np.linalg.inv(jacobian.T @ jacobian) * sample_sd(case.bits) ** 2
-    return np.sqrt(np.diag(covariance)[:3])
 
 
 @lru_cache(4)
@@ -220,7 +150,7 @@ def row_of(case: Case, runs: list[Outcome]) -> tuple[str, ...]:
     error, se = np.array([one.error for one in runs]), np.array([one.se for one in runs])
     done = np.isfinite(error[:, 0])
     if not done.any():
-        return (f"{case.angle:g}", str(case.bits), case.label, f"0 of {len(runs)}", *("-",) * 6)
+        return (f"{case.angle:g}", str(case.bits), case.label, f"0 of {len(runs)}", *("-",) * 8)
     error, se = error[done], se[done]
     rms = np.sqrt(np.mean(error**2, axis=0))
     soon = np.array([np.abs(one.soon).max() for one in runs])
@@ -231,10 +161,11 @@ def row_of(case: Case, runs: list[Outcome]) -> tuple[str, ...]:
         case.label,
         f"{done.sum()} of {len(runs)}",
         " / ".join(f"{100 * one:.2g}" for one in rms),
-        " / ".join(f"{one:.2f}" for one in rms / bound_of(case)),
+        *(" / ".join(f"{one:.2f}" for one in rms / bound) for bound in (bound_of(case), bound_of_measured(case))),
         f"{100 * np.mean(np.abs(error) < 2 * se):.0f} %",
         f"{np.nanmedian([one.first for one in runs]):.1f}",
         f"{100 * np.median(early):.2g}, {100 * early.max():.2g} of {early.size}" if early.size else "-",
+        f"{100 * bound_of_measured(case, until_s=_SOON_S).max():.2g}",
         f"{np.median([one.level for one in runs]):.2f}",
     )
 

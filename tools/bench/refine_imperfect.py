@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from bench.campaign.motion import accelerations, integrate, relative_angle, step_of
 from bench.campaign.pivot import PivotMotion
-from bench.refine import RATE_HZ, RELEASE, TRUTH, engine_of, table_of
+from bench.refine import engine_of, table_of
+from bench.refine_cases import RATE_HZ, RELEASE, TRUTH
 from pvid.core.native import Native
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
 from pvid.sim.imperfections import eccentric, with_play

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from bench.engine import rms
-from bench.refine import L1, RELEASE, table_of
+from bench.refine import table_of
+from bench.refine_cases import L1, RELEASE
 from bench.refine_imperfect import BITS, Fault, Published, run_fault, truth_of
 from pvid.board.boards import BOARDS
 from pvid.board.refined_image import build_refined_image, refined_pendulum

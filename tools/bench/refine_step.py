@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from bench.campaign.motion import accelerations, integrate, relative_angle, step_of
 from bench.campaign.pivot import PivotMotion
-from bench.refine import RATE_HZ, RELEASE, engine_of, table_of
+from bench.refine import engine_of, table_of
+from bench.refine_cases import RATE_HZ, RELEASE
 from pvid.core.native import Native
 from pvid.model.compiled import Following
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, STANDARD_RELEASE, standard_sensors, standard_start

@@ -62,7 +62,8 @@ typedef struct {
     int8_t order;   /* 0: the sample; of an input also 2: its second derivative, -1: its integral since init */
     uint8_t source; /* PVID_SIGNAL_SAMPLED, or of an input PVID_SIGNAL_HELD (weak_parts.h) */
     float scale;    /* factor to the model's unit */
-    float range;    /* largest absolute value [model's unit], > 0: it is kept in 16 bits. Of an output that turns
+    float range;    /* largest absolute value [model's unit], > 0: it is kept in 16 bits. An output beyond it is missing;
+                       behind an input beyond it the block begins anew, as behind a gap. Of an output that turns
                        (pvid_refine_turning) half of the interval modulo which it is kept */
 } pvid_refine_signal_f32;
 
@@ -125,7 +126,8 @@ typedef struct {
     float se[PVID_REFINE_PARAMETERS];                                 /* standard errors [units of r] */
     float covariance[PVID_REFINE_PARAMETERS][PVID_REFINE_PARAMETERS]; /* of the steps of r: relative if logarithmic */
     float level; /* residual variance over its expectation from the sensors' noise */
-    float clash; /* squared difference of the blocks from their past, over its expectation from that noise. The standard
+    float clash; /* squared difference of the blocks from their past, over its expectation from that noise: of the last
+                    blocks, or of all weighted by what they add to the information, whichever is larger. The standard
                     errors contain the root of the larger one of level and clash. Well above 1: the equations lack
                     something. A block that is refused in the track counts as clash_max times the level */
 } pvid_refine_estimate_f32;

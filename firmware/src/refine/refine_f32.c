@@ -359,6 +359,19 @@ static void lengthen(pvid_refine_f32 *self, uint32_t began)
 #endif
 }
 
+/* Part of the information that the block adds to that of the past: mean of the parameters, 0 to 1. */
+static float share_of_block(const pvid_refine_f32 *self)
+{
+    float past = 0.0f;
+    size_t place = 0;
+    for (size_t i = 0; i < N; i++) {
+        const float part = self->triangle[place] / self->solve.triangle[place];
+        past += part * part;
+        place += N - i;
+    }
+    return 1.0f - (past / (float)N);
+}
+
 static void take(pvid_refine_f32 *self, float square, float clash, bool again, uint32_t began)
 {
     const pvid_refine_config_f32 *config = &self->config;
@@ -368,6 +381,8 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         const float mean = self->clash + (CLASH_GAIN * (clash - self->clash));
         const float first = (self->taken == 1u) ? (FIRST_CLASH * clash) : 0.0f;
         self->clash = (first > mean) ? first : mean;
+        const float larger = (clash > first) ? clash : first;
+        self->scatter += share_of_block(self) * (larger - self->scatter);
     }
     self->taken = (uint8_t)((self->taken < 2u) ? (self->taken + 1u) : 2u);
     self->level = ((self->taken == 1u) || again) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
@@ -612,12 +627,19 @@ static void move(pvid_refine_f32 *self)
     }
 }
 
+/* The last blocks are not those that the estimate is made of where the motion has decayed since. */
+static float clash_of(const pvid_refine_f32 *self)
+{
+    return (self->clash > self->scatter) ? self->clash : self->scatter;
+}
+
 /* Variance of a row for the standard errors. A block fits with errors of its equations as well, which then differ from
  * block to block: the scatter of the blocks about their past counts where it is larger than that of the residuals. */
 static float variance_of_row(const pvid_refine_f32 *self)
 {
     const float level = at_least_one(self->level);
-    float larger = (self->clash > level) ? self->clash : level;
+    const float clash = clash_of(self);
+    float larger = (clash > level) ? clash : level;
 #if PVID_REFINE_SIGNS > 0
     larger = (larger > REVERSALS) ? larger : REVERSALS;
 #endif
@@ -707,7 +729,7 @@ PVID_COLD static pvid_reason seldom(pvid_refine_f32 *self)
         assess(self);
         break;
     case JUDGE:
-        pvid_refine_assess_end_f32(&self->work.sums.candidate, self->r, self->level, self->clash);
+        pvid_refine_assess_end_f32(&self->work.sums.candidate, self->r, self->level, clash_of(self));
         self->verdict = pvid_refine_verdict_f32(&self->work.sums.candidate, &self->config, self->weak, self->weak_se);
         self->phase = PUBLISH;
         break;

@@ -192,28 +192,31 @@ static float second_derivative(const float line[], const float weights[])
     return sum;
 }
 
-/* A mean with its droop undone, of the entry `next`. */
-static void enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, size_t signal, float x)
+/* A mean with its droop undone, of the entry `next`; what is entered, which of a second derivative is an earlier entry. */
+static int16_t enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, size_t signal, float x)
 {
+    uint32_t entry = self->next;
+    float value = x;
     if (self->derived[signal]) {
         float *newest = &self->line[signal][self->place];
         newest[0] = x;
         newest[LENGTH] = x;
-        if (self->next >= (uint32_t)(LENGTH - 1)) {
-            const float d = second_derivative(&newest[1], config->second);
-            self->ring[(self->next - (PVID_REFINE_HALF + PVID_REFINE_LATE)) & MASK][signal] =
-                counts(&self->rest[signal], d * self->to_counts[signal]);
+        if (entry < (uint32_t)(LENGTH - 1)) {
+            return 0;
         }
-    } else {
-        const float scaled = x * self->to_counts[signal];
-#if PVID_REFINE_TURNING
-        const bool turns = (signal >= (size_t)INPUTS) && (pvid_refine_turning[signal - INPUTS] != 0u);
-        self->ring[self->next & MASK][signal] =
-            turns ? counts_of_turning(&self->rest[signal], scaled) : counts(&self->rest[signal], scaled);
-#else
-        self->ring[self->next & MASK][signal] = counts(&self->rest[signal], scaled);
-#endif
+        entry -= PVID_REFINE_HALF + PVID_REFINE_LATE;
+        value = second_derivative(&newest[1], config->second);
     }
+    const float scaled = value * self->to_counts[signal];
+#if PVID_REFINE_TURNING
+    const bool turns = (signal >= (size_t)INPUTS) && (pvid_refine_turning[signal - INPUTS] != 0u);
+    const int16_t count =
+        turns ? counts_of_turning(&self->rest[signal], scaled) : counts(&self->rest[signal], scaled);
+#else
+    const int16_t count = counts(&self->rest[signal], scaled);
+#endif
+    self->ring[entry & MASK][signal] = count;
+    return count;
 }
 
 #if !PVID_REFINE_RUNGE_KUTTA
@@ -340,12 +343,10 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
         }
 #endif
         if (known) {
-            enter(self, config, i, entry);
-#if PVID_REFINE_RUNGE_KUTTA
-            if ((i < (size_t)INPUTS) && !self->derived[i] && (self->ring[self->next & MASK][i] == INT16_MIN)) {
+            const int16_t count = enter(self, config, i, entry);
+            if ((i < (size_t)INPUTS) && (count == INT16_MIN)) {
                 return PVID_REFINE_BROKEN; /* beyond its range */
             }
-#endif
         }
         past[0] = x;
         past[1] = first;

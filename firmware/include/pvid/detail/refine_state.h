@@ -172,6 +172,7 @@ struct pvid_refine_f32 {
     uint32_t due;                         /* end of the ring at which it is there */
     float level;                          /* mean square of residuals of the last blocks over the sensors' */
     float clash;                          /* mean square of what the last blocks and their past cannot both have */
+    float scatter;                        /* the same of all blocks, weighted by what they add to the information */
     float r[PVID_REFINE_PARAMETERS];      /* of the last block that was taken, or the weak form's */
     float next[PVID_REFINE_PARAMETERS];   /* where the next block starts its linearisation */
     float linear[PVID_REFINE_PARAMETERS]; /* point of linearisation */

@@ -129,11 +129,14 @@ def header(run: RefinedRun, text: str) -> str:
     return text.replace(_START, own).replace(_HASH, "#define REPLAY_HASH replay_hash")
 
 
-def build_refined_image(target: Board, run: RefinedRun) -> tuple[Path, Path]:
-    """Builds the image; see `build_mechanism_image`."""
+def build_refined_image(
+    target: Board, run: RefinedRun, name: str = "", choices: Mapping[str, str] | None = None
+) -> tuple[Path, Path]:
+    """Builds the image; see `build_mechanism_image`. `choices`: further variables of CMake, of a build of that name."""
     files = files_of(run.weak)
     files["replay_run.h"] = header(run, files["replay_run.h"])
     files["pvid/refine_shape.h"] = files_refine.shape(run.made, MADE_BY)
     files["refine_model_f32.h"] = files_refine.header(run.made, MADE_BY)
-    name = f"{run.weak.name}-refined-f32-{len(run.weak.counts)}"
-    return build_with(target, name, files, fitted_sizes(run.weak.config, refined=True), "f32", refined=True)
+    whole = name or f"{run.weak.name}-refined-f32-{len(run.weak.counts)}"
+    sizes = fitted_sizes(run.weak.config, refined=True)
+    return build_with(target, whole, files, sizes, "f32", refined=True, choices=choices)

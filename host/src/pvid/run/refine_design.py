@@ -40,7 +40,9 @@ _STEP_FREE, _STEP_FINE = 0.02, 0.001  # limits of a block's last step, in prior_
 _REVERSAL = 4.0  # of the noise of a sample: the error is a small part of the jump
 _HALF_TURN = 32767 / 4  # resolutions: an output that turns is kept in quarters of one
 _RICCATI = 2000  # big steps until the filter's gain is steady
-_MARGIN, _MORE = 1.5, 6.0  # ranges over what the run has of them, of integrals, which may go on
+# Ranges over what the run has of them; of second derivatives, whose steps of 16 bits are then still below the noise; of
+# integrals, which may go on.
+_MARGIN, _MARGIN_OF_RATES, _MORE = 1.5, 4.0, 6.0
 
 
 def refine_design(
@@ -121,7 +123,8 @@ def refine_settings(
             raise PvidError(f"{model.name}: its input {name} is no sample")
         x = np.asarray(run[name], float)
         place = names.index(name)
-        range_ = (_MORE if order == -1 else _MARGIN) * abs(scale) * _largest(x, order, rate, block_s)
+        margin = {-1: _MORE, 2: _MARGIN_OF_RATES}.get(order, _MARGIN)
+        range_ = margin * abs(scale) * _largest(x, order, rate, block_s)
         if name in turning:
             range_ = _HALF_TURN * _step_of(model.signal(name))
         source = Source.SAMPLED if order == -1 else sources.get(place, Source.SAMPLED)
@@ -209,8 +212,9 @@ def _largest(x: Float, order: int, rate: float, block_s: float) -> float:
 
 
 def _curvature(x: Float, rate: float, block_s: float) -> Float:
-    """Second derivative of means of a hundredth of a block."""
-    step = max(1, round(block_s * rate / 100))
+    """Second derivative of means of a four hundredth of a block: of what is twenty times as fast as the slowest motion a
+    few per cent are missing."""
+    step = max(1, round(block_s * rate / 400))
     mean = x[: len(x) // step * step].reshape(-1, step).mean(1)
     return np.asarray(np.diff(mean, 2) * (rate / step) ** 2)
 

@@ -112,7 +112,7 @@ class RefineTwin:
         self.renewed = self.frozen = self.waiting = self.restarted = self.solved = self.sane = False
         self.again = self.same_start = False
         self.rested = self.passed = self.taken = self.refused = self.lost = self.length = self.begin = self.origin = 0
-        self.level = self.clash = _F(0)
+        self.level = self.clash = self.scatter = _F(0)
         self.r, self.next, self.linear, self.weak = (np.zeros(n, _F) for _ in range(4))
         self.weak_se = np.zeros(len(shape.place_of_p), _F)
         self.triangle = np.zeros((n, n), _F)
@@ -256,6 +256,12 @@ class RefineTwin:
             self.again, self.same_start = True, first == began
             self.begin = first
 
+    def _share_of_block(self) -> np.float32:
+        past = _F(0)
+        for part in np.diag(self.triangle) / np.diag(self.solve.triangle):
+            past = past + part * part
+        return _F(1) - past / _F(self.shape.parameters)
+
     def _take(self, square: np.float32, clash: np.float32, again: bool, began: int) -> None:
         config = self.config
         self.refused = self.lost = 0
@@ -263,6 +269,8 @@ class RefineTwin:
             mean = self.clash + _CLASH_GAIN * (clash - self.clash)
             first = _FIRST_CLASH * clash if self.taken == 1 else _F(0)
             self.clash = first if first > mean else mean
+            larger = clash if clash > first else first
+            self.scatter = self.scatter + self._share_of_block() * (larger - self.scatter)
         self.taken = min(self.taken + 1, 2)
         self.level = square if self.taken == 1 or again else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
@@ -363,12 +371,15 @@ class RefineTwin:
 
     # ---- the estimate ----
 
+    def _larger_clash(self) -> np.float32:
+        return self.clash if self.clash > self.scatter else self.scatter
+
     def _assess(self) -> None:
         if self.passed == 0:
             self.covariance = np.multiply.outer(self.gain_sd, self.gain_sd)
         x = inverse_column(self.solve.triangle, self.passed)
-        level = _at_least_one(self.level)
-        larger = self.clash if self.clash > level else level
+        level, clash = _at_least_one(self.level), self._larger_clash()
+        larger = clash if clash > level else level
         if self.shape.signs:
             larger = larger if larger > _REVERSALS else _REVERSALS
         variance = self.variance * larger
@@ -381,7 +392,7 @@ class RefineTwin:
         sd = np.sqrt(np.diag(self.covariance))
         logarithmic = self.steps.logarithmic
         se = np.where(logarithmic, sd * self.r, sd)
-        self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level, self.clash)
+        self.candidate = RefineEstimate(self.r.copy(), se, self.covariance.copy(), self.level, self._larger_clash())
         uncertain = logarithmic & ~self.steps.is_width & ~(se <= _F(self.config.se_max) * self.r)
         certain = np.all(np.isfinite(self.r)) and np.all(np.isfinite(se)) and not np.any(uncertain)
         self.verdict = Reason.UPDATED

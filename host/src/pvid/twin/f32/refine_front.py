@@ -171,17 +171,21 @@ class Front:
         self.rest[signal] = whole - _F(rounded)
         return max((rounded + 0x8000) % 0x10000 - 0x8000, _MISSING + 1)
 
-    def _enter(self, signal: int, x: np.float32) -> None:
+    def _enter(self, signal: int, x: np.float32) -> int:
+        """What is entered, which of a second derivative is an earlier entry."""
+        entry = self.next
         if self.derived[signal]:
             line = self.line[signal]
             line.append(x)
             if len(line) > 2 * self.half + 1 + _LATE:
                 del line[: len(line) - 2 * self.half - 1 - _LATE]
-            if len(line) == 2 * self.half + 1 + _LATE:
-                place = (self.next - self.half - _LATE) % self.size
-                self.ring[place, signal] = self._counts(signal, self._second_derivative(line))
-        else:
-            self.ring[self.next % self.size, signal] = self._counts(signal, x)
+            if len(line) < 2 * self.half + 1 + _LATE:
+                return 0
+            entry -= self.half + _LATE
+            x = self._second_derivative(line)
+        count = self._counts(signal, x)
+        self.ring[entry % self.size, signal] = count
+        return count
 
     def _end_block(self, last: Float32) -> Entry:
         if not self.runge_kutta:
@@ -206,10 +210,8 @@ class Front:
                 entry = (self.held[signal] + self.ahead[signal]) * self.share
                 self.held[signal] = self.sum[signal] - self.ahead[signal]
             if known:
-                self._enter(signal, entry)
-                if self.runge_kutta and signal < self.inputs and not self.derived[signal]:
-                    if self.ring[self.next % self.size, signal] == _MISSING:
-                        return Entry.BROKEN
+                if self._enter(signal, entry) == _MISSING and signal < self.inputs:
+                    return Entry.BROKEN  # beyond its range
         self.difference = np.stack([x, first, second, third])
         self.fourth = np.stack([fourth, self.fourth[0]])
         self.sum = np.zeros_like(self.sum)
