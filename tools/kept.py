@@ -1,5 +1,7 @@
-"""What a tool reported of a source, kept in build/cache/checks by all that it read: the tool's version, its options and
-the preprocessed source with its comments. A source of which nothing of that has changed is not read again.
+"""What a tool reported of a source, kept by all that it read: the tool's version, its options and the preprocessed
+source with its comments. A source of which nothing of that has changed is not read again, in no clone of this user's:
+the cache is in XDG_CACHE_HOME or ~/.cache, or in build/cache where nobody may write there. Paths of a clone are kept
+from its top.
 """
 
 from __future__ import annotations
@@ -11,7 +13,11 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
-_PLACE = Path(__file__).resolve().parents[1] / "build" / "cache" / "checks"
+from pvid.base.user_cache import user_cache
+
+_ROOT = Path(__file__).resolve().parents[1]
+_TOP = "<top of the clone>"
+_PLACE = user_cache(_ROOT / "build" / "cache") / "checks"
 
 
 @cache
@@ -31,13 +37,14 @@ def kept(read: Sequence[str | None], make: Callable[[], str | None]) -> str | No
     """make(), or what it returned when the same was read; None, or of a source that is refused, is not kept."""
     if None in read:
         return make()
-    place = _PLACE / hashlib.sha256("\0".join(map(str, read)).encode()).hexdigest()
+    whole = "\0".join(map(str, read)).replace(str(_ROOT), _TOP)
+    place = _PLACE / hashlib.sha256(whole.encode()).hexdigest()
     if place.exists():
-        return place.read_text(encoding="utf-8")
+        return place.read_text(encoding="utf-8").replace(_TOP, str(_ROOT))
     made = make()
     if made is not None:
         _PLACE.mkdir(parents=True, exist_ok=True)
         fresh = place.with_name(f"{place.name}.{os.getpid()}")
-        fresh.write_text(made, encoding="utf-8")
+        fresh.write_text(made.replace(str(_ROOT), _TOP), encoding="utf-8")
         fresh.replace(place)
     return made

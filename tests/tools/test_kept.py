@@ -52,6 +52,21 @@ def test_whatever_changes_it_is_read_again(name: str, text: str, read: Path) -> 
     assert times_made(("1.0", before), ("1.0", checks.preprocessed(COMPILER, read))) == 2
 
 
+def test_another_clone_reads_nothing_again(read: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its paths are those of its own top."""
+    clones = [read.parent / name for name in ("one", "two")]
+    found = []
+    for clone in clones:
+        clone.mkdir()
+        (clone / "a.h").write_text("int a(void);\n", encoding="utf-8")
+        source = clone / "a.c"
+        source.write_text('#include "a.h"\n', encoding="utf-8")
+        monkeypatch.setattr(checks, "_ROOT", clone)
+        text = checks.preprocessed((*COMPILER, f"-I{clone}"), source)
+        found.append(checks.kept((str(source), text), lambda at=clones[0]: f"{at}/a.c:1: warning"))
+    assert found == [f"{clone}/a.c:1: warning" for clone in clones]
+
+
 def test_another_version_reads_it_again(read: Path) -> None:
     text = checks.preprocessed(COMPILER, read)
     assert times_made(("1.0", text), ("1.1", text)) == 2

@@ -1,4 +1,4 @@
-"""Where images are built: in the clone, or in a folder of the user's where the clone belongs to somebody else."""
+"""Folders of the user's: where images are built if the clone belongs to somebody else, and what clones share."""
 
 from __future__ import annotations
 
@@ -7,19 +7,30 @@ import os
 import stat
 import tempfile
 from pathlib import Path
+from typing import overload
 
 
 def built_under(own: Path) -> Path:
     """`own` where this user may write what is built there, else a folder of the cache: XDG_CACHE_HOME, ~/.cache, or a
     private temporary one."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    caches = [*([Path(given)] if given.startswith("/") else []), _home() / ".cache"]
     if _may_write(own / "targets"):
         return own
-    for cache in caches:
-        if _may_write(cache / "pvid"):
-            return cache / "pvid"
-    return _temporary()
+    return user_cache(None) or _temporary()
+
+
+@overload
+def user_cache(other: Path) -> Path: ...
+
+
+@overload
+def user_cache(other: None) -> Path | None: ...
+
+
+def user_cache(other: Path | None) -> Path | None:
+    """The folder of pvid in XDG_CACHE_HOME or ~/.cache, or `other` where this user may write to neither."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    caches = [*([Path(given)] if given.startswith("/") else []), _home() / ".cache"]
+    return next((cache / "pvid" for cache in caches if _may_write(cache / "pvid")), other)
 
 
 def _temporary() -> Path:
