@@ -1,0 +1,140 @@
+"""Both stages in C, as on a board, on the random rigs of a campaign: which stage answers, and how well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.campaign.judge import SUFFICES, Judgement
+from bench.campaign.population import Population, shipped
+from bench.campaign.truth import SimulatedRig, simulate_rig
+from pvid.base.errors import PvidError
+from pvid.core.native import Native
+from pvid.models.kapitza import MODEL
+from pvid.rig.described import described
+from pvid.rig.file import Refine
+from pvid.rig.run import Recording
+from pvid.rig.sensor_steps import resolved
+from pvid.run.mechanism import Value, identify_mechanism, model_of
+from pvid.run.mechanism_core import identify_in_c
+from pvid.run.refined_core import refined_in_c
+
+RIGS, SEED = 120, 7
+HEADER = (
+    "condition",
+    "rigs",
+    "data suffice",
+    "refined",
+    "weak form alone",
+    "none",
+    "no steps",
+    "answered",
+    "wrong, no warning",
+    "error %: refined",
+    "of the same, weak",
+)
+# What the equations of a condition need.
+_OPTIONS = {"dry": Refine(dry_friction=True), "nonvert": Refine(slant=True)}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of a rig.
+
+    Attributes
+    ----------
+    suffices : its data
+    refined, weak : judgements of the stages' last estimates; None where there is none
+    steps : the sample rate has room for the steps of the second stage
+    warned : of the weak form
+    """
+
+    condition: str
+    suffices: bool
+    refined: Judgement | None
+    weak: Judgement | None
+    steps: bool
+    warned: bool
+
+    @property
+    def published(self) -> Judgement | None:
+        """Of the stage whose estimate is the one to use."""
+        return self.refined if self.refined is not None else self.weak
+
+    @property
+    def wrong(self) -> bool:
+        """Without a warning, which a refined estimate never has."""
+        one = self.published
+        return one is not None and bool(one.wrong) and (self.refined is not None or not self.warned)
+
+
+def _judged(values: Mapping[str, Value], rig: SimulatedRig) -> Judgement | None:
+    found = [values[name] for name in MODEL.mapped_names]
+    p, se = ([getattr(one, name) for one in found] for name in ("value", "se"))
+    return None if None in p or None in se else Judgement.of(p, se, rig.p)
+
+
+def outcome_of(simulated: SimulatedRig) -> Outcome:
+    """Identifies a rig as `identify --core f32 --refine` does, with the options that its condition needs."""
+    run, condition = simulated.run, simulated.rig.condition
+    file = replace(simulated.file, refine=_OPTIONS.get(condition, Refine()))
+    model = model_of(described(resolved(file, run)))
+    recording = Recording(run.t, {"phi": run.phi, "y": run.y}, run.sample_rate)
+    suffices = bool((simulated.bound[:2] < SUFFICES).all())
+    try:
+        answer = identify_mechanism(recording, model)
+        weak = identify_in_c(answer, "f32")
+    except PvidError:
+        return Outcome(condition, suffices, None, None, True, False)
+    of_weak = _judged(weak.values, simulated) if weak.identified else None
+    warned = weak.verdict.warning is not None
+    try:
+        both = refined_in_c(answer)
+    except PvidError:
+        return Outcome(condition, suffices, None, of_weak, False, warned)
+    refined = _judged(both.values, simulated) if both.adopted and both.identified else None
+    return Outcome(condition, suffices, refined, of_weak, True, warned)
+
+
+def outcomes_of(
+    rigs: int, seed: int, progress: Callable[[], None], population: Population | None = None
+) -> list[Outcome]:
+    """Of the first rigs of a seed."""
+    native, found = Native(), []
+    for index in range(rigs):
+        found.append(outcome_of(simulate_rig(native, population or shipped(), seed, index)))
+        progress()
+    return found
+
+
+def _median(judgements: Sequence[Judgement | None]) -> str:
+    errors = [100 * float(one.relative.max()) for one in judgements if one is not None]
+    return f"{np.median(errors):.2g}" if errors else "-"
+
+
+def _row(name: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
+    """Cells as in HEADER; those behind the second are of rigs whose data suffice."""
+    good = [one for one in outcomes if one.suffices]
+    refined = [one for one in good if one.refined is not None]
+    weak = [one for one in good if one.refined is None and one.weak is not None]
+    answered = sum(one.published is not None and bool(one.published.answers) for one in good)
+    return (
+        name,
+        *map(str, (len(outcomes), len(good), len(refined), len(weak), len(good) - len(refined) - len(weak))),
+        str(sum(not one.steps for one in good)),
+        str(answered),
+        str(sum(one.wrong for one in good)),
+        _median([one.refined for one in refined]),
+        _median([one.weak for one in refined]),
+    )
+
+
+def table_of(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
+    """A row a condition, and one for all."""
+    conditions = sorted({one.condition for one in outcomes})
+    return [
+        *(_row(name, [one for one in outcomes if one.condition == name]) for name in conditions),
+        _row("all", outcomes),
+    ]
