@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -63,7 +64,7 @@ def test_another_clone_reads_nothing_again(read: Path, monkeypatch: pytest.Monke
         source.write_text('#include "a.h"\n', encoding="utf-8")
         monkeypatch.setattr(checks, "_ROOT", clone)
         text = checks.preprocessed((*COMPILER, f"-I{clone}"), source)
-        found.append(checks.kept((str(source), text), lambda at=clones[0]: f"{at}/a.c:1: warning"))
+        found.append(checks.kept((str(source), text), partial("{}/a.c:1: warning".format, clones[0])))
     assert found == [f"{clone}/a.c:1: warning" for clone in clones]
 
 

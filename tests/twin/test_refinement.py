@@ -92,7 +92,7 @@ def wild(given: Float, sizes: tuple[float, float], every: int) -> Float:
 
 
 def test_a_drive_beyond_its_range_begins_anew() -> None:
-    """The pivot jumps by 0.3 m: its second derivative is far beyond the range for as long as the filter sees the jump."""
+    """The pivot jumps by 0.3 m: its second derivative is far beyond the range while the filter sees the jump."""
     given = samples(12.0, 2.0).copy()
     given[4000:, 1] += 0.3
     core = both(given, configuration(), (0.01, -0.01, 0.01))

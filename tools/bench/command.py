@@ -102,9 +102,9 @@ for _table in TABLES:
 @UPDATE
 def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
     """The refinement behind the weak engine: errors beside the Cramer-Rao bound, and on imperfect rigs."""
-    from bench import refine, refine_imperfect, refine_step
+    from bench import refine, refine_cases, refine_imperfect, refine_step
 
-    runs = seeds * len(refine.CASES) + imperfect * (len(refine_imperfect.FAULTS) + len(refine_step.CHANGES))
+    runs = seeds * len(refine_cases.CASES) + imperfect * (len(refine_imperfect.FAULTS) + len(refine_step.CHANGES))
     with progress_bar("refine", runs) as advance:
         done = count(1)
         rows = refine.refine_table(seeds, lambda: advance(next(done)))

@@ -111,7 +111,7 @@ def _drive_slopes(case: Case) -> tuple[Float, Float]:
     pendulum = replace(STANDARD_PENDULUM, damping1=case.damping[0], damping2=case.damping[1])
     start = [*(RELEASE[case.angle] * np.array(STANDARD_RELEASE)), 0.0, 0.0]
     samples = round(case.duration * RATE_HZ)
-    t = np.arange(2 * samples - 1) * (step / 2)
+    t = np.arange(2 * samples - 1, dtype=np.float64) * (step / 2)
     known = Drive(STANDARD_DRIVE).derivatives(t)[:, 2]
     angles, heights = [], []
     for number in range(1, int(_BAND_HZ * _LONGER * case.duration) + 1):

@@ -139,6 +139,9 @@ static void begin_pass(pvid_refine_f32 *self)
         .turn = self->front.turn,
 #endif
     };
+    if (self->pass < 2u) {
+        self->solve.dropped = 0; /* the first pass may be about another motion */
+    }
     pvid_refine_pass_begin_f32(&self->work, self->linear, self->start, &steps, gate);
     self->phase = PASS;
     self->waiting = false;
@@ -555,7 +558,7 @@ static inline void pass_jobs(pvid_refine_f32 *self)
 static void solve_job(pvid_refine_f32 *self)
 {
     const pvid_refine_solution solution =
-        pvid_refine_solve_job_f32(&self->solve, self->work.sums.sum, self->triangle, self->r, self->linear,
+        pvid_refine_solve_job_f32(&self->solve, &self->work, self->triangle, self->r, self->linear,
                                   self->config.prior_sd, self->config.step_limit);
     if (solution != PVID_REFINE_SOLVING) {
         self->solved = solution == PVID_REFINE_SOLVED;

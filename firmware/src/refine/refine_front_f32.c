@@ -192,7 +192,8 @@ static float second_derivative(const float line[], const float weights[])
     return sum;
 }
 
-/* A mean with its droop undone, of the entry `next`; what is entered, which of a second derivative is an earlier entry. */
+/* A mean with its droop undone, of the entry `next`. Returns what is entered, which of a second derivative is an
+ * earlier entry. */
 static int16_t enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, size_t signal, float x)
 {
     uint32_t entry = self->next;
@@ -210,8 +211,7 @@ static int16_t enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *
     const float scaled = value * self->to_counts[signal];
 #if PVID_REFINE_TURNING
     const bool turns = (signal >= (size_t)INPUTS) && (pvid_refine_turning[signal - INPUTS] != 0u);
-    const int16_t count =
-        turns ? counts_of_turning(&self->rest[signal], scaled) : counts(&self->rest[signal], scaled);
+    const int16_t count = turns ? counts_of_turning(&self->rest[signal], scaled) : counts(&self->rest[signal], scaled);
 #else
     const int16_t count = counts(&self->rest[signal], scaled);
 #endif

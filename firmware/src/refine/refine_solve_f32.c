@@ -19,6 +19,9 @@
 
 /* A column keeps this part of its square, or it has no information of its own. */
 #define LEAST_PART 2.0e-6f
+#if PVID_REFINE_UNKNOWNS > 32
+#error "dropped has 32 bits"
+#endif
 
 /* Halvings of a step that leaves the physical region. */
 #define MOST_HALVINGS 12u
@@ -166,18 +169,21 @@ static void chart_corner(float sum[], const float linear[])
 #endif
 }
 
-static void to_steps(pvid_refine_solve_f32 *self, float sum[], const float linear[])
+static void to_steps(pvid_refine_pass_f32 *pass, const float linear[])
 {
+    float *sum = pass->sums.sum;
     chart_corner(sum, linear);
     for (size_t i = 0; i < PVID_REFINE_UNKNOWNS; i++) {
-        self->whole[i] = sum[at(WIDTH, i, i)];
+        pass->row[0][i] = sum[at(WIDTH, i, i)];
     }
 }
 
 /* One column of Cholesky's: its row is complete and is taken off the rest. Without information of its own it is
- * skipped. */
-static void eliminate(pvid_refine_solve_f32 *self, float sum[], size_t column)
+ * skipped, from the second pass on for the rest of the block: with a column that comes and goes it would not converge.
+ */
+static void eliminate(pvid_refine_solve_f32 *self, pvid_refine_pass_f32 *pass, size_t column)
 {
+    float *sum = pass->sums.sum;
     const size_t length = WIDTH - column;
     float *row = &sum[at(WIDTH, column, column)];
     const float square = row[0];
@@ -185,7 +191,9 @@ static void eliminate(pvid_refine_solve_f32 *self, float sum[], size_t column)
         self->residual = (square > 0.0f) ? square : 0.0f;
         return;
     }
-    if (!(square > (LEAST_PART * self->whole[column]))) {
+    const uint32_t bit = (uint32_t)1u << column;
+    if (((self->dropped & bit) != 0u) || !(square > (LEAST_PART * pass->row[0][column]))) {
+        self->dropped |= bit;
         memset(row, 0, length * sizeof row[0]);
         return;
     }
@@ -323,10 +331,11 @@ static void shift(pvid_refine_solve_f32 *self, const float sums[])
     }
 }
 
-PVID_COLD pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, float sum[],
+PVID_COLD pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, pvid_refine_pass_f32 *pass,
                                                          const float triangle[], const float past[],
                                                          const float linear[], const float prior_sd[], float step_limit)
 {
+    float *sum = pass->sums.sum;
     const uint8_t job = self->job;
     self->job++;
     if (job == COPY) {
@@ -334,9 +343,9 @@ PVID_COLD pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *
     } else if (job == SIDES) {
         chart_sides(sum, linear);
     } else if (job == CORNER) {
-        to_steps(self, sum, linear);
+        to_steps(pass, linear);
     } else if (job < JOIN) {
-        eliminate(self, sum, (size_t)job - ELIMINATE);
+        eliminate(self, pass, (size_t)job - ELIMINATE);
     } else if (job == JOIN) {
         self->job = join(self, sum) ? SOLVE : JOIN;
     } else if (job == SOLVE) {

@@ -41,12 +41,12 @@ void pvid_refine_forget_widths_f32(const float prior_sd[], float sd, float trian
 
 void pvid_refine_solve_begin_f32(pvid_refine_solve_f32 *self);
 
-/* The next job. The sums are those of a pass and are used up; the triangle is that of the past, whose minimum is at
+/* The next job. The sums of the pass are used up; the triangle is that of the past, whose minimum is at
  * `past`; `linear` is the pass's. The step is shortened to step_limit prior_sd. Cost on a Cortex-M4F: up to 700
  * instructions. */
-pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, float sum[], const float triangle[],
-                                               const float past[], const float linear[], const float prior_sd[],
-                                               float step_limit);
+pvid_refine_solution pvid_refine_solve_job_f32(pvid_refine_solve_f32 *self, pvid_refine_pass_f32 *pass,
+                                               const float triangle[], const float past[], const float linear[],
+                                               const float prior_sd[], float step_limit);
 
 /* The state at the end of the pass, corrected by the steps to first order. */
 void pvid_refine_end_state_f32(const pvid_refine_solve_f32 *self, const pvid_refine_pass_f32 *pass,

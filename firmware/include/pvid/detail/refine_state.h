@@ -109,9 +109,9 @@ typedef struct {
     float output_column[PVID_REFINE_OUTPUTS *
                         (PVID_REFINE_STATES + PVID_REFINE_STILL)]; /* dz/dq, dz/dv, dz/dr at that middle */
 #endif
-    float last[PVID_REFINE_OUTPUTS]; /* residuals at the last step; NaN: missing */
-    float mean[PVID_REFINE_OUTPUTS]; /* their sum over the big step, by trapezoids */
-    float row[PVID_REFINE_ROWS][PVID_REFINE_WIDTH];
+    float last[PVID_REFINE_OUTPUTS];                /* residuals at the last step; NaN: missing */
+    float mean[PVID_REFINE_OUTPUTS];                /* their sum over the big step, by trapezoids */
+    float row[PVID_REFINE_ROWS][PVID_REFINE_WIDTH]; /* behind the pass the first one is the diagonal of its sums */
     pvid_refine_sums_f32 sums;
     uint8_t job;
     uint8_t at;     /* steps of the big step that are done */
@@ -125,7 +125,6 @@ typedef struct {
 typedef struct {
     float triangle[PVID_REFINE_TRIANGLE];
     float right[PVID_REFINE_PARAMETERS];
-    float whole[PVID_REFINE_UNKNOWNS];  /* diagonal before the elimination */
     float step[PVID_REFINE_PARAMETERS]; /* of r */
     float shift[PVID_REFINE_STATES];    /* of the block's start */
     float size;                         /* of the step before it is shortened [prior_sd] */
@@ -139,6 +138,7 @@ typedef struct {
     uint8_t row;      /* of the block, that joins the triangle */
     uint8_t rotation; /* its next one */
     uint8_t halvings;
+    uint32_t dropped; /* columns without information in a pass of this block: one bit each */
 } pvid_refine_solve_f32;
 
 /* Only the functions of refine.h write to it. */

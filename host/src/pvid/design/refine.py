@@ -24,7 +24,9 @@ _BANDS = 4.0  # pass band of second derivatives over the fast frequency
 _PERIODS = 2.0  # slow periods of a block
 _LEAST_BLOCK = 16
 _MOST_PASSES = 3  # of a block, that the ring has room for
-_PASSES_WITH_SIGNS = 8  # likewise, while the next one comes in: reversals are found in small steps
+# Likewise, while the next one comes in: parameters that the motion hardly tells apart take many, and reversals are
+# found in small steps.
+_PASSES, _PASSES_WITH_SIGNS = 9, 8
 _JOBS = 9  # of a pass for each big step
 _JOBS_OF_A_PART, _OTHER_JOBS = 10, 15  # with Runge-Kutta
 _LEAST_JOBS = 3  # in a tick
@@ -43,7 +45,7 @@ def refine_config(rig: RefineRig, forgetting_s: float = 0.0, outlier_gate: float
     ratio, parts, fine = _steps_of(rig)
     of_big_step = _JOBS_OF_A_PART * parts + _OTHER_JOBS if rig.runge_kutta else _JOBS
     free = max(ratio - 1, 1)  # ticks of a step that have jobs
-    passes = _PASSES_WITH_SIGNS if rig.jumps else _MOST_PASSES
+    passes = _PASSES_WITH_SIGNS if rig.jumps else _MOST_PASSES if rig.runge_kutta else _PASSES
     jobs = max(_LEAST_JOBS, math.ceil(of_big_step * passes / (BIG_STEP * free)))
     behind = (_MOST_PASSES - 1) / free  # steps that come in for each tick of a pass behind the first one
     ticks = math.ceil(of_big_step / jobs)

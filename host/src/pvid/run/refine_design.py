@@ -212,8 +212,8 @@ def _largest(x: Float, order: int, rate: float, block_s: float) -> float:
 
 
 def _curvature(x: Float, rate: float, block_s: float) -> Float:
-    """Second derivative of means of a four hundredth of a block: of what is twenty times as fast as the slowest motion a
-    few per cent are missing."""
+    """Second derivative of means of a four hundredth of a block: of what is twenty times as fast as the slowest motion
+    a few per cent are missing."""
     step = max(1, round(block_s * rate / 400))
     mean = x[: len(x) // step * step].reshape(-1, step).mean(1)
     return np.asarray(np.diff(mean, 2) * (rate / step) ** 2)

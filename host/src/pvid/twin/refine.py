@@ -131,6 +131,8 @@ class RefineTwin:
         self.restarted = True
 
     def _begin_pass(self) -> None:
+        if self.passed < 2:
+            self.solve.dropped[:] = False
         gate = _ABSURD
         if self.taken > 0 and self.config.gate > 0 and not self.restarted:
             gate = (_F(self.config.gate) * self.sd[0]) * np.sqrt(_at_least_one(self.level))

@@ -67,6 +67,7 @@ class Solve:
         self.step = np.zeros(n, _F)
         self.shift = np.zeros(shape.states, _F)
         self.size = self.bend = self.residual = self.clash = _F(0)
+        self.dropped = np.zeros(shape.width, bool)
         self.begin()
 
     def begin(self) -> None:
@@ -110,7 +111,8 @@ class Solve:
             self.residual = square if square > 0 else _F(0)
             return
         row = self.sum[column, column:].copy()
-        if not square > _LEAST_PART * self.whole[column]:
+        if self.dropped[column] or not square > _LEAST_PART * self.whole[column]:
+            self.dropped[column] = True
             self.sum[column, column:] = 0
             return
         row = row * (_F(1) / np.sqrt(square))
