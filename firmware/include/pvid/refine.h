@@ -62,9 +62,9 @@ typedef struct {
     int8_t order;   /* 0: the sample; of an input also 2: its second derivative, -1: its integral since init */
     uint8_t source; /* PVID_SIGNAL_SAMPLED, or of an input PVID_SIGNAL_HELD (weak_parts.h) */
     float scale;    /* factor to the model's unit */
-    float range;    /* largest absolute value [model's unit], > 0: it is kept in 16 bits. An output beyond it is missing;
-                       behind an input beyond it the block begins anew, as behind a gap. Of an output that turns
-                       (pvid_refine_turning) half of the interval modulo which it is kept */
+    float range; /* largest absolute value [model's unit], > 0: it is kept in 16 bits. An output beyond it is missing;
+                    after an input beyond it a new block begins, as after a gap. Of an output that turns
+                    (pvid_refine_turning) half of the interval modulo which it is kept */
 } pvid_refine_signal_f32;
 
 typedef struct pvid_refine_config_f32 {

@@ -140,7 +140,7 @@ static void begin_pass(pvid_refine_f32 *self)
 #endif
     };
     if (self->pass < 2u) {
-        self->solve.dropped = 0; /* the first pass may be about another motion */
+        self->solve.dropped = 0; /* the first pass may be linearised about a wrong motion */
     }
     pvid_refine_pass_begin_f32(&self->work, self->linear, self->start, &steps, gate);
     self->phase = PASS;
@@ -630,7 +630,7 @@ static void move(pvid_refine_f32 *self)
     }
 }
 
-/* The last blocks are not those that the estimate is made of where the motion has decayed since. */
+/* When the motion has decayed, the last blocks add little to the estimate: the scatter of all blocks counts too. */
 static float clash_of(const pvid_refine_f32 *self)
 {
     return (self->clash > self->scatter) ? self->clash : self->scatter;

@@ -192,8 +192,8 @@ static float second_derivative(const float line[], const float weights[])
     return sum;
 }
 
-/* A mean with its droop undone, of the entry `next`. Returns what is entered, which of a second derivative is an
- * earlier entry. */
+/* A mean with its droop undone, of the entry `next`; its second derivative is that of an earlier entry. Returns the
+ * count that is written: INT16_MIN beyond the range; 0 until the filter has all its means. */
 static int16_t enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, size_t signal, float x)
 {
     uint32_t entry = self->next;

@@ -178,9 +178,9 @@ static void to_steps(pvid_refine_pass_f32 *pass, const float linear[])
     }
 }
 
-/* One column of Cholesky's: its row is complete and is taken off the rest. Without information of its own it is
- * skipped, from the second pass on for the rest of the block: with a column that comes and goes it would not converge.
- */
+/* One column of Cholesky's: its row is complete and is taken off the rest. A column without information of its own is
+ * skipped; from the second pass on it stays skipped for the rest of the block: if it came and went, the passes would
+ * not converge. */
 static void eliminate(pvid_refine_solve_f32 *self, pvid_refine_pass_f32 *pass, size_t column)
 {
     float *sum = pass->sums.sum;

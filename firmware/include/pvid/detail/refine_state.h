@@ -111,7 +111,7 @@ typedef struct {
 #endif
     float last[PVID_REFINE_OUTPUTS];                /* residuals at the last step; NaN: missing */
     float mean[PVID_REFINE_OUTPUTS];                /* their sum over the big step, by trapezoids */
-    float row[PVID_REFINE_ROWS][PVID_REFINE_WIDTH]; /* behind the pass the first one is the diagonal of its sums */
+    float row[PVID_REFINE_ROWS][PVID_REFINE_WIDTH]; /* after the pass row[0] is the diagonal of the sums */
     pvid_refine_sums_f32 sums;
     uint8_t job;
     uint8_t at;     /* steps of the big step that are done */
