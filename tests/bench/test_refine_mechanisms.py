@@ -57,9 +57,9 @@ def test_the_twin_has_the_bits_of_blocks_whose_start_is_measured(furuta: Case) -
 
 
 def test_few_ticks_for_a_step_have_more_jobs_each_and_too_slow_samples_are_refused(furuta: Case) -> None:
-    assert (furuta.settings.ratio, furuta.settings.jobs) == (6, 3)
+    assert (furuta.settings.ratio, furuta.settings.jobs) == (6, 5)
     slower = Case.of("furuta", 1000.0).settings
-    assert (slower.ratio, slower.jobs) == (3, 4)
+    assert (slower.ratio, slower.jobs) == (3, 11)
     simulation = furuta.simulation
     made = refine_functions(simulation.model)
     with pytest.raises(PvidError, match=r"needs \d+ samples a second for the fastest motion .*, not 50"):
