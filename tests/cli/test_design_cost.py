@@ -57,7 +57,7 @@ def test_the_cost_of_both_stages_is_measured_for_a_recording(pendulum: Path) -> 
     assert all(weak[key] < printed[key] for key in ("mean", "longest", "state", "text", "tables", "stack_bound"))
     assert light["longest"] < printed["longest"] and light["state"] == printed["state"]
     assert 0 < weak["first_s"] < printed["first_s"] < printed["ticks"] / 1000
-    assert light["first_s"] is None  # the weak form leaves no tick to it
+    assert printed["first_s"] <= light["first_s"] < printed["ticks"] / 1000  # the weak form leaves it fewer ticks
 
 
 def test_the_cost_of_a_shipped_rig_is_that_of_sizes() -> None:
