@@ -7,8 +7,8 @@ import pytest
 from bench.build_choices import CHOICES, HEADER, Choice, footprint_of
 
 
-def test_each_choice_has_a_title_of_its_own_core() -> None:
-    assert len({(one.core, one.title) for one in CHOICES}) == len(CHOICES)
+def test_each_choice_has_a_title_of_its_own_core_and_stage() -> None:
+    assert len({(one.core, one.refined, one.title) for one in CHOICES}) == len(CHOICES)
     assert len(HEADER) == 5
 
 

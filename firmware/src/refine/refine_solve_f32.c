@@ -191,9 +191,9 @@ static void eliminate(pvid_refine_solve_f32 *self, pvid_refine_pass_f32 *pass, s
         self->residual = (square > 0.0f) ? square : 0.0f;
         return;
     }
-    const uint32_t bit = (uint32_t)1u << column;
-    if (((self->dropped & bit) != 0u) || !(square > (LEAST_PART * pass->row[0][column]))) {
-        self->dropped |= bit;
+    const bool skipped = ((self->dropped >> column) & 1u) != 0u;
+    if (skipped || !(square > (LEAST_PART * pass->row[0][column]))) {
+        self->dropped |= ((uint32_t)1u << column);
         memset(row, 0, length * sizeof row[0]);
         return;
     }
