@@ -833,9 +833,7 @@ static void test_a_wild_sample_is_left_out(void **state)
     /* of 1 cm there remains the ripple's part in the cubic through the neighbours */
     run_front(&front, 4.0f, 0u, 0.01f, 0.0f);
     const int gated = largest_difference(&front, &clean);
-    run_front(&front, 0.0f, 0u, 0.01f, 0.0f);
-    const int without = largest_difference(&front, &clean);
-    assert_true((gated > 0) && ((50 * gated) < without));
+    assert_true((gated > 0) && (gated < 650)); /* without the gate it is beyond the range, 32767 */
 }
 
 static void test_a_jump_is_no_wild_sample_and_becomes_the_usual(void **state)
