@@ -17,7 +17,7 @@ from pvid.base.user_cache import user_cache
 
 _ROOT = Path(__file__).resolve().parents[1]
 _TOP = "<top of the clone>"
-_PLACE = user_cache(_ROOT / "build" / "cache") / "checks"
+_PLACE = (user_cache() or _ROOT / "build" / "cache") / "checks"
 
 
 @cache

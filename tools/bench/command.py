@@ -132,17 +132,16 @@ def bench_refine_options(seeds: int, update: Path | None) -> int:
 
 
 @bench.command(name="refine-rigs")
-@click.option("--rigs", type=click.IntRange(min=1), help="How many.  [default: 120]")
-@click.option("--seed", type=click.IntRange(min=0), help="Of the rigs.  [default: 7]")
+@click.option("--rigs", default=120, show_default=True, type=click.IntRange(min=1), help="How many.")
+@click.option("--seed", default=7, show_default=True, type=click.IntRange(min=0), help="Of the rigs.")
 @UPDATE
-def bench_refine_rigs(rigs: int | None, seed: int | None, update: Path | None) -> int:
+def bench_refine_rigs(rigs: int, seed: int, update: Path | None) -> int:
     """Both stages of the pendulum in C on the random rigs of a campaign."""
     from bench import refine_rigs
 
-    number = rigs or refine_rigs.RIGS
-    with progress_bar("refine-rigs", number) as advance:
+    with progress_bar("refine-rigs", rigs) as advance:
         done = count(1)
-        found = refine_rigs.outcomes_of(number, refine_rigs.SEED if seed is None else seed, lambda: advance(next(done)))
+        found = refine_rigs.outcomes_of(rigs, seed, lambda: advance(next(done)))
     put_table(update, "refine-rigs", markdown(refine_rigs.HEADER, refine_rigs.table_of(found)))
     return DONE
 

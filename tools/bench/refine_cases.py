@@ -30,8 +30,8 @@ TRUTH = STANDARD_PENDULUM.linear
 # Of the standard release: the largest angles are those of the table.
 RELEASE = {0.1: 1.0, 0.2: 1.88, 0.3: 2.85}
 _STEPS = np.array([1e-6] * 3 + [1e-5] * 2 + [1.0, 1e-6] + [1e-6] * 2)  # of log w, .., start, for the bound
-# Of a drive that is not known: tones up to the end of the band of the refinement's filter, whose period is a little
-# longer than the run: then they need not be alike at its ends.
+# Tones of an unknown drive: up to the end of the pass band of the refinement's filter; their common period is a little
+# longer than the run, so that the drive may differ at its two ends.
 _BAND_HZ, _LONGER = 8.0, 1.05
 _TONE_STEP = 1e-7  # [m], of a central difference
 _EVERY = 8  # samples of the rows: the angle has nothing above some Hz
@@ -76,15 +76,9 @@ CASES = (
 
 def _angle(case: Case, change: Float) -> Float:
     """The exact angle with changes of (log w, log d1, log d2, k1, k2, -, offset, angles of the start)."""
-    w, d1, d2 = TRUTH * np.exp(change[:3])
-    ratio = d1 - d2 - 1
-    l2 = L1 * ratio / d2
     scale = RELEASE[case.angle]
-    pendulum = Pendulum(
-        l1=L1,
-        l2=l2,
-        rho2=l2 / np.sqrt(ratio),
-        g=w * L1,
+    pendulum = replace(
+        Pendulum.from_linear(TRUTH * np.exp(change[:3]), L1),
         damping1=case.damping[0] + change[3] * L1**2,
         damping2=case.damping[1] + change[4] * L1**2,
     )
@@ -141,7 +135,7 @@ def bound_of(case: Case, since_s: float = 0.0, until_s: float | None = None) -> 
 
 
 def bound_of_measured(case: Case, since_s: float = 0.0, until_s: float | None = None) -> Float:
-    """The same where only the readings of the pivot's sensor are known of the drive, and its band."""
+    """The same for a drive that is given by the readings of its sensor, and by its band, alone."""
     if case.exact_drive:
         return bound_of(case, since_s, until_s)
     sensors = standard_sensors(case.bits)
@@ -150,7 +144,7 @@ def bound_of_measured(case: Case, since_s: float = 0.0, until_s: float | None = 
     rows = _between(since_s, until_s, _EVERY)
     angle, height = _drive_slopes(case.motion)
     jacobian, angle, height = _slopes(case.motion)[::_EVERY][rows], angle[rows], height[rows]
-    # the drive's own information, and what the angle says of it, are eliminated
+    # Schur complement: the amplitudes of the drive's tones are eliminated
     drive = angle.T @ angle / variance + height.T @ height / of_y
     both = angle.T @ jacobian / variance
     scale = np.diag(drive) ** -0.5

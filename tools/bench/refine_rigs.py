@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.campaign.judge import SUFFICES, Judgement
-from bench.campaign.population import Population, shipped
+from bench.campaign.population import shipped
 from bench.campaign.truth import SimulatedRig, simulate_rig
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
@@ -21,7 +21,6 @@ from pvid.run.mechanism import Value, identify_mechanism, model_of
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.refined_core import refined_in_c
 
-RIGS, SEED = 120, 7
 HEADER = (
     "condition",
     "rigs",
@@ -85,26 +84,24 @@ def outcome_of(simulated: SimulatedRig) -> Outcome:
     suffices = bool((simulated.bound[:2] < SUFFICES).all())
     try:
         answer = identify_mechanism(recording, model)
-        weak = identify_in_c(answer, "f32")
     except PvidError:
         return Outcome(condition, suffices, None, None, True, False)
-    of_weak = _judged(weak.values, simulated) if weak.identified else None
-    warned = weak.verdict.warning is not None
+    refined, steps = None, True
     try:
         both = refined_in_c(answer)
-    except PvidError:
-        return Outcome(condition, suffices, None, of_weak, False, warned)
-    refined = _judged(both.values, simulated) if both.adopted and both.identified else None
-    return Outcome(condition, suffices, refined, of_weak, True, warned)
+        weak = both.weak
+        refined = _judged(both.values, simulated) if both.adopted and both.identified else None
+    except PvidError:  # too few samples a second
+        weak, steps = identify_in_c(answer, "f32"), False
+    of_weak = _judged(weak.values, simulated) if weak.identified else None
+    return Outcome(condition, suffices, refined, of_weak, steps, weak.verdict.warning is not None)
 
 
-def outcomes_of(
-    rigs: int, seed: int, progress: Callable[[], None], population: Population | None = None
-) -> list[Outcome]:
+def outcomes_of(rigs: int, seed: int, progress: Callable[[], None]) -> list[Outcome]:
     """Of the first rigs of a seed."""
-    native, found = Native(), []
+    native, population, found = Native(), shipped(), []
     for index in range(rigs):
-        found.append(outcome_of(simulate_rig(native, population or shipped(), seed, index)))
+        found.append(outcome_of(simulate_rig(native, population, seed, index)))
         progress()
     return found
 
@@ -115,7 +112,7 @@ def _median(judgements: Sequence[Judgement | None]) -> str:
 
 
 def _row(name: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
-    """Cells as in HEADER; those behind the second are of rigs whose data suffice."""
+    """Cells as in HEADER; from the fourth on, of rigs whose data suffice."""
     good = [one for one in outcomes if one.suffices]
     refined = [one for one in good if one.refined is not None]
     weak = [one for one in good if one.refined is None and one.weak is not None]

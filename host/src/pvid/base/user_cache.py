@@ -7,7 +7,6 @@ import os
 import stat
 import tempfile
 from pathlib import Path
-from typing import overload
 
 
 def built_under(own: Path) -> Path:
@@ -15,22 +14,14 @@ def built_under(own: Path) -> Path:
     private temporary one."""
     if _may_write(own / "targets"):
         return own
-    return user_cache(None) or _temporary()
+    return user_cache() or _temporary()
 
 
-@overload
-def user_cache(other: Path) -> Path: ...
-
-
-@overload
-def user_cache(other: None) -> Path | None: ...
-
-
-def user_cache(other: Path | None) -> Path | None:
-    """The folder of pvid in XDG_CACHE_HOME or ~/.cache, or `other` where this user may write to neither."""
+def user_cache() -> Path | None:
+    """The folder of pvid in XDG_CACHE_HOME or ~/.cache; None where this user may write to neither."""
     given = os.environ.get("XDG_CACHE_HOME", "")
     caches = [*([Path(given)] if given.startswith("/") else []), _home() / ".cache"]
-    return next((cache / "pvid" for cache in caches if _may_write(cache / "pvid")), other)
+    return next((cache / "pvid" for cache in caches if _may_write(cache / "pvid")), None)
 
 
 def _temporary() -> Path:

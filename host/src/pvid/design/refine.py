@@ -24,8 +24,8 @@ _BANDS = 4.0  # pass band of second derivatives over the fast frequency
 _PERIODS = 2.0  # slow periods of a block
 _LEAST_BLOCK = 16
 _MOST_PASSES = 3  # of a block, that the ring has room for
-# Likewise, while the next one comes in: parameters that the motion hardly tells apart take many, and reversals are
-# found in small steps.
+# Likewise, while the next one comes in: nearly collinear parameters take many, and reversals are found in small
+# steps.
 _PASSES, _PASSES_WITH_SIGNS = 9, 8
 _JOBS = 9  # of a pass for each big step
 _JOBS_OF_A_PART, _OTHER_JOBS = 10, 15  # with Runge-Kutta
