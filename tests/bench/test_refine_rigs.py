@@ -25,8 +25,8 @@ def test_a_rig_is_refined_where_its_samples_have_room_for_the_steps() -> None:
 
 
 def test_a_column_without_information_stays_out_of_the_block() -> None:
-    """Two frictions that are nearly collinear: with a column that came and went d2 was 5 % off, 6.5 standard errors, and
-    most such rigs were not refined."""
+    """Two frictions that are nearly collinear: with a column that came and went d2 was 5 % off, 6.5 standard errors,
+    and most such rigs were not refined."""
     found = outcome_of(simulate_rig(Native(), shipped(), 8, 55))
     assert found.suffices and not found.wrong
 
