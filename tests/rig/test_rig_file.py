@@ -239,11 +239,11 @@ def test_the_gate_where_the_file_does_not_say() -> None:
     assert Identifier(outlier_gate=0.0).gate == 0.0
     assert Identifier(law="pseudovelocity", outlier_gate=5.0).gate == 5.0
     assert Identifier().patience_s is None, "of some windows"
-    assert Identifier(forgetting_s=10.0).patience_s == 10.0
+    assert Identifier(forgetting_s=10.0).patience_s == 5.0
     assert Identifier(form="strong").patience_s == 0.0
     assert Identifier(form="strong", forgetting_s=10.0).patience_s == 60.0
-    assert Identifier(forgetting_s=1e12).patience_s == 1e12
-    assert Identifier(core="q31", forgetting_s=10.0).patience_s == 10.0
+    assert Identifier(forgetting_s=1e12).patience_s == 5e11
+    assert Identifier(core="q31", forgetting_s=10.0).patience_s == 5.0
     assert Identifier(forgetting_s=10.0, outlier_patience_s=0.0).patience_s == 0.0
 
 

@@ -15,6 +15,7 @@ from pvid.model.signals import Jet
 Part = Mapping[int, sp.Expr]
 
 _PATIENT_WINDOWS = 100
+_PATIENT_PART = 0.5  # of the time constant of forgetting; FORMS of settings/forms.py has the same
 
 
 @dataclass(frozen=True)
@@ -208,11 +209,11 @@ class Following:
         return self == Following()
 
     def patience_s(self, window_s: float) -> float:
-        """Patience of the gate for windows that end every window_s: what is given, else the time constant of
+        """Patience of the gate for windows that end every window_s: what is given, else half the time constant of
         forgetting, and without forgetting the time of 100 windows."""
         if self.outlier_patience_s is not None:
             return self.outlier_patience_s
-        return self.forgetting_s or _PATIENT_WINDOWS * window_s
+        return _PATIENT_PART * self.forgetting_s or _PATIENT_WINDOWS * window_s
 
 
 @dataclass(frozen=True)

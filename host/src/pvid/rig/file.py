@@ -132,8 +132,8 @@ class Identifier:
     kappa_min : strong form: hold the estimate while less than this share of the information on w is its own
     outlier_gate : reject rows or windows whose residuals exceed this multiple of the usual; 0: no gate; default: 4
         (weak form), 6 (strong form), and no gate with the law pseudovelocity
-    outlier_patience_s : the gate accepts a changed mechanism after this time; 0: never; default: forgetting_s, or
-        100 windows without forgetting (weak form); 6 times forgetting_s (strong form)
+    outlier_patience_s : the gate accepts a changed mechanism after this time; 0: never; default: half of
+        forgetting_s, or 100 windows without forgetting (weak form); 6 times forgetting_s (strong form)
     dead_zone : keep p while it is within this many standard errors of the solution of all data; 0: no dead zone
     """
 

@@ -46,7 +46,7 @@ class CoreTraits:
 
 
 FORMS: dict[Form, FormTraits] = {
-    "weak": FormTraits(gate=4.0, patience=1.0, publishes=True, estimates_zero=True),
+    "weak": FormTraits(gate=4.0, patience=0.5, publishes=True, estimates_zero=True),
     "strong": FormTraits(gate=6.0, patience=6.0, publishes=False, estimates_zero=False),
 }
 CORES: dict[AnyCore, CoreTraits] = {
