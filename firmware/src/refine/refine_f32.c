@@ -52,9 +52,13 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
 /* Factor on the clash of the first two blocks: they are short, and neighbours err alike. */
 #define FIRST_CLASH 2.0f
 
-/* Part of the triangle that remains when a longer block begins anew: the past knows its samples already, and has next
- * to no weight then, but still shows the clash. */
+/* Part of the triangle that remains when a longer block begins anew, whose samples the past knows already, and when the
+ * information of past and block does not add: it has next to no weight then, but still shows the clash. */
 #define KEPT (1.0f / 16.0f)
+
+/* Factor by which a block's information may differ between its first pass, where its past was linearised, and its last
+ * one: with more the information of the two does not add. */
+#define CONSISTENT 2.0f
 
 /* Steps between the three readings that a block's start is measured by. */
 #define APART 4u
@@ -122,10 +126,19 @@ static bool is_there(const pvid_refine_f32 *self)
     return back <= ((int32_t)pvid_refine_front_room_f32(&self->front) - 8);
 }
 
+/* Whether large residuals are outliers: not while a second block is still seen from the first one, which may have been
+ * short. (Where the start is measured, a motion that is off begins there; with signs the prior is narrow.) */
+static bool is_gated(const pvid_refine_f32 *self)
+{
+    const bool seen = (PVID_REFINE_HAS_MEASURED != 0) || (PVID_REFINE_SIGNS > 0) || (self->pass >= 2u);
+    const bool close = (self->taken > 1u) || ((self->taken == 1u) && seen);
+    return close && (self->config.gate > 0.0f) && !self->restarted;
+}
+
 static void begin_pass(pvid_refine_f32 *self)
 {
-    const bool gated = (self->taken > 0u) && (self->config.gate > 0.0f) && !self->restarted;
-    const float gate = gated ? (self->config.gate * self->config.sd[0] * pvid_refine_root_f32(self->level)) : ABSURD;
+    const float gate =
+        is_gated(self) ? (self->config.gate * self->config.sd[0] * pvid_refine_root_f32(self->level)) : ABSURD;
     const pvid_refine_steps_f32 steps = {
         .h = self->h,
 #if PVID_REFINE_RUNGE_KUTTA
@@ -375,6 +388,21 @@ static float share_of_block(const pvid_refine_f32 *self)
     return 1.0f - (past / (float)N);
 }
 
+#if PVID_REFINE_SIGNS == 0
+/* Whether the information of past and block adds: theirs is known at different points. Where a combination of
+ * parameters is hardly determined, it is another one at each point; both together then seem to determine all. */
+static bool is_consistent(const pvid_refine_f32 *self)
+{
+    float ratio = 1.0f;
+    size_t place = 0;
+    for (size_t i = 0; i < N; i++) {
+        ratio *= self->solve.triangle[place] / self->diagonal[i];
+        place += N - i;
+    }
+    return (ratio < CONSISTENT) && (ratio > (1.0f / CONSISTENT));
+}
+#endif
+
 static void take(pvid_refine_f32 *self, float square, float clash, bool again, uint32_t began)
 {
     const pvid_refine_config_f32 *config = &self->config;
@@ -387,20 +415,26 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         const float larger = (clash > first) ? clash : first;
         self->scatter += share_of_block(self) * (larger - self->scatter);
     }
-    self->taken = (uint8_t)((self->taken < 2u) ? (self->taken + 1u) : 2u);
+#if PVID_REFINE_SIGNS > 0
+    const bool consistent = true; /* the prior is narrow */
+#else
+    const bool consistent = (self->taken == 0u) || again || is_consistent(self);
+#endif
+    self->taken = ((self->taken == 0u) || !consistent) ? 1u : 2u;
     self->level = ((self->taken == 1u) || again) ? square : (self->level + (LEVEL_GAIN * (square - self->level)));
     memcpy(self->r, self->linear, sizeof self->r);
     memcpy(self->next, self->linear, sizeof self->next);
     float fade = 1.0f - ((1.0f - self->fade) * ((float)self->length / (float)config->block));
     if (self->length < config->block) {
         lengthen(self, began);
-        fade = self->again ? KEPT : fade;
     }
+    const bool anew = self->again || !consistent;
+    fade = anew ? KEPT : fade;
     float counts = 1.0f;
 #if PVID_REFINE_SIGNS > 0
     counts = is_fine(self) ? 1.0f : ROUGHLY;
 #endif
-    self->kept = self->again ? (KEPT * counts) : counts;
+    self->kept = anew ? (KEPT * counts) : counts;
     fade *= counts;
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
@@ -613,6 +647,15 @@ static void move(pvid_refine_f32 *self)
     for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
         self->start[i] += self->solve.shift[i];
     }
+#if PVID_REFINE_SIGNS == 0
+    if (self->pass == 0u) {
+        size_t place = 0;
+        for (size_t i = 0; i < N; i++) {
+            self->diagonal[i] = self->solve.triangle[place];
+            place += N - i;
+        }
+    }
+#endif
     self->pass++;
     if (grows(self)) {
         self->length = (uint16_t)(2u * self->length);

@@ -179,8 +179,11 @@ struct pvid_refine_f32 {
     float weak[PVID_REFINE_PARAMETERS];   /* newest estimate of the weak form */
     float weak_se[PVID_REFINE_P];
     float triangle[PVID_REFINE_TRIANGLE]; /* square root of the information of the steps of r, in residuals */
-    float start[PVID_REFINE_STATES];      /* of the pass */
-    float expected[PVID_REFINE_STATES];   /* start of the block, from the one before */
+#if PVID_REFINE_SIGNS == 0
+    float diagonal[PVID_REFINE_PARAMETERS]; /* of the triangle with the block, after its first pass */
+#endif
+    float start[PVID_REFINE_STATES];    /* of the pass */
+    float expected[PVID_REFINE_STATES]; /* start of the block, from the one before */
     pvid_refine_front_f32 front;
     pvid_refine_pass_f32 work;
     pvid_refine_solve_f32 solve;

@@ -29,6 +29,7 @@ _LEVEL_GAIN = _F(0.2)
 _CLASH_GAIN = _F(0.3)
 _FIRST_CLASH = _F(2)
 _KEPT = _F(1 / 16)
+_CONSISTENT = _F(2)
 _APART = 4
 _SHORT = _F(0.25)
 _SHARPEST, _REVERSALS = _F(0.25), _F(4)
@@ -117,6 +118,7 @@ class RefineTwin:
         self.weak_se = np.zeros(len(shape.place_of_p), _F)
         self.triangle = np.zeros((n, n), _F)
         self.start, self.expected = np.zeros(shape.states, _F), np.zeros(shape.states, _F)
+        self.diagonal = np.zeros(n, _F)
         self.covariance = np.zeros((n, n), _F)
         self.verdict = Reason.UPDATED
         self.told = Reason.WARMING_UP  # of the last block
@@ -134,7 +136,9 @@ class RefineTwin:
         if self.passed < 2:
             self.solve.dropped[:] = False
         gate = _ABSURD
-        if self.taken > 0 and self.config.gate > 0 and not self.restarted:
+        seen = any(self.shape.measured) or bool(self.shape.signs) or self.passed >= 2
+        close = self.taken > 1 or (self.taken == 1 and seen)
+        if close and self.config.gate > 0 and not self.restarted:
             gate = (_F(self.config.gate) * self.sd[0]) * np.sqrt(_at_least_one(self.level))
         parts = self.parts, self.config.fine_parts or 1
         self.work.begin(self.linear, self.start, self.h, parts, gate, self.front.turn, self.observer)
@@ -264,6 +268,12 @@ class RefineTwin:
             past = past + part * part
         return _F(1) - past / _F(self.shape.parameters)
 
+    def _is_consistent(self) -> bool:
+        ratio = _F(1)
+        for part in np.diag(self.solve.triangle) / self.diagonal:
+            ratio = ratio * part
+        return bool(_F(1) / _CONSISTENT < ratio < _CONSISTENT)
+
     def _take(self, square: np.float32, clash: np.float32, again: bool, began: int) -> None:
         config = self.config
         self.refused = self.lost = 0
@@ -273,15 +283,17 @@ class RefineTwin:
             self.clash = first if first > mean else mean
             larger = clash if clash > first else first
             self.scatter = self.scatter + self._share_of_block() * (larger - self.scatter)
-        self.taken = min(self.taken + 1, 2)
+        consistent = bool(self.shape.signs) or self.taken == 0 or again or self._is_consistent()
+        self.taken = 1 if self.taken == 0 or not consistent else 2
         self.level = square if self.taken == 1 or again else self.level + _LEVEL_GAIN * (square - self.level)
         self.r, self.next = self.linear.copy(), self.linear.copy()
         fade = _F(1) - (_F(1) - self.fade) * (_F(self.length) / _F(config.block))
         if self.length < config.block:
             self._lengthen(began)
-            fade = _KEPT if self.again else fade
+        anew = self.again or not consistent
+        fade = _KEPT if anew else fade
         counts = _F(1) if not self.shape.signs or self._is_fine() else _ROUGHLY
-        self.kept = _KEPT * counts if self.again else counts
+        self.kept = _KEPT * counts if anew else counts
         fade = fade * counts
         self.triangle = self.solve.triangle * fade
         for i in range(self.shape.widths):
@@ -473,6 +485,8 @@ class RefineTwin:
             widths = self.linear[self.steps.is_width]
             self.linear[self.steps.is_width] = np.maximum(widths, _SHARPEST * self.config.width)
         self.start = self.start + self.solve.shift
+        if self.passed == 0:
+            self.diagonal = np.diag(self.solve.triangle).copy()
         self.passed += 1
         if self._grows():
             self.length, self.passed = 2 * self.length, 0
