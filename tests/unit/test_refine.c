@@ -617,6 +617,58 @@ static void test_a_search_behind_a_lost_track_remembers_the_refusals(void **stat
     assert_true(!(refinement.clash < remembered));
 }
 
+/* Both have the same information at the point where the past was linearised, the block's first pass; where the last
+ * pass finds another one, by more than a factor of 2, the two do not add. */
+static void test_a_past_whose_information_depends_on_the_point_is_given_up(void **state)
+{
+    (void)state;
+    const float factors[] = {0.49f, 0.51f, 1.0f, 1.99f, 2.01f, NAN};
+    const bool adds[] = {false, true, true, true, false, false};
+    begin_run();
+    uint32_t tick = run_until(is_published, 0);
+    tick = run_until(is_at_its_end, tick);
+    const pvid_refine_f32 before = refinement;
+    for (size_t i = 0; i < (sizeof adds / sizeof adds[0]); i++) {
+        refinement = before;
+        size_t place = 0;
+        for (size_t k = 0; k < PVID_REFINE_PARAMETERS; k++) {
+            refinement.diagonal[k] = refinement.solve.triangle[place];
+            place += PVID_REFINE_PARAMETERS - k;
+        }
+        refinement.diagonal[i % PVID_REFINE_PARAMETERS] /= factors[i];
+        const float whole = refinement.solve.triangle[0];
+        (void)run_until(has_left_the_end, tick);
+        assert_int_equal(refinement.taken, adds[i] ? 2 : 1);
+        assert_int_equal(refinement.verdict, adds[i] ? PVID_UPDATED : PVID_HELD_UNCERTAIN);
+        assert_true(fabsf((refinement.triangle[0] / whole) - (adds[i] ? 1.0f : (1.0f / 16.0f))) < 1.0e-6f);
+        assert_true(fabsf(refinement.kept - (adds[i] ? 1.0f : (1.0f / 16.0f))) < 1.0e-6f);
+    }
+}
+
+/* Rows beyond the gate count at first: the second block is seen from a first one that may have been short. */
+static void test_the_gate_waits_for_the_second_pass_of_a_second_block(void **state)
+{
+    (void)state;
+    begin_run();
+    uint32_t tick = run_until(has_taken, 0);
+    const pvid_refine_f32 before = refinement;
+    for (uint8_t taken = 1; taken <= 2u; taken++) {
+        refinement = before;
+        refinement.taken = taken;
+        refinement.again = false;
+        refinement.restarted = false;
+        bool gated[3] = {false, false, false};
+        for (uint32_t i = tick; (i < TICKS) && (refinement.phase != END); i++) {
+            (void)pvid_refine_step_f32(&refinement, samples[i], NULL, false);
+            if (refinement.pass < 3u) {
+                gated[refinement.pass] = refinement.work.gate < 1.0f;
+            }
+        }
+        assert_int_equal(gated[0], taken == 2u);
+        assert_int_equal(gated[1], taken == 2u);
+    }
+}
+
 /* ---- what is published ---- */
 
 /* Steps until a block ends, with an estimate of the weak form at the first tick; *tick: the first one, then the one
@@ -926,6 +978,8 @@ int main(void)
         cmocka_unit_test(test_a_longer_block_of_used_samples_is_judged_by_its_own_level),
         cmocka_unit_test(test_behind_a_refused_longer_block_the_whole_past_is_clashed_with),
         cmocka_unit_test(test_a_search_behind_a_lost_track_remembers_the_refusals),
+        cmocka_unit_test(test_a_past_whose_information_depends_on_the_point_is_given_up),
+        cmocka_unit_test(test_the_gate_waits_for_the_second_pass_of_a_second_block),
         cmocka_unit_test(test_an_estimate_that_disagrees_is_held_and_the_published_one_withdrawn),
         cmocka_unit_test(test_the_published_estimate_outlives_one_refused_block_and_not_the_loss_of_the_track),
         cmocka_unit_test(test_the_best_estimate_is_the_refined_one_while_it_stands),

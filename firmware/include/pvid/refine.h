@@ -12,6 +12,11 @@
  *   - A single wild sample (interference, a flipped bit) is left out of the block before (outlier_gate).
  *   - A block is accepted if its residuals, its clash with the past and its last step are small enough, relative to the
  *     best of the last blocks. After two refused blocks in a row the search begins again.
+ *   - The past is given up if the information of an accepted block depends on the point of linearisation: if it is twice
+ *     or half as large (determinant) after the last pass as after the first one. A short block may hardly determine some
+ *     combination of parameters, at each point another one. Two such blocks, linearised at different points, together
+ *     seem to determine all parameters, and the estimate stays wrong with small standard errors. (Not with dry
+ *     friction, where the weak form's standard errors limit the prior.)
  *
  *   static pvid_refine_f32 refinement;
  *   static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &refine_config};
