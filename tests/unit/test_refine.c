@@ -617,8 +617,8 @@ static void test_a_search_behind_a_lost_track_remembers_the_refusals(void **stat
     assert_true(!(refinement.clash < remembered));
 }
 
-/* Both have the same information at the point where the past was linearised, the block's first pass; where the last
- * pass finds another one, by more than a factor of 2, the two do not add. */
+/* The past is given up if the square root of the determinant of the information of past and block changes by more than
+ * a factor of 2 from the first pass to the last one, or if the ratio is no number. */
 static void test_a_past_whose_information_depends_on_the_point_is_given_up(void **state)
 {
     (void)state;
@@ -645,8 +645,8 @@ static void test_a_past_whose_information_depends_on_the_point_is_given_up(void 
     }
 }
 
-/* Rows beyond the gate count at first: the second block is seen from a first one that may have been short. */
-static void test_the_gate_waits_for_the_second_pass_of_a_second_block(void **state)
+/* In its first two passes no row is left out: its start is predicted from a first block that may have been short. */
+static void test_the_gate_waits_for_the_third_pass_of_a_second_block(void **state)
 {
     (void)state;
     begin_run();
@@ -979,7 +979,7 @@ int main(void)
         cmocka_unit_test(test_behind_a_refused_longer_block_the_whole_past_is_clashed_with),
         cmocka_unit_test(test_a_search_behind_a_lost_track_remembers_the_refusals),
         cmocka_unit_test(test_a_past_whose_information_depends_on_the_point_is_given_up),
-        cmocka_unit_test(test_the_gate_waits_for_the_second_pass_of_a_second_block),
+        cmocka_unit_test(test_the_gate_waits_for_the_third_pass_of_a_second_block),
         cmocka_unit_test(test_an_estimate_that_disagrees_is_held_and_the_published_one_withdrawn),
         cmocka_unit_test(test_the_published_estimate_outlives_one_refused_block_and_not_the_loss_of_the_track),
         cmocka_unit_test(test_the_best_estimate_is_the_refined_one_while_it_stands),

@@ -12,11 +12,13 @@
  *   - A single wild sample (interference, a flipped bit) is left out of the block before (outlier_gate).
  *   - A block is accepted if its residuals, its clash with the past and its last step are small enough, relative to the
  *     best of the last blocks. After two refused blocks in a row the search begins again.
- *   - The past is given up if the information of an accepted block depends on the point of linearisation: if it is twice
- *     or half as large (determinant) after the last pass as after the first one. A short block may hardly determine some
- *     combination of parameters, at each point another one. Two such blocks, linearised at different points, together
- *     seem to determine all parameters, and the estimate stays wrong with small standard errors. (Not with dry
- *     friction, where the weak form's standard errors limit the prior.)
+ *   - After an accepted block the past is given up if the information of both depends on the point of linearisation:
+ *     if the square root of its determinant after the block's last pass is more than 2 times, or less than half, of
+ *     that after its first pass. Which combination of parameters a short block hardly determines depends on that
+ *     point; the information of two such blocks appears to determine all of them, and the estimate may stay wrong with
+ *     small standard errors. The triangle, with the block, is then multiplied by 1/16, and the estimate is withdrawn.
+ *     (Without this check: longer blocks that begin with samples already used; models with dry friction, whose prior
+ *     is at most 10 standard errors of the weak form wide.)
  *
  *   static pvid_refine_f32 refinement;
  *   static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &refine_config};
@@ -109,7 +111,8 @@ typedef struct pvid_refine_config_f32 {
     float forgetting_s;                    /* time constant of the triangle [s], > 0; 0: it does not forget */
     float outlier_gate; /* means of `ratio` samples of an output, or of an input of order 2, that stand out by more than
                            this multiple of the usual are replaced, 2..1e3; 0: no gate; recommended: 4 */
-    float gate;         /* in the track, rows with a larger residual are left out [standard deviations]; 0: no gate */
+    float gate;         /* in the track, rows with a larger residual are left out [standard deviations], as a rule
+                           not in the first two passes after a single block; 0: no gate */
     float chi_max;      /* limit of a block's mean square of residuals, relative to the level, > 1; recommended: 3 */
     float clash_max;    /* limit of its clash with the past, relative to the level, > 1; recommended: 25 */
     float step_max;     /* limit of its last step [prior_sd], > 0; recommended: 0.02 */
@@ -163,14 +166,16 @@ pvid_status pvid_refine_init_f32(pvid_refine_f32 *self, const pvid_refine_config
  *     (An output that is not finite is a missing row.)
  *   - PVID_HELD_FROZEN while frozen,
  *   - at the end of a block PVID_UPDATED if an estimate was published, else PVID_HELD_SEARCHING (no block fits yet),
- *     PVID_HELD_BLOCK (the block does not fit its past), PVID_HELD_UNCERTAIN (standard errors too large, or one block
- *     alone), or PVID_HELD_DISAGREES (the estimate differs from the weak form's by more than the errors of both),
+ *     PVID_HELD_BLOCK (the block does not fit its past), PVID_HELD_UNCERTAIN (standard errors too large, one block
+ *     alone, or the past was given up), or PVID_HELD_DISAGREES (the estimate differs from the weak form's by more than
+ *     the errors of both),
  *   - PVID_ACCUMULATED at all other ticks. */
 pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy);
 
 /* The published estimate, for the context that calls step; NULL: there is none. It stands until the next one, unless it
- * is withdrawn: when the track is lost (two blocks in a row do not fit their past), or when a block's estimate is too
- * uncertain or disagrees with the weak form's. The next one may be published many blocks later. */
+ * is withdrawn: when the track is lost (two blocks in a row do not fit their past), when a block's estimate is too
+ * uncertain or disagrees with the weak form's, or when the past is given up. The next one may be published many blocks
+ * later. */
 const pvid_refine_estimate_f32 *pvid_refine_latest_f32(const pvid_refine_f32 *self);
 
 /* The outcome of the last block: the reason that step returned at its end. PVID_WARMING_UP before the first one,

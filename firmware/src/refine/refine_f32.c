@@ -52,12 +52,12 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
 /* Factor on the clash of the first two blocks: they are short, and neighbours err alike. */
 #define FIRST_CLASH 2.0f
 
-/* Part of the triangle that remains when a longer block begins anew, whose samples the past knows already, and when the
- * information of past and block does not add: it has next to no weight then, but still shows the clash. */
+/* Factor on the triangle if the next block contains samples that the triangle already has, or if the past is given up:
+ * it has next to no weight then, but the clash with it can still be computed. */
 #define KEPT (1.0f / 16.0f)
 
-/* Factor by which a block's information may differ between its first pass, where its past was linearised, and its last
- * one: with more the information of the two does not add. */
+/* Largest change of the information of past and block (square root of its determinant) from the block's first pass,
+ * which is linearised where the past was, to its last one. Beyond it the past is given up. */
 #define CONSISTENT 2.0f
 
 /* Steps between the three readings that a block's start is measured by. */
@@ -126,13 +126,14 @@ static bool is_there(const pvid_refine_f32 *self)
     return back <= ((int32_t)pvid_refine_front_room_f32(&self->front) - 8);
 }
 
-/* Whether large residuals are outliers: not while a second block is still seen from the first one, which may have been
- * short. (Where the start is measured, a motion that is off begins there; with signs the prior is narrow.) */
+/* Whether rows with large residuals are left out: not in the first two passes after a single block, from which the
+ * motion may be predicted badly. (Where the start is measured, such a block begins again there, as is_off has it; with
+ * signs the prior is at most ten standard errors of the weak form wide.) */
 static bool is_gated(const pvid_refine_f32 *self)
 {
-    const bool seen = (PVID_REFINE_HAS_MEASURED != 0) || (PVID_REFINE_SIGNS > 0) || (self->pass >= 2u);
-    const bool close = (self->taken > 1u) || ((self->taken == 1u) && seen);
-    return close && (self->config.gate > 0.0f) && !self->restarted;
+    const bool late = (PVID_REFINE_HAS_MEASURED != 0) || (PVID_REFINE_SIGNS > 0) || (self->pass >= 2u);
+    const bool predicted = (self->taken > 1u) || ((self->taken == 1u) && late);
+    return predicted && (self->config.gate > 0.0f) && !self->restarted;
 }
 
 static void begin_pass(pvid_refine_f32 *self)
@@ -389,8 +390,8 @@ static float share_of_block(const pvid_refine_f32 *self)
 }
 
 #if PVID_REFINE_SIGNS == 0
-/* Whether the information of past and block adds: theirs is known at different points. Where a combination of
- * parameters is hardly determined, it is another one at each point; both together then seem to determine all. */
+/* Whether the information of past and block may be added, which are linearised at different points. Which combination
+ * of parameters a block hardly determines depends on the point; the sum may then appear to determine all of them. */
 static bool is_consistent(const pvid_refine_f32 *self)
 {
     float ratio = 1.0f;
@@ -416,7 +417,7 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         self->scatter += share_of_block(self) * (larger - self->scatter);
     }
 #if PVID_REFINE_SIGNS > 0
-    const bool consistent = true; /* the prior is narrow */
+    const bool consistent = true; /* the prior is at most ten standard errors of the weak form wide */
 #else
     const bool consistent = (self->taken == 0u) || again || is_consistent(self);
 #endif

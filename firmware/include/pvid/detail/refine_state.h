@@ -163,7 +163,7 @@ struct pvid_refine_f32 {
     uint8_t phase;
     uint8_t rested;                       /* ticks without jobs that the weak form was busy at, in a row */
     uint8_t pass;                         /* of the block */
-    uint8_t taken;                        /* blocks in a row, up to 2 */
+    uint8_t taken;                        /* blocks in a row since the search began or the past was given up, up to 2 */
     uint8_t refused;                      /* in a row */
     uint8_t lost;                         /* in the search */
     uint16_t length;                      /* of the block in big steps */
@@ -180,7 +180,7 @@ struct pvid_refine_f32 {
     float weak_se[PVID_REFINE_P];
     float triangle[PVID_REFINE_TRIANGLE]; /* square root of the information of the steps of r, in residuals */
 #if PVID_REFINE_SIGNS == 0
-    float diagonal[PVID_REFINE_PARAMETERS]; /* of the triangle with the block, after its first pass */
+    float diagonal[PVID_REFINE_PARAMETERS]; /* of solve.triangle after the block's first pass */
 #endif
     float start[PVID_REFINE_STATES];    /* of the pass */
     float expected[PVID_REFINE_STATES]; /* start of the block, from the one before */

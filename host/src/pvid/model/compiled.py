@@ -15,7 +15,7 @@ from pvid.model.signals import Jet
 Part = Mapping[int, sp.Expr]
 
 _PATIENT_WINDOWS = 100
-_PATIENT_PART = 0.5  # of the time constant of forgetting; FORMS of settings/forms.py has the same
+_PATIENT_PART = 0.5  # of the time constant of forgetting: FORMS["weak"].patience of settings/forms.py
 
 
 @dataclass(frozen=True)
@@ -209,8 +209,8 @@ class Following:
         return self == Following()
 
     def patience_s(self, window_s: float) -> float:
-        """Patience of the gate for windows that end every window_s: what is given, else half the time constant of
-        forgetting, and without forgetting the time of 100 windows."""
+        """Patience of the gate for windows that end every window_s: outlier_patience_s if it is given; otherwise half
+        the time constant of forgetting, or without forgetting the time of 100 windows."""
         if self.outlier_patience_s is not None:
             return self.outlier_patience_s
         return _PATIENT_PART * self.forgetting_s or _PATIENT_WINDOWS * window_s
