@@ -136,9 +136,9 @@ class RefineTwin:
         if self.passed < 2:
             self.solve.dropped[:] = False
         gate = _ABSURD
-        seen = any(self.shape.measured) or bool(self.shape.signs) or self.passed >= 2
-        close = self.taken > 1 or (self.taken == 1 and seen)
-        if close and self.config.gate > 0 and not self.restarted:
+        late = any(self.shape.measured) or bool(self.shape.signs) or self.passed >= 2
+        predicted = self.taken > 1 or (self.taken == 1 and late)
+        if predicted and self.config.gate > 0 and not self.restarted:
             gate = (_F(self.config.gate) * self.sd[0]) * np.sqrt(_at_least_one(self.level))
         parts = self.parts, self.config.fine_parts or 1
         self.work.begin(self.linear, self.start, self.h, parts, gate, self.front.turn, self.observer)
