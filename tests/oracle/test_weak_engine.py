@@ -53,3 +53,11 @@ def test_an_error_of_the_equations_beyond_float32_is_refused_with_its_reason() -
     rig = engine_rig("kapitza")
     with pytest.raises(PvidError, match=r"variance of the equations' own error of 8e\+44 is beyond float32"):
         design_tables(rig.config.design.model, rig.rows, rig.truth, [EquationError(8e44)] * rig.rows.kinds)
+
+
+def test_parameters_that_ran_away_are_refused_with_their_reason() -> None:
+    """Their noise would have no finite weights, and the core call the design bad."""
+    rig = engine_rig("kapitza")
+    errors = [EquationError(0.0)] * rig.rows.kinds
+    with pytest.raises(PvidError, match="coefficient of .* is beyond float32: the equations do not fit"):
+        design_tables(rig.config.design.model, rig.rows, 1e39 * rig.truth, errors)

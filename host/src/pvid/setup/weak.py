@@ -117,6 +117,7 @@ def _filter(weights: Float) -> WeakFilter:
 def _noise(rows: WeakRows, kind: int, p: Float) -> list[WeakNoise]:
     """Entries that matter at some harmonic at p."""
     theta = np.append(rows.compiled.parameters.theta(p)[kind], -1.0)
+    _as_float32(theta, "coefficient")  # refuses what ran away
     count = len(theta)
     shares = rows.noise.of_harmonics(kind)[:, :count, :count]
     rates = rows.functions.rates[rows.functions.highest :] ** 2

@@ -171,7 +171,8 @@ class NoiseModel:
 
     def covariance(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
         """R0 [K, K] of two row kinds in one window."""
-        return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._grams)
+        with np.errstate(over="ignore", invalid="ignore"):  # an iteration that runs away is judged by its residuals
+            return np.tensordot(self._of_orders(a, theta_a, b, theta_b), self._grams)
 
     def with_next(self, a: int, theta_a: Float, b: int, theta_b: Float) -> Float:
         """R1 [K, K]: of the rows of a kind with those of another in the next window."""
