@@ -157,7 +157,7 @@ def test_a_drive_of_steps_is_refined_in_c() -> None:
 
     x = motion(rate, np.zeros(2), voltage, dt, 2)
     recording = recorded(dt, V=voltage, i=read(x[:, 0], 1 / 2**12, 6), v=read(x[:, 1], 20 / 2**12, 7))
-    found = refined_in_c(identify_mechanism(recording, model.compiled("circuit")))
+    found = refined_in_c(identify_in_c(identify_mechanism(recording, model.compiled("circuit")), "f32"))
     assert found.adopted and found.level is not None and found.level < 1.3
     for name, one in truth.items():
         value, se = of_core(found, name)

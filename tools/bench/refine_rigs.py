@@ -82,21 +82,16 @@ def outcome_of(simulated: SimulatedRig) -> Outcome:
     model = model_of(described(resolved(file, run)))
     recording = Recording(run.t, {"phi": run.phi, "y": run.y}, run.sample_rate)
     suffices = bool((simulated.bound[:2] < SUFFICES).all())
-    none = Outcome(condition, suffices, None, None, True, False)
     try:
-        answer = identify_mechanism(recording, model)
+        weak = identify_in_c(identify_mechanism(recording, model), "f32")
     except PvidError:
-        return none
+        return Outcome(condition, suffices, None, None, True, False)
     refined, steps = None, True
     try:
-        both = refined_in_c(answer)
-        weak = both.weak
+        both = refined_in_c(weak)
         refined = _judged(both.values, simulated) if both.adopted and both.identified else None
-    except PvidError:  # too few samples a second, or no design of the weak form
-        try:
-            weak, steps = identify_in_c(answer, "f32"), False
-        except PvidError:
-            return none
+    except PvidError:  # too few samples a second
+        steps = False
     of_weak = _judged(weak.values, simulated) if weak.identified else None
     return Outcome(condition, suffices, refined, of_weak, steps, weak.verdict.warning is not None)
 

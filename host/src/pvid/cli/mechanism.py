@@ -248,11 +248,12 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
 
 def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None, on: str | None) -> int:
     """Identifies by both stages in C and prints the refined estimate, or that of the first stage."""
+    from pvid.run.mechanism_core import identify_in_c
     from pvid.run.refined_core import refined_in_c
 
     if figure is not None:
         raise PvidError("--figure is of a refinement in float64; omit --core f32")
-    found = refined_in_c(answer)
+    found = refined_in_c(identify_in_c(answer, "f32"))
     if as_json:
         click.echo(json.dumps(found.as_json() | ({} if on is None else {"on": on})))
     else:

@@ -9,13 +9,13 @@ from typing import Literal
 import sympy as sp
 
 from pvid.model.signals import Jet
+from pvid.settings.forms import FORMS
 
 # order -> psi: the sum of D^order[psi] over the entries; psi holds jets of order 0 (of order 1 or more: a smoothed
 # derivative is needed), sgn, Integral and TIME, and no unknown.
 Part = Mapping[int, sp.Expr]
 
 _PATIENT_WINDOWS = 100
-_PATIENT_PART = 0.5  # of the time constant of forgetting: FORMS["weak"].patience of settings/forms.py
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ class Following:
         the time constant of forgetting, or without forgetting the time of 100 windows."""
         if self.outlier_patience_s is not None:
             return self.outlier_patience_s
-        return _PATIENT_PART * self.forgetting_s or _PATIENT_WINDOWS * window_s
+        return FORMS["weak"].patience * self.forgetting_s or _PATIENT_WINDOWS * window_s
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from pvid.run.compare import Comparison, Difference
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.mechanism import MechanismAnswer, Value, own_keys, refined_gains_of, values_of
 from pvid.run.mechanism_compare import compare_samples
-from pvid.run.mechanism_core import CoreAnswer, identify_in_c
+from pvid.run.mechanism_core import CoreAnswer
 from pvid.run.refine_design import refine_design
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
@@ -136,15 +136,15 @@ class RefinedCoreAnswer:
         }
 
 
-def refined_in_c(answer: MechanismAnswer) -> RefinedCoreAnswer:
-    """The recording of an analysis by both stages in C.
+def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
+    """The recording of an identification by the first stage in float32 (identify_in_c), by both stages in C.
 
     Raises
     ------
     PvidError
-        When there is no C compiler, or a stage does not have what the model needs.
+        When there is no C compiler, or the second stage does not have what the model needs.
     """
-    weak = identify_in_c(answer, "f32")
+    answer = weak.oracle
     config = config_to_identify(answer.model, answer.recording, answer.ranking)
     try:
         stages = BothStages.of(answer.model, answer.recording, config)

@@ -117,7 +117,7 @@ def _filter(weights: Float) -> WeakFilter:
 def _noise(rows: WeakRows, kind: int, p: Float) -> list[WeakNoise]:
     """Entries that matter at some harmonic at p."""
     theta = np.append(rows.compiled.parameters.theta(p)[kind], -1.0)
-    _as_float32(theta, "coefficient")  # refuses what ran away
+    _refuse_beyond_float32(theta, "coefficient")
     count = len(theta)
     shares = rows.noise.of_harmonics(kind)[:, :count, :count]
     rates = rows.functions.rates[rows.functions.highest :] ** 2
@@ -209,12 +209,17 @@ def _within_float32(bounds: list[float]) -> Float:
     return np.where(np.isfinite(given), np.clip(given, -most, most), given)
 
 
-def _as_float32(values: object, what: str = "setting") -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
-    """Read-only; PvidError where a finite value is infinite in float32: of `what`, in the singular."""
-    given = np.asarray(values, np.float64)
-    beyond = given[np.isfinite(given) & (np.abs(given) > np.finfo(np.float32).max)]
+def _refuse_beyond_float32(values: Float, what: str) -> None:
+    """PvidError where a finite value is infinite in float32: of `what`, in the singular."""
+    beyond = values[np.isfinite(values) & (np.abs(values) > np.finfo(np.float32).max)]
     if beyond.size:
         raise PvidError(f"a {what} of {beyond[0]:.2g} is beyond float32: the equations do not fit the run")
+
+
+def _as_float32(values: object, what: str = "setting") -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    """Read-only; refused as by _refuse_beyond_float32."""
+    given = np.asarray(values, np.float64)
+    _refuse_beyond_float32(given, what)
     out = np.ascontiguousarray(given, np.float32)
     out.setflags(write=False)
     return out
