@@ -47,10 +47,10 @@ def test_shipped_descriptions_are_short(name: str) -> None:
     assert set(SHIPPED) == set(names())
 
 
-def written(folder: Path, text: str) -> str:
+def written(folder: Path, text: str) -> Path:
     path = folder / "mine.py"
     path.write_text("from pvid.model import *\nmodel = Model('mine')\n" + text, encoding="utf-8")
-    return str(path)
+    return path
 
 
 FINE_LINES = """x = model.sensor("x", "m", resolution=1e-4)
@@ -65,6 +65,12 @@ def test_a_users_file_is_compiled_by_its_name(tmp_path: Path) -> None:
     compiled = compiled_of(path)
     assert compiled.name == "mine"
     assert compiled_of(path) is compiled
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    path = written(tmp_path, FINE_LINES + FINE_EQUATION)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert compiled_of(path).name == "mine"
 
 
 def test_a_file_may_import_what_lies_beside_it(tmp_path: Path) -> None:

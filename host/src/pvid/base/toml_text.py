@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from typing import Any
 
@@ -30,6 +31,11 @@ def key_and_value(setting: str, example: str) -> tuple[str, Any]:
         return key, toml_document(f"value = {text}")["value"]
     except PvidError:
         return key, text
+
+
+def quoted(text: str) -> str:
+    """A string of TOML: that of JSON, whose escapes are TOML's as well; what is no UTF-8 becomes question marks."""
+    return json.dumps(text.encode("utf-8", "replace").decode(), ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def toml_document(text: str) -> dict[str, Any]:

@@ -195,8 +195,8 @@ def _described(
     made = BOARDS[core or "f32"]
     if refine:
         refuse_unrefined(core or "f32")
-    if run_path is None and rig_path is None:
-        name = model or "" if described is None else described.model
+    name = model or "" if described is None else described.model
+    if run_path is None and rig_path is None and isinstance(name, str):
         return MechanismBoard.of_shipped_rig(name, refined=True) if refine else made.of_shipped_rig(name)
     if described is None:
         return None

@@ -48,8 +48,9 @@ def check(model: str) -> int:
     """
     from pvid.model.report import check_report, identifiable
     from pvid.models.mechanisms import compiled_of
+    from pvid.models.registry import asked_for
 
-    compiled = compiled_of(model)
+    compiled = compiled_of(asked_for(model))
     click.echo(check_report(compiled))
     return DONE if identifiable(compiled).identifiable else NOTHING_IDENTIFIED
 
@@ -78,12 +79,13 @@ def predict(
     """
     from pvid.models.mechanisms import compiled_of
     from pvid.models.mechanisms import names as names_of_shipped
+    from pvid.models.registry import asked_for
     from pvid.models.simulated_rig import simulated_rig
     from pvid.run.prediction import advice, predicted
     from pvid.sim.drives import DRIVES, drive_named
     from pvid.sim.simulated_run import RigSimulation, rig_of_guess
 
-    compiled = compiled_of(model)
+    compiled = compiled_of(asked_for(model))
     own = simulated_rig(compiled.name) if model in names_of_shipped() else None
     length = duration or (own.duration if own else 20.0)
     hz = rate or (own.sample_rate if own else 1000.0)
@@ -257,10 +259,11 @@ def simulate(
     half their reach.
     """
     from pvid.models.mechanisms import compiled_of
+    from pvid.models.registry import asked_for
     from pvid.sim.imperfections import Imperfections, sizes_of
     from pvid.sim.simulated_run import RigSimulation, write_simulated_run
 
-    compiled = compiled_of(model)
+    compiled = compiled_of(asked_for(model))
     rig = _rig_to_simulate(compiled, model, duration, rate, drive)
     true = _numbers(truths, "--truth", "--truth m=1.3")
     for name in true:

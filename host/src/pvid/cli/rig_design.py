@@ -19,15 +19,17 @@ def model_of_rig(
     from pvid.log.mechanism_settings import mechanism_rig
     from pvid.log.rig_settings import rig_for
     from pvid.models.mechanisms import compiled_of
+    from pvid.models.registry import asked_for
     from pvid.rig.described import described
 
+    compiled = compiled_of(asked_for(model))
     if rig_path is None and run_path is None:
-        return compiled_of(model), None
+        return compiled, None
     rig = mechanism_rig(run_path, rig_path, (), model)
     if rig is not None:
-        return rig.applied(compiled_of(model)), rig
+        return rig.applied(compiled), rig
     own = rig_for(run_path, rig_path)
-    return described(own).applied(compiled_of(model)), own
+    return described(own).applied(compiled), own
 
 
 def recorded(

@@ -4,12 +4,12 @@ them."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from pvid.base.toml_text import toml_document
 from pvid.log.rig import LOG_SUFFIX, described_document_of_log
-from pvid.models.registry import DEFAULT, MODELS
+from pvid.models.registry import DEFAULT, MODELS, asked_for, shipped
 from pvid.rig.file import parsed_file, rig_path_of
 from pvid.rig.mechanism_file import MechanismRig, with_settings
 from pvid.rig.run import is_run
@@ -24,32 +24,42 @@ def mechanism_rig(
     ----------
     run_path, rig_path : a log has its own rig, a run may have a rig file beside it; the other one comes before both
     settings : `KEY=VALUE`, which come before the file
-    model : name or model file, before both
+    model : name or model file of this call, before both
 
     Raises
     ------
     PvidError
-        Where the file cannot be read, or a key or a value is wrong.
+        Where the file cannot be read, a key or a value is wrong, or a log or rig file names a model file that `model`
+        does not name: what they name is never run.
     """
+    asked = None if model is None else asked_for(model)
+    where = "this recording" if rig_path is None else str(rig_path)
     if rig_path is None and run_path is not None and is_run(run_path) and rig_path_of(run_path).is_file():
         rig_path = rig_path_of(run_path)
     if rig_path is None and run_path is not None and run_path.suffix == LOG_SUFFIX:
         logged = described_document_of_log(run_path)
-        if logged is not None and model in (None, logged["model"]["name"]):
-            return MechanismRig.of_document(with_settings(logged, settings))
+        if logged is not None and (asked is None or is_named(asked, logged["model"]["name"])):
+            return _of_document(with_settings(logged, settings), asked, where)
     if model is None and rig_path is None:
         return None
     document = {} if rig_path is None else parsed_file(rig_path, toml_document)
     table = document.get("model", {})
-    if model is not None:
-        document = {**document, "model": {**(table if isinstance(table, dict) else {}), "name": model}}
-    elif not isinstance(table, dict) or (table.get("name", DEFAULT) in MODELS and not _is_described(document)):
+    name = model or (table.get("name", DEFAULT) if isinstance(table, dict) else DEFAULT)
+    if isinstance(name, str) and name in MODELS and not _is_described(document):
         return None
-    elif rig_path is not None and str(table["name"]).endswith(".py"):
-        document["model"]["name"] = str(rig_path.parent / table["name"])
-    if model in MODELS and not _is_described(document):
-        return None
-    return MechanismRig.of_document(with_settings(document, settings))
+    return _of_document(with_settings(document, settings), asked, where)
+
+
+def is_named(asked: str | Path, name: str) -> bool:
+    """Whether a log's text names the mechanism of this call: of a model file it has the name without the folder."""
+    return asked == name if isinstance(asked, str) else PureWindowsPath(name).name == asked.name
+
+
+def _of_document(document: Mapping[str, Any], asked: str | Path | None, where: str) -> MechanismRig:
+    rig = MechanismRig.of_document(document, asked)
+    if isinstance(rig.model, str):
+        shipped(rig.model, where)
+    return rig
 
 
 def _is_described(document: Mapping[str, Any]) -> bool:

@@ -1,4 +1,7 @@
-"""Mechanisms that are described and compiled: the shipped ones (folders with mechanism.py) and a user's own file."""
+"""Mechanisms that are described and compiled: the shipped ones (folders with mechanism.py) and a user's own file.
+
+Here alone a model file runs, and only one that is given as a Path: see pvid.models.registry.
+"""
 
 from __future__ import annotations
 
@@ -10,36 +13,32 @@ from typing import Any
 
 from pvid import model as language
 from pvid.base.errors import PvidError
+from pvid.base.wording import printable
 from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
 from pvid.model.refusal import ModelError, Place
+from pvid.models.registry import DESCRIPTION, shipped
+from pvid.models.registry import names as names
 
 _FOLDER = Path(__file__).parent
-_FILE = "mechanism.py"
 
 
-def names() -> tuple[str, ...]:
-    """Of the shipped mechanisms."""
-    return tuple(sorted(path.parent.name for path in _FOLDER.glob(f"*/{_FILE}")))
-
-
-def path_of(name_or_path: str | Path) -> tuple[str, Path]:
+def path_of(mechanism: str | Path) -> tuple[str, Path]:
     """A mechanism's name and file.
 
     Raises
     ------
     PvidError
-        Where there is no such mechanism or file.
+        Where there is no shipped mechanism of the name, or no such model file.
     """
-    if str(name_or_path) in names():
-        return str(name_or_path), _FOLDER / str(name_or_path) / _FILE
-    path = Path(name_or_path)
-    if path.suffix == ".py" and path.is_file():
-        return path.parent.name if path.name == _FILE else path.stem, path
-    raise PvidError(f"{name_or_path}: no such model; give a .py file or one of {', '.join(names())}")
+    if isinstance(mechanism, str):
+        return shipped(mechanism), _FOLDER / mechanism / DESCRIPTION
+    if mechanism.suffix == ".py" and mechanism.is_file():
+        return mechanism.parent.name if mechanism.name == DESCRIPTION else mechanism.stem, mechanism
+    raise PvidError(f"{printable(str(mechanism))}: no such model; give a .py file or one of {', '.join(names())}")
 
 
-def described(name_or_path: str | Path) -> Model:
+def described(mechanism: str | Path) -> Model:
     """The description in a model file, which may import Python files that lie beside it.
 
     Raises
@@ -47,12 +46,12 @@ def described(name_or_path: str | Path) -> Model:
     PvidError
         Where the file cannot be read or run, or leaves no model; the sentence contains the line.
     """
-    _, path = path_of(name_or_path)
+    _, path = path_of(mechanism)
     space: dict[str, Any] = {"__name__": "pvid_model_file", "__file__": str(path)}
     folder = str(path.resolve().parent)
     sys.path.insert(0, folder)
     try:
-        exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), space)
+        exec(compile(path.read_text(encoding="utf-8-sig"), str(path), "exec"), space)
     except ModelError as error:
         raise error.at(Place(str(path), _line(error, path))) from None
     except PvidError:
@@ -94,12 +93,12 @@ def _line(error: BaseException, path: Path) -> int:
     return (lines[-1] or 0) if lines else 0
 
 
-def compiled_of(name_or_path: str | Path) -> CompiledModel:
-    """A mechanism by name or model file, compiled; kept while the file does not change."""
-    name, path = path_of(name_or_path)
-    return _compiled(name, str(path), path.stat().st_mtime_ns)
+def compiled_of(mechanism: str | Path) -> CompiledModel:
+    """A shipped mechanism by its name, or a model file by its path, compiled; kept while the file does not change."""
+    name, path = path_of(mechanism)
+    return _compiled(name, path, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=32)
-def _compiled(name: str, path: str, changed: int) -> CompiledModel:
+def _compiled(name: str, path: Path, changed: int) -> CompiledModel:
     return described(path).compiled(name)

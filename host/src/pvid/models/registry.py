@@ -1,14 +1,24 @@
-"""The mechanisms with a hand-made C core: every folder of pvid.models that defines MODEL."""
+"""The shipped mechanisms, and what a call names beside them.
+
+A mechanism is a `str`, the name of a shipped one, or a `Path`, a model file, which is Python and runs. Texts (a rig
+file, a log) contain `str` alone; `asked_for` alone makes a `Path`, of what the user of this call named himself.
+"""
 
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
+from pathlib import Path
 
 import pvid.models
+from pvid.base.errors import PvidError
+from pvid.base.wording import printable
 from pvid.models.model import Model
 
-DEFAULT = "kapitza"
+DEFAULT = "kapitza"  # of the mechanisms with a hand-made C core: folders that define MODEL
+DESCRIPTION = "mechanism.py"  # of a shipped mechanism, in its folder
+_FOLDER = Path(__file__).parent
 
 
 def _found() -> dict[str, Model]:
@@ -19,3 +29,33 @@ def _found() -> dict[str, Model]:
 
 
 MODELS = _found()
+
+
+def names() -> tuple[str, ...]:
+    """Of the shipped mechanisms."""
+    return tuple(sorted(path.parent.name for path in _FOLDER.glob(f"*/{DESCRIPTION}")))
+
+
+def asked_for(model: str | os.PathLike[str]) -> str | Path:
+    """The mechanism that `--model` of this call, or the argument `model` of a function, names."""
+    return str(model) if str(model) in names() else Path(model)
+
+
+def shipped(name: str, where: str = "this recording") -> str:
+    """The name of a shipped mechanism in a text, which may come from anybody.
+
+    Parameters
+    ----------
+    where : the text, as a sentence names it
+
+    Raises
+    ------
+    PvidError
+        Where it is none. A model file is not looked for: a text must not choose what runs.
+    """
+    if name in names():
+        return name
+    if name.endswith(".py"):
+        own = printable(name)
+        raise PvidError(f"{where} names the model file {own}: add --model {own} to run it")
+    raise PvidError(f"{printable(name)}: no such model; give a .py file or one of {', '.join(names())}")

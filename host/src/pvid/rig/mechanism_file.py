@@ -2,7 +2,7 @@
 
     sample_rate = 1000        # Hz
     [model]
-    name = "dc_motor"         # or the path of a model file
+    name = "dc_motor"         # or the name of a model file, which --model of the call must name as well
     [known]
     g = 9.81                  # constants of the model
     [known_sd]
@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.base.toml_text import key_and_value, toml_document
+from pvid.base.toml_text import key_and_value, quoted, toml_document
 from pvid.base.wording import listed, shown
 from pvid.models.model import Channel
 
@@ -49,7 +49,7 @@ class MechanismRig:
 
     Attributes
     ----------
-    model : name of a shipped mechanism or path of a model file
+    model : name of a shipped mechanism, or the path of a model file that this call named (pvid.models.registry)
     sample_rate : [Hz]; None: that of the run
     known, known_sd : values of the model's constants, and standard deviations of them
     sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative], neglected (see Signal); of an
@@ -59,7 +59,7 @@ class MechanismRig:
     refine : options of the refinement in C that are chosen or not
     """
 
-    model: str
+    model: str | Path
     sample_rate: float | None = None
     known: Mapping[str, float] = field(default_factory=dict)
     sensor: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -80,14 +80,14 @@ class MechanismRig:
         return cls.of_document(toml_document(text))
 
     @classmethod
-    def of_document(cls, document: Mapping[str, Any]) -> MechanismRig:
-        """From the tables of a text; see `parse`."""
+    def of_document(cls, document: Mapping[str, Any], asked: str | Path | None = None) -> MechanismRig:
+        """From the tables of a text; see `parse`. `asked`: the mechanism of this call, in place of the text's."""
         known_keys = ("sample_rate", "model", "known", "known_sd", "sensor", "nominal", "identifier", "refine")
         for key in document:
             if key not in known_keys:
                 raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(known_keys)} are")
-        model = _table(document, "model").get("name")
-        if not isinstance(model, str):
+        model = _table(document, "model").get("name") if asked is None else asked
+        if not isinstance(model, str | Path):
             raise PvidError('the mechanism is missing: [model] name = "dc_motor", or the path of a model file')
         rate = document.get("sample_rate")
         sensors = {
@@ -116,7 +116,8 @@ class MechanismRig:
     def text(self) -> str:
         """TOML text; `parse` gives the same rig back."""
         lines = [] if self.sample_rate is None else [f"sample_rate = {self.sample_rate!r}  # Hz"]
-        lines += ["", "[model]", f'name = "{self.model}"']
+        name = self.model.name if isinstance(self.model, Path) else self.model
+        lines += ["", "[model]", f"name = {quoted(name)}"]
         tables: dict[str, Mapping[str, float]] = {"known": self.known, "known_sd": self.known_sd}
         tables |= {f"sensor.{name}": keys for name, keys in self.sensor.items()}
         tables |= {"nominal": self.nominal, "identifier": self.identifier}
