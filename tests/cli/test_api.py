@@ -72,6 +72,11 @@ def test_a_mechanism_of_the_list_is_identified(tmp_path: Path) -> None:
     assert result.plot(tmp_path / "motor.png").exists()
     in_c = pvid.identify(path, core="f32")
     assert in_c.identified and in_c.details["core"] == "f32" and in_c["R"].value == pytest.approx(1.2, rel=1e-3)
+    assert result.advice == () and result.details["advice"] == []
+    negated = pvid.identify(path, columns="V=V:-1")
+    sentence = "V seems to have the opposite sign: --columns V=V:-1"
+    assert negated.advice == (sentence,) and negated.details["advice"] == [sentence]
+    assert f"advice: {sentence}" in str(negated) and sentence in negated._repr_html_()
 
 
 def test_the_estimator_takes_a_model_of_ones_own() -> None:

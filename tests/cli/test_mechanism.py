@@ -128,6 +128,16 @@ def test_standard_deviation_of_a_constant_is_part_of_the_errors(tmp_path: Path) 
         pvid("identify", path, "--set", "known_sd.kt=-1")
 
 
+def test_advice_is_printed_and_part_of_the_json(motor: Path) -> None:
+    """Whatever stage answers."""
+    sentence = "V seems to have the opposite sign: --columns V=V:-1"
+    for more in ((), ("--refine",), ("--core", "f32")):
+        answer = pvid("identify", motor, "--columns", "V=V:-1", "--json", *more)
+        assert json.loads(answer.stdout)["advice"] == [sentence], more
+        assert f"pvid: advice: {sentence}" in answer.stderr
+    assert json.loads(pvid("identify", motor, "--json").stdout)["advice"] == []
+
+
 def test_weights_are_chosen_and_reported(motor: Path) -> None:
     shown = [json.loads(pvid("identify", motor, "--json", *more).stdout) for more in ((), ("--weights", "sensors"))]
     assert [one["weights"] for one in shown] == ["residuals", "sensors"]

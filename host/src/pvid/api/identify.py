@@ -22,6 +22,7 @@ from pvid.rig.run import Recording, Run, read_recording, recording_of_arrays
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advised import identified
 from pvid.run.mechanism import identify_mechanism, model_of
+from pvid.run.mechanism_advice import advised
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.skew import aligned
 from pvid.run.wild_samples import without_wild_samples
@@ -82,7 +83,7 @@ def identify(
             recording = recording_of_log(path, [one.name for one in compiled.signals])
         else:
             recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
-        answer = identify_mechanism(without_wild_samples(recording.whole(), compiled), compiled)
+        answer = advised(identify_mechanism(without_wild_samples(recording.whole(), compiled), compiled))
         engine = ENGINE_CORES.get(core or "")
         return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)

@@ -45,6 +45,7 @@ class Result:
     parameters : by name: physical parameters, then the unknowns of the equations
     status : the last word of the identifier
     warning : reasons to doubt the estimate; None: there are none
+    advice : a sentence each, with what to type, where a column seems to be wrong
     notes : what was done to the data, a sentence each
     details : everything, as `pvid identify --json` prints it
     """
@@ -53,6 +54,7 @@ class Result:
     parameters: Mapping[str, Parameter]
     status: str
     warning: str | None
+    advice: tuple[str, ...]
     notes: tuple[str, ...]
     details: Mapping[str, Any]
     _answer: Identification | MechanismAnswer
@@ -63,18 +65,23 @@ class Result:
     def __str__(self) -> str:
         head = f"nothing identified: {self.status}"
         lines = [f"{name} = {one}" for name, one in self.parameters.items()] if self.identified else [head]
-        return "\n".join([*lines, *([f"warning: {self.warning}"] if self.warning else [])])
+        return "\n".join([*lines, *self._doubts])
 
     __repr__ = __str__
 
+    @property
+    def _doubts(self) -> list[str]:
+        """The warning and the advice, a line each."""
+        warning = [f"warning: {self.warning}"] if self.warning else []
+        return warning + [f"advice: {one}" for one in self.advice]
+
     def _repr_html_(self) -> str:
         if not self.identified:
-            return f"<p>{escape(str(self))}</p>"
+            return f"<p>{escape(str(self)).replace(chr(10), '<br>')}</p>"
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(str(one))}</td></tr>" for name, one in self.parameters.items()
         )
-        warning = f"<p>warning: {escape(self.warning)}</p>" if self.warning else ""
-        return f"<table>{rows}</table>{warning}"
+        return f"<table>{rows}</table>" + "".join(f"<p>{escape(one)}</p>" for one in self._doubts)
 
     def plot(self, path: str | Path) -> Path:
         """Writes a figure of the estimates over time with their standard errors (png, svg or pdf) and returns its path,
@@ -130,4 +137,4 @@ def _result(
         for name, one in details["parameters"].items()
         if identified and one["value"] is not None
     }
-    return Result(identified, known, status, warning, tuple(notes), details, found)
+    return Result(identified, known, status, warning, tuple(details["advice"]), tuple(notes), details, found)

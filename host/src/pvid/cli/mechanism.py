@@ -28,7 +28,7 @@ from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.compare import Comparison
 from pvid.run.engine_identify import ALL_ALIKE
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
-from pvid.run.mechanism_advice import advice_on
+from pvid.run.mechanism_advice import advised
 from pvid.run.wild_samples import without_wild_samples
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
@@ -119,7 +119,7 @@ def identify_run(
     recording, model = recording_of(path, rig, columns)
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
-    answer = identify_mechanism(recording, model, weights)
+    answer = advised(identify_mechanism(recording, model, weights))
     if refine and in_c:
         return _refined_in_c(answer, as_json=as_json, figure=figure, on=on)
     if refine:
@@ -145,8 +145,7 @@ def identify_run(
         click.echo(f"figure: {figure}")
     for one in (core.verdict if core is not None else answer.found.verdict).reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
-    for sentence in advice_on(answer):
-        write_stderr(f"pvid: advice: {sentence}")
+    _print_advice(answer)
     if not shown.identified:
         reason = f": {core.reason.text}" if core is not None and not core.published else ""
         write_stderr(f"pvid: nothing identified{reason}")
@@ -222,6 +221,7 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
         click.echo(text)
     if figure is not None and refined is not None:
         write_refined_figure(refined, figure)
+    _print_advice(answer)
     if not answer.identified:
         write_stderr("pvid: nothing identified")
         return NOTHING_IDENTIFIED
@@ -263,6 +263,7 @@ def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None
         click.echo(f"{found.text}; hash of both stages {found.hash:08x}")
     for one in () if found.adopted else found.weak.verdict.reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
+    _print_advice(answer)
     if not found.identified:
         write_stderr(f"pvid: nothing identified: {found.weak.reason.text}")
         return NOTHING_IDENTIFIED
@@ -360,6 +361,11 @@ def _print(answer: MechanismAnswer, stage: str = "weak form") -> None:
         f"status {found.verdict.status}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "
         f"{found.design.window_s:.3g} s; R^2 {explained}"
     )
+
+
+def _print_advice(answer: MechanismAnswer) -> None:
+    for sentence in answer.advice:
+        write_stderr(f"pvid: advice: {sentence}")
 
 
 def _print_core(core: CoreAnswer) -> None:

@@ -46,6 +46,7 @@ class MechanismAnswer:
     values : by name: outputs of the model, then p
     recording : the samples
     weights : of the rows
+    advice : sentences with what to type, where a column seems to be wrong
     """
 
     model: CompiledModel
@@ -53,6 +54,7 @@ class MechanismAnswer:
     values: Mapping[str, Value]
     recording: Recording
     weights: Weights = "residuals"
+    advice: tuple[str, ...] = ()
 
     @property
     def identified(self) -> bool:
@@ -75,6 +77,7 @@ class MechanismAnswer:
             "identified": self.identified,
             "status": found.verdict.status,
             "warning": found.verdict.warning,
+            "advice": list(self.advice),
             "reasons": {one.name: one.text for one in found.verdict.reasons},
             "parameters": parameters,
             **own_keys(self.model, parameters),

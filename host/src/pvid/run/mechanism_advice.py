@@ -30,6 +30,11 @@ _UNITS = {
 }
 
 
+def advised(answer: MechanismAnswer) -> MechanismAnswer:
+    """The answer with its advice."""
+    return replace(answer, advice=advice_on(answer))
+
+
 @np.errstate(all="ignore")  # what diverges is judged and left out
 def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
     """A sentence with what to type, or none; some tenths of a second, where the answer is bad alone.
