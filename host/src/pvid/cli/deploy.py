@@ -86,8 +86,10 @@ def _deployment(
     from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
     from pvid.run.engine_design_q31 import engine_for_recording, engine_for_rig_like_the_shipped
     from pvid.run.refine_design import full_motion_of, refine_design, refine_for_simulated_rig
+    from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
+    refuse_too_many_unknowns(compiled)
     if run_path is not None:
         recording = recorded(compiled, rig, run_path, columns)
         if is_integer:

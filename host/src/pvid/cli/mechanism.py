@@ -32,6 +32,7 @@ from pvid.run.mechanism_advice import advised
 from pvid.run.wild_samples import without_wild_samples
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
+from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
@@ -117,6 +118,8 @@ def identify_run(
     if refine and in_c and in_c is not FLOAT:
         raise PvidError(f"--refine is in float32 and float64; omit --core {in_c.name}")
     recording, model = recording_of(path, rig, columns)
+    if in_c or on is not None:
+        refuse_too_many_unknowns(model)
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     answer = advised(identify_mechanism(recording, model, weights))
@@ -163,6 +166,8 @@ def _identified_by_strong_form(
     if given.get("on") is not None:
         raise PvidError("--on with the strong form of a described mechanism is for `compare`")
     recording, model = recording_of(path, rig, columns)
+    if core == STRONG.name:
+        refuse_too_many_unknowns(model)
     answer = identify_strong_mechanism(recording, model, core == STRONG.name, _LAWS[given.get("law") or "stationary"])
     if as_json:
         click.echo(json.dumps(answer.as_json()))
@@ -299,6 +304,7 @@ def compare_recording(
                 f"--{option} {value}: {name} is compared in float32 or fixed point by the weak form; omit --{option}"
             )
     recording, model = recording_of(path, rig, columns)
+    refuse_too_many_unknowns(model)
     outcomes = []
     chosen = given.get("core") or FLOAT.name
     for core in [one.name for one in ENGINE_CORES.values() if chosen in (one.name, "all")]:
@@ -340,6 +346,7 @@ def _compared_strong(
     if core != STRONG.name:
         raise PvidError(f"--core {core} has no twin; omit it")
     recording, model = recording_of(path, rig, columns)
+    refuse_too_many_unknowns(model)
     outcomes = []
     for law in [given["law"]] if given.get("law") else ["stationary"]:
         assert law is not None

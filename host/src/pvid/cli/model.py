@@ -49,8 +49,11 @@ def check(model: str) -> int:
     from pvid.model.report import check_report, identifiable
     from pvid.models.mechanisms import compiled_of
     from pvid.models.registry import asked_for
+    from pvid.setup.weak_sizes import too_many_unknowns
 
     compiled = compiled_of(asked_for(model))
+    if (refusal := too_many_unknowns(compiled.name, len(compiled.unknowns))) is not None:
+        write_stderr(f"pvid: note: {refusal}")
     click.echo(check_report(compiled))
     return DONE if identifiable(compiled).identifiable else NOTHING_IDENTIFIED
 
@@ -170,8 +173,10 @@ def build(
     """
     from pvid.codegen import build as generated
     from pvid.codegen.reaches import Reaches
+    from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
+    refuse_too_many_unknowns(compiled)
     design = _design_of(compiled, rig, model, run_path, columns, functions)
     limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
     soft = _numbers(soft_signs, "--soft-sign")

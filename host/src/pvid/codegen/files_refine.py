@@ -223,8 +223,8 @@ def check_outputs(made: RefineFunctions) -> None:
         for k in range(moving):
             if shown[row * width + k]:
                 raise PvidError(
-                    f"{made.model.name}: {made.parameters[k].name} changes the motion and is in {made.outputs[row]} "
-                    "too, which the refinement in C does not have: make what is measured a coordinate"
+                    f"{made.model.name}: the second stage in C needs readings without parameters of the motion; "
+                    f"{made.outputs[row]} depends on {made.parameters[k].name}, which changes the motion too"
                 )
 
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.codegen.functions import with_values
 from pvid.codegen.names import identifiers
 from pvid.codegen.operations import Argument, Builder, Literal, Operation, Program, Value
@@ -39,6 +40,10 @@ SKEW = "tau"
 SKEW_SD = 5e-3  # [s]
 LOG_SD = 0.15  # of the logarithm of a positive parameter: how far off the start may be
 WIDTH_SD = 0.9  # of the logarithm of a sign's width
+_COUPLED = 3  # equations that are solved together
+# Operations of an expression, terms of a determinant: longer ones are not brought into a shorter form, which may take
+# for ever.
+_LONG, _MANY = 2000, 60
 
 
 @dataclass(frozen=True)
@@ -240,6 +245,8 @@ class _Refine:
                 "the refinement needs as many equations"
             )
         top = {name: max(jet.order for jet in found if jet.of == name) for name in free}
+        if not any(top.values()):
+            raise PvidError(f"{model.name}: the second stage needs a motion; no equation has a derivative")
         self.highest = [Jet(name, top[name]) for name in free]
         jumps = any(one.hold == "zoh" and not one.smooth for one in model.signals)  # which spoil the steps of Adams
         self.runge_kutta = widths is not None and (bool(signs) or len(set(top.values())) > 1 or jumps)
@@ -259,10 +266,14 @@ class _Refine:
                 raise PvidError(
                     f"{model.name}: the refinement does not know {min(map(str, beyond))}, which is measured"
                 )
+        self._check_linear(equations)
+        self._matrix = sp.Matrix(len(free), len(free), lambda i, j: sp.diff(equations[i], self.highest[j]))
+        self._blocks = self._in_turn(self._matrix)
         self._parameters([*equations, *readings], equations)
         marked = [self._marked(one, width_symbols) for one in (*equations, *readings)]
         self._solve(marked[: len(equations)])
-        self.z = [one.xreplace(dict(zip(self.highest, self._h, strict=True))) for one in marked[len(equations) :]]
+        self._readings = marked[len(equations) :]
+        self.z = [one.xreplace(dict(zip(self.highest, self._h, strict=True))) for one in self._readings]
 
     @staticmethod
     def _in_order(found: Iterable[Jet], equations: Sequence[sp.Expr]) -> list[Jet]:
@@ -284,14 +295,7 @@ class _Refine:
         """r, and the symbols of the motion in the order of its moving entries."""
         own, model = self.model.refinement, self.model
         used = {symbol for one in whole for symbol in one.free_symbols}
-        moved = {symbol for one in equations for symbol in one.free_symbols}
-        if any(top.order == 0 for top in self.highest):  # an algebraic equation only measures
-            moved = {
-                symbol
-                for one in equations
-                if not any(top.order == 0 and top in one.free_symbols for top in self.highest)
-                for symbol in one.free_symbols
-            }
+        moved = {symbol for i in self._moving_equations() for symbol in equations[i].free_symbols}
         shapes = [one for one in own.shapes if one in used]
         behind = {symbol for one in shapes for symbol in own.shapes[one].free_symbols}
         every = [*(one.symbol for one in model.unknowns), *(one.symbol for one in own.extras)]
@@ -394,20 +398,12 @@ class _Refine:
     # ---- solution
 
     def _solve(self, equations: Sequence[sp.Expr]) -> None:
-        n, name = len(equations), self.model.name
+        n = len(equations)
         matrix = sp.Matrix(n, n, lambda i, j: sp.diff(equations[i], self.highest[j]))
-        for i, j in sorted(matrix.todok()):
-            if matrix[i, j].has(*self.highest):
-                raise PvidError(f"{name}: equation {i + 1} of the refinement is not linear in {self.highest[j]}")
         right = [-one.xreplace(dict.fromkeys(self.highest, _ZERO)) for one in equations]
         self._matrix = matrix
-        self._right = [self._symbol(f"right_{i}", one) for i, one in enumerate(right)]
-        self._plain_right = right
-        self._inverse = self._inverted(matrix)
-        self._h = [
-            self._symbol(f"h_{i}", sum((self._inverse[i, j] * self._right[j] for j in range(n)), _ZERO))
-            for i in range(n)
-        ]
+        self._inverse = self._inverted()
+        self._h = self._solved([self._symbol(f"right_{i}", one) for i, one in enumerate(right)], "h_{}")
         # what is 0 for the solution: its derivatives at fixed h are the right sides of all columns
         self._rest = [right[i] - sum((matrix[i, j] * self._h[j] for j in range(n)), _ZERO) for i in range(n)]
         self._by_inner = {
@@ -416,41 +412,108 @@ class _Refine:
             for mark, _, _ in self._inner
         }
         self._columns: dict[tuple[sp.Expr, ...], list[sp.Expr]] = {}
+        self._by_step: dict[tuple[sp.Symbol, sp.Expr], list[sp.Expr]] = {}
 
-    def _inverted(self, matrix: sp.Matrix) -> sp.Matrix:
-        """By blocks of at most three equations that have nothing in common."""
-        n = matrix.rows
-        whole = sp.zeros(n, n)
-        left = set(range(n))
-        while left:
-            rows, columns = {min(left)}, set[int]()
-            while True:
-                more = {j for i in rows for j in range(n) if matrix[i, j] != 0}
-                other = {i for j in more for i in range(n) if matrix[i, j] != 0}
-                if more == columns and other == rows:
-                    break
-                rows, columns = rows | other, more
-            i, j = sorted(rows), sorted(columns)
-            if len(i) != len(j) or len(i) > 3:
+    def _check_linear(self, equations: Sequence[sp.Expr]) -> None:
+        """A highest derivative neither in a power nor inside a sign, a magnitude or an angle."""
+        for i, one in enumerate(equations):
+            inside = {jet for part in one.atoms(sp.Function) for jet in jets(part)}
+            for jet in self.highest:
+                if jet in inside or sp.diff(one, jet).has(jet):
+                    raise PvidError(
+                        f"{self.model.name}: the second stage needs equations that are linear in each highest "
+                        f"derivative; equation {i + 1} is not linear in {jet}"
+                    )
+
+    def _moving_equations(self) -> set[int]:
+        """Those that the rates depend on; the others determine what is measured alone."""
+        block_of = {j: rows for rows, columns in self._blocks for j in columns}
+        found: set[int] = set()
+        for rows, columns in reversed(self._blocks):
+            if any(self.highest[j].order > 0 for j in columns) or found & set(rows):
+                found.update(i for k in rows for j in block_of if self._matrix[k, j] != 0 for i in block_of[j])
+        return found
+
+    def _in_turn(self, matrix: sp.Matrix) -> list[tuple[list[int], list[int]]]:
+        """Rows and columns of the smallest blocks that can be solved one behind the other, each with those before it.
+
+        Raises
+        ------
+        PvidError
+            Where the equations do not determine their highest derivatives, or more than three only together.
+        """
+        equation_of: dict[int, int] = {}  # highest derivative -> the equation that is solved for it
+
+        def solves(row: int, tried: set[int]) -> bool:
+            for column in range(matrix.rows):
+                if matrix[row, column] != 0 and column not in tried:
+                    tried.add(column)
+                    if column not in equation_of or solves(equation_of[column], tried):
+                        equation_of[column] = row
+                        return True
+            return False
+
+        name, rows = self.model.name, range(matrix.rows)
+        for row in rows:
+            if not solves(row, set()):
+                left = ", ".join(str(self.highest[k]) for k in rows if k not in equation_of)
                 raise PvidError(
-                    f"{self.model.name}: the equations do not determine the motion"
-                    if len(i) != len(j)
-                    else f"{self.model.name}: {len(i)} coupled equations; the refinement solves up to three"
+                    f"{name}: the second stage needs equations that determine the highest derivative of each quantity; "
+                    f"equation {row + 1} and those before it leave {left} open"
                 )
-            block = self._inverted_block(matrix.extract(i, j), f"{i[0]}")
-            for a, column in enumerate(j):
-                for b, row in enumerate(i):
+        needs = [(i, equation_of[j]) for i in rows for j in rows if matrix[i, j] != 0]
+        found = []
+        for block in sp.utilities.iterables.strongly_connected_components((list(rows), needs)):
+            if len(block) > _COUPLED:
+                raise PvidError(
+                    f"{name}: {len(block)} coupled equations; the second stage needs at most {_COUPLED} that are "
+                    "solved together"
+                )
+            found.append((sorted(block), sorted(j for j in rows if equation_of[j] in block)))
+        return found
+
+    def _inverted(self) -> sp.Matrix:
+        """Of each block, at the places of its quantities and equations."""
+        whole = sp.zeros(self._matrix.rows, self._matrix.rows)
+        for rows, columns in self._blocks:
+            block = self._inverted_block(self._matrix.extract(rows, columns), f"{rows[0]}")
+            if block is None:
+                which = listed([i + 1 for i in rows])
+                what = listed([self.highest[j] for j in columns])
+                raise PvidError(
+                    f"{self.model.name}: the second stage needs equations that determine the highest derivative of "
+                    f"each quantity; equations {which} do not determine {what}"
+                )
+            for a, column in enumerate(columns):
+                for b, row in enumerate(rows):
                     whole[column, row] = block[a, b]
-            left -= rows
         return whole
 
-    def _inverted_block(self, block: sp.Matrix, name: str) -> sp.Matrix:
+    def _solved(self, right: Sequence[sp.Expr], name: str) -> list[sp.Expr]:
+        """x of A x = right, a symbol of this name with the place of each."""
+        found: dict[int, sp.Expr] = {}
+        for rows, columns in self._blocks:
+            left = {}
+            for i in rows:
+                known = sum((self._matrix[i, j] * x for j, x in found.items()), _ZERO)
+                left[i] = right[i] if known == 0 else self._symbol(f"left_{i} of {name}", right[i] - known)
+            for j in columns:
+                e = sum((self._inverse[j, i] * left[i] for i in rows), _ZERO)
+                found[j] = self._symbol(name.format(j), e)
+        return [found[j] for j in range(len(right))]
+
+    def _inverted_block(self, block: sp.Matrix, name: str) -> sp.Matrix | None:
+        """None: it is singular."""
         if block.rows == 1:
             return sp.Matrix([[self._symbol(f"inverse_{name}_00", 1 / block[0, 0])]])
         fixed = set(self.motion) | set(self.r) | set(self.settings)
         pairs = {one: sp.Dummy() for one in (*block.atoms(sp.sin), *block.atoms(sp.cos))}
         plain = block.xreplace(pairs)
         determinant = sp.expand(plain.det())
+        if determinant == 0:
+            return None
+        if len(sp.Add.make_args(determinant)) > _MANY:
+            return block.adjugate() * self._symbol(f"over_{name}", 1 / block.det())
         squares = {}
         for one, mark in list(pairs.items()):
             if isinstance(one, sp.cos):
@@ -459,6 +522,8 @@ class _Refine:
         factored = sp.factor(sp.expand(determinant.subs(squares)))
         if sp.count_ops(factored) >= sp.count_ops(sp.factor(determinant)):
             factored = sp.factor(determinant)
+        if factored == 0:
+            return None
         back = {mark: one for one, mark in pairs.items()}
         ahead = sp.Mul(*[one for one in sp.Mul.make_args(factored) if one.free_symbols <= fixed])
         rest = sp.Mul(*[one for one in sp.Mul.make_args(factored) if not one.free_symbols <= fixed])
@@ -489,19 +554,21 @@ class _Refine:
 
     def _column(self, x: sp.Symbol, factor: sp.Expr = _ONE) -> list[sp.Expr]:
         """d h / d x times a factor [n]."""
+        if (x, factor) not in self._by_step:
+            self._by_step[x, factor] = self._new_column(x, factor)
+        return self._by_step[x, factor]
+
+    def _new_column(self, x: sp.Symbol, factor: sp.Expr) -> list[sp.Expr]:
         n = len(self._h)
         sides = []
         for i in range(n):
             by_inner = {mark: self._by_inner[i, mark] for mark, _, _ in self._inner}
             sides.append(self._by(self._rest[i], x, by_inner))
         key = tuple(sides)
-        if factor != 1 and key in self._columns:
+        if key in self._columns:
             return [factor * one for one in self._columns[key]]
         marks = [self._symbol(f"side_{i} by {x}", _shortest(factor * one)) for i, one in enumerate(sides)]
-        column = [
-            self._symbol(f"d h_{i} by {x}", sum((self._inverse[i, j] * marks[j] for j in range(n)), _ZERO))
-            for i in range(n)
-        ]
+        column = self._solved(marks, f"d h_{{}} by {x}")
         if factor == 1:
             self._columns[key] = column
         return column
@@ -535,18 +602,18 @@ class _Refine:
         jacobian["B"] = [e for one in self.motion for e in self._rates(by_m[one], one)]
         steps = [*self.motion, *tail]
         readings = {
-            "Zq": [self._reading(z, one, by_q[one]) for z in self.z for one in q],
-            "Zv": [self._reading(z, one, by_q[one]) for z in self.z for one in v],
+            "Zq": [self._reading(z, one, by_q[one]) for z in self._readings for one in q],
+            "Zv": [self._reading(z, one, by_q[one]) for z in self._readings for one in v],
             "Zr": [
                 (one if self.log[one] else _ONE)
                 * self._reading(z, one, None if one in by_m else self._column(one), by_m.get(one))
-                for z in self.z
+                for z in self._readings
                 for one in steps
             ],
         }
         groups: dict[str, list[tuple[str, list[sp.Expr]]]] = {
             "motion": [("a", a)],
-            "jacobian": [("a", a), *((key, e) for key, e in jacobian.items() if e)],
+            "jacobian": [("a", a), *((key, e) for key, e in jacobian.items() if e or key in ("U", "B"))],
             "output": [("z", list(self.z))],
             "output_jacobian": [(key, e) for key, e in readings.items() if e],
         }
@@ -557,17 +624,17 @@ class _Refine:
     def _reading(
         self, z: sp.Expr, x: sp.Symbol, of_h: Sequence[sp.Expr] | None, scaled: Sequence[sp.Expr] | None = None
     ) -> sp.Expr:
-        """dz/dx, with what goes through an algebraic equation; `scaled` is d h / d log x."""
+        """dz/dx of a reading, with what goes through its highest derivatives; `scaled` is d h / d log x."""
         by_inner = {mark: sp.diff(z, mark) for mark, _, _ in self._inner}
         total = self._by(z, x, by_inner)
-        for place, h in enumerate(self._h):
-            share = sp.diff(z, h) if h.is_Symbol else _ZERO
+        for place, h in enumerate(self.highest):
+            share = sp.diff(z, h)
             if share != 0:
                 if scaled is not None:
                     total += share * scaled[place] / (x if self.log[x] else _ONE)
                 elif of_h is not None:
                     total += share * of_h[place]
-        return sp.expand(total) if total.is_Add else total
+        return _expanded(total) if total.is_Add else total
 
     def _generated(self, groups: Mapping[str, Sequence[tuple[str, list[sp.Expr]]]]) -> RefineFunctions:
         own = self.model.refinement
@@ -694,7 +761,13 @@ def _locals(names: Sequence[str]) -> list[str]:
 
 def _shortest(e: sp.Expr) -> sp.Expr:
     """The form with the fewest operations."""
+    if sp.count_ops(e) > _LONG:
+        return e
     return min((sp.factor_terms(e), sp.expand(e), e), key=lambda one: (sp.count_ops(one), str(one)))
+
+
+def _expanded(e: sp.Expr) -> sp.Expr:
+    return e if sp.count_ops(e) > _LONG else sp.expand(e)
 
 
 class _Split:

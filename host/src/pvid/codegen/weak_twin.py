@@ -10,6 +10,7 @@ from pvid.codegen.twin_file import namespace, pattern_of
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.model.compiled import CompiledModel
 from pvid.settings.weak import WeakModel
+from pvid.setup.weak_sizes import refuse_too_many_unknowns, sizes_of_model
 
 _SUMMARIES = {
     "prepare": "Derivatives of the runs and arguments of sgn [results, ...] from the jets [jets, ...].",
@@ -65,5 +66,14 @@ def loaded(made: WeakFunctions) -> WeakModel:
 
 @Recent
 def weak_model_of(compiled: CompiledModel) -> WeakModel:
-    """The tables and twin of a compiled model, without corners as given."""
-    return loaded(weak_functions_of(compiled))
+    """The tables and twin of a compiled model, without corners as given.
+
+    Raises
+    ------
+    PvidError
+        Where the engine does not have what the model needs.
+    """
+    refuse_too_many_unknowns(compiled)
+    model = loaded(weak_functions_of(compiled))
+    sizes_of_model(model)  # raises
+    return model

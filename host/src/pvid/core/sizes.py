@@ -10,6 +10,7 @@ from pvid.core.sources import FIRMWARE
 
 _DEFINED = re.compile(r"^#define (PVID_MAX_\w+) (\d+)$", re.MULTILINE)
 _LEAST = re.compile(r"^#if (PVID_MAX_\w+) < (\d+) ", re.MULTILINE)
+_MOST = re.compile(r"^#if (PVID_MAX_\w+) < \d+ \|\| \1 > (\d+)$", re.MULTILINE)
 
 # Sizes that depend on the design alone are rounded up to multiples of these.
 _STEPS = {
@@ -33,6 +34,13 @@ def least_sizes() -> Mapping[str, int]:
     """Macro -> least value that config.h allows."""
     text = (FIRMWARE / "include" / "pvid" / "config.h").read_text(encoding="utf-8")
     return {name: int(value) for name, value in _LEAST.findall(text)}
+
+
+@cache
+def most_sizes() -> Mapping[str, int]:
+    """Macro -> largest value that config.h allows."""
+    text = (FIRMWARE / "include" / "pvid" / "config.h").read_text(encoding="utf-8")
+    return {name: int(value) for name, value in _MOST.findall(text)}
 
 
 def smallest(needed: Mapping[str, int]) -> dict[str, int]:

@@ -6,10 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
+import sympy as sp
 
+from pvid.base.errors import PvidError
 from pvid.codegen.refine import RefineFunctions
 from pvid.model.compiled import CompiledModel
-from pvid.model.signals import Integral, Jet, jets
+from pvid.model.signals import Integral, Jet, jets, sgn
+from pvid.oracle.weak.channels import broadcast, evaluated
 
 Float = npt.NDArray[np.float64]
 
@@ -49,23 +52,44 @@ def straight(values: Float, sub: int) -> Float:
 def inputs_of(
     model: CompiledModel, made: RefineFunctions, signals: Mapping[str, Float], rate: float, sub: int
 ) -> tuple[Float, Float]:
-    """u [steps, 3, inputs] from recorded signals, none of them a derivative, and zeros in place of their rates."""
-    u = np.ascontiguousarray(np.stack([_input(model, jet, signals, rate, sub) for jet in made.inputs], -1))
+    """u [steps, 3, inputs] from recorded signals, and zeros in place of their rates.
+
+    Raises
+    ------
+    PvidError
+        For an input that is the derivative of a recorded signal.
+    """
+    steps = sub * len(signals[made.outputs[0]])
+    u = np.empty((steps, 3, len(made.inputs)))
+    for k, jet in enumerate(made.inputs):
+        u[..., k] = _input(model, jet, signals, rate, sub)
     return u, np.zeros_like(u)
 
 
 def _input(model: CompiledModel, jet: Jet, signals: Mapping[str, Float], rate: float, sub: int) -> Float:
     if jet in model.opaque:
-        value = model.opaque[jet]
-        assert value.func is Integral and jets(value.args[0]) == {value.args[0]}, value
-        signal = model.signal(value.args[0].of)
-        x = signals[signal.name]
-        if signal.hold == "zoh":
-            total = np.concatenate([[0.0], np.cumsum(x)[:-1]]) / rate
-        else:
-            total = np.concatenate([[0.0], np.cumsum((x[1:] + x[:-1]) / 2)]) / rate
-        return straight(total, sub)
-    signal = model.signal(jet.of)
-    if signal.hold == "zoh":
+        return straight(_computed(model, model.with_knowns(model.opaque[jet]), signals, rate), sub)
+    if jet.order > 0:
+        raise PvidError(f"the second stage needs recorded inputs; {model.name} has the derivative of {jet.of} as one")
+    if model.signal(jet.of).hold == "zoh":
         return held(signals[jet.of], sub)
     return smooth(signals[jet.of], sub)
+
+
+def _computed(model: CompiledModel, value: sp.Expr, signals: Mapping[str, Float], rate: float) -> Float:
+    """A defined signal at the samples; integrals in it begin at the first one."""
+    size = len(next(iter(signals.values())))
+    values: dict[sp.Symbol, Float] = {}
+    for one in sorted(value.atoms(Integral), key=str):
+        x, fold = _computed(model, one.args[0], signals, rate), int(one.args[1])
+        is_held = all(model.signal(jet.of).hold == "zoh" for jet in jets(one.args[0]))
+        for k in range(fold):
+            steps = x[:-1] if is_held and k == 0 else (x[1:] + x[:-1]) / 2
+            x = np.concatenate([[0.0], np.cumsum(steps)]) / rate
+        mark = sp.Dummy()
+        values[mark], value = x, value.xreplace({one: mark})
+    for jet in jets(value):
+        if jet.order > 0:
+            raise PvidError(f"the second stage needs recorded inputs; {model.name} has {jet}, a derivative, in one")
+        values[jet] = signals[jet.of]
+    return broadcast(evaluated(value.xreplace({one: sp.sign(one.args[0]) for one in value.atoms(sgn)}), values), size)
