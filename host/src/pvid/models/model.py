@@ -64,11 +64,13 @@ class Channel(Quantity):
     short : in one word
     shown_in : a unit for pages and terminals, and how many of it are one of SI; ("", 1): that of SI
     usual_names : regular expression of likely column names of this signal
+    held : it keeps each value until the next one: a blank cell is no change
     """
 
     short: str = ""
     shown_in: tuple[str, float] = ("", 1.0)
     usual_names: str = "(?!)"
+    held: bool = False
 
     @property
     def shown_unit(self) -> str:

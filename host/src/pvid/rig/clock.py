@@ -13,13 +13,14 @@ gets its tick, so that missing samples are seen, and one of two things holds:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
+from pvid.rig.gaps import spread
 from pvid.rig.table import Table
 
 FloatArray = npt.NDArray[np.float64]
@@ -60,6 +61,10 @@ _LEAST_ROWS = 32
 _BLOCKS, _LEAST_BLOCKS = 400, 8
 _CLEARLY = 4.0  # standard errors
 _CHUNK = 1 << 16
+# More incomplete rows than this part of all: sensors with stamps of their own stand in one table.
+_INCOMPLETE_SHARE = 0.1
+# A sensor of another clock has a gap beyond so many of its usual steps.
+_OWN_GAP = 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +80,14 @@ class Uniform:
     sample_rate : float
         [Hz].
     notes : what was found and done, a sentence each
+    ticks_between : by name: mean ticks from sample to sample of a sensor that is slower, where it is interpolated
     """
 
     t: FloatArray
     signals: Mapping[str, FloatArray]
     sample_rate: float
     notes: tuple[str, ...]
+    ticks_between: Mapping[str, float] = field(default_factory=dict)
 
 
 def uniform(table: Table, promised: float | None) -> Uniform:
@@ -117,7 +124,8 @@ def _from_stamps(table: Table, promised: float | None) -> Uniform:
         raise table.error(row, "t", f"{table.t[row]!s} s runs back from {before}")
     if table.t[-1] == table.t[0]:
         raise table.error(1, "t", f"{table.t[1]!s} s repeats the time before it, as all times do")
-    table, steps = _without_repeated_rows(table, steps)
+    table = _on_one_clock(table)
+    table, steps = _without_repeated_rows(table, np.diff(table.t))
     quantum = _quantum(table.t)
     fit = _chosen(_fits(table, steps, quantum), quantum)
     repeats = steps == 0
@@ -131,6 +139,59 @@ def _from_stamps(table: Table, promised: float | None) -> Uniform:
     else:
         placed = _with_jitter(table, repeats, fit, rate, promised, note)
     return placed
+
+
+def _on_one_clock(table: Table) -> Table:
+    """Of a table in which sensors have stamps of their own: the rows of the one with most numbers, the other signals at
+    its stamps; a held input as its mean until the next one."""
+    named = {name: one for name, one in table.signals.items() if name not in table.kept}
+    clock = max(named, key=lambda name: int(np.count_nonzero(np.isfinite(named[name]))))
+    rows = np.flatnonzero(np.isfinite(table.signals[clock]))
+    t = table.t[rows]
+    incomplete = np.count_nonzero(~table.complete)
+    if rows.size == table.t.size or not (incomplete > _INCOMPLETE_SHARE * table.t.size or _keeps_time(t)):
+        return table
+    signals = {}
+    for name, values in table.signals.items():
+        own = np.isfinite(values)
+        if name in table.columns.held:
+            signals[name] = means_of_held(table.t[own], values[own], t, np.append(np.diff(t), t[-1] - t[-2]))
+        elif own[rows].all():
+            signals[name] = values[rows]
+        else:
+            longest = _OWN_GAP * float(np.median(np.diff(table.t[own])))
+            signals[name] = spread(table.t[own], values[own], t, max(longest, _LATE_S))
+    there = np.logical_and.reduce([np.isfinite(one) for one in signals.values()])
+    first, last = int(np.argmax(there)), there.size - 1 - int(np.argmax(there[::-1]))
+    note = f"the signals have stamps of their own: they are interpolated at those of {table.columns[clock].name}"
+    less = replace(table, signals={name: one[first : last + 1] for name, one in signals.items()}, t=t[first : last + 1])
+    return replace(less, place=lambda row: table.place(int(rows[row + first])), notes=(*table.notes, note))
+
+
+def _keeps_time(t: FloatArray) -> bool:
+    if not t[-1] > t[0]:
+        return False
+    fit = _fit(t)
+    return fit.period > 0 and fit.keeps_time(_quantum(t))
+
+
+def means_of_held(times: FloatArray, values: FloatArray, at: FloatArray, spans: FloatArray | float) -> FloatArray:
+    """Means of an input that keeps each value until its next time, from each of `at` on over a span [n].
+
+    Parameters
+    ----------
+    times, values : rising [m]; the first value holds before its time too, the last one for ever
+    at : wanted times [n]
+    spans : lengths [same unit]
+    """
+    changes = np.concatenate([[True], values[1:] != values[:-1]])
+    times, values = times[changes], values[changes]
+    first = np.clip(np.searchsorted(times, at, side="right") - 1, 0, None)
+    last = np.clip(np.searchsorted(times, at + spans * (1 - 1e-9), side="left") - 1, 0, None)
+    whole = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(times))])
+    until = [whole[k] + values[k] * (end - times[k]) for k, end in ((first, at), (last, at + spans))]
+    means = np.clip((until[1] - until[0]) / spans, values.min(), values.max())
+    return np.where(last <= first, values[first], means)
 
 
 def _without_repeated_rows(table: Table, steps: FloatArray) -> tuple[Table, FloatArray]:
@@ -418,31 +479,46 @@ def _unexplained(x: FloatArray, t: FloatArray) -> FloatArray:
 
 
 def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """t and the signals at uniform times from the cubics through the four samples around them; NaN within gaps."""
-    there = table.complete
-    times, values = table.t, list(table.signals.values())
-    if not there.all():
-        times, values = times[there], [one[there] for one in values]
-    first, last = float(times[0]), float(times[-1])
+    """t and the signals at uniform times; NaN within gaps.
+
+    A sensor is interpolated by the cubics through four samples around a time, a slow one by splines; a held input is
+    its mean until the next time.
+    """
+    first, last = float(table.t[0]), float(table.t[-1])
     t = _times(first, int(np.floor((last - first) * rate * (1 + 1e-12))) + 1, rate)
-    out = np.empty((len(values), t.size))
-    for begin in range(0, t.size, _CHUNK):
-        at = t[begin : begin + _CHUNK]
-        right = np.clip(np.searchsorted(times, at, side="right"), 1, times.size - 1)
-        start = np.clip(right - 2, 0, times.size - 4)
-        gaps = [times[start + k] - at for k in range(4)]
-        piece = out[:, begin : begin + _CHUNK]
-        piece[:] = 0.0
-        for i in range(4):
-            weight = np.ones(at.size)
-            for j in range(4):
-                if j != i:
-                    weight *= gaps[j] / (gaps[j] - gaps[i])
-            for row, one in zip(piece, values, strict=True):
-                row += weight * one[start + i]
-        # a sample within half a period is as good as one at the tick
-        nearest = np.minimum(np.abs(times[right] - at), np.abs(at - times[right - 1]))
-        within = (times[right] - times[right - 1] > _EMPTY_PERIODS * period) & (nearest > period / 2)
-        piece[:, within] = np.nan
-    end = t.size - int(np.argmax(np.isfinite(out[0, ::-1])))
+    out = np.empty((len(table.signals), t.size))
+    for row, (name, values) in zip(out, table.signals.items(), strict=True):
+        own = np.isfinite(values)
+        times, values = (table.t, values) if own.all() else (table.t[own], values[own])
+        usual = float(np.median(np.diff(times)))
+        slow = usual > _GAP_PERIODS * period
+        if name in table.columns.held:
+            row[:] = means_of_held(times, values, t, 1 / rate)
+        elif slow:
+            row[:] = spread(times, values, t, max(_OWN_GAP * usual, _LATE_S))
+        for begin in range(0, t.size, _CHUNK):
+            at, piece = t[begin : begin + _CHUNK], row[begin : begin + _CHUNK]
+            right = np.clip(np.searchsorted(times, at, side="right"), 1, times.size - 1)
+            if name not in table.columns.held and not slow:
+                piece[:] = _by_cubics(times, values, at, right)
+            # a sample within half a period is as good as one at the tick
+            nearest = np.minimum(np.abs(times[right] - at), np.abs(at - times[right - 1]))
+            within = (times[right] - times[right - 1] > _EMPTY_PERIODS * max(period, usual)) & (nearest > period / 2)
+            piece[within] = np.nan
+    there = np.flatnonzero(np.isfinite(out).any(axis=0))
+    end = int(there[-1]) + 1
     return t[:end], dict(zip(table.signals, out[:, :end], strict=True))
+
+
+def _by_cubics(times: FloatArray, values: FloatArray, at: FloatArray, right: IntArray) -> FloatArray:
+    """Of samples [m] at times `at` [n], whose next samples are `right`."""
+    start = np.clip(right - 2, 0, times.size - 4)
+    gaps = [times[start + k] - at for k in range(4)]
+    found = np.zeros(at.size)
+    for i in range(4):
+        weight = np.ones(at.size)
+        for j in range(4):
+            if j != i:
+                weight *= gaps[j] / (gaps[j] - gaps[i])
+        found += weight * values[start + i]
+    return found

@@ -72,6 +72,11 @@ class Columns:
         """In SI, by signal: that of the time first."""
         return {one.name: one.unit for one in (_TIME, *self.channels)}
 
+    @property
+    def held(self) -> frozenset[str]:
+        """Inputs that keep each value until the next one."""
+        return frozenset(one.name for one in self.channels if one.held)
+
     def __getitem__(self, signal: str) -> Column:
         return self.named.get(signal, Column(signal))
 

@@ -176,7 +176,13 @@ class MechanismRig:
 def channels_of(model: CompiledModel) -> tuple[Channel, ...]:
     """The signals of a model as channels of a recording; a column's name may carry a unit behind the signal's."""
     return tuple(
-        Channel(one.name, one.unit, one.name, usual_names=rf"^{re.escape(one.name)}([\s_(\[].*)?$")
+        Channel(
+            one.name,
+            one.unit,
+            one.name,
+            usual_names=rf"^{re.escape(one.name)}([\s_(\[].*)?$",
+            held=one.kind == "input" and one.hold == "zoh",
+        )
         for one in model.signals
     )
 

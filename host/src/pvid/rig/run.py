@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -27,7 +27,17 @@ from pvid.rig.array_table import read_npz, read_parquet, table_of, write_npz, wr
 from pvid.rig.clock import Uniform, uniform
 from pvid.rig.columns import Columns
 from pvid.rig.csv_table import read_csv, write_csv, write_csv_gz
-from pvid.rig.gaps import bridge, longest_stretch
+from pvid.rig.gaps import (
+    SLOW_GAP,
+    bridge,
+    bridge_held,
+    holds_changes,
+    last_values,
+    longest_bridged,
+    longest_stretch,
+    spread,
+    ticks_between,
+)
 from pvid.rig.table import Table, row_place
 from pvid.rig.turns import joined
 
@@ -36,6 +46,8 @@ Function = TypeVar("Function")
 
 # The shortest finite difference of order 4 takes 5 samples: fewer feed no form of the identifier.
 MIN_ROWS = 5
+
+_LONG_BLANK_ROWS = 20  # in a column of an input's changes
 
 _LARGEST = 1e12  # [rad] or [m]: counts of 40 bits
 
@@ -54,12 +66,15 @@ class Recording:
         [Hz].
     notes : tuple of str
         What was done to the recording, a sentence each; empty when it is as recorded.
+    ticks_between : by name
+        Mean ticks from sample to sample of a sensor that is slower than the clock: it is interpolated.
     """
 
     t: FloatArray
     signals: Mapping[str, FloatArray]
     sample_rate: float
     notes: tuple[str, ...] = ()
+    ticks_between: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -265,23 +280,49 @@ def is_run(path: Path) -> bool:
 
 
 def _checked(table: Table) -> Table:
-    """The rows between the first and the last sample; refused when there are too few, or a number is infinite."""
+    """The rows in which every signal has begun and none has ended, held inputs with the values that they keep; refused
+    when there are too few numbers, or one is infinite."""
     for signal, data in {"t": table.t, **table.signals}.items():
         if np.isinf(data).any():
             row = int(np.argmax(np.isinf(data)))
             raise table.error(row, signal, f"{data[row]} is not a finite number")
-    there = table.complete
-    rows = int(np.count_nonzero(there))
-    if rows < MIN_ROWS:
-        raise PvidError(f"{table.path} has {rows} rows of data; a run needs at least {MIN_ROWS}.")
-    first, last = int(np.argmax(there)), there.size - 1 - int(np.argmax(there[::-1]))
+    table = table.with_merged_rows()
+    rows = table.t.size
+    places = {name: np.flatnonzero(np.isfinite(one)) for name, one in table.signals.items()}
+    for name, own in places.items():
+        if own.size < (1 if name in table.columns.held and rows >= MIN_ROWS else MIN_ROWS):
+            if all(one.size == own.size for one in places.values()):
+                raise PvidError(f"{table.path} has {own.size} rows of data; a run needs at least {MIN_ROWS}.")
+            raise PvidError(
+                f"{table.path}, column {table.columns[name].name}: it has {own.size} numbers; a run needs at least "
+                f"{MIN_ROWS}."
+            )
+    table = _with_kept_values(table)
+    first = max(int(own[0]) for own in places.values())
+    last = min(int(own[-1]) if name not in table.kept else rows - 1 for name, own in places.items())
+    if last - first + 1 < MIN_ROWS:
+        raise PvidError(f"{table.path} has {max(last - first + 1, 0)} rows of data; a run needs at least {MIN_ROWS}.")
     if not np.isfinite(table.t[first : last + 1]).all():
         row = first + int(np.argmin(np.isfinite(table.t[first : last + 1])))
         raise table.error(row, "t", f"the cell is empty or nan, and only {listed(table.signals)} may be missing")
-    if (first, last) == (0, there.size - 1):
+    if (first, last) == (0, rows - 1):
         return table
-    note = f"rows without numbers at the ends, left out: {there.size - (last + 1 - first)}"
+    note = f"rows without numbers at the ends, left out: {rows - (last + 1 - first)}"
     return table.rows(slice(first, last + 1), lambda row: table.place(row + first), note)
+
+
+def _with_kept_values(table: Table) -> Table:
+    """A held input of which a table contains the changes alone has its last value in the blank cells."""
+    kept, notes = {}, []
+    for name in table.columns.held.intersection(table.signals):
+        values = table.signals[name]
+        blank = int(np.count_nonzero(np.isnan(values)))
+        if blank and holds_changes(values, _LONG_BLANK_ROWS):
+            kept[name] = last_values(values)
+            notes.append(f"{table.columns[name].name} is blank where it does not change: {blank} cells keep its value")
+    if not kept:
+        return table
+    return replace(table, signals={**table.signals, **kept}, notes=(*table.notes, *sorted(notes)), kept=frozenset(kept))
 
 
 def _recording(table: Table, rate: float | None) -> Recording:
@@ -293,15 +334,54 @@ def _recording(table: Table, rate: float | None) -> Recording:
             note = f"{name} jumps by a turn, {jumps} times: joined (the encoder starts over there)"
             table = replace(table, signals={**table.signals, angle: values}, notes=(*table.notes, note))
     clocked = uniform(table, rate)
-    firsts, ends = bridge(list(clocked.signals.values()), clocked.sample_rate)
-    notes = (*clocked.notes, *_gap_notes(clocked, firsts, ends))
-    return Recording(clocked.t, clocked.signals, clocked.sample_rate, notes)
+    return _bridged(clocked, table)
 
 
-def _gap_notes(clocked: Uniform, firsts: npt.NDArray[np.int64], ends: npt.NDArray[np.int64]) -> tuple[str, ...]:
+def _bridged(clocked: Uniform, table: Table) -> Recording:
+    """The recording with the gaps of each signal filled that can be, NaN in all signals where one stays missing."""
+    rate, slow = clocked.sample_rate, dict(clocked.ticks_between)
+    signals, notes = dict(clocked.signals), list(clocked.notes)
+    gaps: dict[tuple[bytes, bytes], list[str]] = {}
+    for name, recorded in clocked.signals.items():
+        if not np.isnan(recorded).any():
+            continue
+        signal = signals[name] = recorded.copy()
+        held = name in table.columns.held
+        between = 1.0 if held else ticks_between(signal)
+        if between > 1:
+            places = np.flatnonzero(np.isfinite(signal)).astype(np.float64)
+            longest = max(SLOW_GAP * between, longest_bridged(rate))
+            signal[:] = spread(places, recorded[np.isfinite(recorded)], np.arange(float(signal.size)), longest)
+            slow[name] = between
+            column = table.columns[name].name
+            notes.append(f"{column} has a sample every {between:.3g} ticks: interpolated at {rate:g} Hz by splines")
+        firsts, ends = (bridge_held if held else bridge)(signal, rate)
+        if firsts.size:
+            gaps.setdefault((firsts.tobytes(), ends.tobytes()), []).append(name)
+    for (firsts_of, ends_of), names in gaps.items():
+        firsts, ends = np.frombuffer(firsts_of, np.int64), np.frombuffer(ends_of, np.int64)
+        own = "" if len(names) == len(signals) else f" of {listed(table.columns[one].name for one in names)}"
+        filled = np.logical_and.reduce([np.isfinite(signals[name][firsts]) for name in names])
+        notes += _gap_notes(clocked, own, firsts, ends, filled)
+    whole = np.logical_and.reduce([np.isfinite(one) for one in signals.values()])
+    if whole.all():
+        return Recording(clocked.t, signals, rate, tuple(notes), slow)
+    if not whole.any():
+        raise PvidError(f"{table.path}: no row has numbers of {listed(signals)} at the same time.")
+    part = slice(int(np.argmax(whole)), whole.size - int(np.argmax(whole[::-1])))
+    common = {name: np.where(whole, one, np.nan)[part] for name, one in signals.items()}
+    return Recording(clocked.t[part], common, rate, tuple(notes), slow)
+
+
+def _gap_notes(
+    clocked: Uniform,
+    of: str,
+    firsts: npt.NDArray[np.int64],
+    ends: npt.NDArray[np.int64],
+    filled: npt.NDArray[np.bool_],
+) -> list[str]:
     lengths = ends - firsts
     rate = clocked.sample_rate
-    filled = np.isfinite(next(iter(clocked.signals.values()))[firsts])
     notes = []
     for chosen, done in (
         (filled, "interpolated"),
@@ -313,10 +393,10 @@ def _gap_notes(clocked: Uniform, firsts: npt.NDArray[np.int64], ends: npt.NDArra
             at = float(clocked.t[firsts[chosen][0]])
             longest = float(lengths[chosen].max()) / rate
             notes.append(
-                f"missing samples: {samples} of {clocked.t.size}, in {count} gap{'s' if count > 1 else ''} (first at "
-                f"{at:.6g} s, longest {longest:.3g} s), {done}"
+                f"missing samples{of}: {samples} of {clocked.t.size}, in {count} gap{'s' if count > 1 else ''} (first "
+                f"at {at:.6g} s, longest {longest:.3g} s), {done}"
             )
-    return tuple(notes)
+    return notes
 
 
 _READERS: dict[str, Callable[[Path, Columns], Table]] = {

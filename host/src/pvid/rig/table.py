@@ -30,6 +30,7 @@ class Table:
     columns : how the file calls them
     place : how to call the place of row k: a line or a row
     notes : what was left out, a sentence each
+    kept : held inputs whose blank cells have their last value
     """
 
     path: Path
@@ -38,6 +39,7 @@ class Table:
     columns: Columns
     place: Callable[[int], str]
     notes: tuple[str, ...] = ()
+    kept: frozenset[str] = frozenset()
 
     @property
     def complete(self) -> npt.NDArray[np.bool_]:
@@ -49,6 +51,22 @@ class Table:
         """Some of the rows, with a note on the others."""
         signals = {name: one[kept] for name, one in self.signals.items()}
         return replace(self, t=self.t[kept], signals=signals, place=place, notes=(*self.notes, note))
+
+    def with_merged_rows(self) -> Table:
+        """Rows of one stamp that hold one number of each signal at most, as one."""
+        again = np.diff(self.t) == 0
+        if not again.any() or self.complete.all():
+            return self
+        group = np.concatenate([[0], np.cumsum(~again)])
+        merged = {}
+        for name, values in self.signals.items():
+            there = np.isfinite(values)
+            if np.bincount(group[there], minlength=1).max() > 1:
+                return self
+            merged[name] = np.full(int(group[-1]) + 1, np.nan)
+            merged[name][group[there]] = values[there]
+        first = np.flatnonzero(np.concatenate([[True], ~again]))
+        return replace(self, t=self.t[first], signals=merged, place=lambda row: self.place(int(first[row])))
 
     def error(self, row: int, signal: str, complaint: str) -> PvidError:
         """The refusal of a cell."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -119,8 +119,26 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
         When the recording is too short, or holds a signal beyond all reason.
     """
     refuse_constant(recording, model)
+    model = as_sampled(model, recording.ticks_between)
     found = identified_by(model, recording.signals, recording.sample_rate, weights=weights)
     return MechanismAnswer(model, found, _values(model, found), recording, weights)
+
+
+def as_sampled(model: CompiledModel, ticks_between: Mapping[str, float]) -> CompiledModel:
+    """The model with white noise of slow sensors that has, at every tick, the density of theirs.
+
+    Parameters
+    ----------
+    ticks_between : by signal: mean ticks from sample to sample, of those that were interpolated
+    """
+    if not ticks_between:
+        return model
+    signals = []
+    for one in model.signals:
+        between = ticks_between.get(one.name, 1.0)
+        rounding = 1 / 12 if one.resolution else 0.0
+        signals.append(replace(one, noise=float(np.sqrt(between * (rounding + one.noise**2) - rounding))))
+    return replace(model, signals=tuple(signals))
 
 
 def refuse_constant(recording: Recording, model: CompiledModel) -> None:

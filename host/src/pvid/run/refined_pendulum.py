@@ -184,7 +184,7 @@ class _Search:
         broken = breaks(y, max(8, round(rate / self.slow)), NOISE_LSB * self.rig.sensor.y_lsb)
         missing = np.isnan(y)
         whole = np.where(broken, np.nan, y)
-        bridge([whole], rate)
+        bridge(whole, rate)
         firsts, _ = stretches(np.isnan(whole) & ~missing)
         if len(firsts) > periods / _PERIODS:  # more than blocks: corners of the drive
             return y, ()

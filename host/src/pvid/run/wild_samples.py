@@ -38,7 +38,7 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
             if end - first > _LONGEST:
                 found[first:end] = False
         bridged = np.where(found, np.nan, x)
-        bridge([bridged], recording.sample_rate)
+        bridge(bridged, recording.sample_rate)
         replaced = found & np.isfinite(bridged)
         firsts, _ = stretches(replaced)
         if 0 < len(firsts) <= _MOST * len(x):
