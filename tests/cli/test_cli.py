@@ -132,8 +132,10 @@ BAD_RUNS = {
     "empty": "",
     "header only": "t,phi,y\n",
     "wrong columns": "time,angle,pivot\n0,0,0\n0.001,0,0\n",
-    "text in numbers": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,fast,0\n",
-    "not a number": "t,phi,y\n" + "".join(f"{k / 1000},0.1,0\n" for k in range(400)) + "0.4,inf,0\n",
+    "text in numbers": "t,phi,y\n"
+    + "".join(f"{k / 1000},0.1,0\n" for k in range(400))
+    + "0.4,fast,0\n" * 40
+    + "0.44,0,0",
     "gap": "t,phi,y\n" + "".join(f"{(k + (k > 200) * 500) / 1000},0.1,0\n" for k in range(400)),
     "clock runs back": "t,phi,y\n" + "".join(f"{k % 200 / 1000},0.1,0\n" for k in range(400)),
     "too short": "t,phi,y\n0,0.1,0\n0.001,0.1,0\n0.002,0.1,0\n",

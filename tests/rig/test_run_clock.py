@@ -133,9 +133,10 @@ def test_empty_and_nan_cells_are_missing_samples(tmp_path: Path) -> None:
     run = read_run(tmp_path / "run.csv")
     assert len(run) == 1999 and np.isfinite(run.phi).all() and np.isfinite(run.y).all()
     assert run.phi[0] == phi[1] and run.t[0] == t[1]
-    assert run.notes[0] == "rows without numbers at the ends, left out: 1"
-    assert run.notes[1].startswith("missing samples of phi: 2 of 1999, in 2 gaps")
-    assert run.notes[2].startswith("missing samples of y: 1 of 1999, in 1 gap")
+    assert run.notes[0] == "cells without a number, taken as missing: 1 of y ('NA')"
+    assert run.notes[1] == "rows without numbers at the ends, left out: 1"
+    assert run.notes[2].startswith("missing samples of phi: 2 of 1999, in 2 gaps")
+    assert run.notes[3].startswith("missing samples of y: 1 of 1999, in 1 gap")
     assert (run.y[[699, 899]] == y[[700, 900]]).all() and run.phi[900] == phi[901]  # what stands beside stays
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -13,45 +13,48 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import shown
+from pvid.base.wording import listed, shown
 from pvid.models.model import Channel
 from pvid.models.registry import DEFAULT, MODELS
+from pvid.rig.units import Scale, is_unit, scale_to, spelled, usual
 
 FloatArray = npt.NDArray[np.float64]
 
 _TIME = Channel("t", "s", "time", usual_names=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
 
-# (factor, divisor) to SI. A divisor gives the same bits as the decimal number in SI has: 7 ms / 1000 = 0.007 s.
-_UNITS_OF: dict[str, dict[str, tuple[float, float]]] = {
-    "s": {"s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "ns": (1.0, 1e9), "min": (60.0, 1.0)},
-    "rad": {
-        "rad": (1.0, 1.0),
-        "mrad": (1.0, 1e3),
-        "deg": (math.pi, 180.0),
-        "rev": (2.0 * math.pi, 1.0),
-        "turn": (2.0 * math.pi, 1.0),
-    },
-    "m": {"m": (1.0, 1.0), "cm": (1.0, 1e2), "mm": (1.0, 1e3), "um": (1.0, 1e6), "in": (0.0254, 1.0)},
-}
-_PREFIXED = ("A", "V", "N", "W", "Hz", "Pa")  # units with the usual prefixes
-_SAME = {"µs": "us", "μs": "us", "µm": "um", "μm": "um", "°": "deg", "turns": "turn", "revs": "rev", "sec": "s"}
-
 _UNIT_AT_END = re.compile(r"(?:^|[\s_.\-/(\[])(?P<unit>[a-zµμ°]+)[)\]]?\s*$", re.I)
+_IN_BRACKETS = re.compile(r"[\[(](?P<unit>[^\[\]()]+)[\])]\s*$")
+_PART = re.compile(r'(?:[^,"]|"(?:[^"]|"")*"?)+')
+_ASSIGNED = re.compile(
+    r'\s*(?P<signal>[^=]*?)\s*=\s*(?:"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<name>[^":].*?))'
+    r"(?:\s*:\s*(?P<unit>[^:]*?)\s*)?",
+    re.S,
+)
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a file, and what one unit of it is in SI: factor/divisor."""
+    """A column of a file, and what a number of it is in SI: value * factor / divisor + offset.
+
+    Attributes
+    ----------
+    name : in the file's header, or a position from 1
+    unit_given : whether the scale was typed; else that of the file holds, if it has one
+    """
 
     name: str
     factor: float = 1.0
     divisor: float = 1.0
+    offset: float = 0.0
+    unit_given: bool = False
 
     def in_si(self, values: FloatArray) -> FloatArray:
         """Numbers of the file [n] in s, rad or m [n]; the same array where the file is in SI."""
         if self.factor != 1.0:
             values = values * self.factor
-        return values if self.divisor == 1.0 else values / self.divisor
+        if self.divisor != 1.0:
+            values = values / self.divisor
+        return values if self.offset == 0.0 else values + self.offset
 
 
 @dataclass(frozen=True)
@@ -84,9 +87,10 @@ class Columns:
     def parse(cls, text: str, channels: tuple[Channel, ...] = MODELS[DEFAULT].channels) -> Columns:
         """Reads `SIGNAL=COLUMN[:UNIT],...`.
 
-        COLUMN is a name in the file's header or a number, 1 for the first column. UNIT is s, ms, us, ns, min; rad,
-        mrad, deg, rev, turn; m, cm, mm, um, in; or a number of SI units. A minus sign in front of it turns the sign,
-        `/N` behind it divides: `rev/4096` for counts of an encoder, `-mm` for a height that grows downwards.
+        COLUMN is a name in the file's header, in double quotes where it has a comma, a colon or a quote of its own
+        (which is doubled), or a number, 1 for the first column. UNIT is one of `pvid.rig.units`, or a number of SI
+        units. A minus sign in front of it turns the sign, `/N` behind it divides: `rev/4096` for counts of an encoder,
+        `-mm` for a height that grows downwards.
 
         Raises
         ------
@@ -95,23 +99,46 @@ class Columns:
         """
         named: dict[str, Column] = {}
         units = cls(channels=channels).units
-        for part in text.split(","):
-            signal, equals, rest = part.partition("=")
-            signal = signal.strip()
-            name, colon, unit = rest.rpartition(":")
-            if not colon:
-                name, unit = rest, units.get(signal, "")
-            if not equals or not name.strip() or not unit.strip():
+        for part in _PART.findall(text) or [""]:
+            match = _ASSIGNED.fullmatch(part)
+            name = "" if match is None else (match["name"] or (match["quoted"] or "").replace('""', '"')).strip()
+            if match is None or not name or match["unit"] == "":
                 raise PvidError(
                     f"--columns: {shown(part)} is not SIGNAL=COLUMN:UNIT, as in t=time_ms:ms,phi=angle_deg:deg,y=h:mm"
                 )
+            signal = match["signal"]
             if signal not in units:
                 raise PvidError(f"--columns: {shown(signal)} is no signal; the signals are {', '.join(units)}")
             if signal in named:
                 raise PvidError(f"--columns: {signal} is given twice")
-            factor, divisor = _scale(signal, units[signal], unit.strip())
-            named[signal] = Column(name.strip(), factor, divisor)
+            unit = match["unit"]
+            named[signal] = Column(name) if unit is None else _column(signal, name, units[signal], unit.strip())
         return cls(MappingProxyType(named), channels)
+
+    def in_units_of_file(self, units: Mapping[str, str]) -> tuple[Columns, tuple[str, ...]]:
+        """With the units that a file states for signals, where none was typed; and a sentence on each that was used or
+        is no unit of its signal."""
+        named, used, unknown = dict(self.named), [], []
+        for signal, unit in units.items():
+            column = self[signal]
+            if column.unit_given or not unit.strip():
+                continue
+            scale = scale_to(self.units[signal], unit)
+            if scale is None:
+                unknown.append(f"{shown(unit)} of column {shown(column.name)}")
+                continue
+            named[signal] = replace(column, factor=scale.factor, divisor=scale.divisor, offset=scale.offset)
+            if scale != Scale():
+                used.append(f"{signal} in {spelled(unit)}")
+        notes: tuple[str, ...] = (f"units as the file states them: {listed(used)}",) if used else ()
+        if unknown:
+            notes += (f"{listed(unknown)} is no unit of its signal: taken as SI; type its unit in --columns",)
+        return replace(self, named=MappingProxyType(named)), notes
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """Names that the header of a file contains; not positions."""
+        return tuple(self[one].name for one in self.units if not (one in self.named and self[one].name.isdecimal()))
 
     def places(self, path: Path, names: Sequence[str], where: str = "") -> dict[str, int]:
         """Index of each signal's column among the names of a file's columns.
@@ -126,7 +153,11 @@ class Columns:
             name = self[signal].name
             times = names.count(name)
             if times > 1:
-                raise PvidError(f"{path}{where}: column {shown(name)} appears {times} times.")
+                at = [str(k + 1) for k, one in enumerate(names) if one == name]
+                raise PvidError(
+                    f"{path}{where}: column {shown(name)} appears {times} times: name it by its position, "
+                    f"{listed(at, 'or')}, as in --columns {signal}={at[0]}."
+                )
             if times == 1:
                 places[signal] = names.index(name)
             elif signal in self.named and name.isdecimal() and 1 <= int(name) <= len(names):
@@ -165,12 +196,13 @@ class Columns:
             elif signal not in self.named:
                 continue
             if place is None:
-                parts.append(f"{signal}=NAME:{unit}")
+                parts.append(f"{signal}=NAME:{unit or 1}")
                 continue
             taken.add(place)
             name = names[place]
-            plain = name.isprintable() and len(name) <= 24 and not set(name) & set(",:='\"")
-            parts.append(f"{signal}={name if plain else place + 1}:{_unit_in(name, unit) or unit}")
+            plain = name.isprintable() and len(name) <= 24 and not set(name) & set("='\"")
+            typed = (f'"{name}"' if set(name) & set(",:") else name) if plain else place + 1
+            parts.append(f"{signal}={typed}:{_unit_in(name, unit) or unit or 1}")
         text = ",".join(parts)
         return text if re.fullmatch(r"[\w=:,.\-]+", text, re.ASCII) else f"'{text}'"
 
@@ -180,29 +212,38 @@ def parsed(text: str | None, channels: tuple[Channel, ...] = MODELS[DEFAULT].cha
     return Columns(channels=channels) if text is None else Columns.parse(text, channels)
 
 
-def _units(unit: str) -> dict[str, tuple[float, float]]:
-    """Units of the same kind as one of SI; without a table only that one."""
-    prefixed = {f"k{unit}": (1e3, 1.0), f"m{unit}": (1.0, 1e3), f"u{unit}": (1.0, 1e6)} if unit in _PREFIXED else {}
-    return _UNITS_OF.get(unit, {unit: (1.0, 1.0), **prefixed})
-
-
-def _scale(signal: str, si: str, text: str) -> tuple[float, float]:
-    """Factor and divisor of a unit: `deg`, `-mm`, `rev/4096`, `3.8e-4`."""
-    unit, slash, count = text.partition("/")
-    turned = unit.startswith("-")
-    unit = unit.removeprefix("-").strip()
-    known = _units(si).get(_SAME.get(unit, unit))
+def _column(signal: str, name: str, si: str, text: str) -> Column:
+    """With a typed unit: `deg`, `-mm`, `rev/4096`, `rev/min`, `3.8e-4`, `12/255`."""
+    turned = text.startswith("-")
+    unit, slash, count = text.removeprefix("-").strip(), "", ""
+    scale = _scale(si, unit)
+    if scale is None:
+        unit, slash, count = unit.rpartition("/")
+        scale = _scale(si, unit)
     try:
-        factor, divisor = known if known is not None else (float(unit), 1.0)
-        divisor *= float(count) if slash else 1.0
+        divisor = float(count) if slash else 1.0
     except ValueError:
-        factor = divisor = math.nan
-    if not (math.isfinite(factor) and factor > 0.0 and math.isfinite(divisor) and divisor > 0.0):
+        divisor = math.nan
+    if scale is None or not (math.isfinite(divisor) and divisor > 0.0 and math.isfinite(scale.divisor * divisor)):
         raise PvidError(
             f"--columns: {shown(text)} is no unit of {signal}; "
-            f"it is {', '.join(_units(si))} or a number of {si or '1'}, as in {signal}=NAME:0.001"
+            f"it is {', '.join(usual(si))} or a number of {si or '1'}, as in {signal}=NAME:0.001"
         )
-    return (-factor if turned else factor), divisor
+    if scale.offset and (turned or slash):
+        raise PvidError(f"--columns: {shown(text)}: {unit} has an offset, and takes no sign and no divisor")
+    return Column(name, -scale.factor if turned else scale.factor, scale.divisor * divisor, scale.offset, True)
+
+
+def _scale(si: str, text: str) -> Scale | None:
+    """Of a unit, or of a positive number."""
+    known = scale_to(si, text) if text else None
+    if known is not None:
+        return known
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return Scale(number) if math.isfinite(number) and number > 0.0 else None
 
 
 def _unit_in(name: str, si: str) -> str | None:
@@ -210,5 +251,11 @@ def _unit_in(name: str, si: str) -> str | None:
     match = _UNIT_AT_END.search(name)
     if match is None:
         return None
-    unit = _SAME.get(match["unit"], match["unit"].lower())
-    return unit if unit in _units(si) else None
+    unit = spelled(match["unit"])
+    return unit if scale_to(si, unit) is not None else None
+
+
+def unit_in_brackets(name: str) -> str:
+    """The unit at the end of a column's name: `h (mm)`, `time [ms]`; "" where there is none."""
+    match = _IN_BRACKETS.search(name)
+    return match["unit"] if match is not None and is_unit(match["unit"]) else ""

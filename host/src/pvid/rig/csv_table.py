@@ -1,78 +1,58 @@
-"""Text tables as programs and loggers write them, read in blocks: memory for the three signals and a block more.
+"""Text tables as instruments, programs and loggers write them, read in blocks: memory for the signals and a block more.
 
-Separators are commas, semicolons, tabs or spaces; with any but commas the decimal point may be a comma. A byte order
-mark, CRLF, quotes, blank lines and lines that begin with #, % or // are accepted; such a line may contain the names,
-as written by numpy.savetxt. A table without names has columns 1, 2, 3, ... If a file ends within a line, that line is
-ignored. Every other fault is reported with its line number.
+`layout` finds the table, `text_lines` reads any encoding, `cells` and `times` read what numpy's compiled reader does
+not: it takes the lines of plain numbers, and only what it refuses is read cell by cell. A line that is no row is left
+out, counted, and named in a note.
 """
 
 from __future__ import annotations
 
-import csv
-import functools
 import gzip
 import io
 import math
 import re
-import zlib
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import reason, shown
-from pvid.rig.columns import Columns
+from pvid.base.wording import listed, shown
+from pvid.rig.cells import PLAIN, Evidence, Style, is_missing, is_number, style_note, styles
+from pvid.rig.columns import Columns, unit_in_brackets
+from pvid.rig.layout import Layout, find, split
 from pvid.rig.size import refuse_beyond
 from pvid.rig.table import Table
+from pvid.rig.text_lines import blocks
+from pvid.rig.times import TimesOfDay, is_time
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 
-_BLOCK = 1 << 20  # bytes read at a time, and the longest line
-_SAMPLED_LINES = 200  # that separator and decimal point are found from
+_SEARCHED_LINES = 20_000  # for the table
+_SAMPLED_ROWS = 500  # that show the style of the numbers; what differs later is found where it is read
 _TAIL = 1000  # lines that a cut last line is compared with
+# Damaged lines that a table may have: this part of all, and so many of a short one.
+_DAMAGED_SHARE, _DAMAGED_LINES = 0.05, 3
+_FEW = 32  # lines: what numpy refuses is halved down to so many
+_NO_NUMBER = (9.9e37, 9.91e37)  # an overload and no number in SCPI, the language of instruments
 
-# Cells that stand for a missing number; what is "nan" is read as a number.
-_EMPTY_CELLS = ("", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--")
+_NO_DATA = re.compile(rb"(?m)^[ \t]*(?:[#%]|//|sep=)")
+_BLANK_CELL = {
+    separator: re.compile(
+        rb"(?m)(?:(?<=" + re.escape(separator.encode()) + rb")|^)[ ]*(?=" + re.escape(separator.encode()) + rb"|$)"
+    )
+    for separator in (",", ";", "\t", "|")
+}
 
-_NO_DATA = re.compile(rb"(?m)^[ \t]*(?:(?:[#%]|//|sep=).*)?$\n?")
-_COMMENT_MARKS = (b"#", b"%", b"//")
-_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 
-
-@dataclass(frozen=True)
-class _Layout:
-    """How a table is written: `body` is the number of the first line behind the names."""
-
-    separator: str
-    decimal: str
-    names: tuple[str, ...]
-    body: int
-
-    def cells(self, line: str) -> list[str]:
-        """Cells of a line; csv.Error when its quotes do not match."""
-        return _split(line, self.separator, strict=True)
-
-    def is_number(self, cell: str) -> bool:
-        """What a block's reader takes as a number."""
-        if cell in _EMPTY_CELLS:
-            return True
-        if self.decimal != ".":
-            cell = cell.replace(".", "?").replace(self.decimal, ".")
-        if "_" in cell or not cell.isascii():  # float() would take 1_000 for a thousand, and digits of any script
-            return False
-        try:
-            float(cell)
-        except ValueError:
-            return False
-        return True
-
-    def number(self, cell: str) -> float:
-        """Of a cell that is a number; NaN of an empty one."""
-        return math.nan if cell in _EMPTY_CELLS else float(cell.replace(self.decimal, "."))
+class _OtherStyleError(Exception):
+    """A number in another style than the column seemed to have."""
 
 
 def read_csv(path: Path, columns: Columns) -> Table:
@@ -83,40 +63,7 @@ def read_csv(path: Path, columns: Columns) -> Table:
     PvidError
         For whatever is wrong with the file.
     """
-    layout: _Layout | None = None
-    places: dict[str, int] = {}
-    signals = {signal: _Growing() for signal in columns.units}
-    tail: list[str] = []
-    notes: tuple[str, ...] = ()
-    first_line = 1
-    for whole in _blocks(path):
-        block, line = whole, first_line
-        first_line += whole.count(b"\n")
-        if layout is None:
-            layout = _layout(path, block)
-            where = f", line {layout.body - 1}" if layout.body > 1 else ""
-            places = columns.places(path, layout.names, where)
-            block, line = _from_line(block, layout.body), layout.body
-        if not block.endswith(b"\n"):
-            block, _, last = block.rpartition(b"\n")
-            tail += [text for _, text in _data_lines(block[-64 * _TAIL :], 1)][-_TAIL:]
-            if _is_cut(last.decode(errors="replace"), tail, layout):
-                notes = (f"the file ends within line {first_line}, which is left out",)
-            else:
-                block = block + b"\n" + last if block else last
-        else:
-            tail = [text for _, text in _data_lines(block[-64 * _TAIL :], 1)][1:]
-        for signal, values in _numbers(path, block, line, layout, places).items():
-            signals[signal].extend(columns[signal].in_si(values))
-        refuse_beyond(path, signals["t"].size)
-    if layout is None:
-        raise PvidError(f"{path} is empty.")
-    found = {signal: one.values for signal, one in signals.items()}
-    t = found.pop("t")
-    if not t.size:
-        raise PvidError(f"{path} has a header but no data.")
-    body = layout.body
-    return Table(path, t, found, columns, lambda row: f"line {_line_of_row(path, body, row)}", notes)
+    return _TextTable(path, columns).read()
 
 
 def write_csv(path: Path, named: dict[str, FloatArray]) -> bytes:
@@ -131,158 +78,195 @@ def write_csv_gz(path: Path, named: dict[str, FloatArray]) -> bytes:
     return gzip.compress(write_csv(path, named), compresslevel=6, mtime=0)
 
 
-# --- lines -----------------------------------------------------------------------------------------------------
+class _TextTable:
+    """A file, with what is found out about it from its first block."""
+
+    def __init__(self, path: Path, columns: Columns) -> None:
+        self._path = path
+        first = next(blocks(path), b"")
+        lines = first.decode(errors="replace").split("\n", _SEARCHED_LINES)[:_SEARCHED_LINES]
+        if not any(line.strip() for line in lines):
+            raise PvidError(f"{path} is empty.")
+        layout = _layout(lines, columns)
+        if layout is None:
+            raise PvidError(f"{path} has no line of two numbers or more: this is no table.")
+        self._layout = layout
+        where = f", line {layout.header}" if layout.header else ""
+        self._places = columns.places(path, layout.names, where)
+        if max(self._places.values()) >= layout.width:
+            raise PvidError(f"{path}{where}: more names than the lines below have cells, {layout.width}.")
+        units = {
+            signal: (layout.units[place] if place < len(layout.units) else "") or unit_in_brackets(layout.names[place])
+            for signal, place in self._places.items()
+        }
+        rows = (layout.cells(line) for line in lines[layout.body - 1 :])
+        body = list(islice((cells for cells in rows if cells and self._is_row(cells)), _SAMPLED_ROWS))
+        times = sum(is_time(cells[self._places["t"]]) for cells in body)
+        self._time_is_text = 2 * times > len(body)
+        if self._time_is_text:
+            units.pop("t")
+        self._columns, notes = columns.in_units_of_file(units)
+        self._notes = (*_front_note(lines, layout), *notes)
+        self._sample = body
+
+    def _is_row(self, cells: Sequence[str]) -> bool:
+        return len(cells) in (self._layout.width, self._layout.beside[0])
+
+    @property
+    def _numbers(self) -> list[str]:
+        """Signals that are numbers."""
+        return [one for one in self._places if one != "t" or not self._time_is_text]
+
+    def read(self) -> Table:
+        """The whole file."""
+        evidence = {self._columns[one].name: Evidence() for one in self._numbers}
+        for signal in self._numbers:
+            evidence[self._columns[signal].name].add(cells[self._places[signal]] for cells in self._sample)
+        found = styles(str(self._path), evidence, whole=False)
+        try:
+            if found is not None:
+                return self._table({one: found[self._columns[one].name] for one in self._numbers}, sampled=True)
+        except _OtherStyleError:
+            pass
+        found = self._styles_of_all()
+        return self._table({one: found[self._columns[one].name] for one in self._numbers}, sampled=False)
+
+    def _styles_of_all(self) -> dict[str, Style]:
+        """By name of a column, from all cells of the file."""
+        evidence = {self._columns[one].name: Evidence() for one in self._numbers}
+        for _, block in self._body():
+            rows = [
+                cells
+                for line in block.decode(errors="replace").split("\n")
+                if (cells := self._layout.cells(line)) and self._is_row(cells)
+            ]
+            for signal in self._numbers:
+                evidence[self._columns[signal].name].add(cells[self._places[signal]] for cells in rows)
+        found = styles(str(self._path), evidence)
+        assert found is not None
+        return found
+
+    def _body(self) -> Iterator[tuple[int, bytes]]:
+        """Blocks of lines from the first row on, with the number of their first line."""
+        first, body = 1, self._layout.body
+        for block in blocks(self._path):
+            count = block.count(b"\n")
+            if first + count >= body:
+                yield max(first, body), _from_line(block, body - first)
+            first += count
+
+    def _table(self, style_of: dict[str, Style], sampled: bool) -> Table:
+        reader = _Reader(self._layout, self._places, style_of, sampled)
+        signals = {signal: _Growing() for signal in self._places}
+        notes = self._notes
+        before = b""
+        for first, whole in self._body():
+            block = whole
+            if not block.endswith(b"\n"):
+                block, _, last = block.rpartition(b"\n")
+                tail = _rows_in((before + block)[-64 * _TAIL :])[-_TAIL:]
+                if _is_cut(last.decode(errors="replace"), tail, self._layout):
+                    end = first + whole.count(b"\n")
+                    notes += (f"the file ends within line {end}, which is left out",)
+                else:
+                    block = block + b"\n" + last if block else last
+            before = block[-64 * _TAIL :]
+            values = reader.rows(block, first) if block else np.empty((len(signals), 0))
+            for signal, row in zip(signals, values, strict=True):
+                text = signal == "t" and self._time_is_text
+                signals[signal].extend(row if text else self._columns[signal].in_si(row))
+            refuse_beyond(self._path, signals["t"].size)
+        found = {signal: one.values for signal, one in signals.items()}
+        if sampled and _may_be_thousands([found[one] for one in self._numbers]):
+            raise _OtherStyleError
+        t = found.pop("t")
+        reader.refuse_many_damaged(self._path, t.size, self._columns)
+        if not t.size:
+            raise PvidError(f"{self._path} has a header but no data.")
+        if reader.times is not None:
+            try:
+                t = reader.times.unwrapped(t)
+            except PvidError as error:
+                raise PvidError(f"{self._path}, column {self._columns['t'].name}: {error}") from error
+        style_notes = style_note({self._columns[one].name: style for one, style in style_of.items()})
+        notes = (*notes, *style_notes, *reader.notes(self._columns))
+        return Table(self._path, t, found, self._columns, reader.place(self._layout.body), notes)
 
 
-def _blocks(path: Path) -> Iterator[bytes]:
-    """The text in blocks of whole lines, each line ended by one newline but perhaps the last."""
-    line = 1
-    rest = b""
-    zipped = path.name.lower().endswith(".gz")
-    try:
-        with gzip.open(path, "rb") if zipped else path.open("rb") as file:
-            while data := file.read(_BLOCK):
-                if data.endswith(b"\r"):
-                    data += file.read(1)
-                if line == 1 and not rest:
-                    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-                        raise PvidError(f"{path} is UTF-16 text, where UTF-8 is wanted.")
-                    data = data.removeprefix(b"\xef\xbb\xbf")
-                block = rest + data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-                if b"\0" in block:
-                    line += block.count(b"\n", 0, block.index(b"\0"))
-                    raise PvidError(f"{path}, line {line}: a zero byte, so this is not a text file.")
-                end = block.rfind(b"\n") + 1
-                rest = block[end:]
-                if len(rest) >= _BLOCK:
-                    raise PvidError(f"{path}: a line longer than {_BLOCK} bytes, so this is no table of numbers.")
-                if end:
-                    line += block.count(b"\n")
-                    yield block[:end]
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise PvidError(f"{path} is not a whole gzip file: {reason(error)}.") from error
-    if rest:
-        yield rest
+def _layout(lines: Sequence[str], columns: Columns) -> Layout | None:
+    """By the wanted names; a wanted number is first sought as a name, then as a position."""
+    numbered = [one.name for one in columns.named.values() if one.name.isdecimal()]
+    if numbered:
+        found = find(lines, [*columns.wanted, *numbered])
+        if found is not None and all(name in found.names for name in numbered):
+            return found
+    return find(lines, columns.wanted, [int(name) - 1 for name in numbered])
 
 
-def _data_lines(block: bytes, first: int) -> Iterator[tuple[int, str]]:
-    """Number and text of each line of a block that is neither blank nor a comment."""
-    for number, line in enumerate(block.split(b"\n"), first):
-        if not _NO_DATA.fullmatch(line):
-            yield number, line.decode(errors="replace")
+def _front_note(lines: Sequence[str], layout: Layout) -> tuple[str, ...]:
+    """On the lines in front of the first row that are neither blank, comments, names nor units."""
+    front = [
+        number
+        for number, line in enumerate(lines[: layout.body - 1], 1)
+        if line.strip() and not _NO_DATA.match(line.encode()) and number not in (layout.header, layout.units_line)
+    ]
+    notes = () if not layout.units_line else (f"line {layout.units_line} states units",)
+    if not front:
+        return notes
+    at = f"line {front[0]}" if len(front) == 1 else f"{len(front)} lines up to line {front[-1]}"
+    return (f"left out in front of the table: {at}, {shown(lines[front[0] - 1].strip())}", *notes)
 
 
-def _line_of_row(path: Path, body: int, row: int) -> int:
-    """Line of the row counted from 0: searched only on request."""
-    first = 1
-    for block in _blocks(path):
-        for number, _ in _data_lines(block, first):
-            if number >= body:
-                if row == 0:
-                    return number
-                row -= 1
-        first += block.count(b"\n")
-    return first
-
-
-def _from_line(block: bytes, number: int) -> bytes:
-    """A block that begins the file, from a line on."""
+def _from_line(block: bytes, count: int) -> bytes:
+    """A block without its first lines."""
     position = 0
-    for _ in range(number - 1):
+    for _ in range(count):
         position = block.find(b"\n", position) + 1
         if position == 0:
             return b""
     return block[position:]
 
 
-# --- layout ----------------------------------------------------------------------------------------------------
+def _rows_in(block: bytes) -> list[str]:
+    return [line.decode(errors="replace") for line in block.split(b"\n") if line.strip() and not _NO_DATA.match(line)]
 
 
-def _layout(path: Path, block: bytes) -> _Layout:
-    """From the file's first block."""
-    sampled: list[tuple[int, str]] = []
-    for numbered in _data_lines(block, 1):
-        sampled.append(numbered)
-        if len(sampled) == _SAMPLED_LINES:
-            break
-    if not sampled:
-        raise PvidError(f"{path} is empty.")
-    lines = [text for _, text in sampled]
-    separator = _separator(lines)
-    decimal = _decimal(lines, separator)
-    number = sampled[0][0]
-    first = _Layout(separator, decimal, (), number)
-    names = _split(lines[0], separator)
-    if all(first.is_number(name) for name in names):  # no names, unless a comment holds them
-        comment = _comment_before(block, number)
-        held = _split(comment, separator) if comment else []
-        if len(held) != len(names) or all(first.is_number(name) for name in held):
-            held = [str(k + 1) for k in range(len(names))]
-        return _Layout(separator, decimal, tuple(held), number)
-    width = Counter(len(_split(line, separator)) for line in lines[1:]).most_common(1)
-    if width and width[0][0] == len(names) + 1 and lines[1].rstrip(" ").endswith(separator):
-        names.append("")  # each line of numbers ends with a separator
-    return _Layout(separator, decimal, tuple(names), number + 1)
-
-
-def _comment_before(block: bytes, number: int) -> str:
-    """Text of the line in front of a line, without the marks of a comment."""
-    if number < 2:
-        return ""
-    line = block.split(b"\n", number)[number - 2]
-    return line.decode(errors="replace").lstrip("#%/ \t")
-
-
-def _separator(lines: list[str]) -> str:
-    """What divides the lines into the largest number of columns that header and numbers agree on."""
-    most, best = 1, ""
-    for separator in (";", "\t", ","):
-        counts = [len(_split(line, separator)) for line in lines]
-        usual = Counter(counts[1:] or counts).most_common(1)[0][0]
-        if usual > most and abs(counts[0] - usual) <= 1:
-            most, best = usual, separator
-    if best:
-        return best
-    return " " if len(lines[0].split()) > 1 and "," not in lines[0] else ","
-
-
-def _decimal(lines: list[str], separator: str) -> str:
-    cells = (cell for line in lines for cell in _split(line, separator))
-    return "," if any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells) else "."
-
-
-def _split(line: str, separator: str, strict: bool = False) -> list[str]:
-    """Cells of a line. One line is one row: a quoted cell may not run over a line's end."""
-    if separator == " ":
-        line = " ".join(line.split())
-    if '"' in line:
-        try:
-            return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True))]
-        except csv.Error:
-            if strict:
-                raise
-    return [cell.strip() for cell in line.split(separator)]
-
-
-def _is_cut(last: str, before: list[str], layout: _Layout) -> bool:
+def _is_cut(last: str, before: list[str], layout: Layout) -> bool:
     """Whether the last line, which has no end, stops within a number.
 
     It may lack its end (RFC 4180). But a last cell shorter than all others of its column is then taken for the rest of
     a number.
     """
-    if _NO_DATA.fullmatch(last.encode()):
+    if not last.strip() or _NO_DATA.match(last.encode()):
         return False
-    try:
-        cells = layout.cells(last)
-    except csv.Error:
+    cells = split(last, layout.separator, strict=True)
+    if cells is None:
         return True
-    if len(cells) != len(layout.names):
-        return len(cells) < len(layout.names)
-    lengths = [len(_split(line, layout.separator)[-1].lstrip("+-")) for line in before]
+    width = layout.width - int(layout.stamped)
+    if len(cells) != width:
+        return len(cells) < width and (len(cells) > 1 or last.lstrip()[0] in "+-.0123456789")
+    lengths = [
+        len(other[-1].lstrip("+-"))
+        for line in before
+        if (other := split(line, layout.separator)) and len(other) == width
+    ]
     return len(lengths) > 0 and len(cells[-1].lstrip("+-")) < min(lengths)
 
 
-# --- numbers ---------------------------------------------------------------------------------------------------
+def _may_be_thousands(numbers: Sequence[FloatArray]) -> bool:
+    """Whether points could separate thousands: three decimals wherever there are any, and none below 1."""
+    mixed = False
+    for values in numbers:
+        there = np.abs(values[np.isfinite(values)])
+        fractional = there[there != np.floor(there)]
+        if not fractional.size:
+            continue
+        with np.errstate(over="ignore"):
+            thousands = fractional * 1000.0
+        if (fractional < 1.0).any() or (np.abs(thousands - np.round(thousands)) > 1e-9 * thousands).any():
+            return False
+        mixed |= fractional.size < there.size
+    return mixed
 
 
 class _Growing:
@@ -313,91 +297,273 @@ class _Growing:
         self._size = size
 
 
-def _numbers(
-    path: Path, block: bytes, first_line: int, layout: _Layout, places: dict[str, int]
-) -> dict[str, FloatArray]:
-    """The signals in a block [n], in the file's units; NaN where a cell is empty."""
-    clean = block
-    if any(mark in block for mark in _COMMENT_MARKS):
-        clean = _NO_DATA.sub(b"", block)
-    try:
-        return _parsed(clean, layout, places)
-    except (ValueError, csv.Error) as error:
-        without = _NO_DATA.sub(b"", clean)  # of lines of blanks
-        if without != clean:
-            try:
-                return _parsed(without, layout, places)
-            except (ValueError, csv.Error):
-                pass
-        raise _fault(path, block, first_line, layout, places, error) from error
+class _Reader:
+    """Rows of a body, block after block, and what was left out of it."""
 
+    def __init__(self, layout: Layout, places: Mapping[str, int], style_of: Mapping[str, Style], sampled: bool) -> None:
+        self._layout, self._places, self._style_of, self._sampled = layout, places, style_of, sampled
+        self._used = sorted(set(places.values()))
+        self.times = None if "t" in style_of else TimesOfDay()
+        self._comma = any(style.decimal == "," for style in style_of.values())
+        self._compiled = not (
+            layout.labelled
+            or layout.stamped
+            or self.times is not None
+            or any(style.thousands for style in style_of.values())
+            or (self._comma and layout.separator == ",")
+        )
+        self._skipped: list[IntArray] = []
+        self._damaged: list[int] = []
+        self._example = ("", "")
+        self._heads: list[int] = []
+        self._last_row = 0
+        self._missing: dict[str, Counter[str]] = {signal: Counter() for signal in places}
 
-def _parsed(block: bytes, layout: _Layout, places: dict[str, int]) -> dict[str, FloatArray]:
-    """As `_numbers`; ValueError where a line has too few or too many cells, or a cell is not a number."""
-    separator, wanted = layout.separator.encode(), sorted(set(places.values()))
-    if separator == b" ":
-        block = re.sub(rb"[ \t]+", b" ", block)
-        block = re.sub(rb"(?m)^ | $", b"", block)
-    if not block.strip():
-        return {}
-    if b'"' in block:
-        return _from_cells(block.decode(errors="replace"), layout, places)
-    lines = block.rstrip(b"\n").split(b"\n")
-    if {line.count(separator) for line in lines} != {len(layout.names) - 1}:
-        raise ValueError("a line has too few or too many cells")
-    if layout.decimal == ",":
-        if b"." in block:  # in a column that is not wanted, or in a number
-            return _from_cells(block.decode(errors="replace"), layout, places)
-        block = block.replace(b",", b".")
-    if b"_" in block or not block.isascii():
-        return _from_cells(block.decode(errors="replace"), layout, places)
-    try:
-        columns = _loaded(block, layout.separator, wanted)
-    except ValueError:
-        filled = _empty_cell(layout.separator).sub(b"nan", block.rstrip(b"\n"))
-        columns = _loaded(filled, layout.separator, wanted)
-    return {signal: columns[:, wanted.index(place)].copy() for signal, place in places.items()}
+    def rows(self, block: bytes, first: int) -> FloatArray:
+        """Of a block of lines from number `first` on: shape (signals, rows), in the file's units."""
+        if not block.endswith(b"\n"):
+            block += b"\n"
+        lines = _Split(block, self._layout)
+        values = np.full((len(self._places), lines.count), np.nan)
+        is_row = np.zeros(lines.count, np.bool_)
+        careful = np.ones(lines.count, np.bool_)
+        careful[lines.silent] = False
+        if self._compiled:
+            plain = lines.plain(self._comma)
+            for k, row in self._compiled_rows(lines, np.flatnonzero(plain)):
+                values[:, k] = row
+                is_row[k] = True
+                careful[k] = False
+        self._careful_rows(lines, np.flatnonzero(careful), first, values, is_row)
+        self._without_numbers(values, is_row, lines, first)
+        self._skipped.append(first + np.flatnonzero(~is_row))
+        if is_row.any():
+            self._last_row = first + int(np.flatnonzero(is_row)[-1])
+        return values[:, is_row] if not is_row.all() else values
 
+    def _compiled_rows(self, lines: _Split, at: IntArray) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Lines that numpy's reader takes, and their values (signals, lines)."""
+        if not at.size:
+            return
+        text = lines.text(at)
+        if self._layout.separator == " ":
+            text = re.sub(rb"(?m)^ | $", b"", re.sub(rb"[ \t]+", b" ", text))
+        if self._comma:
+            text = text.replace(b",", b".")
+        parsed = self._parsed(text)
+        blank = _BLANK_CELL.get(self._layout.separator)
+        if parsed is None and blank is not None and at.size > _FEW:
+            text = blank.sub(b"nan", text.rstrip(b"\n"))
+            parsed = self._parsed(text)
+        if parsed is not None:
+            yield at, parsed
+        elif at.size > _FEW:
+            half = at.size // 2
+            yield from self._compiled_rows(lines, at[:half])
+            yield from self._compiled_rows(lines, at[half:])
 
-def _loaded(block: bytes, separator: str, wanted: list[int]) -> FloatArray:
-    return np.loadtxt(io.BytesIO(block), delimiter=separator, usecols=wanted, comments=None, ndmin=2)
-
-
-@functools.cache
-def _empty_cell(separator: str) -> re.Pattern[bytes]:
-    """Cells that hold no number."""
-    between = re.escape(separator.encode())
-    cells = b"|".join(re.escape(one.encode()) for one in sorted(_EMPTY_CELLS, key=len, reverse=True))
-    return re.compile(rb"(?m)(?:(?<=" + between + rb")|^)(?:" + cells + rb")(?=" + between + rb"|\r?$)")
-
-
-def _from_cells(block: str, layout: _Layout, places: dict[str, int]) -> dict[str, FloatArray]:
-    """Cell by cell: for quotes, and for whatever else is seldom in a table of numbers."""
-    rows: list[list[float]] = []
-    wanted = sorted(set(places.values()))
-    for line in block.splitlines():
-        cells = layout.cells(line)
-        if len(cells) != len(layout.names) or not all(layout.is_number(cells[place]) for place in wanted):
-            raise ValueError("a cell is not a number")
-        rows.append([layout.number(cells[place]) for place in wanted])
-    columns = np.array(rows, np.float64).reshape(-1, len(wanted))
-    return {signal: columns[:, wanted.index(place)].copy() for signal, place in places.items()}
-
-
-def _fault(
-    path: Path, block: bytes, first_line: int, layout: _Layout, places: dict[str, int], error: Exception
-) -> PvidError:
-    """The refusal of a block's first line that cannot be read."""
-    width = len(layout.names)
-    for number, line in _data_lines(block, first_line):
+    def _parsed(self, text: bytes) -> FloatArray | None:
         try:
-            cells = layout.cells(line)
-        except csv.Error as why:
-            return PvidError(f"{path}, line {number}: a malformed quoted cell ({reason(why)}).")
-        if len(cells) != width:
-            return PvidError(f"{path}, line {number}: {len(cells)} columns where the header has {width}.")
-        for place in places.values():
-            if not layout.is_number(cells[place]):
-                name = layout.names[place]
-                return PvidError(f"{path}, line {number}, column {name}: {shown(cells[place])} is not a number.")
-    return PvidError(f"{path}, from line {first_line}: {reason(error)}.")
+            columns = np.loadtxt(
+                io.BytesIO(text), delimiter=self._layout.separator, usecols=self._used, comments=None, ndmin=2
+            )
+        except ValueError:
+            return None
+        return columns[:, [self._used.index(place) for place in self._places.values()]].T
+
+    def _careful_rows(self, lines: _Split, at: IntArray, first: int, values: FloatArray, is_row: Flags) -> None:
+        """Cell by cell: for whatever is seldom in a table of numbers."""
+        layout = self._layout
+        kept: list[int] = []
+        cells: list[list[str]] = []
+        for k in at.tolist():
+            number = first + k
+            found = layout.cells(lines.line(k))
+            if found is not None and len(found) != layout.width:
+                if len(found) == layout.beside[0] and number <= layout.beside[1]:
+                    pass
+                elif layout.repeats_head(found):
+                    self._heads.append(number)
+                    continue
+                else:
+                    if any(found):
+                        self._damage(number, lines.line(k), f"{len(found)} columns where the header has {layout.width}")
+                    continue
+            if found is None:
+                self._damage(number, lines.line(k), "a malformed line or quoted cell")
+            else:
+                kept.append(k)
+                cells.append(found)
+        if not kept:
+            return
+        bad: dict[int, str] = {}
+        words: list[tuple[int, str, str]] = []
+        for order, (signal, place) in enumerate(self._places.items()):
+            column = [row[place] for row in cells]
+            if signal == "t" and self.times is not None:
+                found_t = self.times.seconds(column)
+                for j in np.flatnonzero(np.isnan(found_t)).tolist():
+                    if not is_missing(column[j]):
+                        bad.setdefault(j, f"column {layout.names[place]}: {shown(column[j])} is not a time")
+                values[order, kept] = found_t
+                continue
+            numbers = self._numbers_of(column, signal)
+            for j in np.flatnonzero(np.isnan(numbers)).tolist():
+                if not is_missing(column[j]):
+                    if self._sampled and is_number(column[j]) and not layout.repeats_head(cells[j]):
+                        raise _OtherStyleError
+                    bad.setdefault(j, f"column {layout.names[place]}: {shown(column[j])} is not a number")
+                elif column[j] and column[j].lower() != "nan":
+                    words.append((j, signal, column[j]))
+            values[order, kept] = numbers
+        for j, signal, word in words:
+            self._missing[signal][word] += int(j not in bad)
+        for j, k in enumerate(kept):
+            if j not in bad:
+                is_row[k] = True
+            elif layout.repeats_head(cells[j]):
+                self._heads.append(first + k)
+            else:
+                self._damage(first + k, lines.line(k), bad[j])
+
+    def _numbers_of(self, column: list[str], signal: str) -> FloatArray:
+        """NaN where a cell is no number."""
+        style = self._style_of[signal]
+        if style == PLAIN:
+            joined = "".join(column)
+            if joined.isascii() and "_" not in joined:
+                try:
+                    return np.array(list(map(float, column)))
+                except ValueError:
+                    pass
+        return np.array([math.nan if (one := style.number(cell)) is None else one for cell in column])
+
+    def _without_numbers(self, values: FloatArray, is_row: Flags, lines: _Split, first: int) -> None:
+        """Rows without a time or without any number are none; overloads are missing."""
+        order = list(self._places)
+        for k, signal in enumerate(order):
+            for j in np.flatnonzero(np.isinf(values[k]) | np.isin(values[k], _NO_NUMBER)).tolist():
+                word = "inf" if math.isinf(values[k, j]) else "9.9E37"
+                if word == "inf" or "E" in lines.line(j):  # not what `write_csv` writes
+                    self._missing[signal][word] += int(is_row[j])
+                    values[k, j] = np.nan
+        timeless = is_row & np.isnan(values[order.index("t")])
+        if timeless.any():
+            for k in np.flatnonzero(timeless).tolist():
+                if not np.isnan(values[:, k]).all():
+                    name = self._layout.names[self._places["t"]]
+                    self._damage(first + k, lines.line(k), f"column {name}: the cell is empty or nan")
+            is_row &= ~timeless
+
+    def _damage(self, number: int, line: str, complaint: str) -> None:
+        if not self._damaged or number < self._damaged[0]:
+            self._example = (line.strip(), complaint)
+            self._damaged.insert(0, number)
+        else:
+            self._damaged.append(number)
+
+    def refuse_many_damaged(self, path: Path, rows: int, columns: Columns) -> None:
+        """Refuses a table of which more than a sensible part is damaged; lines behind the last row do not count."""
+        within = sum(number < self._last_row for number in self._damaged)
+        if not rows:
+            within = len(self._damaged)
+        most = max(_DAMAGED_LINES, int(_DAMAGED_SHARE * (rows + within)))
+        if within > most or (within and not rows):
+            raise PvidError(
+                f"{path}, line {self._damaged[0]}{', ' if self._example[1].startswith('column') else ': '}"
+                f"{self._example[1]}; {within} of {rows + within} lines are no rows of the table."
+            )
+
+    def notes(self, columns: Columns) -> tuple[str, ...]:
+        """On what was left out."""
+        notes = []
+        within = [one for one in self._damaged if one < self._last_row]
+        behind = len(self._damaged) - len(within)
+        if within:
+            count = f"{len(within)} damaged lines, the first is line" if len(within) > 1 else "a damaged line,"
+            notes.append(f"left out: {count} {within[0]}, {shown(self._example[0])}")
+        if behind:
+            last = sorted(self._damaged)[-behind]
+            text = f", {shown(self._example[0])}" if not within else ""
+            notes.append(f"left out behind the table: line{'s from' if behind > 1 else ''} {last}{text}")
+        if self._heads:
+            again = f"{len(self._heads)} times, first in line" if len(self._heads) > 1 else "in line"
+            notes.append(f"the names come again {again} {min(self._heads)} (a restart?)")
+        words = {columns[signal].name: found for signal, found in self._missing.items() if sum(found.values())}
+        if words:
+            parts = [
+                f"{sum(found.values())} of {name} ({listed(shown(one) for one, _ in found.most_common(3))})"
+                for name, found in words.items()
+            ]
+            notes.append(f"cells without a number, taken as missing: {listed(parts)}")
+        return tuple(notes)
+
+    def place(self, body: int) -> Callable[[int], str]:
+        """What calls the line of a row."""
+        skipped = np.concatenate(self._skipped) if self._skipped else np.empty(0, np.int64)
+        rows_before = skipped - body - np.arange(skipped.size)
+        return lambda row: f"line {body + row + int(np.searchsorted(rows_before, row, side='right'))}"
+
+
+class _Split:
+    """Lines of a block: where they begin, and which are plain."""
+
+    def __init__(self, block: bytes, layout: Layout) -> None:
+        self._block, self._layout = block, layout
+        self._bytes = np.frombuffer(block, np.uint8)
+        self._ends = np.flatnonzero(self._bytes == 10)
+        self._starts = np.concatenate([np.zeros(1, np.int64), self._ends[:-1] + 1])
+        self.count = int(self._ends.size)
+
+    @cached_property
+    def silent(self) -> IntArray:
+        """Blank lines and comments."""
+        found = np.flatnonzero(self._starts == self._ends)
+        if any(mark in self._block for mark in (b"#", b"%", b"//", b"sep=")):
+            marked = [match.start() for match in _NO_DATA.finditer(self._block)]
+            found = np.concatenate([found, np.searchsorted(self._ends, marked)])
+        return found.astype(np.int64)
+
+    def plain(self, comma: bool) -> Flags:
+        """Lines with as many cells as a row has, and none in quotes."""
+        separator = self._layout.separator
+        good = np.ones(self.count, np.bool_)
+        if separator == " ":
+            blank = (self._bytes == 32) | (self._bytes == 9)
+            begins = ~blank & (self._bytes != 10)
+            begins[1:] &= blank[:-1] | (self._bytes[:-1] == 10)
+            good &= self._counts(begins) == self._layout.width
+        else:
+            good &= self._have(np.flatnonzero(self._bytes == ord(separator)), self._layout.width - 1)
+        for odd in ('"', "\0", *("." if comma else "")):
+            if odd.encode() in self._block:
+                good &= self._counts(self._bytes == ord(odd)) == 0
+        good[self.silent] = False
+        return good
+
+    def _have(self, at: IntArray, count: int) -> Flags:
+        """Whether each line has `count` of these places."""
+        if at.size == self.count * count:
+            by_line = at.reshape(self.count, count)
+            good: Flags = (by_line[:, 0] >= self._starts) & (by_line[:, -1] < self._ends)
+            if good.all():
+                return good
+        found: Flags = np.diff(np.searchsorted(at, self._ends), prepend=0) == count
+        return found
+
+    def _counts(self, found: Flags) -> IntArray:
+        """In each line."""
+        return np.diff(np.searchsorted(np.flatnonzero(found), self._ends), prepend=0)
+
+    def text(self, at: IntArray) -> bytes:
+        """Of lines."""
+        if at.size == self.count:
+            return self._block
+        breaks = np.flatnonzero(np.diff(at) > 1)
+        firsts, lasts = at[np.concatenate([[0], breaks + 1])], at[np.concatenate([breaks, [at.size - 1]])]
+        spans = zip(self._starts[firsts].tolist(), (self._ends[lasts] + 1).tolist(), strict=True)
+        return b"".join(self._block[low:high] for low, high in spans)
+
+    def line(self, k: int) -> str:
+        """Text of a line."""
+        return self._block[self._starts[k] : self._ends[k]].decode(errors="replace")

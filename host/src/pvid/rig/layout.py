@@ -1,0 +1,329 @@
+"""Where the table is in a text file: names, units, first line of numbers, and what divides the columns.
+
+Instruments write settings, titles and messages in front of a table and beside it; middleware writes the names in a
+comment. The names that are wanted find the line of names; without them it is the last text in front of the numbers.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from pvid.rig.cells import is_missing, is_number
+from pvid.rig.times import is_time
+from pvid.rig.units import is_unit
+
+_NO_DATA = re.compile(r"[ \t]*(?:(?:[#%]|//|sep=).*)?")
+_MARKS = "#%/; \t"  # of a comment
+_GARBAGE = re.compile(r"[^!-~]+")
+_SEPARATORS = (";", "\t", ",", "|", " ")
+_SAMPLED = 400  # lines that the separator is found from
+_LABEL = re.compile(r"([A-Za-z_][^\s:=,;]*)\s*[:=]\s*([^\s:=]*)")
+_DATE = r"\d{4}-\d\d-\d\d[T ]"
+_STAMP = re.compile(rf"\s*\[?((?:{_DATE})?\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?)(?:\]\s*(?:[-=]?>)?|\s*[-=]?>)\s*")
+_MOSTLY = 0.8
+
+STAMP = "stamp"  # name of a monitor's stamps in front of the lines; "t" where no other column is called so
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a table is written.
+
+    Attributes
+    ----------
+    separator : " ": any number of blanks and tabs
+    names : of the columns; positions from 1 where the file has no names
+    units : of the columns, "" where there is none; () where the file states none
+    header, units_line : number of these lines, 0 where there are none
+    body : number of the first line that may be a row
+    labelled : whether each cell repeats its name: `t:1,F:2`
+    stamped : whether a serial monitor's time stands in front of each line
+    width : number of cells of a row
+    beside : the same of the rows that have settings beside them, and the last line of these
+    """
+
+    separator: str
+    names: tuple[str, ...]
+    units: tuple[str, ...] = ()
+    header: int = 0
+    units_line: int = 0
+    body: int = 1
+    width: int = 0
+    labelled: bool = False
+    stamped: bool = False
+    beside: tuple[int, int] = (0, 0)
+
+    def cells(self, line: str) -> list[str] | None:
+        """Of a row, without labels; None where it has too few or too many, or its quotes do not match."""
+        if self.stamped:
+            line, stamp = without_stamp(line)
+        found = split(line, self.separator, strict=True)
+        if found is None:
+            return None
+        if self.stamped:
+            found.insert(0, stamp)
+        if self.labelled:
+            first = int(self.stamped)
+            for k in range(first, len(found)):
+                match = _LABEL.fullmatch(found[k])
+                if match is None or k >= len(self.names) or match[1] != self.names[k]:
+                    return None
+                found[k] = match[2]
+        return found
+
+    def repeats_head(self, cells: Sequence[str]) -> bool:
+        """Whether a line is that of the names again, or that of the units."""
+        first = int(self.stamped)  # the stamp is another one
+        bare = [cells[0].lstrip(_MARKS), *cells[1:]] if cells else []
+        return any(len(one) > first and tuple(bare[first:]) == one[first:] for one in (self.names, self.units) if one)
+
+
+def without_stamp(line: str) -> tuple[str, str]:
+    """A line without the stamp of a serial monitor, and the stamp."""
+    match = _STAMP.match(line)
+    return (line, "") if match is None else (line[match.end() :], match[1])
+
+
+def split(line: str, separator: str, strict: bool = False) -> list[str] | None:
+    """Cells of a line; None when its quotes do not match, or, unless strict, without regard to them.
+
+    One line is one row: a quoted cell may not run over a line's end.
+    """
+    if separator == " ":
+        line = " ".join(line.split())
+    if '"' in line:
+        try:
+            reader = csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)
+            return [cell.strip() for cell in next(reader)]
+        except csv.Error:
+            if strict:
+                return None
+    return [cell.strip() for cell in line.split(separator)]
+
+
+@dataclass(frozen=True)
+class _Line:
+    number: int
+    cells: list[str]
+    bare: list[str]  # without the mark of a comment
+    is_comment: bool
+    kinds: str  # a letter each cell: n number, t time, e missing, x text
+
+    @property
+    def is_blank(self) -> bool:
+        return not any(self.cells)
+
+
+def find(lines: Sequence[str], wanted: Sequence[str], positions: Sequence[int] = ()) -> Layout | None:
+    """The layout of a file that begins with these lines.
+
+    Parameters
+    ----------
+    lines : from the first on
+    wanted : names that the header has, if there is one
+    positions : from 0, of columns that are wanted beside these
+
+    Returns
+    -------
+    None where no line has a number.
+    """
+    stamped = _is_stamped(lines)
+    bare = [without_stamp(line)[0] for line in lines] if stamped else lines
+    sought = [one for one in wanted if not (stamped and one in ("t", STAMP))]
+    found: list[tuple[tuple[bool, float], Layout]] = []
+    for separator in _SEPARATORS:
+        table = _table(bare, separator, sought, [one - int(stamped) for one in positions])
+        if table is not None:
+            found.append(table)
+    if not found:
+        return None
+    layout = max(found, key=lambda one: one[0])[1]
+    if stamped:
+        stamp = STAMP if "t" in layout.names else "t"
+        units = ("", *layout.units) if layout.units else ()
+        wide, last = layout.beside
+        names, width = (stamp, *layout.names), layout.width + 1
+        layout = replace(layout, stamped=True, names=names, units=units, width=width, beside=(wide + 1, last))
+    return layout
+
+
+def _is_stamped(lines: Sequence[str]) -> bool:
+    seen = [line for line in lines[:_SAMPLED] if line.strip()]
+    return sum(_STAMP.match(line) is not None for line in seen) > _MOSTLY * len(seen)
+
+
+def _table(
+    lines: Sequence[str], separator: str, wanted: Sequence[str], positions: Sequence[int]
+) -> tuple[tuple[bool, float], Layout] | None:
+    """The layout if this is the separator, and how well it fits; None where it divides nothing."""
+    sampled = [*_read(lines, separator, range(min(len(lines), _SAMPLED)))]
+    head = _head(sampled, wanted)
+    if head is None and wanted and len(lines) > _SAMPLED:
+        at = [k for k in range(_SAMPLED, len(lines)) if all(name in lines[k] for name in wanted)][:3]
+        further = _head([*_read(lines, separator, at)], wanted)
+        if further is not None:
+            sampled += _read(lines, separator, range(further[0].number, min(len(lines), further[0].number + _SAMPLED)))
+            head = further
+    after = [one for one in sampled if head is None or one.number > head[0].number]
+    labelled = _labels(after if head is None else [])
+    if labelled is not None:
+        names, first = labelled
+        return (True, float(len(names))), Layout(separator, names, body=first, width=len(names), labelled=True)
+    rows = [one for one in after if not one.is_comment and len(one.cells) > 1 and _has_number(one)]
+    if not rows:
+        if head is None or len(head[1]) < 2:
+            return None
+        names, number = tuple(head[1]), head[0].number
+        return (True, 0.0), Layout(separator, names, header=number, body=number + 1, width=len(names))
+    width = Counter(len(one.cells) for one in rows).most_common(1)[0][0]
+    usual = [one for one in rows if len(one.cells) == width]
+    numeric = sum(sum(kind in "nt" for kind in one.kinds) for one in usual) / len(rows)
+    layout = _with_head(separator, sampled, usual, head, (wanted, positions))
+    return (head is not None, numeric**2 / width), layout
+
+
+def _read(lines: Sequence[str], separator: str, at: Iterable[int]) -> Iterator[_Line]:
+    for k in at:
+        cells = split(lines[k], separator) or [""]
+        bare = split(lines[k].lstrip(_MARKS), separator) or [""] if lines[k][:1] in _MARKS else cells
+        yield _Line(k + 1, cells, bare, _NO_DATA.fullmatch(lines[k]) is not None, "".join(map(_kind, cells)))
+
+
+def _kind(cell: str) -> str:
+    if is_missing(cell):
+        return "e"
+    if is_number(cell):
+        return "n"
+    return "t" if is_time(cell) else "x"
+
+
+def _has_number(line: _Line) -> bool:
+    return "n" in line.kinds or "t" in line.kinds
+
+
+def _head(lines: Sequence[_Line], wanted: Sequence[str]) -> tuple[_Line, list[str]] | None:
+    """The first line with all names, and its names as wanted: with the mark of a comment or without."""
+    if not wanted:
+        return None
+    for line in lines:
+        if len(line.cells) < len(wanted):
+            continue
+        for cells in (line.cells, line.bare, [_GARBAGE.sub("", line.cells[0]), *line.cells[1:]]):
+            if cells[0] and not cells[0].strip(_MARKS):
+                continue  # the mark of a comment is no name
+            if all(name in cells for name in wanted):
+                return line, cells
+    return None
+
+
+def _labels(lines: Sequence[_Line]) -> tuple[tuple[str, ...], int] | None:
+    """Names of cells such as `F:1.5`, and the number of the first line that has them."""
+    found: Counter[tuple[str, ...]] = Counter()
+    first: dict[tuple[str, ...], int] = {}
+    for line in lines:
+        matches = [_LABEL.fullmatch(cell) for cell in line.cells]
+        if len(matches) > 1 and all(one is not None and (is_number(one[2]) or is_missing(one[2])) for one in matches):
+            names = tuple(one[1] for one in matches if one is not None)
+            found[names] += 1
+            first.setdefault(names, line.number)
+    if not found:
+        return None
+    names, times = found.most_common(1)[0]
+    return (names, first[names]) if times > _MOSTLY * len([one for one in lines if not one.is_blank]) else None
+
+
+def _with_head(
+    separator: str,
+    lines: Sequence[_Line],
+    usual: Sequence[_Line],
+    head: tuple[_Line, list[str]] | None,
+    sought: tuple[Sequence[str], Sequence[int]],
+) -> Layout:
+    """With the names in front of the numbers, and the units; `usual` are lines of the table's width."""
+    width = len(usual[0].cells)
+    numbers = [k for k in range(width) if sum(one.kinds[k] in "nte" for one in usual) >= _MOSTLY * len(usual)]
+    if head is None:
+        head = _guessed(lines, _first(usual, numbers), width, numbers)
+    names = [str(k + 1) for k in range(width)] if head is None else list(head[1])
+    if len(names) == width + 1 and not names[-1]:
+        names.pop()
+    elif len(names) == width - 1:
+        if not any(one.cells[-1] for one in usual):
+            names.append("")  # each row ends with a separator
+        elif _counts([one.cells[0] for one in usual]):
+            names.insert(0, "")  # numbers of the rows
+    wanted, positions = sought
+    if all(name in names for name in wanted):
+        used = {*(names.index(name) for name in wanted), *positions}
+        numbers = [k for k in used if 0 <= k < width] or numbers
+    first = _first(usual, numbers)
+    number = 0 if head is None else head[0].number
+    wide = [one for one in lines if number < one.number and len(one.cells) > width and _has_number(one)]
+    wide = [one for one in wide if one.number < first and all(one.kinds[k] in "nte" for k in numbers)]
+    beside = (len(wide[-1].cells), wide[-1].number) if wide else (0, 0)
+    if wide:
+        first = wide[0].number
+    between = [one for one in lines if number < one.number < first and not one.is_blank] if number else []
+    units = next((one for one in between if _are_units(one, len(names))), None)
+    return Layout(
+        separator,
+        tuple(names),
+        () if units is None else tuple(units.bare),
+        number,
+        0 if units is None else units.number,
+        first,
+        width if wide else len(names),
+        beside=beside,
+    )
+
+
+def _first(usual: Sequence[_Line], numbers: Sequence[int]) -> int:
+    """Number of the first row."""
+    rows = (one.number for one in usual if all(one.kinds[k] in "nte" for k in numbers) and _has_number(one))
+    return next(rows, usual[0].number)
+
+
+def _guessed(lines: Sequence[_Line], first: int, width: int, numbers: Sequence[int]) -> tuple[_Line, list[str]] | None:
+    """The names in front of the first row when none of them is wanted."""
+    before = [one for one in lines if one.number < first and not one.is_blank]
+    text = []
+    for one in reversed(before):
+        named = len(one.cells) == width and not any(one.kinds[k] in "nt" for k in numbers if k < width)
+        if one.is_comment or not named:
+            break
+        text.append(one)
+    if not text and before and not before[-1].is_comment and len(before[-1].cells) > 1:
+        return (before[-1], before[-1].cells) if not _has_number(before[-1]) else None
+    if not text:
+        held = [one for one in before if one.is_comment and len(one.bare) == width and not _are_numbers(one)]
+        return (held[-1], held[-1].bare) if held else None
+    for k, one in enumerate(text[:-1]):
+        if _are_units(one, width):
+            return text[k + 1], text[k + 1].cells
+    return text[0], text[0].cells
+
+
+def _are_numbers(line: _Line) -> bool:
+    return all(is_number(cell) for cell in line.bare)
+
+
+def _are_units(line: _Line, width: int) -> bool:
+    """Whether a line states units: half of its cells or more, the others being blank or words, and no number."""
+    cells = line.bare
+    if len(cells) != width or "n" in line.kinds:
+        return False
+    filled = [cell for cell in cells if cell]
+    known = sum(is_unit(cell) for cell in filled)
+    return known > 0 and 2 * known >= len(filled)
+
+
+def _counts(cells: Sequence[str]) -> bool:
+    """Whether cells are 0, 1, 2, ... or 1, 2, 3, ..."""
+    try:
+        return [int(cell) - int(cells[0]) for cell in cells] == list(range(len(cells))) and int(cells[0]) in (0, 1)
+    except ValueError:
+        return False

@@ -1,0 +1,112 @@
+"""Lines of a text file in any usual encoding, in blocks of UTF-8 whose lines end in one newline each.
+
+UTF-8 and UTF-16 are recognised, with a byte order mark or without; what is neither is Windows-1252, line by line, so
+that garbage from a serial port does not change the encoding of the rest.
+"""
+
+from __future__ import annotations
+
+import codecs
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, cast
+
+from pvid.base.errors import PvidError
+from pvid.base.wording import reason
+
+BLOCK = 1 << 20  # bytes read at a time, and the longest line
+
+_GZIP = b"\x1f\x8b\x08"
+_SEEN = 4096  # bytes that the encoding is found from
+# Of UTF-16 text of mostly ASCII characters, every second byte is zero.
+_ZEROS = 0.4
+# Of a text file, damaged or not, at most this part is zero bytes and control characters.
+_CONTROL_SHARE = 0.05
+_CONTROL = re.compile(rb"[\0-\x06\x0e-\x1a\x1c-\x1f]")
+
+
+def blocks(path: Path) -> Iterator[bytes]:
+    """The text in blocks of whole lines, each line ended by one newline but perhaps the last.
+
+    Raises
+    ------
+    PvidError
+        Where the file is no text, or a gzip file that is not whole.
+    """
+    try:
+        with path.open("rb") as plain:
+            zipped = path.name.lower().endswith(".gz") or plain.read(3) == _GZIP
+        with gzip.open(path, "rb") if zipped else path.open("rb") as file:
+            yield from _lines(path, cast("BinaryIO", file))
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise PvidError(f"{path} is not a whole gzip file: {reason(error)}.") from error
+
+
+def blocks_of(text: str) -> Iterator[bytes]:
+    """The same of a text that is in memory."""
+    yield from _lines(Path("text"), io.BytesIO(text.encode()))
+
+
+def _lines(path: Path, file: BinaryIO) -> Iterator[bytes]:
+    first = file.read(BLOCK)
+    mark, encoding = _encoding(first)
+    first = first[mark:]
+    decoder = codecs.getincrementaldecoder(encoding)("replace") if encoding else None
+    rest, line = b"", 1
+    data = first
+    while data:
+        if decoder is not None:
+            data = decoder.decode(data).encode("utf-8", "replace")
+        if data.endswith(b"\r"):
+            following = file.read(1 if decoder is None else 2)
+            data += following if decoder is None else decoder.decode(following).encode("utf-8", "replace")
+        if line == 1 and not rest and len(_CONTROL.findall(data)) > _CONTROL_SHARE * len(data):
+            at = data.count(b"\n", 0, cast("re.Match[bytes]", _CONTROL.search(data)).start())
+            raise PvidError(f"{path}, line {line + at}: zero bytes or control characters, so this is not a text file.")
+        block = rest + data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        end = block.rfind(b"\n") + 1
+        rest = block[end:]
+        if len(rest) >= BLOCK:
+            raise PvidError(f"{path}: a line longer than {BLOCK} bytes, so this is no table of numbers.")
+        if end:
+            line += block.count(b"\n")
+            yield _in_utf_8(block[:end])
+        data = file.read(BLOCK)
+    if rest:
+        yield _in_utf_8(rest)
+
+
+def _encoding(first: bytes) -> tuple[int, str]:
+    """How many bytes of mark the file begins with, and its encoding: "" where it is UTF-8 or bytes."""
+    if first.startswith(codecs.BOM_UTF8):
+        return 3, ""
+    marked = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}.get(first[:2], "")
+    seen = first[2 if marked else 0 : _SEEN]
+    seen = seen[: len(seen) // 2 * 2]
+    zeros = {"utf-16-be": seen[0::2].count(0), "utf-16-le": seen[1::2].count(0)}
+    found = max(zeros, key=lambda one: zeros[one])
+    if seen and zeros[found] > _ZEROS * len(seen) / 2:
+        return (2 if marked else 0), found
+    return (2 if marked else 0), ""  # a mark without UTF-16 behind it is garbage
+
+
+def _in_utf_8(block: bytes) -> bytes:
+    if block.isascii():
+        return block
+    try:
+        block.decode()
+        return block
+    except UnicodeDecodeError:
+        return b"\n".join(map(_line_in_utf_8, block.split(b"\n")))
+
+
+def _line_in_utf_8(line: bytes) -> bytes:
+    try:
+        line.decode()
+        return line
+    except UnicodeDecodeError:
+        return line.decode("cp1252", "replace").encode()
