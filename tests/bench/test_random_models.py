@@ -1,21 +1,61 @@
-"""Random descriptions, in short: a report or one sentence, never a traceback."""
+"""Random rigs the whole road, in short."""
 
 from __future__ import annotations
 
-import random
+from pathlib import Path
 
-from bench.random_models import described, run
+import numpy as np
+import pytest
+
+from bench.random_models import Road, roads, table_of
+from bench.random_motion import random_run
+from bench.random_rigs import IN_C, KINDS, random_rig
+
+SHORT = (2, 3)  # seeds
 
 
-def test_every_random_description_is_reported_or_refused_in_one_sentence() -> None:
-    tally = run(range(40))
-    assert tally.tracebacks == []
-    assert tally.count["refused"] > 10
-    assert tally.count["identifiable"] > 10
-    assert tally.count["not identifiable"] > 0
+@pytest.mark.parametrize("seed", SHORT)
+def test_a_random_rig_goes_the_whole_road(seed: int) -> None:
+    (road,) = roads(range(seed, seed + 1))
+    assert road.failures == []
+    assert {"identify", "f32", "q31", "build", "compile", "deploy", "fixed deploy"} <= set(road.reached)
 
 
-def test_a_seed_describes_the_same_model_again() -> None:
-    for seed in (0, 2, 3, 5):
-        one, other = (described(random.Random(seed)) for _ in range(2))
-        assert [each.expression for each in one.equations] == [each.expression for each in other.equations]
+def test_every_kind_draws_the_same_rig_again_and_others_from_other_seeds() -> None:
+    for kind in KINDS:
+        texts = [random_rig(seed, kind).text for seed in (1, 1, 2)]
+        assert texts[0] == texts[1] != texts[2]
+
+
+def test_the_grammar_draws_every_feature_that_real_rigs_have() -> None:
+    drawn = {one for seed in range(300) for one in random_rig(seed).features}
+    wanted = {
+        *("friction of a measured speed", "measured supply", "no inductance", "no mass", "force cell", "accelerometer"),
+        *("no input", "integral", "encoder offset", "truth 0", "more than 8 unknowns", "hidden coordinate", "feedback"),
+        *("steps", "sines", "prbs", "chirp", "held input", "sampled input", "measured drive", "Lagrangian", "gyro"),
+        *("air drag", "cubic spring", "constant load", "base motion", "dry friction", "measured speed"),
+    }
+    assert wanted <= drawn
+    assert max(len(random_rig(seed).truth) for seed in range(300)) > IN_C
+
+
+def test_a_block_slides_and_stops_as_coulomb_says(tmp_path: Path) -> None:
+    """A vehicle that coasts down without drag: v falls by Fr/m a second, and it then stays."""
+    rig = next(one for seed in range(999) if "no input" in (one := random_rig(seed, "vehicle")).features)
+    values = dict(zip([*rig.truth, "m"], range(9), strict=False))
+    bare = [0.0 if name in ("b", "cw") else rig.values[place] for name, place in values.items()]
+    decay = bare[values["Fr"]] / bare[values["m"]]
+    stop = rig.start[0] / decay
+    run = random_run(type(rig)(**{**vars(rig), "values": bare, "lasts": 2 * stop, "pace": 1 / stop}), 1, tmp_path)
+    v, t = run.signals["v"], run.signals["t"]
+    step = run.rig.sensed[0].resolution
+    assert np.abs(v - np.maximum(rig.start[0] - decay * t, 0.0)).max() < 5 * step
+    assert run.stuck == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_table_counts_failures_by_kind() -> None:
+    some = [Road(1, "cell", [], "good", {"E": 0.5}), Road(2, "cell", [], "warning", {"E": -1.5}, ["f32: bits differ"])]
+    header, whole = table_of(some)
+    assert header[:8] == ("cell", "2", "1", "1", "1", "0", "0", "1.00")
+    assert header[8] == "0.5"
+    assert whole[0] == "all"

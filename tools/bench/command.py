@@ -18,6 +18,7 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
+from pvid.core.sources import build_folder
 
 if TYPE_CHECKING:
     from bench.recorded_rigs import Rig
@@ -695,16 +696,22 @@ def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
 
 @bench.command(name="random-models")
 @UPDATE
-@click.option("--count", default=10_000, show_default=True, help="Of models.")
-@click.option("--first", default=0, show_default=True, help="Seed of the first one.")
-def bench_random_models(update: Path | None, count: int, first: int) -> int:
-    """`pvid model check` of random descriptions: a report or one sentence, never a traceback."""
+@click.option("--count", default=2000, show_default=True, type=click.IntRange(min=1), help="Of rigs.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the first rig.")
+@click.option("--resume", is_flag=True, help="Go on behind the rigs of an earlier run of this seed on this code.")
+def bench_random_models(update: Path | None, count: int, seed: int, resume: bool) -> int:
+    """Random rigs the whole road: check, identify in float64 and in C, refine, build, compile, equal bits."""
     from bench import random_models
 
-    with progress_bar("models", count) as advance:
-        tally = random_models.run(range(first, first + count), advance)
-    put_table(update, "random-models", markdown(random_models.HEADER, [tally.row()]))
+    kept = build_folder() / f"random-models-{seed}.jsonl"
+    if not resume:
+        kept.unlink(missing_ok=True)
+    with progress_bar("rigs", count) as advance:
+        found = random_models.roads(range(seed, seed + count), kept, advance)
+    put_table(update, "random-models", markdown(random_models.HEADER, random_models.table_of(found)))
     put_table(update, "compile-times", markdown(random_models.COMPILE_HEADER, random_models.compile_times()))
-    for seed, error in tally.tracebacks[:20]:
-        click.echo(f"pvid: seed {seed}: {error}", err=True)
-    return DIFFERENT if tally.tracebacks else DONE
+    failed = [one for one in found if one.failures]
+    for one in failed:
+        for failure in one.failures:
+            write_stderr(f"pvid: rig {one.seed} ({one.kind}): {failure}")
+    return DIFFERENT if failed else DONE

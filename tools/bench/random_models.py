@@ -1,81 +1,407 @@
-"""Random descriptions of mechanisms: `check` of each is a report or one sentence, never a traceback.
+"""Random rigs the whole road: model file, check, a recording by an integrator that is not pvid's, identification in
+float64 and in C, both stages, generated files, the compiler's words, the deployed example, equal bits.
 
-Half of them are mechanisms with a fault or none (Lagrangians, linear systems with hidden coordinates); the other half
-are expressions without sense.
+A failure is an exception, a C compiler's word, a road that does not end, bits that differ from the twin's, a wrong
+answer that is called good, or a run that determines every parameter well and is not identified.
 """
 
 from __future__ import annotations
 
-import random
+import json
+import math
+import os
+import signal
+import statistics
+import subprocess
+import tempfile
 import time
+import traceback
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
 
-import sympy as sp
+import numpy as np
 from sympy.core.cache import clear_cache
 
+from bench.random_motion import RandomRun, random_run
+from bench.random_rigs import IN_C, random_rig
 from pvid.base.errors import PvidError
-from pvid.model import Integral, Model, cos, sgn, sin
+from pvid.cli.mechanism import recording_of
+from pvid.codegen import build as generated
+from pvid.core.host_compiler import compiled_once, host_compiler
+from pvid.core.sources import INCLUDES, core_sources
+from pvid.deploy.deployment import Deployment
+from pvid.deploy.example import expected
+from pvid.deploy.of_rig import deployment_f32, deployment_q31
+from pvid.deploy.targets import write_package
 from pvid.model.identifiability import identifiable
 from pvid.model.report import check_report
-from pvid.model.signals import Jet
 from pvid.models import mechanisms
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.run.compare import Comparison
+from pvid.run.engine_design import config_for_recording
+from pvid.run.engine_design_q31 import FixedEngine, engine_for_recording
+from pvid.run.engine_files_q31 import config_of, files_of
+from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism
+from pvid.run.mechanism_advice import advice_on
+from pvid.run.mechanism_compare import compare_recording
+from pvid.run.mechanism_core import identify_in_c
+from pvid.run.refine_design import refine_design
+from pvid.run.refined_core import compare_both, refined_in_c
+from pvid.run.refined_mechanism import refined_answer
+from pvid.settings.enums import Core
+from pvid.settings.refine import RefineConfig
+from pvid.settings.weak import WeakConfig
 
-HEADER = ("models", "compiled", "identifiable", "not identifiable", "refused", "tracebacks", "longest [s]")
-_UNITS = ("s", "m", "rad", "kg*m^2", "1/s", "mm", "V", "furlong", "A*", "deg")
+HEADER = (
+    "kind",
+    "rigs",
+    "failures",
+    "good",
+    "warning",
+    "not identified",
+    "refused",
+    "median error [s.e.]",
+    "largest of good",
+    "second stage in C",
+    "fixed point",
+)
+COMPILE_HEADER = ("mechanism", "theta", "unknowns", "compiled in [s]", "judged in [s]")
+
+_LIMIT_S = 240.0  # processor time of a rig: a road that takes longer has no end
+_WRONG_SE, _WRONG = 5.0, 0.02  # a good answer is wrong beyond so many standard errors and this part of the value
+_DETERMINED = 3e-3  # a relative standard error that no estimate need exceed is a parameter that the run determines
+_LAST_DIGIT = 2e-4  # of the five that the example prints
+_WARNINGS = (
+    *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wcast-align", "-Wcast-qual", "-Wconversion", "-Wvla", "-Wundef"),
+    *("-Wdouble-promotion", "-Wfloat-equal", "-Wmissing-prototypes", "-Wshadow", "-Wstrict-prototypes"),
+)
+_STRICT = ("-std=c99", "-O0", "-ffp-contract=off", *_WARNINGS)
+_USUAL = ("-std=c99", "-O0", "-Werror", "-Wall", "-Wextra")  # of a user, for a package
+_NUMBERS = ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
 
 
 @dataclass
-class Tally:
-    """Outcomes of many descriptions.
+class Road:
+    """What became of a rig.
 
     Attributes
     ----------
-    count : of each kind of outcome
-    causes : first words of the refusals
-    tracebacks : (seed, error) of what must not happen
-    longest : processor time of the slowest one [s], and its seed
+    outcome : of the identification in float64: good, warning, not identified, refused
+    errors : by unknown: error over standard error
+    failures : what must not happen, each with its stage
+    refusals : by stage: the sentence
+    reached : stages that did what they are for
+    seconds : processor time, that of compilers included
     """
 
-    count: Counter[str] = field(default_factory=Counter)
-    causes: Counter[str] = field(default_factory=Counter)
-    tracebacks: list[tuple[int, str]] = field(default_factory=list)
-    longest: tuple[float, int] = (0.0, -1)
+    seed: int
+    kind: str
+    features: list[str]
+    outcome: str = "refused"
+    errors: dict[str, float] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
+    refusals: dict[str, str] = field(default_factory=dict)
+    reached: list[str] = field(default_factory=list)
+    seconds: float = 0.0
 
-    def row(self) -> tuple[str, ...]:
-        """Cells of the table."""
-        compiled = self.count["identifiable"] + self.count["not identifiable"]
-        numbers = (compiled + self.count["refused"] + len(self.tracebacks), compiled, self.count["identifiable"])
-        rest = (self.count["not identifiable"], self.count["refused"], len(self.tracebacks))
-        return (*map(str, numbers + rest), f"{self.longest[0]:.2f} (seed {self.longest[1]})")
-
-
-def run(seeds: range, advance: Callable[[int], None] = lambda done: None) -> Tally:
-    """Describes, compiles and reports one model for each seed."""
-    tally = Tally()
-    for seed in seeds:
-        began = time.process_time()
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """A part of the road: a refusal is kept with its sentence, an exception is a failure."""
         try:
-            model = described(random.Random(seed))
-            compiled = model.compiled("random")
-            text = check_report(compiled)
-            assert "sum of theta * N = Y" in text
-            tally.count["not identifiable" if "Not identifiable: " in text else "identifiable"] += 1
+            yield
         except PvidError as error:
-            cause = str(error)
-            if "\n" in cause or len(cause) < 20:
-                tally.tracebacks.append((seed, f"not a sentence: {cause!r}"))
-            tally.count["refused"] += 1
-            tally.causes[" ".join(cause.split(": ", 1)[-1].split()[:4])] += 1
+            sentence = str(error)
+            if "\n" in sentence or len(sentence) < 20 or _is_of_machinery(sentence):
+                self.failures.append(f"{name}: no sentence: {sentence!r}")
+            self.refusals[name] = sentence
+        except _TooLongError:
+            raise
         except Exception as error:  # what is looked for
-            tally.tracebacks.append((seed, f"{type(error).__name__}: {error}"))
-        tally.longest = max(tally.longest, (time.process_time() - began, seed))
-        advance(seed - seeds.start + 1)
-    return tally
+            frames = traceback.extract_tb(error.__traceback__)
+            where = next((one for one in reversed(frames) if "/pvid/" in one.filename), frames[-1])
+            place = f"{Path(where.filename).name}:{where.name}"
+            self.failures.append(f"{name}: {type(error).__name__} in {place}: {error}")
+        else:
+            self.reached.append(name)
 
 
-COMPILE_HEADER = ("mechanism", "theta", "unknowns", "compiled in [s]", "judged in [s]")
+class _TooLongError(Exception):
+    """The limit of time of a rig."""
+
+
+def _is_of_machinery(sentence: str) -> bool:
+    """Whether a refusal is that of a compiler or of the core for what the generator or the design got wrong."""
+    return "C compiler refused" in sentence or "core refused" in sentence
+
+
+def road_of(seed: int, kind: str | None = None) -> Road:
+    """Takes the rig of a seed the whole road."""
+    rig = random_rig(seed, kind)
+    road = Road(seed, rig.kind, sorted(rig.features))
+    began = _processor_s()
+
+    def stop(*_: object) -> None:
+        raise _TooLongError
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, _LIMIT_S)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            _travel(road, random_run(rig, seed, Path(folder)), Path(folder))
+    except _TooLongError as error:
+        last = next(one for one in reversed(traceback.extract_tb(error.__traceback__)) if "/pvid/" in one.filename)
+        road.failures.append(f"no end within {_LIMIT_S:g} s, in {Path(last.filename).name}:{last.name}")
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+    road.seconds = round(_processor_s() - began, 1)
+    return road
+
+
+def _processor_s() -> float:
+    own = os.times()
+    return own.user + own.system + own.children_user + own.children_system
+
+
+def _travel(road: Road, run: RandomRun, folder: Path) -> None:
+    path, recorded = folder / "rig.py", folder / "run.csv"
+    path.write_text(run.rig.text, encoding="utf-8")
+    table = np.stack(list(run.signals.values()), 1)
+    np.savetxt(recorded, table, fmt="%.10g", delimiter=",", header=",".join(run.signals), comments="")
+    possible = False
+    with road.stage("check"):
+        compiled = mechanisms.compiled_of(path)
+        possible = identifiable(compiled).identifiable
+        assert "sum of theta * N = Y" in check_report(compiled)
+    if "check" not in road.reached:
+        return
+    with road.stage("identify"):
+        recording, model = recording_of(recorded, MechanismRig(str(path)), None)
+        answer = identify_mechanism(recording, model)
+        json.dumps(answer.as_json(), allow_nan=False)
+        list(advice_on(answer))
+    if "identify" not in road.reached:
+        return
+    verdict = answer.found.verdict
+    road.outcome = verdict.status.replace("_", " ")
+    _judge(road, run, answer.values, good=verdict.status == "good")
+    if possible and not answer.identified and run.stuck < 0.5:
+        worst = max(one / _size(run, name) for name, one in run.bound.items())
+        if worst < _DETERMINED:
+            told = "; ".join(one.text for one in verdict.reasons if one.alarm) or "no reason"
+            road.failures.append(f"identify: withheld, of a run that determines all to {100 * worst:.2g} %: {told}")
+    with road.stage("refine"):
+        refined, _, _ = refined_answer(answer)
+        json.dumps(refined.as_json(), allow_nan=False)
+        if refined is not answer:
+            _judge(road, run, refined.values, good=verdict.status == "good", stage="refine")
+    _in_c(road, run, answer)
+    _built(road, answer, folder)
+
+
+def _size(run: RandomRun, name: str) -> float:
+    """What the error of an unknown is relative to."""
+    return max(abs(run.rig.truth[name]), run.rig.small.get(name, 0.0))
+
+
+def _judge(road: Road, run: RandomRun, values: dict[str, Value] | Any, *, good: bool, stage: str = "identify") -> None:
+    """Errors of an answer; one that is called good and is wrong is a failure."""
+    wrong = []
+    for name, truth in run.rig.truth.items():
+        one = values.get(name)
+        if one is None or one.value is None or not one.se:
+            continue
+        error = one.value - truth
+        if stage == "identify":
+            road.errors[name] = error / one.se
+        if abs(error) > _WRONG_SE * one.se and abs(error) > _WRONG * _size(run, name):
+            wrong.append(f"{name} {100 * error / _size(run, name):+.2g} % ({error / one.se:+.2g} s.e.)")
+    if wrong and good:
+        road.failures.append(f"{stage}: good and wrong: {', '.join(wrong)}")
+
+
+def _in_c(road: Road, run: RandomRun, answer: MechanismAnswer) -> None:
+    """Both cores and the second stage, and their bits beside those of the twins."""
+    model, recording, ranking = answer.model, answer.recording, answer.ranking
+    core: Core
+    for core in ("f32", "q31"):
+        with road.stage(core):
+            found = identify_in_c(answer, core)
+            json.dumps(found.as_json(), allow_nan=False)
+            if found.identified:
+                _judge(road, run, found.values, good=found.verdict.status == "good", stage=core)
+            if core == "f32":
+                first, second = compare_both(model, recording, ranking=ranking)
+                _equal(road, "f32", first)
+                if isinstance(second, Comparison):
+                    _equal(road, "second stage", second)
+                with road.stage("second stage"):
+                    both = refined_in_c(found)
+                    json.dumps(both.as_json(), allow_nan=False)
+                    if both.adopted and both.identified:
+                        _judge(road, run, both.values, good=found.verdict.status == "good", stage="second stage")
+            else:
+                _equal(road, core, compare_recording(model, recording, core, ranking=ranking))
+
+
+def _equal(road: Road, stage: str, found: Comparison) -> None:
+    if not found.equal:
+        road.failures.append(f"{stage}: bits differ: {found.difference}")
+
+
+def _built(road: Road, answer: MechanismAnswer, folder: Path) -> None:
+    """Generated files and packages, compiled with the project's warnings as errors, and what they print."""
+    compiled, recording, ranking = answer.model, answer.recording, answer.ranking
+    design: WeakConfig | None = None
+    engine: FixedEngine | None = None
+    refine: RefineConfig | None = None
+    with road.stage("design"):
+        design = config_for_recording(compiled, recording, ranking=ranking)
+    with road.stage("fixed design"):
+        engine = engine_for_recording(compiled, recording, ranking=ranking)
+    if design is not None and generated.refine_refusal(compiled) is None:
+        with road.stage("second design"):
+            refine = refine_design(compiled, design, recording.signals)
+    files = folder / "generated"
+    with road.stage("build"):
+        fixed = {} if engine is None else files_of(engine, "bench") | config_of(engine, "bench")
+        options = generated.Options(design=design, fixed_weak=fixed, refine_design=refine)
+        generated.build(compiled, files, "bench", options)
+    if "build" in road.reached:
+        with road.stage("compile"):
+            _compile(road, files, compiled.name, design is not None, engine is not None, refine is not None)
+    deployed: list[tuple[str, Callable[[], Deployment]]] = []
+    if design is not None:
+        deployed.append(("deploy", lambda: deployment_f32(compiled, design, recording.signals, "bench", refine)))
+    if engine is not None:
+        deployed.append(("fixed deploy", lambda: deployment_q31(engine, recording.signals, "bench")))
+    for name, made in deployed:
+        with road.stage(name):
+            _play(road, name, made(), folder / name.replace(" ", "_"))
+
+
+def _compile(road: Road, files: Path, name: str, designed: bool, fixed: bool, second: bool) -> None:
+    """Every file of a folder; its test runs."""
+    own = [f"-I{files}", *INCLUDES]
+    plain = [files / f"{name}_{one}.c" for one in ("f32", "q31", "test")]
+    core = [one for one in core_sources() if one.stem in _NUMBERS]
+    program = str(files / "it")
+    sources = [str(one) for one in [*plain, *core] if one.exists()]
+    done = _cc(road, [*_STRICT, "-DPVID_PLAIN_NAMES", *own, *sources, "-o", program, "-lm"])
+    if done:
+        ran = subprocess.run([program], capture_output=True, text=True, check=False)
+        if ran.returncode != 0:
+            road.failures.append(f"compile: {name}_test fails: {(ran.stdout + ran.stderr).strip()[-200:]}")
+    units = []
+    if designed:
+        units.append((f"{name}_weak_f32.c", f"{name}_config.h", f"{name}_design_f32.h"))
+    if second:
+        units.append(("", f"{name}_config.h", f"{name}_refine_design_f32.h"))
+    if fixed:
+        units.append((f"{name}_weak_q31.c", f"{name}_config_q31.h", f"{name}_design_q31.h"))
+    for source, sizes, header in units:
+        user = files / f"user_of_{header}.c"
+        user.write_text(f'#include "{header}"\nint used(void);\nint used(void) {{ return 0; }}\n', encoding="utf-8")
+        inputs = [str(user), *([str(files / source)] if source else [])]
+        flags = [*_STRICT, "-Wno-unused", f'-DPVID_CONFIG_HEADER="{sizes}"', "-fsyntax-only"]
+        _cc(road, [*flags, *(["-DPVID_REFINEMENT=1"] if "refine" in header else []), *own, *inputs])
+
+
+def _cc(road: Road, options: Sequence[str]) -> bool:
+    """Whether the compiler is silent; its first word is a failure."""
+    command = [host_compiler("the bench"), *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=compiled_once())
+    if done.returncode or done.stderr:
+        lines = [one for one in done.stderr.splitlines() if "error" in one or "undefined" in one]
+        road.failures.append(f"compile: {(lines or [done.stderr])[0].rpartition('/')[2][:300]}")
+        return False
+    return True
+
+
+def _play(road: Road, name: str, made: Deployment, folder: Path) -> None:
+    """Compiles the two files of a package and its example, and compares what that prints."""
+    write_package(made, "amalgamation", folder)
+    program = str(folder / "it")
+    sources = [str(one) for one in sorted(folder.rglob("*.c"))]
+    if not _cc(road, [*_USUAL, f"-I{folder}", f"-I{folder / 'example'}", *sources, "-o", program, "-lm"]):
+        return
+    done = subprocess.run([program], capture_output=True, text=True, check=False, timeout=60)
+    if done.returncode or not _alike(done.stdout.splitlines(), expected(made)):
+        road.failures.append(f"{name}: the example prints {done.stdout!r}, not {expected(made)!r}"[:400])
+
+
+def _alike(printed: Sequence[str], wanted: Sequence[str]) -> bool:
+    """The same words, the same numbers but for the rounding of the last digit."""
+
+    def same(one: str, other: str) -> bool:
+        try:
+            return math.isclose(float(one), float(other), rel_tol=_LAST_DIGIT)
+        except ValueError:
+            return one == other
+
+    if len(printed) != len(wanted):
+        return False
+    pairs = [(a.split(), b.split()) for a, b in zip(printed, wanted, strict=True)]
+    return all(len(a) == len(b) and all(map(same, a, b)) for a, b in pairs)
+
+
+# ---- many
+
+
+def roads(seeds: range, kept: Path | None = None, advance: Callable[[int], None] = lambda done: None) -> list[Road]:
+    """The rigs of seeds, one after the other.
+
+    Parameters
+    ----------
+    kept : JSON lines of what is done; those that it has are not travelled again
+    """
+    done: dict[int, Road] = {}
+    if kept is not None and kept.exists():
+        lines = (json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines())
+        done = {one["seed"]: Road(**one) for one in lines}
+    found = []
+    for own in seeds:
+        road = done.get(own)
+        if road is None:
+            road = road_of(own)
+            clear_cache()
+            if kept is not None:
+                with kept.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(asdict(road)) + "\n")
+        found.append(road)
+        advance(len(found))
+    return found
+
+
+def table_of(found: Sequence[Road]) -> list[tuple[str, ...]]:
+    """A row for each kind, then one of all."""
+    kinds = sorted({one.kind for one in found})
+    return [*(_row(kind, [one for one in found if one.kind == kind]) for kind in kinds), _row("all", found)]
+
+
+def _row(name: str, found: Sequence[Road]) -> tuple[str, ...]:
+    count = Counter(one.outcome for one in found)
+    errors = [abs(z) for one in found if one.outcome in ("good", "warning") for z in one.errors.values()]
+    good = [abs(z) for one in found if one.outcome == "good" for z in one.errors.values()]
+    reached = [sum(stage in one.reached for one in found) for stage in ("second stage", "q31")]
+    return (
+        name,
+        str(len(found)),
+        str(sum(bool(one.failures) for one in found)),
+        *(str(count[one]) for one in ("good", "warning", "not identified", "refused")),
+        f"{statistics.median(errors):.2f}" if errors else "-",
+        f"{max(good):.1f}" if good else "-",
+        *map(str, reached),
+    )
+
+
+def covered(found: Sequence[Road]) -> Counter[str]:
+    """How many rigs have each feature of the grammar."""
+    return Counter(feature for one in found for feature in one.features)
 
 
 def compile_times() -> list[tuple[str, ...]]:
@@ -93,103 +419,4 @@ def compile_times() -> list[tuple[str, ...]]:
     return out
 
 
-def described(source: random.Random) -> Model:
-    """A random description."""
-    return source.choice((_lagrangian, _linear, _senseless, _senseless))(source)
-
-
-def _signal(model: Model, source: random.Random, name: str, unit: str) -> Jet:
-    kind = source.randrange(8)
-    if kind == 0:
-        return model.unmeasured(name, unit)
-    if kind == 1:
-        return model.input(name, unit, hold=source.choice(("zoh", "sampled")))
-    return model.sensor(name, unit, resolution=1e-3)
-
-
-def _unknown(model: Model, source: random.Random, name: str, unit: str) -> sp.Expr:
-    if source.random() < 0.1:
-        return model.known(name, unit, source.choice((0.5, 9.81, 2.0)))
-    if source.random() < 0.15:
-        return model.unknown(name, unit, 0.0, positive=False, sd=1.0)
-    return model.unknown(name, unit, source.choice((1e-3, 0.3, 1.0, 20.0)))
-
-
-def _lagrangian(source: random.Random) -> Model:
-    """One to three coordinates, masses and stiffnesses, sines of sums, friction; some of it not measured."""
-    model = Model("random Lagrangian")
-    n = source.randint(1, 3)
-    q = [_signal(model, source, f"q{k}", "rad") for k in range(n)]
-    u = [_signal(model, source, f"u{k}", "1/s^2") for k in range(n)]
-    offset = _unknown(model, source, "c", "rad") if source.random() < 0.3 else sp.Integer(0)
-    angles = [sin(q[0] - offset), cos(q[-1] - offset), sp.Integer(1), q[0], q[-1] ** 2, cos(q[0] - q[-1])]
-    total = sp.Integer(0)
-    for k in range(source.randint(n, n + 2)):
-        speeds = source.choice(q).d() * source.choice(q).d()
-        total += _unknown(model, source, f"m{k}", "") * speeds * source.choice(angles) * source.choice(angles)
-    for k in range(source.randint(0, 2)):
-        total -= _unknown(model, source, f"g{k}", "1/s^2") * source.choice(angles)
-    forces = []
-    for k in range(n):
-        friction = _unknown(model, source, f"b{k}", "1/s") * q[k].d()
-        if source.random() < 0.4:
-            friction += _unknown(model, source, f"f{k}", "1/s^2") * source.choice((sgn(q[k].d()), abs(q[k]), sgn(u[k])))
-        forces.append(u[k] - friction)
-    model.lagrange(total, q, forces)
-    return model
-
-
-def _linear(source: random.Random) -> Model:
-    """Linear equations with constant coefficients, often too few; now and then a product with a signal."""
-    model = Model("random linear system")
-    signals = [_signal(model, source, f"z{k}", "") for k in range(source.randint(2, 5))]
-    if source.random() < 0.2:
-        signals.append(model.define("w", "s", Integral(signals[0], 1)))
-    units = {0: "1", 1: "s", 2: "s^2"}
-    for e in range(source.randint(1, 4)):
-        whole = sp.Integer(0)
-        for k, one in enumerate(source.sample(signals, source.randint(1, len(signals)))):
-            order = source.randint(0, 2)
-            factor = _unknown(model, source, f"p{e}{k}", units[order]) if source.random() < 0.7 else sp.Integer(1)
-            term = factor * one.d(order) if source.random() < 0.85 else factor * one.d(order) * source.choice(signals)
-            whole += term if factor != 1 or order == 0 else one
-        model.equation(whole)
-    return model
-
-
-def _senseless(source: random.Random) -> Model:
-    """Whatever the symbols allow."""
-    model = Model("random expressions")
-    odd = 0.05 if source.random() < 0.2 else 0.0  # how often a unit is a wrong one
-    signals = [_signal(model, source, f"z{k}", _unit(source, odd)) for k in range(source.randint(1, 3))]
-    unknowns = [_unknown(model, source, f"p{k}", _unit(source, odd)) for k in range(source.randint(1, 4))]
-    second = model.known("s0", "s", 1.0)
-    leaves = [*signals, *signals, *unknowns, *(one.d(n) * second**n for one in signals for n in (1, 2, 3))]
-    for _ in range(source.randint(1, 3)):
-        whole = _expression(source, leaves, source.randint(1, 4))
-        model.equation(whole + sum(source.choice(unknowns) * source.choice(leaves) for _ in range(2)))
-    return model
-
-
-def _unit(source: random.Random, odd: float) -> str:
-    return source.choice(_UNITS) if source.random() < odd else ""
-
-
-def _expression(source: random.Random, leaves: list[sp.Expr], depth: int) -> sp.Expr:
-    if depth == 0:
-        leaf = source.choice(leaves)
-        return leaf if source.random() < 0.9 else sp.Float(source.choice((0.5, 2.0, 3.3)))
-    one = _expression(source, leaves, depth - 1)
-    other = _expression(source, leaves, source.randrange(depth))
-    kind = source.randrange(14)
-    if kind < 5:
-        return one + other
-    if kind < 9:
-        return one * other
-    if kind == 9:
-        return one / (other if other != 0 else sp.Integer(1))
-    if kind == 10:
-        return source.choice((sin, cos, sgn, abs, sp.exp, sp.sqrt, sp.tan, sp.tanh))(one)
-    if kind == 11:
-        return one ** source.choice((2, 3, -1, 0.5))
-    return one - other
+__all__ = ["COMPILE_HEADER", "HEADER", "IN_C", "Road", "compile_times", "covered", "road_of", "roads", "table_of"]
