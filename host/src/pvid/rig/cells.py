@@ -20,7 +20,10 @@ _BLANKS = " \xa0\u2009\u202f'’"  # that group digits
 _GROUPED = re.compile(rf"[1-9]\d{{0,2}}(?:[{_BLANKS}]\d{{3}})+(?![\d{_BLANKS}])")
 _THOUSANDS = {mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:\{mark}\d{{3}})+(?!\d)") for mark in ",."}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
-_ANY_NUMBER = re.compile(r"[+-]?(?P<digits>\d[\d.,]*|[.,]\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+_ANY_NUMBER = re.compile(
+    r"[+-]?(?P<digits>\d+[.,]?\d*|[.,]\d+|[1-9]\d{0,2}(?:(?:,\d{3})+(?:\.\d*)?|(?:\.\d{3})+(?:,\d*)?))(?:[eEdD][+-]?\d+)?",
+    re.ASCII,
+)
 _WORDS = {"true": 1.0, "false": 0.0}
 # Of the cells that decide, those of another style are damaged if they are fewer than this part.
 _DAMAGED = 0.01

@@ -39,6 +39,8 @@ _SAMPLED_ROWS = 500  # that show the style of the numbers; what differs later is
 _TAIL = 1000  # lines that a cut last line is compared with
 # Damaged lines that a table may have: this part of all, and so many of a short one.
 _DAMAGED_SHARE, _DAMAGED_LINES = 0.05, 3
+_EARLY = 1000  # and more than there are rows: the rest need not be read
+_SHOWN = 60  # characters of a line
 _FEW = 32  # lines: what numpy refuses is halved down to so many
 _NO_NUMBER = (9.9e37, 9.91e37)  # an overload and no number in SCPI, the language of instruments
 
@@ -155,8 +157,9 @@ class _TextTable:
                 yield max(first, body), _from_line(block, body - first)
             first += count
 
-    def _table(self, style_of: dict[str, Style], sampled: bool) -> Table:
-        reader = _Reader(self._layout, self._places, style_of, sampled)
+    def _table(self, style_of: dict[str, Style], sampled: bool, month_first: bool = False) -> Table:
+        times = TimesOfDay(month_first) if self._time_is_text else None
+        reader = _Reader(self._layout, self._places, style_of, sampled, times)
         signals = {signal: _Growing() for signal in self._places}
         notes = self._notes
         before = b""
@@ -176,16 +179,19 @@ class _TextTable:
                 text = signal == "t" and self._time_is_text
                 signals[signal].extend(row if text else self._columns[signal].in_si(row))
             refuse_beyond(self._path, signals["t"].size)
+            reader.refuse_many_damaged(self._path, ended=False)
         found = {signal: one.values for signal, one in signals.items()}
         if sampled and _may_be_thousands([found[one] for one in self._numbers]):
             raise _OtherStyleError
         t = found.pop("t")
-        reader.refuse_many_damaged(self._path, t.size, self._columns)
+        reader.refuse_many_damaged(self._path)
         if not t.size:
             raise PvidError(f"{self._path} has a header but no data.")
-        if reader.times is not None:
+        if times is not None:
+            if times.are_month_first:
+                return self._table(style_of, sampled, month_first=True)
             try:
-                t = reader.times.unwrapped(t)
+                t = times.unwrapped(t)
             except PvidError as error:
                 raise PvidError(f"{self._path}, column {self._columns['t'].name}: {error}") from error
         style_notes = style_note({self._columns[one].name: style for one, style in style_of.items()})
@@ -300,21 +306,28 @@ class _Growing:
 class _Reader:
     """Rows of a body, block after block, and what was left out of it."""
 
-    def __init__(self, layout: Layout, places: Mapping[str, int], style_of: Mapping[str, Style], sampled: bool) -> None:
+    def __init__(
+        self,
+        layout: Layout,
+        places: Mapping[str, int],
+        style_of: Mapping[str, Style],
+        sampled: bool,
+        times: TimesOfDay | None,
+    ) -> None:
         self._layout, self._places, self._style_of, self._sampled = layout, places, style_of, sampled
         self._used = sorted(set(places.values()))
-        self.times = None if "t" in style_of else TimesOfDay()
+        self._times = times
         self._comma = any(style.decimal == "," for style in style_of.values())
         self._compiled = not (
             layout.labelled
             or layout.stamped
-            or self.times is not None
+            or self._times is not None
             or any(style.thousands for style in style_of.values())
             or (self._comma and layout.separator == ",")
         )
         self._skipped: list[IntArray] = []
-        self._damaged: list[int] = []
-        self._example = ("", "")
+        self._damaged: dict[int, tuple[str, str]] = {}  # text and complaint, by number of the line
+        self._rows = 0
         self._heads: list[int] = []
         self._last_row = 0
         self._missing: dict[str, Counter[str]] = {signal: Counter() for signal in places}
@@ -337,6 +350,7 @@ class _Reader:
         self._careful_rows(lines, np.flatnonzero(careful), first, values, is_row)
         self._without_numbers(values, is_row, lines, first)
         self._skipped.append(first + np.flatnonzero(~is_row))
+        self._rows += int(np.count_nonzero(is_row))
         if is_row.any():
             self._last_row = first + int(np.flatnonzero(is_row)[-1])
         return values[:, is_row] if not is_row.all() else values
@@ -400,8 +414,8 @@ class _Reader:
         words: list[tuple[int, str, str]] = []
         for order, (signal, place) in enumerate(self._places.items()):
             column = [row[place] for row in cells]
-            if signal == "t" and self.times is not None:
-                found_t = self.times.seconds(column)
+            if signal == "t" and self._times is not None:
+                found_t = self._times.seconds(column)
                 for j in np.flatnonzero(np.isnan(found_t)).tolist():
                     if not is_missing(column[j]):
                         bad.setdefault(j, f"column {layout.names[place]}: {shown(column[j])} is not a time")
@@ -456,36 +470,45 @@ class _Reader:
             is_row &= ~timeless
 
     def _damage(self, number: int, line: str, complaint: str) -> None:
-        if not self._damaged or number < self._damaged[0]:
-            self._example = (line.strip(), complaint)
-            self._damaged.insert(0, number)
-        else:
-            self._damaged.append(number)
+        self._damaged[number] = (line.strip()[:_SHOWN], complaint)
 
-    def refuse_many_damaged(self, path: Path, rows: int, columns: Columns) -> None:
+    def refuse_many_damaged(self, path: Path, ended: bool = True) -> None:
         """Refuses a table of which more than a sensible part is damaged; lines behind the last row do not count."""
-        within = sum(number < self._last_row for number in self._damaged)
-        if not rows:
-            within = len(self._damaged)
-        most = max(_DAMAGED_LINES, int(_DAMAGED_SHARE * (rows + within)))
-        if within > most or (within and not rows):
+        if not ended and len(self._damaged) <= max(_EARLY, self._rows):
+            return
+        within = self._within() if self._rows else sorted(self._damaged)
+        most = max(_DAMAGED_LINES, int(_DAMAGED_SHARE * (self._rows + len(within)))) if self._rows else 0
+        if len(within) > most:
+            complaint = self._damaged[within[0]][1]
             raise PvidError(
-                f"{path}, line {self._damaged[0]}{', ' if self._example[1].startswith('column') else ': '}"
-                f"{self._example[1]}; {within} of {rows + within} lines are no rows of the table."
+                f"{path}, line {within[0]}{', ' if complaint.startswith('column') else ': '}{complaint}; "
+                f"{len(within)} of {self._rows + len(within)} lines are no rows of the table."
             )
+
+    def _within(self) -> list[int]:
+        """Numbers of the damaged lines in front of the last row, but for what a board prints before the names."""
+        damaged = {one for one in self._damaged if one < self._last_row}
+        if damaged and self._heads:
+            no_rows = set(np.concatenate(self._skipped).tolist())
+            for head in self._heads:
+                line = head - 1
+                while line in no_rows:
+                    damaged.discard(line)
+                    line -= 1
+        return sorted(damaged)
 
     def notes(self, columns: Columns) -> tuple[str, ...]:
         """On what was left out."""
         notes = []
-        within = [one for one in self._damaged if one < self._last_row]
-        behind = len(self._damaged) - len(within)
+        within = self._within()
+        behind = sum(one > self._last_row for one in self._damaged)
         if within:
             count = f"{len(within)} damaged lines, the first is line" if len(within) > 1 else "a damaged line,"
-            notes.append(f"left out: {count} {within[0]}, {shown(self._example[0])}")
+            notes.append(f"left out: {count} {within[0]}, {shown(self._damaged[within[0]][0])}")
         if behind:
-            last = sorted(self._damaged)[-behind]
-            text = f", {shown(self._example[0])}" if not within else ""
-            notes.append(f"left out behind the table: line{'s from' if behind > 1 else ''} {last}{text}")
+            last = min(one for one in self._damaged if one > self._last_row)
+            lines = f"{behind} lines from line" if behind > 1 else "line"
+            notes.append(f"left out behind the table: {lines} {last}, {shown(self._damaged[last][0])}")
         if self._heads:
             again = f"{len(self._heads)} times, first in line" if len(self._heads) > 1 else "in line"
             notes.append(f"the names come again {again} {min(self._heads)} (a restart?)")

@@ -248,6 +248,8 @@ def _with_head(
     numbers = [k for k in range(width) if sum(one.kinds[k] in "nte" for one in usual) >= _MOSTLY * len(usual)]
     if head is None:
         head = _guessed(lines, _first(usual, numbers), width, numbers)
+        if head is not None and not sought[0] and len(head[1]) != width:
+            head = None  # every column has a position
     names = [str(k + 1) for k in range(width)] if head is None else list(head[1])
     if len(names) == width + 1 and not names[-1]:
         names.pop()

@@ -36,14 +36,17 @@ def is_time(cell: str) -> bool:
 class TimesOfDay:
     """A column of times as text; what was read before decides what is read later, so there is one of each column.
 
-    A run without dates may pass midnight. Dates such as 5/2/2024 are days or months first: while all rows are of one
-    day, that does not matter.
+    A run without dates may pass midnight. Dates such as 5/2/2024 are read with the day first unless `month_first`:
+    while all rows are of one day, that does not matter.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, month_first: bool = False) -> None:
+        self._month_first = month_first
+        self._days: set[str] = set()
+        self._orders: set[bool] = set()  # what dates allow one reading alone, such as 5/13/2024: month first or not
         self._first: int | None = None  # [ns]
         self._minutes: dict[tuple[str | None, str, str], int | None] = {}  # [ns]
-        self._slashed: set[tuple[int, int, int]] = set()
+        self._either = ""  # a date that allows both
         self._period = 0  # [s], after which it starts over; 0: there are dates
 
     def seconds(self, cells: Sequence[str]) -> FloatArray:
@@ -59,16 +62,30 @@ class TimesOfDay:
                 out[k] = (at - first) / 1e9
         return out
 
+    @property
+    def are_month_first(self) -> bool:
+        """Whether all was read with the day first, and a date shows that the month is."""
+        return self._orders == {True} and not self._month_first and self._either != ""
+
     def unwrapped(self, t: FloatArray) -> FloatArray:
-        """All times [n], when all are read: those past midnight are of the next day."""
-        if len(self._slashed) > 1:
-            a, b, _ = next(iter(self._slashed))
-            raise PvidError(f"the run lasts over more than one day, and the dates, as {a}/{b}, can be read in two ways")
+        """All times [n], when all are read: those past midnight are of the next day.
+
+        Raises
+        ------
+        PvidError
+            When the dates can be read in two ways.
+        """
+        if self._either and len(self._days) > 1 and len(self._orders) != 1:
+            raise PvidError(f"dates such as {self._either} can be read in two ways, and the run lasts over midnight")
         if not self._period or t.size < 2:
             return t
         steps = np.diff(t)
-        turns = np.cumsum(np.where(steps < -self._period / 2, self._period, 0.0))
-        return np.concatenate([t[:1], t[1:] + turns]) if turns[-1] else t
+        turns = np.cumsum(np.where(steps < -self._period / 2, self._period, 0))
+        if not turns[-1]:
+            return t
+        fine = np.round(t * 1e9).astype(np.int64)  # exact up to some months
+        fine[1:] += turns.astype(np.int64) * 10**9
+        return fine / 1e9
 
     def _nanoseconds(self, match: re.Match[str]) -> int | None:
         key = (match["day"], match["clock"], match["rest"])
@@ -105,11 +122,16 @@ class TimesOfDay:
 
     def _day(self, match: re.Match[str]) -> int | None:
         """Number of a date; None of an impossible one."""
+        self._days.add(match["day"].strip())
         if match["a"]:
             first, second, year = int(match["a"]), int(match["b"]), int(match["ye"])
-            if match["mark"] != "." and first <= 12 and second <= 12 and first != second:
-                self._slashed.add((first, second, year))
-            month, day = (first, second) if second > 12 else (second, first)
+            month_first = second > 12 or (self._month_first and first <= 12)
+            if match["mark"] != "." and first != second:
+                if first <= 12 and second <= 12:
+                    self._either = match["day"].strip()
+                else:
+                    self._orders.add(second > 12)
+            month, day = (first, second) if month_first else (second, first)
         elif match["name"]:
             name = match["name"].lower()
             year, day = int(match["yn"]), int(match["dn"])
