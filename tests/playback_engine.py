@@ -23,7 +23,7 @@ from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core import snapshot
 from pvid.core.model_library import core_of
 from pvid.core.native import Publisher
-from pvid.core.sizes import options_of, raised, roomy
+from pvid.core.sizes import options_of, roomy
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
@@ -217,7 +217,7 @@ class InFixedPoint:
     @property
     def definitions(self) -> tuple[str, ...]:
         model = self.engine.parameters.model
-        return defined(raised(sizes_of_q31(self.engine.config.design, model.n_p, len(model.c_row))))
+        return defined(roomy(sizes_of_q31(self.engine.config.design, model.n_p, len(model.c_row))))
 
     @property
     def sources(self) -> list[Path]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -11,6 +12,9 @@ from typing import Any
 import pytest
 from conftest import ROOT
 
+from pvid.base.packages import PACKAGES
+
+MODULES_OF_EXTRAS = {"plot": ["matplotlib"], "serial": ["serial"]}
 NOTEBOOKS = sorted((ROOT / "host" / "notebooks").glob("*.ipynb"))
 
 
@@ -32,10 +36,26 @@ def outputs_of(notebook: dict[str, Any]) -> list[list[str]]:
     ]
 
 
+def without(folder: Path, modules: list[str]) -> None:
+    """Modules that a process finds in this folder first, and that are not installed there."""
+    for name in modules:
+        (folder / name).mkdir(parents=True)
+        text = f"raise ModuleNotFoundError('No module named {name!r}', name={name!r})\n"
+        (folder / name / "__init__.py").write_text(text, encoding="utf-8")
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_every_cell_runs_and_shows_what_the_file_shows(
     path: Path, runner: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """In the environment that the first cell names: no other extra is installed."""
+    named = re.search(
+        r"\./host\[([\w,]+)\]", "".join(json.loads(path.read_text(encoding="utf-8"))["cells"][0]["source"])
+    )
+    assert named is not None
+    brought = {module for extra in named[1].split(",") for module in MODULES_OF_EXTRAS[extra]}
+    without(tmp_path / "absent", [one for one in PACKAGES if one not in brought])
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "absent"))
     monkeypatch.chdir(tmp_path)
     ran = runner.run_notebook(path)
     kept = json.loads(path.read_text(encoding="utf-8"))

@@ -14,7 +14,6 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-import serial
 
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import Streamed, settings_number
@@ -161,7 +160,7 @@ def collect(
                 target.port.write(encode(configure, sequence))
                 ask_at, sequence = now + RESEND_S, sequence + 1
             data = target.port.read(4096)
-        except (serial.SerialException, OSError) as error:
+        except OSError as error:
             raise PvidError(f"the port of {target.name} is gone: {error}") from error
         if data:
             silent_at = now + patience_s

@@ -18,7 +18,6 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
-import serial
 
 from pvid.base import subprocesses as child
 from pvid.base.errors import PvidError
@@ -259,7 +258,7 @@ class Player:
     def _send(self, message: Message, tick: int = 0) -> None:
         try:
             self.target.port.write(encode(message, self.sequence, tick))
-        except (serial.SerialException, OSError) as error:
+        except OSError as error:
             raise PortGoneError(str(error)) from error
         self.sequence = (self.sequence + 1) & 0xFFFF
 
@@ -297,7 +296,7 @@ class Player:
         """Takes in what has come; returns whether that was progress."""
         try:
             data = self.target.port.read(4096)
-        except (serial.SerialException, OSError) as error:
+        except OSError as error:
             raise PortGoneError(str(error)) from error
         before = (self.account.done, self.running, len(self.account.estimates), self._configure.session)
         for item in self.decoder.feed(data):

@@ -17,6 +17,7 @@ import click
 from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.output import watch
+from pvid.base.packages import PACKAGES, installing
 from pvid.base.version import __version__
 from pvid.base.wording import reason
 
@@ -61,16 +62,6 @@ _ELSEWHERE = {
 }
 _IN_A_CLONE = ("bench", "campaign")
 # Packages that not every installation has, with the extra of pvid that brings them.
-_EXTRAS = {
-    "dask": "cluster",
-    "distributed": "cluster",
-    "matplotlib": "plot",
-    "mcap": "mcap",
-    "pyarrow": "parquet",
-    "serial": "serial",
-    "starlette": "page",
-    "uvicorn": "page",
-}
 
 
 def main() -> None:
@@ -101,10 +92,10 @@ def main() -> None:
         write_stderr(f"pvid: {'' if error.filename is None else f'{error.filename}: '}{reason(error)}")
         code = BAD_INPUT
     except ModuleNotFoundError as error:
-        extra = _EXTRAS.get((error.name or "").partition(".")[0])
-        if extra is None:
+        module = (error.name or "").partition(".")[0]
+        if module not in PACKAGES:
             raise
-        write_stderr(f"pvid: this needs the Python package {error.name}: pip install 'pvid[{extra}]'")
+        write_stderr(f"pvid: this needs the Python package {PACKAGES[module]}: {installing(module)}")
         code = BAD_INPUT
     except MemoryError as error:
         detail = f" ({reason(error)})" if str(error) else ""

@@ -6,22 +6,12 @@ import errno
 import os
 from typing import Any, Protocol
 
-import serial
-from serial.urlhandler import protocol_socket
-
 from pvid.base.errors import PvidError
 from pvid.base.wording import reason
 
 BAUD = 115200
 _READ_S = 0.02
 _WRITE_S = 8.0  # an emulator on a busy machine may not read for seconds
-
-
-class _Socket(protocol_socket.Serial):
-    """A socket, of which opening drops nothing: pyserial throws away what a board has sent by then."""
-
-    def reset_input_buffer(self) -> None:
-        """Keeps it."""
 
 
 class Port(Protocol):
@@ -44,7 +34,7 @@ def open_port(name: str) -> Port:
         When it cannot be opened; the sentence contains the cause.
     """
     try:
-        port: Any = _Socket() if name.startswith("socket://") else serial.serial_for_url(name, do_not_open=True)
+        port = _unopened(name)
         port.port, port.baudrate, port.timeout, port.write_timeout = name, BAUD, _READ_S, _WRITE_S
         if "://" not in name:
             port.exclusive = True
@@ -52,9 +42,26 @@ def open_port(name: str) -> Port:
             port.rts = False
         port.open()
         opened: Port = port
+    except ModuleNotFoundError:
+        raise
     except Exception as error:  # the classes that pyserial loads for URLs let through whatever their text provokes
         raise PvidError(opening_failure(name, error)) from error
     return opened
+
+
+def _unopened(name: str) -> Any:
+    """Of pyserial, which what opens no port does without.
+
+    Opening a socket of pyserial throws away what a board has sent by then; this one keeps it.
+    """
+    import serial
+    from serial.urlhandler import protocol_socket
+
+    class Socket(protocol_socket.Serial):
+        def reset_input_buffer(self) -> None:
+            pass
+
+    return Socket() if name.startswith("socket://") else serial.serial_for_url(name, do_not_open=True)
 
 
 def opening_failure(name: str, error: Exception) -> str:

@@ -11,6 +11,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pvid.base.errors import PvidError
+from pvid.base.packages import installing
 from pvid.link.frames import Loss
 from pvid.log.json_messages import encoded, messages, schema, topic, units
 from pvid.log.reader import Account, Record
@@ -45,7 +46,7 @@ class FoxgloveServer:
             import foxglove
             from foxglove.websocket import Capability, ServerListener
         except ImportError as error:
-            raise PvidError(f"{address} needs foxglove-sdk: pip install 'pvid[foxglove]'") from error
+            raise PvidError(f"{address} needs foxglove-sdk: {installing('foxglove')}") from error
         self._foxglove = foxglove
         foxglove.set_log_level("ERROR")  # it reports every client that comes and goes
         self._context = foxglove.Context()

@@ -17,9 +17,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-import serial
-from serial.tools import list_ports
-
 from pvid.base.errors import PvidError
 from pvid.base.wording import printable, reason
 from pvid.board.target import Target, refusal
@@ -78,6 +75,8 @@ class PortSource:
 
     def open(self) -> Target:
         """See Source."""
+        from serial.tools import list_ports  # of the extra `serial`
+
         place = self.name
         devices = {one.device: found for one in list_ports.comports() if (found := _identity(one)) is not None}
         if self.usb is None:
@@ -192,7 +191,7 @@ class Recorder(threading.Thread):
         if target is not None:
             self._sent += 1
             # TypeError: pyserial's own, when the other thread closes the port meanwhile
-            with contextlib.suppress(serial.SerialException, OSError, TypeError):
+            with contextlib.suppress(OSError, TypeError):
                 target.port.write(encode(message, self._sent - 1))
 
     def _segment(self, target: Target) -> None:
@@ -202,7 +201,7 @@ class Recorder(threading.Thread):
             why = self._read(target.port, target.coming_up_s, None if target.process is None else self._room)
         finally:
             self._target, self.connected = None, False
-            with contextlib.suppress(serial.SerialException, OSError):
+            with contextlib.suppress(OSError):
                 target.close()
         self.writer.end(why)
 
@@ -223,7 +222,7 @@ class Recorder(threading.Thread):
             while left > 0 and time.monotonic() < limit and (data := port.read(left)):
                 left -= 0 if room is None else len(data)
                 self.writer.take(data)
-        except (serial.SerialException, OSError) as error:
+        except OSError as error:
             return f"the port is gone: {loss_cause(error)}"
         return self.why
 

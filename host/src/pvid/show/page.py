@@ -23,6 +23,7 @@ from pathlib import Path
 
 from pvid.base.errors import PvidError
 from pvid.base.hosts import addresses
+from pvid.base.packages import installing
 from pvid.base.wording import reason
 
 DEFAULT = "127.0.0.1:8765"
@@ -77,7 +78,7 @@ def page(at: str, log: Path, title: str) -> Iterator[str]:
     """
     lacking = [name for name in ("starlette", "uvicorn") if importlib.util.find_spec(name) is None]
     if lacking:
-        raise PvidError(f"the live page needs {' and '.join(lacking)}: pip install 'pvid[page]'")
+        raise PvidError(f"the live page needs {' and '.join(lacking)}: {installing(*lacking)}")
     listening, address = listen(at)
     command = [sys.executable, "-P", "-m", "pvid.show.page", str(listening.fileno()), str(log), title]
     with listening, open(os.devnull, "wb") as nowhere:
