@@ -46,7 +46,7 @@ from pvid.run.engine_design import config_for_recording
 from pvid.run.engine_design_q31 import FixedEngine, engine_for_recording
 from pvid.run.engine_files_q31 import config_of, files_of
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism
-from pvid.run.mechanism_advice import advice_on
+from pvid.run.mechanism_advice import advised
 from pvid.run.mechanism_compare import compare_recording
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.refine_design import refine_design
@@ -55,6 +55,7 @@ from pvid.run.refined_mechanism import refined_answer
 from pvid.settings.enums import Core
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
+from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 HEADER = (
     "kind",
@@ -180,26 +181,32 @@ def _travel(road: Road, run: RandomRun, folder: Path) -> None:
     if "check" not in road.reached:
         return
     with road.stage("identify"):
-        recording, model = recording_of(recorded, MechanismRig(str(path)), None)
-        answer = identify_mechanism(recording, model)
+        recording, model = recording_of(recorded, MechanismRig(path), None)
+        answer = advised(identify_mechanism(recording, model))
         json.dumps(answer.as_json(), allow_nan=False)
-        list(advice_on(answer))
+    determined = max(one / _size(run, name) for name, one in run.bound.items())
     if "identify" not in road.reached:
+        if determined < _DETERMINED and "identify" in road.refusals:
+            road.failures.append(f"identify: refused, of a run that determines all: {road.refusals['identify']}")
         return
     verdict = answer.found.verdict
     road.outcome = verdict.status.replace("_", " ")
     _judge(road, run, answer.values, good=verdict.status == "good")
     if possible and not answer.identified and run.stuck < 0.5:
-        worst = max(one / _size(run, name) for name, one in run.bound.items())
-        if worst < _DETERMINED:
+        if determined < _DETERMINED:
             told = "; ".join(one.text for one in verdict.reasons if one.alarm) or "no reason"
-            road.failures.append(f"identify: withheld, of a run that determines all to {100 * worst:.2g} %: {told}")
+            road.failures.append(
+                f"identify: withheld, of a run that determines all to {100 * determined:.2g} %: {told}"
+            )
     with road.stage("refine"):
         refined, _, _ = refined_answer(answer)
         json.dumps(refined.as_json(), allow_nan=False)
         if refined is not answer:
             _judge(road, run, refined.values, good=verdict.status == "good", stage="refine")
-    _in_c(road, run, answer)
+    with road.stage("size"):
+        refuse_too_many_unknowns(model)
+    if "size" in road.reached:
+        _in_c(road, run, answer)
     _built(road, answer, folder)
 
 

@@ -446,7 +446,7 @@ def chain(s: Sketch) -> RandomRig:
         )
     if s.chance(0.3, "accelerometer"):
         j = seen[s.count(0, len(seen) - 1)]
-        zero = s.offset("g0", units["a"], 0.05 * force / mass, force / mass) if s.chance(0.8) else "0"
+        zero = s.offset("g0", units["a"], 0.05 * force / mass, force / mass) if s.chance(0.9) else "0"
         s.sensor("acc", units["a"], f"v{j + 1}_rate + {zero}")
         s.equation(f"acc - v{j + 1}_rate" + (f" - {zero}" if zero != "0" else ""))
     if links and s.chance(0.25, "force cell"):
