@@ -1,7 +1,7 @@
 """The command line: `./tools/pvid COMMAND`.
 
 Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, or output that cannot be written (one sentence),
-3 nothing identified, 130 interrupted, 141 the output was closed by its reader.
+3 nothing identified, 70 an error of pvid's own (a report is written), 130 interrupted, 141 the output was closed by its reader.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from importlib.util import find_spec
 
 import click
 
-from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, write_stderr
+from pvid.base.console import BAD_INPUT, DONE, INTERRUPTED, OWN_ERROR, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.output import watch
 from pvid.base.packages import PACKAGES, installing
@@ -79,7 +79,7 @@ def main() -> None:
 
         write_stderr(f"pvid: {setting_for(error) or _usage(error)}")
         code = BAD_INPUT
-    except click.exceptions.Abort:
+    except (click.exceptions.Abort, KeyboardInterrupt):
         write_stderr("pvid: interrupted")
         code = INTERRUPTED
     except click.ClickException as error:
@@ -93,15 +93,28 @@ def main() -> None:
         code = BAD_INPUT
     except ModuleNotFoundError as error:
         module = (error.name or "").partition(".")[0]
-        if module not in PACKAGES:
-            raise
-        write_stderr(f"pvid: this needs the Python package {PACKAGES[module]}: {installing(module)}")
-        code = BAD_INPUT
+        if module in PACKAGES:
+            write_stderr(f"pvid: this needs the Python package {PACKAGES[module]}: {installing(module)}")
+            code = BAD_INPUT
+        else:
+            code = _own_error(error)
     except MemoryError as error:
         detail = f" ({reason(error)})" if str(error) else ""
         write_stderr(f"pvid: not enough memory{detail}: is a length, a rate or a count too large?")
         code = BAD_INPUT
+    except Exception as error:
+        code = _own_error(error)
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _own_error(error: Exception) -> int:
+    """One sentence on an error that nobody foresaw, with the file of its report."""
+    from pvid.base.crash_report import written  # rarely needed
+
+    report = written(error, sys.argv[1:])
+    where = "no file for its report could be written" if report is None else f"please send the report {report}"
+    write_stderr(f"pvid: an error of pvid's own ({type(error).__name__}), not of your input: {where}")
+    return OWN_ERROR
 
 
 def _usage(error: click.ClickException) -> str:

@@ -21,6 +21,7 @@ from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import blur_of, rates_of_drives
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.front import samples_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
@@ -109,7 +110,7 @@ def _scored(
             return None
         fit = gated(rows, start, equation_error=errors, passes=_PASSES)
         found = uncertainty(fit)
-    except (PvidError, np.linalg.LinAlgError):
+    except FAILURES:
         return None
     size = np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd)
     other = other_line(fit)
@@ -117,7 +118,7 @@ def _scored(
     relative = np.hypot(np.hypot(found.predicted, apart) / size, blur_of(model, run, design))
     if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
         return None
-    known = not verdict.not_identified(model.bare, fit, found) and not verdict.of_range(model.bare, fit.p)
+    known = not verdict.not_identified(model.bare, fit, found.se) and not verdict.of_range(model.bare, fit.p)
     return Scored(design, float(np.exp(np.mean(np.log(relative)))), fit.p, found.chi2, relative * size, known)
 
 
@@ -197,10 +198,13 @@ def ranked(
         raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
     best = min(tried, key=_order)
     if best.chi2 > MODEL_ERROR and equation_error:
-        errors = True
+        errors, of_sensors = True, tried[:]
         tried.clear()
         attempt([best.design])
         attempt(made(basis, window_s=one) for one in windows)
+        if not tried:  # with errors of the equations the search runs away everywhere
+            errors = False
+            tried += of_sensors
         best = min(tried, key=_order)
     if rates:
         filters = _RATES + (_FLAT_RATES if rates_of_drives(model) else ())

@@ -34,6 +34,12 @@ class Uncertainty:
     covariance: Float
     r2: list[float]
 
+    @classmethod
+    def unbounded(cls, fit: Fit) -> Uncertainty:
+        """Of an estimate that ran away."""
+        none = np.full(len(fit.p), np.inf)
+        return cls(none, none, none, np.inf, np.inf, np.diag(none), [0.0] * fit.rows.kinds)
+
 
 def uncertainty(fit: Fit) -> Uncertainty:
     """Of an estimate, in units of p."""

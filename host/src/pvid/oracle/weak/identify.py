@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
+from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Known
 from pvid.oracle.weak import verdict
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.choice import Scored, ranked
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.errors import Uncertainty, uncertainty
+from pvid.oracle.weak.failures import FAILURES, Found, attempted
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.weak.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
-from pvid.oracle.weak.solve import Fit, batch, compensated, gauss_newton, online
-from pvid.oracle.weak.verdict import Halves, Verdict
+from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
+from pvid.oracle.weak.verdict import Halves, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
 
 
@@ -43,9 +46,10 @@ class Identified:
     chi2 : mean square of the residuals over what the sensors alone explain
     verdict : whether to trust it
     r2 : of each row kind
-    times, history : end of each window [s]; p after it, window by window [windows, n_p]
+    times : end of each window [s]
     design : of the windows
     equation_errors : of each row kind
+    with_error : they were estimated
     halves : p of either half; None: too short
     fit : rows and residuals, for plots
     ranking : designs that were tried, the best first; () where the design was given
@@ -62,9 +66,9 @@ class Identified:
     verdict: Verdict
     r2: dict[str, float]
     times: Float
-    history: Float
     design: WeakDesign
     equation_errors: dict[str, EquationError]
+    with_error: bool
     halves: Halves | None
     fit: Fit
     ranking: tuple[Scored, ...]
@@ -77,6 +81,12 @@ class Identified:
     def values(self) -> dict[str, tuple[float, float]]:
         """name -> (value, standard error)."""
         return {name: (float(p), float(se)) for name, p, se in zip(self.names, self.p, self.se, strict=True)}
+
+    @cached_property
+    @np.errstate(all="ignore")
+    def history(self) -> Float:
+        """p after each window, from the windows up to it [windows, n_p]; NaN where the search ran away."""
+        return online(self.fit.rows, self.fit.start, self.with_error)
 
 
 _SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
@@ -129,62 +139,52 @@ def identify(
     else:
         used, near = design, None
     rows = WeakRows.of(model, run, used)
-    fit = gated(rows, begun, with_error, compensate)
+    fit = _estimated(rows, begun, with_error, compensate)
     if near is not None and not _found(compiled, fit):  # the guesses lead elsewhere
-        fit = replace(gated(rows, near, with_error, compensate), start=fit.start)
-    found = uncertainty(fit)
-    halves = verdict.halves_of(fit)
-    reasons = {
-        "not_identified": verdict.not_identified(compiled, fit, found),
-        "not_settled": verdict.settled(fit),
-        "halves": verdict.of_halves(compiled, fit, halves),
-        "attenuation": verdict.of_attenuation(compiled, fit, found, other_line(fit)),
-        "feedback": verdict.of_feedback(compiled, fit),
-        "residuals": verdict.of_residuals(found, with_error),
-        "range": verdict.of_range(compiled, fit.p),
-        "left_out": verdict.of_spoiled(rows, fit),
+        other = replace(_estimated(rows, near, with_error, compensate), start=fit.start)
+        fit = fit if other.diverged and not fit.diverged else other
+    found = attempted(lambda: uncertainty(fit)) or Uncertainty.unbounded(fit)
+    attempt = _Attempts()
+    halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
+    sensors = attempt("errors of the sensors", lambda: SensorErrors(run, used, fit))
+    error = None if sensors is None else attempt("errors of the sensors", lambda: sensors.found(found.se))
+    white = attempt("a white force as the error of the equations", lambda: as_white_force(fit))
+    by_gain = {
+        one.name: _or_nan(fit, None if sensors is None else partial(sensors.by_gain, one))
+        for one in compiled.signals
+        if one.gain_sd > 0 or one.unit != "rad"
     }
-    sensors_only = by_sensors(fit)
-    if sensors_only is not None:
-        reasons["weights"] = verdict.of_weights(compiled, fit, found, sensors_only, uncertainty(sensors_only))
-    other = other_length(model, run, used, fit.p, with_error)
-    if other is not None:
-        reasons["windows"] = verdict.of_windows(compiled, fit, found, other, uncertainty(other))
-    shorter = shorter_rates(model, run, used, fit.p, with_error)
-    if shorter is not None:
-        reasons["smoothing"] = verdict.of_smoothing(compiled, fit, found, shorter, uncertainty(shorter))
-    sensors = SensorErrors(run, used, fit)
-    by_gain = {one.name: sensors.by_gain(one) for one in compiled.signals if one.gain_sd > 0 or one.unit != "rad"}
-    error = sensors.found(found.se)
-    reasons["sensors"] = of_sensors(compiled, error, found.se)
-    reasons["scale"] = of_scale(compiled, by_gain, fit.p, found.se)
-    by_known = {one.name: of_known(compiled, run, fit, one) for one in compiled.knowns if one.sd > 0}
+    by_known = {
+        one.name: _or_nan(fit, partial(of_known, compiled, run, fit, one)) for one in compiled.knowns if one.sd > 0
+    }
     by_neglect = fit.parameters.positive * fit.p * neglected(compiled, run)
-    white = as_white_force(fit)
-    by_weights = [] if white is None else [white - fit.p]
-    history = online(fit.rows, begun, with_error)
+    parts = [
+        verdict.widened(found.se, halves),
+        *given(compiled, by_gain, by_known),
+        by_neglect,
+        *([] if white is None else [white - fit.p]),
+    ]
+    se = np.sqrt(np.sum(np.square(parts), axis=0))
+    reasons = verdict.not_identified(compiled, fit, se)
+    if not fit.diverged:
+        reasons += attempt.reasons(_checks(rows, run, fit, found, halves, with_error))
+        reasons += of_sensors(compiled, error, found.se) + of_scale(compiled, by_gain, fit.p, found.se)
+        reasons += attempt.failed
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
         p=fit.p,
-        se=np.sqrt(
-            np.sum(
-                np.square(
-                    [verdict.widened(found.se, halves), *given(compiled, by_gain, by_known), by_neglect, *by_weights]
-                ),
-                axis=0,
-            )
-        ),
+        se=se,
         predicted=found.predicted,
         clustered=found.clustered,
         covariance=found.covariance,
         chi2=found.chi2,
-        verdict=Verdict(verdict.named(reasons)),
+        verdict=Verdict(verdict.sorted_by_gravity(reasons)),
         r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},
         times=fit.rows.end_times(),
-        history=history,
         design=used,
         equation_errors={row.name: one for row, one in zip(compiled.rows, fit.errors, strict=True)},
+        with_error=with_error,
         halves=halves,
         fit=fit,
         ranking=ranking,
@@ -195,11 +195,94 @@ def identify(
     )
 
 
+def _estimated(rows: WeakRows, start: Float | None, equation_error: bool, compensate: bool) -> Fit:
+    """The estimate; where the search runs away, the last that could be computed.
+
+    Raises
+    ------
+    PvidError
+        When not even the start can be.
+    """
+    try:
+        return gated(rows, start, equation_error, compensate)
+    except DivergedError as error:
+        return error.fit
+    except FAILURES as error:
+        name = rows.compiled.model.name
+        raise PvidError(
+            f"the equations of {name} give numbers beyond all bounds at the guesses: is a signal in another unit?"
+        ) from error
+
+
+class _Attempts:
+    """Computations beside the fit. Those whose numbers run away are named in one warning: they may have had one."""
+
+    def __init__(self) -> None:
+        self._without: list[str] = []
+
+    def __call__(self, what: str, computation: Callable[[], Found]) -> Found | None:
+        try:
+            return computation()
+        except FAILURES:
+            self._without.append(what)
+            return None
+
+    def reasons(self, checks: Mapping[str, Callable[[], list[Reason]]]) -> list[Reason]:
+        """Of all checks, by what they look at."""
+        return [one for what, check in checks.items() for one in self(what, check) or []]
+
+    @property
+    def failed(self) -> list[Reason]:
+        """The warning."""
+        if not self._without:
+            return []
+        what = listed(dict.fromkeys(self._without))
+        return [Reason("unchecked", f"Not checked, because the numbers ran away: {what}.")]
+
+
+def _checks(
+    rows: WeakRows,
+    run: Mapping[str, npt.ArrayLike],
+    fit: Fit,
+    found: Uncertainty,
+    halves: Halves | None,
+    equation_error: bool,
+) -> dict[str, Callable[[], list[Reason]]]:
+    """Every check of an estimate, by what it looks at."""
+    model, design = rows.compiled, rows.record.grid.design
+    bare = model.bare
+
+    def compared(judge: Callable[..., list[Reason]], other: Fit | None) -> list[Reason]:
+        return [] if other is None else judge(bare, fit, found, other, uncertainty(other))
+
+    return {
+        "the search": lambda: verdict.settled(fit),
+        "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
+        "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
+        "feedback": lambda: verdict.of_feedback(bare, fit),
+        "the residuals": lambda: verdict.of_residuals(found, equation_error),
+        "the range": lambda: verdict.of_range(bare, fit.p),
+        "spoiled windows": lambda: verdict.of_spoiled(rows, fit),
+        "the weights of the sensors": lambda: compared(verdict.of_weights, by_sensors(fit)),
+        "windows of another length": lambda: compared(
+            verdict.of_windows, other_length(model, run, design, fit.p, equation_error)
+        ),
+        "shorter derivatives": lambda: compared(
+            verdict.of_smoothing, shorter_rates(model, run, design, fit.p, equation_error)
+        ),
+    }
+
+
+def _or_nan(fit: Fit, computation: Callable[[], Float] | None) -> Float:
+    """What is computed [n_p]; NaN where it cannot be, or its numbers ran away."""
+    found = None if computation is None else attempted(computation)
+    return np.full(len(fit.p), np.nan) if found is None else found
+
+
 def _found(model: CompiledModel, fit: Fit) -> bool:
     """Whether a search came to rest at plausible parameters."""
-    return (
-        fit.settled and not verdict.not_identified(model, fit, uncertainty(fit)) and not verdict.of_range(model, fit.p)
-    )
+    found = attempted(lambda: uncertainty(fit)) if fit.settled else None
+    return found is not None and not verdict.not_identified(model, fit, found.se) and not verdict.of_range(model, fit.p)
 
 
 def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float]) -> list[Float]:

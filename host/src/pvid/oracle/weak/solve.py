@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
+from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.rows import EquationError, WeakRows, WhiteRows
@@ -130,6 +132,7 @@ class Fit:
     errors : of each row kind
     start : where the search began
     settled : the last step was tiny
+    diverged : the search ran away; p is where it last could be computed with
     """
 
     p: Float
@@ -138,6 +141,7 @@ class Fit:
     errors: list[EquationError]
     start: Float
     settled: bool
+    diverged: bool = False
 
     @property
     def parameters(self) -> Parameters:
@@ -168,6 +172,19 @@ class Fit:
         return [one.residuals(theta) for one in self.white]
 
 
+class DivergedError(ArithmeticError):
+    """A search for p ran away, and with it every number that depends on it.
+
+    Attributes
+    ----------
+    fit : the last that could be computed
+    """
+
+    def __init__(self, fit: Fit) -> None:
+        super().__init__("the search for the parameters ran away")
+        self.fit = fit
+
+
 def batch(
     rows: WeakRows,
     start: Float | None = None,
@@ -184,7 +201,28 @@ def batch(
     equation_error : estimate the error of each equation from its residuals and weight with it
     compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R / d theta
     passes : of whitening at the present p, at most
+
+    Raises
+    ------
+    DivergedError
+        When p leaves what numbers hold.
+    numpy.linalg.LinAlgError
+        When the rows cannot be whitened at the start.
     """
+    last: Fit | None = None
+    try:
+        for fit in _passes(rows, start, equation_error, compensate, passes):
+            last = fit
+    except FAILURES as error:
+        if last is None:
+            raise
+        raise DivergedError(replace(last, settled=False, diverged=True)) from error
+    assert last is not None
+    return last
+
+
+def _passes(rows: WeakRows, start: Float | None, equation_error: bool, compensate: bool, passes: int) -> Iterator[Fit]:
+    """The estimate before each pass of `batch`, and after the last."""
     parameters = rows.compiled.parameters
     p = begun = parameters.checked(start)
     prior = parameters.prior(begun)
@@ -193,6 +231,7 @@ def batch(
     for turn in range(passes):
         theta = parameters.theta(p)
         white = [rows.white(group, theta, errors) for group in rows.groups]
+        yield Fit(p, rows, white, errors, begun, settled=False)
         moments = compensated(rows, white, theta) if compensate else Moments.of(white)
         p, size = gauss_newton(parameters, moments, p, prior, 3 if turn < 4 else _STEPS)
         changed = False
@@ -207,7 +246,9 @@ def batch(
         settled = size < 1e-4
     theta = parameters.theta(p)
     white = [rows.white(group, theta, errors) for group in rows.groups]
-    return Fit(p, rows, white, errors, begun, settled)
+    if not np.isfinite(p).all():
+        raise FloatingPointError
+    yield Fit(p, rows, white, errors, begun, settled)
 
 
 def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) -> Moments:
@@ -338,14 +379,22 @@ def online(rows: WeakRows, start: Float | None = None, equation_error: bool = Tr
 
     The sums of rows that were whitened at a poor p weigh wrongly. Here all rows are whitened anew when their number is
     a power of two, and again until p stays: three steps from a start that is 50 % off are too few. An engine that keeps
-    no rows lets its first sums fade instead.
+    no rows lets its first sums fade instead. NaN from the window on at which numbers run away.
     """
+    history = np.full((rows.windows, len(rows.compiled.parameters.names)), np.nan)
+    with suppress(*FAILURES):
+        for w, p in enumerate(_growing(rows, start, equation_error)):
+            history[w] = p
+    return history
+
+
+def _growing(rows: WeakRows, start: Float | None, equation_error: bool) -> Iterator[Float]:
+    """p after each window."""
     parameters = rows.compiled.parameters
     p = parameters.checked(start)
     prior = parameters.prior(p)
     errors = [EquationError()] * rows.kinds
     moments = Moments([], [], [])
-    history = np.empty((rows.windows, len(p)))
     for w in range(rows.windows):
         anew = w & (w + 1) == 0
         if anew and equation_error and w >= 3:
@@ -361,5 +410,4 @@ def online(rows: WeakRows, start: Float | None = None, equation_error: bool = Tr
             if size < _STAYS:
                 break
         moments = whole
-        history[w] = p
-    return history
+        yield p

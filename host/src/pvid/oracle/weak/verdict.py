@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,6 +13,7 @@ from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Jet
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
+from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.front import filtered, weights_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
@@ -40,6 +41,7 @@ Name = Literal[
     "misfit",
     "core",
     "held",
+    "unchecked",
 ]
 Status = Literal["good", "warning", "not_identified"]
 
@@ -63,6 +65,11 @@ _LAW = 0.02
 _NO_BETTER = 3.0
 
 _FEW_WINDOWS = 8
+
+_RAN_AWAY = (
+    "The search for the parameters ran away: the equations do not describe this run, or a signal has another unit, "
+    "sign or name."
+)
 
 
 @dataclass(frozen=True)
@@ -119,19 +126,26 @@ class Halves:
     clash: Float
 
 
-def not_identified(model: CompiledModel, fit: Fit, found: Uncertainty) -> list[Reason]:
-    """Parameters that the run does not determine, and with what the worst is mixed."""
+def not_identified(model: CompiledModel, fit: Fit, se: Float) -> list[Reason]:
+    """Parameters that the run does not determine, and with what the worst is mixed.
+
+    Parameters
+    ----------
+    se : standard errors [n_p], those that are published where there are such
+    """
+    if fit.diverged:
+        return [Reason("not_identified", _RAN_AWAY)]
     p, parameters = fit.p, fit.parameters
     # an offset of exactly 0 has an error all the same
-    relative = found.se / np.where(parameters.positive, UNKNOWN * np.abs(p), _UNKNOWN_OF_RANGE * parameters.sd)
+    relative = se / np.where(parameters.positive, UNKNOWN * np.abs(p), _UNKNOWN_OF_RANGE * parameters.sd)
     bad = [k for k in np.argsort(-relative) if relative[k] > 1 or not np.isfinite(relative[k])]
     if not bad:
         return []
     names = [model.p_names[k] for k in bad]
-    partner = partner_of(fit, int(bad[0]))
+    partner = attempted(lambda: partner_of(fit, int(bad[0])))
     together = f"{names[0]} and {model.p_names[partner]}" if partner is not None else ""
     mixed = f"; {together} are not identifiable together" if together else ""
-    worst = with_unit(found.se[bad[0]], model.unknowns[bad[0]].unit, 2)
+    worst = with_unit(se[bad[0]], model.unknowns[bad[0]].unit, 2)
     error = f"the standard error of {names[0]} is {worst}"
     return [Reason("not_identified", f"The run does not determine {listed(names)}: {error}{mixed}.")]
 
@@ -379,7 +393,6 @@ def widened(se: Float, halves: Halves | None) -> Float:
     return np.where(apart > 2 * se, apart, se)
 
 
-def named(reasons: Mapping[str, list[Reason]]) -> tuple[Reason, ...]:
-    """All reasons, alarms first."""
-    every = [one for group in reasons.values() for one in group]
-    return tuple(sorted(every, key=lambda one: not one.alarm))
+def sorted_by_gravity(reasons: Iterable[Reason]) -> tuple[Reason, ...]:
+    """Alarms first."""
+    return tuple(sorted(reasons, key=lambda one: not one.alarm))

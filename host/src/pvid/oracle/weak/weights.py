@@ -39,7 +39,7 @@ def as_white_force(fit: Fit) -> Float | None:
         white = [rows.white(group, theta, errors) for group in rows.groups]
         p, size = gauss_newton(parameters, compensated(rows, white, theta), p, prior, _STEPS)
         if not np.isfinite(p).all():
-            return None
+            raise FloatingPointError("p is not finite")
         if size < _SETTLED:
             break
     return p
