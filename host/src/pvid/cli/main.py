@@ -1,7 +1,8 @@
 """The command line: `./tools/pvid COMMAND`.
 
 Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, or output that cannot be written (one sentence),
-3 nothing identified, 70 an error of pvid's own (a report is written), 130 interrupted, 141 the output was closed by its reader.
+3 nothing identified, 70 an error of pvid's own (a report is written), 130 interrupted, 141 the output was closed by its
+reader.
 """
 
 from __future__ import annotations
