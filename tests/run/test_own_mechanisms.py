@@ -233,7 +233,7 @@ def test_a_dry_friction_that_the_equations_lack_is_named(friction: float) -> Non
     ("name", "factor", "sentence"),
     [
         ("F", 1.0, None),
-        ("F", -1.0, "F seems to have the opposite sign: --columns F=F:-1"),
+        ("F", -1.0, "F seems to have the opposite sign: --columns F=F:-1 (or x: --columns x=x:-1)"),
         ("x", 1e3, "x seems to be in mm, not m: --columns x=x:mm"),
         ("F", 0.0, "F is 0 in every sample: is it the column of the drive?"),
     ],

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pvid.model.compiled import Signal
+from pvid.base.wording import with_unit
+from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.weak.choice import score_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
@@ -17,10 +18,14 @@ from pvid.run.mechanism import MechanismAnswer
 
 # Residuals over what the sensors explain, above which a mistake is sought.
 _MISFIT = 20.0
-# A mistake is named if the run then leaves less than this part of them, and determines every parameter.
+# A mistake is named if it leaves less than this part of the residuals, relative to the motion ...
 _PART = 1 / 30
+# ... or, where the answer without it is implausible, this part: another sign gives a linear mechanism other residuals,
+# another unit the same ones.
+_PART_OF_SIGN, _PART_OF_UNIT = 0.3, 1.5
+_FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: a unit is doubted beyond the one, right within the other
+_ALIKE = 1.05  # times the least part that is left
 _TIMES = ("ms", "us")
-_FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: the time is doubted beyond the one, right within the other
 # By unit: what a column may be in instead, and what to type for it.
 _UNITS = {
     "rad": {"deg": "deg", "rev": "rev"},
@@ -43,19 +48,29 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
     """
     if (unit := _unit_of_time(answer)) is not None:
         return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
-    if answer.identified and answer.found.chi2 < _MISFIT:
+    if answer.identified and answer.found.chi2 < _MISFIT and _distance(answer, answer.found.p) < _FAR:
         return ()
     run = answer.recording.signals
-    idle = [one for one in answer.model.signals if one.kind == "input" and not np.any(run[one.name])]
-    if idle:
-        return (f"{idle[0].name} is 0 in every sample: is it the column of the drive?",)
-    found = min(_tried(answer), default=None)
-    return () if found is None else (found[1],)
+    for one in answer.model.signals:
+        if one.kind == "input" and np.ptp(run[one.name]) == 0:
+            value = float(run[one.name][0])
+            shown = with_unit(value, one.unit, 3) if value else "0"
+            return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
+    found = list(_tried(answer))
+    least = min((left for left, _, _ in found), default=0.0)
+    # A linear mechanism moves alike with the other sign of its input and of its sensor.
+    alike = [(said, typed) for left, said, typed in found if left <= _ALIKE * least][:2]
+    if not alike:
+        return ()
+    other = [f" (or {typed.partition('=')[0]}: --columns {typed})" for _, typed in alike[1:]]
+    return (f"{alike[0][0]}: --columns {alike[0][1]}" + "".join(other),)
 
 
 def _unit_of_time(answer: MechanismAnswer) -> str | None:
-    """In which the parameters come near their guesses; None where they are near as it is, or in no unit. Residuals do
-    not tell: another unit of time gives a linear mechanism other parameters and the same motion."""
+    """In which the parameters come near their guesses; None where they are near as it is, or in no unit.
+
+    Residuals contain nothing of it: another unit of time gives a linear mechanism other parameters and the same motion.
+    """
     if _distance(answer, answer.found.p) < _FAR:
         return None
     model, signals, design = ready(answer.model), answer.recording.signals, answer.found.design
@@ -74,26 +89,40 @@ def _distance(answer: MechanismAnswer, p: Float) -> float:
     return max((max(ratio, 1 / ratio) if ratio > 0 else np.inf for ratio in of), default=1.0)
 
 
-def _tried(answer: MechanismAnswer) -> Iterator[tuple[float, str]]:
-    """chi^2 and sentence of what explains the run."""
+def _tried(answer: MechanismAnswer) -> Iterator[tuple[float, str, str]]:
+    """Part of the residuals that is left by a mistake which explains the run, its sentence, and what to type."""
     model, signals, design = ready(answer.model), answer.recording.signals, answer.found.design
     before = score_of(model, signals, design, None, False)
-    most = np.inf if before is None or not before.known else _PART * before.chi2
-    channels = channels_of(answer.model)
-    for signal in answer.model.signals:
+    far = before is None or _distance(answer, before.p) > _FAR
+    for signal in sorted(answer.model.signals, key=lambda one: one.kind != "input"):
         name = signal.name
-        if name not in signals:
-            continue
-        for said, unit in _mistakes(signal):
+        for said, unit, most in _mistakes(signal, signals[name]):
             typed = f"{name}={name}:{unit}"
-            changed = {**signals, name: Columns.parse(typed, channels)[name].in_si(signals[name])}
-            one = score_of(model, changed, design, None, False)
-            if one is not None and one.known and one.chi2 < min(most, _MISFIT):
-                yield one.chi2, f"{said}: --columns {typed}"
+            scale = float(Columns.parse(typed, channels_of(answer.model))[name].in_si(np.ones(1))[0])
+            # Noise is scaled with its signal: a signal that is small beside its noise fits any equations.
+            scaled = model if abs(scale) == 1 else ready(_with_noise(answer.model, name, abs(scale)))
+            one = score_of(scaled, {**signals, name: scale * signals[name]}, design, None, False)
+            if one is None or not one.known or _distance(answer, one.p) > _NEAR:
+                continue
+            left = one.chi2 / before.chi2 if before is not None else 0.0
+            implausible = far or (scale < 0 and before is not None and not before.known)
+            if left < (most if implausible else _PART):
+                yield left, said, typed
 
 
-def _mistakes(signal: Signal) -> Iterator[tuple[str, str]]:
-    """What is said of a signal, and what to type behind its column."""
-    yield f"{signal.name} seems to have the opposite sign", "-1"
+def _with_noise(model: CompiledModel, name: str, scale: float) -> CompiledModel:
+    """With the resolution and the noise of a signal so many times as large."""
+    own = model.signal(name)
+    noise = own.noise if own.resolution else scale * own.noise
+    other = replace(own, resolution=scale * own.resolution, noise=noise)
+    return replace(model, signals=tuple(other if one is own else one for one in model.signals))
+
+
+def _mistakes(signal: Signal, values: Float) -> Iterator[tuple[str, str, float]]:
+    """What a signal seems to be, what to type behind its column, and the part of the residuals that may be left."""
+    yield f"{signal.name} seems to have the opposite sign", "-1", _PART_OF_SIGN
     for unit, typed in _UNITS.get(signal.unit, {}).items():
-        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", typed
+        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", typed, _PART_OF_UNIT
+    if signal.resolution and np.array_equal(values, np.rint(values)):
+        typed = f"{signal.resolution:.9g}"
+        yield f"{signal.name} seems to be in counts, not {signal.unit or 'the unit 1'}", typed, _PART_OF_UNIT

@@ -19,6 +19,7 @@ from pvid.oracle.weak.choice import Scored, ranked
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
 from pvid.oracle.weak.failures import FAILURES, Found, attempted
+from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
@@ -259,7 +260,7 @@ def _checks(
         "the search": lambda: verdict.settled(fit),
         "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
         "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
-        "feedback": lambda: verdict.of_feedback(bare, fit),
+        "feedback": lambda: of_feedback(bare, run, fit, _determined(bare, fit, found)),
         "the residuals": lambda: verdict.of_residuals(found, equation_error),
         "the range": lambda: verdict.of_range(bare, fit.p),
         "spoiled windows": lambda: verdict.of_spoiled(rows, fit),
@@ -282,7 +283,12 @@ def _or_nan(fit: Fit, computation: Callable[[], Float] | None) -> Float:
 def _found(model: CompiledModel, fit: Fit) -> bool:
     """Whether a search came to rest at plausible parameters."""
     found = attempted(lambda: uncertainty(fit)) if fit.settled else None
-    return found is not None and not verdict.not_identified(model, fit, found.se) and not verdict.of_range(model, fit.p)
+    return found is not None and _determined(model, fit, found)
+
+
+def _determined(model: CompiledModel, fit: Fit, found: Uncertainty) -> bool:
+    """Whether every parameter has a value, within its range."""
+    return not verdict.not_identified(model, fit, found.se) and not verdict.of_range(model, fit.p)
 
 
 def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float]) -> list[Float]:

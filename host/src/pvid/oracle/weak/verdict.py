@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import sympy as sp
 
 from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
-from pvid.model.signals import Jet
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
 from pvid.oracle.weak.failures import attempted
-from pvid.oracle.weak.front import filtered, weights_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.rows import WeakRows
@@ -58,11 +55,6 @@ _VISIBLE = 1e-3
 # Residuals above this many times what the sensors explain are reported.
 _CHI2 = 2.0
 _CHI2_WEIGHTED = 3.0
-
-# An input is explained by the outputs if a static law of them leaves less than this part of it, and less than this many
-# times what the model leaves.
-_LAW = 0.02
-_NO_BETTER = 3.0
 
 _FEW_WINDOWS = 8
 
@@ -279,79 +271,6 @@ def of_residuals(found: Uncertainty, equation_error: bool = True) -> list[Reason
             )
         )
     return out
-
-
-def of_feedback(model: CompiledModel, fit: Fit) -> list[Reason]:
-    """Inputs that a static law of the outputs explains as well as the model explains them.
-
-    Of an output the law has derivatives below the highest one of the equations: all of them are the mechanism itself.
-    """
-    rows, functions = fit.rows, fit.rows.functions
-    grid = rows.record.grid
-    chi = functions.combine(0)
-
-    def sums(x: Float) -> Float:
-        return np.asarray((functions.window_sums(x) @ chi)[rows.numbers].reshape(-1))
-
-    outputs = [np.ones(grid.size)]
-    for one in model.signals:
-        if one.kind == "sensor" and not one.driven:
-            z = filtered(grid.raw[one.name], weights_of(grid.design, 0))[grid.places]
-            order = _order_of(model, one.name)
-            if order < 1:
-                continue
-            outputs.append(z)
-            if order > 1 and (grid.design.rate_taps > 1 or grid.design.taps > 1):
-                outputs.append(filtered(grid.raw[one.name], weights_of(grid.design, 1))[grid.places])
-            if one.unit == "rad":
-                outputs += [np.sin(z), np.cos(z)]
-    basis = np.stack([sums(x) for x in outputs], axis=1)
-    basis = basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
-    out = []
-    for one in model.signals:
-        if one.kind != "input" or one.name not in grid.raw:
-            continue
-        u = sums(grid.raw[one.name][grid.places])
-        total = float(u @ u)
-        if total == 0:
-            continue
-        rest = u - basis @ np.linalg.lstsq(basis, u, rcond=1e-10)[0]
-        left = float(rest @ rest) / total
-        model_leaves = unexplained(model, fit, one.jet, total)
-        if left < _LAW and (model_leaves is None or left < _NO_BETTER * model_leaves):
-            out.append(
-                Reason(
-                    "feedback",
-                    f"{one.name} is a function of the measured outputs ({100 * (1 - left):.4g} % explained): the "
-                    "estimate may describe the controller, not the mechanism. Add an excitation that does not depend "
-                    "on the outputs.",
-                )
-            )
-    return out
-
-
-def _order_of(model: CompiledModel, name: str) -> int:
-    """Highest derivative of a signal in the rows."""
-    orders = [0]
-    for row in model.rows:
-        for part in (*row.regressors, row.known):
-            for order, psi in part.items():
-                for jet in sp.sympify(psi).atoms(Jet):
-                    below = model.opaque.get(Jet(jet.of), Jet(jet.of)).atoms(Jet)
-                    orders += [order + jet.order + one.order for one in below if one.of == name]
-    return max(orders)
-
-
-def unexplained(model: CompiledModel, fit: Fit, jet: Jet, total: float) -> float | None:
-    """Part of an input's sums that the row in which it is known leaves; None where there is no such row."""
-    parts = []
-    for row, columns, th in zip(model.rows, fit.rows.columns, fit.parameters.theta(fit.p), strict=True):
-        gain = sp.diff(sp.sympify(row.known.get(0, 0)), jet)
-        gain = model.with_knowns(gain) if gain != 0 else gain
-        if gain != 0 and gain.is_number:
-            e = columns[:, len(th)] - np.einsum("wjk,j->wk", columns[:, : len(th)], th)
-            parts.append(float(np.sum(e**2)) / float(gain) ** 2 / total)
-    return min(parts) if parts else None
 
 
 def of_range(model: CompiledModel, p: Float) -> list[Reason]:
