@@ -5,7 +5,8 @@
 #include "dc_motor_example.h"
 #include "task.h"
 
-#define PERIOD pdMS_TO_TICKS(DC_MOTOR_PERIOD_US / 1000)
+/* Of a rig faster than the tick of the system one tick, which is too long: raise configTICK_RATE_HZ. */
+#define PERIOD (pdMS_TO_TICKS(DC_MOTOR_PERIOD_US / 1000) > 0 ? pdMS_TO_TICKS(DC_MOTOR_PERIOD_US / 1000) : 1)
 
 static void identify(void *unused)
 {

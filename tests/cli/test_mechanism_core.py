@@ -103,6 +103,50 @@ def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(recor
     )
 
 
+def test_a_core_that_has_published_nothing_is_not_called_good(recorded: dict[str, Path]) -> None:
+    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
+    core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
+    silent = replace(core, published=False, reason=Reason.HELD_NOT_EXCITED)
+    assert silent.verdict.status == "not_identified"
+    assert silent.as_json()["status"] == "not_identified"
+    assert silent.verdict.reasons[0].text == "The C core has published no estimate: held not excited."
+
+
+def test_core_and_analysis_are_compared_by_their_noise(recorded: dict[str, Path]) -> None:
+    """The errors of gains are the same in both: they hide no difference."""
+    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
+    core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
+    one = core.values["Iyz"]
+    assert one.value is not None and one.se_noise is not None
+    loud = replace(one, se=100 * one.se_noise)
+    apart = replace(loud, value=one.value + 5 * one.se_noise)
+    near = replace(loud, value=one.value + 2 * one.se_noise)
+    assert replace(core, values={**core.values, "Iyz": apart}).verdict.status == "warning"
+    assert replace(core, values={**core.values, "Iyz": near}).verdict.status == "good"
+
+
+def test_without_a_second_stage_the_answer_is_that_of_the_first(tmp_path: Path) -> None:
+    """A motor without inductance, whose current is a reading that contains parameters of the motion."""
+    model, run = tmp_path / "motor.py", tmp_path / "motor.csv"
+    model.write_text(
+        "from pvid.model import Model\n"
+        "model = Model('motor without inductance')\n"
+        "V = model.input('V', 'V', hold='zoh', reach=12)\n"
+        "i, w = model.sensor('i', 'A', noise=5e-3), model.sensor('w', 'rad/s', noise=0.05, reach=300)\n"
+        "R, k = model.unknown('R', 'ohm', 1.2), model.unknown('k', 'N*m/A', 0.05)\n"
+        "J, b = model.unknown('J', 'kg*m^2', 2e-4), model.unknown('b', 'N*m*s', 1e-4)\n"
+        "model.equation(R * i + k * w - V)\n"
+        "model.equation(J * w.d() + b * w - k * i)\n",
+        encoding="utf-8",
+    )
+    assert pvid("model", "simulate", model, run, "--duration", "8").return_value == DONE
+    found = pvid("identify", run, "--model", model, "--core", "f32", "--refine")
+    assert found.return_value == DONE and "weak form, C in float32" in found.stdout
+    assert "not refined: motor: the second stage in C needs readings" in found.stderr
+    shown = json.loads(pvid("identify", run, "--model", model, "--core", "f32", "--refine", "--json").stdout)
+    assert shown["identified"] and not shown["refinement"]["adopted"] and "i depends on" in shown["refinement"]["text"]
+
+
 def test_where_the_core_publishes_nothing_the_values_are_null(
     recorded: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,11 +16,15 @@ from pvid.base.errors import PvidError
 from pvid.codegen.build import Options, build, check, files_of, fixed_point_refusal, refine_functions
 from pvid.codegen.reaches import Reaches
 from pvid.codegen.weak_library import weak_native
-from pvid.core.sizes import raised
-from pvid.core.sources import source
+from pvid.core.host_compiler import host_compiler
+from pvid.core.sizes import default_sizes, raised
+from pvid.core.sources import INCLUDES, source
 from pvid.model import Integral, Model
 from pvid.models.mechanisms import compiled_of
 from pvid.run.engine_design import config_for_simulated_rig, samples_of, simulated_run_of
+from pvid.run.engine_design_q31 import engine_for_rig_like_the_shipped
+from pvid.run.engine_files_q31 import files_of as fixed_files_of
+from pvid.run.engine_files_q31 import fitted_of
 from pvid.run.refine_design import refine_design, refine_settings
 from pvid.setup.weak_sizes import sizes_of_design
 
@@ -154,6 +158,30 @@ def test_the_weak_form_and_its_refinement_are_options_of_the_folder(tmp_path: Pa
     assert host.refined is not None
     assert printed.tolist() == [*host.estimator.p, *host.refined["r"].tolist()]
     assert np.allclose(printed[-6:-3], p_of_rig[:3], rtol=2e-4) and np.allclose(printed[-6:], p_of_rig, atol=2e-6)
+
+
+def test_both_arithmetics_of_a_mechanism_are_in_one_c_file(tmp_path: Path) -> None:
+    """As in a firmware that carries both for a comparison."""
+    compiled = compiled_of("dc_motor")
+    engine = engine_for_rig_like_the_shipped(compiled)
+    config = config_for_simulated_rig(compiled)
+    build(compiled, tmp_path, options=Options(design=config, fixed_weak=fixed_files_of(engine, "test")))
+    (tmp_path / "both.c").write_text(
+        '#include "dc_motor_design_f32.h"\n#include "dc_motor_design_q31.h"\n'
+        "static pvid_weak_f32 one;\nstatic pvid_weak_q31 other;\n"
+        "int main(void)\n{\n    return (pvid_weak_init_f32(&one, &dc_motor_config_f32) != PVID_OK) ||\n"
+        "           (pvid_weak_init_q31(&other, &dc_motor_config_q31) != PVID_OK);\n}\n",
+        encoding="utf-8",
+    )
+    needed, fixed = sizes_of_design(config.design), fitted_of(engine)
+    largest = {
+        macro: max(needed.get(macro, 0), fixed.get(macro, 0)) for macro in {*needed, *fixed} & set(default_sizes())
+    }
+    usual = [f"-D{macro}={size}" for macro, size in raised(largest).items()]
+    run(
+        host_compiler("a test"), "-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", *usual, f"-I{tmp_path}",
+        *INCLUDES, tmp_path / "both.c",
+    )  # fmt: skip
 
 
 def test_what_the_refinement_in_c_lacks_is_a_sentence() -> None:

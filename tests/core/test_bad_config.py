@@ -149,7 +149,7 @@ def test_a_field_out_of_its_range_is_refused_by_name(
 
 
 def test_a_refusal_is_an_error_that_names_the_field(native: Native) -> None:
-    with pytest.raises(PvidError, match="refused the configuration: bad length"):
+    with pytest.raises(PvidError, match="refused the configuration: bad length: l1 is nan and must be"):
         native.identifier(replace(strong_config(rig_with(form="strong"), 1000.0), l1=math.nan))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,9 +16,12 @@ from pvid.codegen.build import files_of, refine_functions, refine_refusal
 from pvid.model import Integral, Model, sgn, sin
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Jet
+from pvid.rig.run import Recording
+from pvid.run.engine_design import config_to_identify
 from pvid.run.mechanism import identify_mechanism
 from pvid.run.mechanism_core import identify_in_c
-from pvid.run.refined_core import refined_in_c
+from pvid.run.refine_design import refine_settings
+from pvid.run.refined_core import BothStages, compare_refined, refined_in_c
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import kernel_of
 from pvid.run.refined_mechanism import refine_mechanism
@@ -217,6 +221,67 @@ def test_an_integral_of_a_product_is_an_input() -> None:
     u, _ = inputs_of(compiled, kernel_of(compiled).made, signals, 100.0, 2)
     place = kernel_of(compiled).made.inputs.index(Jet("z"))
     assert np.abs(u[::2, 0, place] - (t - np.sin(2 * t) / 2)).max() < 1e-4
+
+
+def coasting() -> CompiledModel:
+    model = Model("coasting vehicle")
+    F = model.input("F", "N", hold="zoh", reach=400)
+    v = model.sensor("v", "m/s", resolution=0.01, reach=20)
+    m, Fr = model.unknown("m", "kg", 80.0), model.unknown("Fr", "N", 10.0)
+    b, cw = model.unknown("b", "N*s/m", 0.5), model.unknown("cw", "kg/m", 0.3)
+    model.equation(m * v.d() + Fr * sgn(v) + b * v + cw * v * abs(v) - F)
+    return model.compiled("coasting")
+
+
+def coasted(n: int = 4000) -> tuple[Recording, dict[str, float]]:
+    truth = {"m": 92.0, "Fr": 13.5, "b": 0.9, "cw": 0.31}
+
+    def rate(x: Float, F: float) -> Float:
+        drag = truth["Fr"] * np.tanh(x / 0.01) + truth["b"] * x + truth["cw"] * x * np.abs(x)
+        return np.asarray((F - drag) / truth["m"])
+
+    F = np.maximum(held_at_random(n, 100, 300, 200.0, 3), -60.0)
+    v = motion(rate, np.array([0.1]), F, 0.02, 40)[:, 0]
+    return recorded(0.02, F=F, v=read(v, 0.01, 5)), truth
+
+
+def test_friction_of_a_measured_speed_has_a_second_stage_in_c() -> None:
+    """Its jump is that at the reversal; the step there is as short as the speed's sensor needs, not its integral."""
+    recording, _ = coasted()
+    answer = identify_mechanism(recording, coasting())
+    stages = BothStages.of(coasting(), recording, config_to_identify(coasting(), recording, answer.ranking))
+    widths = stages.settings.width
+    h = stages.settings.ratio / stages.settings.sample_rate
+    assert widths is not None and stages.settings.fine_parts is not None
+    assert abs(float(widths[0]) / (2 * 13.5 / 92.0 * h / stages.settings.fine_parts) - 1) < 0.02
+    in_c = refined_in_c(identify_in_c(answer))
+    assert in_c.identified
+    assert compare_refined(stages).equal
+
+
+def test_a_reversal_against_a_moving_belt_is_where_the_speeds_are_equal() -> None:
+    model = Model("block on a belt")
+    x, w = model.sensor("x", "m", resolution=1e-4, reach=0.2), model.known("w", "m/s", 0.3)
+    m, k, Fc = model.unknown("m", "kg", 1.0), model.unknown("k", "N/m", 30.0), model.unknown("Fc", "N", 2.0)
+    model.equation(m * x.d(2) + k * x + Fc * sgn(x.d() - w))
+    t = np.arange(2000) * 1e-3
+    settings = refine_settings(
+        refine_functions(model.compiled("belt")), {"x": 0.1 * np.sin(5.5 * t)}, 1e3, (1.0, 30.0, 2.0), 2.0
+    )
+    assert settings.width is not None and settings.fine_parts is not None
+    assert abs(float(settings.width[0]) / (2 * 2.0 / 1.0 * settings.ratio * 1e-3 / settings.fine_parts) - 1) < 0.01
+
+
+def test_a_configuration_that_the_core_refuses_is_named_with_its_value() -> None:
+    recording, _ = coasted()
+    answer = identify_mechanism(recording, coasting())
+    stages = BothStages.of(coasting(), recording, config_to_identify(coasting(), recording, answer.ranking))
+    narrow = replace(stages.settings, width=np.array([1e-12], np.float32))
+    with pytest.raises(PvidError, match=r"bad bounds: width is 1e-12 and must be 1e-09 to 1e\+09"):
+        replace(stages, settings=narrow).run()
+    several = replace(stages.settings, first_block=200)
+    with pytest.raises(PvidError, match=r"bad window \(host/docs/reasons.md has its fields and their ranges\)"):
+        replace(stages, settings=several).run()
 
 
 def refused(model: Model) -> str:

@@ -99,8 +99,8 @@ static void a_reading_beyond_full_scale_restarts_windows_and_keeps_sums(void **s
     static const int32_t offset[2] = {-7, 40};
     config.offset = offset;
     start();
-    const int32_t y_max = kapitza_full_scale[ENGINE_Y];
-    const int32_t phi_max = kapitza_full_scale[ENGINE_PHI];
+    const int32_t y_max = kapitza_full_scale_q31[ENGINE_Y];
+    const int32_t phi_max = kapitza_full_scale_q31[ENGINE_PHI];
     const int32_t good[4][2] = {{0, phi_max}, {0, -phi_max}, {y_max, 0}, {-y_max, 0}};
     const int32_t bad[4][2] = {{0, phi_max + 1}, {0, -phi_max - 1}, {y_max + 1, 0}, {-y_max - 1, 0}};
     const int32_t far[4][2] = {{-7, INT32_MIN}, {-7, INT32_MAX}, {INT32_MIN, 40}, {INT32_MAX, 40}};
@@ -241,7 +241,7 @@ static void random_counts_keep_every_bound(void **state)
     start();
     uint32_t generator = 1u;
     for (int i = 0; i < 30000; i++) {
-        const int32_t range[2] = {((i / 3000) % 2 == 0) ? 3 : 300, kapitza_full_scale[ENGINE_PHI]};
+        const int32_t range[2] = {((i / 3000) % 2 == 0) ? 3 : 300, kapitza_full_scale_q31[ENGINE_PHI]};
         int32_t reading[2];
         for (int k = 0; k < 2; k++) {
             generator = (generator * 1664525u) + 1013904223u;

@@ -64,7 +64,7 @@ static void start_again(void)
     memcpy(own.channel, kapitza_channel, sizeof own.channel);
     memcpy(own.term, kapitza_term, sizeof own.term);
     memcpy(own.kind, kapitza_kind, sizeof own.kind);
-    memcpy(own.full_scale, kapitza_full_scale, sizeof own.full_scale);
+    memcpy(own.full_scale, kapitza_full_scale_q31, sizeof own.full_scale);
     memcpy(own.down, kapitza_down, sizeof own.down);
     memcpy(own.filter, kapitza_filter, sizeof own.filter);
     memcpy(own.integral, kapitza_integral, sizeof own.integral);

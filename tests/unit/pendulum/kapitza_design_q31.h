@@ -37,34 +37,34 @@
 #error "compile pvid and this file with -DPVID_MAX_THETA_Q31=8 -DPVID_MAX_P=4 -DPVID_MAX_MOMENTS_Q31=36 -DPVID_MAX_C_Q31=16 -DPVID_MAX_SAMPLES=2 -DPVID_MAX_INPUTS=2 -DPVID_MAX_CHANNELS=8 -DPVID_MAX_INTEGRANDS=3 -DPVID_MAX_KINDS=1 -DPVID_MAX_COLUMNS=11 -DPVID_MAX_RING=42 -DPVID_MAX_HARMONICS=7 -DPVID_MAX_FUNCTIONS=7 -DPVID_MAX_POWER=6 -DPVID_MAX_DECIMATION=24 -DPVID_MAX_BLOCKS=1"
 #endif
 
-static const PVID_TABLE int32_t kapitza_weights_0[5] = {
+static const PVID_TABLE int32_t kapitza_weights_0_q31[5] = {
     0, 656025384, -139896732, 21927761, -1791711,
 };
 
-static const PVID_TABLE int32_t kapitza_weights_1[3] = {
+static const PVID_TABLE int32_t kapitza_weights_1_q31[3] = {
     749613206, -99549526, 9329519,
 };
 
-static const int32_t kapitza_full_scale[2] = {
+static const int32_t kapitza_full_scale_q31[2] = {
     6000, 782,
 };
 
-static const uint8_t kapitza_down[2] = {
+static const uint8_t kapitza_down_q31[2] = {
     0, 0,
 };
 
-static const pvid_weak_filter_q31 kapitza_filter[2] = {
-    {4, 17, kapitza_weights_0},
-    {2, 18, kapitza_weights_1},
+static const pvid_weak_filter_q31 kapitza_filter_q31[2] = {
+    {4, 17, kapitza_weights_0_q31},
+    {2, 18, kapitza_weights_1_q31},
 };
 
-static const pvid_weak_integral_q31 kapitza_integral[3] = {
+static const pvid_weak_integral_q31 kapitza_integral_q31[3] = {
     {12, 4},
     {12, 4},
     {12, 4},
 };
 
-static const pvid_weak_format_q31 kapitza_format[9] = {
+static const pvid_weak_format_q31 kapitza_format_q31[9] = {
     {2, 0, 0, 0, 0},
     {1, 0, 1, 32, 29},
     {2, 0, 0, 0, 0},
@@ -76,7 +76,7 @@ static const pvid_weak_format_q31 kapitza_format[9] = {
     {1, 0, 0, 0, 0},
 };
 
-static const pvid_scaled_q31 kapitza_factor[13] = {
+static const pvid_scaled_q31 kapitza_factor_q31[13] = {
     {-564970861, -46},
     {-710897863, -42},
     {-564970861, -51},
@@ -92,7 +92,7 @@ static const pvid_scaled_q31 kapitza_factor[13] = {
     {-867795243, -44},
 };
 
-static const pvid_weak_noise_q31 kapitza_noise[21] = {
+static const pvid_weak_noise_q31 kapitza_noise_q31[21] = {
     {0, 0, 3, 3, {846139136, -53}},
     {0, 0, 3, 5, {880576192, -64}},
     {0, 0, 5, 5, {588744832, -58}},
@@ -116,15 +116,15 @@ static const pvid_weak_noise_q31 kapitza_noise[21] = {
     {0, 4, 8, 8, {704297908, -42}},
 };
 
-static const uint8_t kapitza_error_order[1] = {
+static const uint8_t kapitza_error_order_q31[1] = {
     0,
 };
 
-static const pvid_scaled_q31 kapitza_error_variance[1] = {
+static const pvid_scaled_q31 kapitza_error_variance_q31[1] = {
     {0, 0},
 };
 
-static const PVID_TABLE int32_t kapitza_circle[130] = {
+static const PVID_TABLE int32_t kapitza_circle_q31[130] = {
     32565, 32408, 31939, 31163, 30086, 28720, 27077, 25173, 23027, 20659, 18092, 15351,
     12462, 9453, 6353, 3192, 0, -3192, -6353, -9453, -12462, -15351, -18092, -20659,
     -23027, -25173, -27077, -28720, -30086, -31163, -31939, -32408, -32565, -32408, -31939, -31163,
@@ -147,30 +147,30 @@ static const pvid_weak_design_q31 kapitza_design_q31 = {
     .hop = 32,
     .fine = false,
     .n_noise = 21,
-    .full_scale = kapitza_full_scale,
-    .down = kapitza_down,
-    .filter = kapitza_filter,
-    .integral = kapitza_integral,
-    .format = kapitza_format,
-    .factor = kapitza_factor,
-    .noise = kapitza_noise,
-    .error_order = kapitza_error_order,
-    .error_variance = kapitza_error_variance,
-    .circle = kapitza_circle,
+    .full_scale = kapitza_full_scale_q31,
+    .down = kapitza_down_q31,
+    .filter = kapitza_filter_q31,
+    .integral = kapitza_integral_q31,
+    .format = kapitza_format_q31,
+    .factor = kapitza_factor_q31,
+    .noise = kapitza_noise_q31,
+    .error_order = kapitza_error_order_q31,
+    .error_variance = kapitza_error_variance_q31,
+    .circle = kapitza_circle_q31,
 };
 
-static const int32_t kapitza_offset[2] = {
+static const int32_t kapitza_offset_q31[2] = {
     0, 0,
 };
 
-static const int32_t kapitza_drive_min[2] = {
+static const int32_t kapitza_drive_min_q31[2] = {
     2, 0,
 };
 
 static const pvid_weak_config_q31 kapitza_config_q31 = {
     .design = &kapitza_design_q31,
-    .offset = kapitza_offset,
-    .drive_min = kapitza_drive_min,
+    .offset = kapitza_offset_q31,
+    .drive_min = kapitza_drive_min_q31,
     .compensation = true,
     .iterations = 2,
     .estimator = {

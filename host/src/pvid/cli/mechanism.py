@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.console import Console
@@ -123,18 +123,25 @@ def identify_run(
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     answer = advised(identify_mechanism(recording, model, weights))
-    if refine and in_c:
-        return _refined_in_c(answer, as_json=as_json, figure=figure, on=on)
-    if refine:
+    if refine and not in_c:
         return _refined(answer, as_json=as_json, figure=figure)
     core: CoreAnswer | None = None
+    no_second: dict[str, Any] = {}
     if in_c:
         from pvid.run.mechanism_core import identify_in_c
 
         core = identify_in_c(answer, in_c.name)
+    if core is not None and refine:
+        if figure is not None:
+            raise PvidError("--figure is of a refinement in float64; omit --core f32")
+        try:
+            return _refined_in_c(core, as_json=as_json, on=on)
+        except PvidError as error:  # the answer is that of the first stage
+            no_second = {"refinement": {"adopted": False, "text": f"not refined: {error}"}}
+            write_stderr(f"pvid: note: not refined: {error}")
     shown = core or answer
     if as_json:
-        click.echo(json.dumps(shown.as_json() | ({} if on is None else {"on": on})))
+        click.echo(json.dumps(shown.as_json() | no_second | ({} if on is None else {"on": on})))
     elif core is not None:
         _print_core(core)
     else:
@@ -147,7 +154,7 @@ def identify_run(
         convergence(answer, figure)
         click.echo(f"figure: {figure}")
     for one in (core.verdict if core is not None else answer.found.verdict).reasons:
-        write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
+        write_stderr(f"pvid: {'warning' if one.alarm and shown.identified else 'note'}: {one.text}")
     _print_advice(answer)
     if not shown.identified:
         reason = f": {core.reason.text}" if core is not None and not core.published else ""
@@ -251,14 +258,18 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     return answer if answer.identified else None
 
 
-def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None, on: str | None) -> int:
-    """Identifies by both stages in C and prints the refined estimate, or that of the first stage."""
-    from pvid.run.mechanism_core import identify_in_c
+def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
+    """Refines an answer of the first stage by both stages in C and prints the refined estimate, or that of the first
+    stage.
+
+    Raises
+    ------
+    PvidError
+        Where the mechanism, or its rig, has no second stage in C; nothing is printed.
+    """
     from pvid.run.refined_core import refined_in_c
 
-    if figure is not None:
-        raise PvidError("--figure is of a refinement in float64; omit --core f32")
-    found = refined_in_c(identify_in_c(answer, "f32"))
+    answer, found = core.oracle, refined_in_c(core)
     if as_json:
         click.echo(json.dumps(found.as_json() | ({} if on is None else {"on": on})))
     else:
@@ -267,7 +278,7 @@ def _refined_in_c(answer: MechanismAnswer, *, as_json: bool, figure: Path | None
             _table(found.values, f"{answer.model.title}: {stage}, C in {FLOAT.words}")
         click.echo(f"{found.text}; hash of both stages {found.hash:08x}")
     for one in () if found.adopted else found.weak.verdict.reasons:
-        write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
+        write_stderr(f"pvid: {'warning' if one.alarm and found.identified else 'note'}: {one.text}")
     _print_advice(answer)
     if not found.identified:
         write_stderr(f"pvid: nothing identified: {found.weak.reason.text}")

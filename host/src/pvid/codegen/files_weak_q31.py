@@ -175,29 +175,29 @@ def _model(made: FixedWeak, prefix: str) -> list[str]:
 def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
     parts, filters = [], []
     for k, one in enumerate(design.filter):
-        weights = f"{prefix}_weights_{k}"
+        weights = f"{prefix}_weights_{k}_q31"
         parts.append(_numbers("PVID_TABLE int32_t", weights, one.weights))
         filters.append((one.half, one.down, weights))
     formats = [(one.value, one.lift, one.own, one.plain, one.ramp) for one in design.format]
     tables = {
-        "full_scale": _numbers("int32_t", f"{prefix}_full_scale", design.full_scale),
-        "down": _numbers("uint8_t", f"{prefix}_down", design.down),
-        "filter": _structs("pvid_weak_filter_q31", f"{prefix}_filter", filters),
+        "full_scale": _numbers("int32_t", f"{prefix}_full_scale_q31", design.full_scale),
+        "down": _numbers("uint8_t", f"{prefix}_down_q31", design.down),
+        "filter": _structs("pvid_weak_filter_q31", f"{prefix}_filter_q31", filters),
         "run": _structs(
-            "pvid_weak_rescale_q31", f"{prefix}_run", [(x.down, x.shift, x.multiplier) for x in design.run]
+            "pvid_weak_rescale_q31", f"{prefix}_run_q31", [(x.down, x.shift, x.multiplier) for x in design.run]
         ),
-        "sign_width": _numbers("int32_t", f"{prefix}_sign_width", design.sign_width),
-        "integral": _structs("pvid_weak_integral_q31", f"{prefix}_integral", design.integral),
-        "format": _structs("pvid_weak_format_q31", f"{prefix}_format", formats),
-        "factor": _structs("pvid_scaled_q31", f"{prefix}_factor", design.factor),
+        "sign_width": _numbers("int32_t", f"{prefix}_sign_width_q31", design.sign_width),
+        "integral": _structs("pvid_weak_integral_q31", f"{prefix}_integral_q31", design.integral),
+        "format": _structs("pvid_weak_format_q31", f"{prefix}_format_q31", formats),
+        "factor": _structs("pvid_scaled_q31", f"{prefix}_factor_q31", design.factor),
         "noise": _structs(
             "pvid_weak_noise_q31",
-            f"{prefix}_noise",
+            f"{prefix}_noise_q31",
             [(x.kind, x.power, x.a, x.b, f"{{{x.factor[0]}, {x.factor[1]}}}") for x in design.noise],
         ),
-        "error_order": _numbers("uint8_t", f"{prefix}_error_order", design.error_order),
-        "error_variance": _structs("pvid_scaled_q31", f"{prefix}_error_variance", design.error_variance),
-        "circle": _numbers("PVID_TABLE int32_t", f"{prefix}_circle", design.circle.tolist()),
+        "error_order": _numbers("uint8_t", f"{prefix}_error_order_q31", design.error_order),
+        "error_variance": _structs("pvid_scaled_q31", f"{prefix}_error_variance_q31", design.error_variance),
+        "circle": _numbers("PVID_TABLE int32_t", f"{prefix}_circle_q31", design.circle.tolist()),
     }
     sizes = ("functions", "power", "decimation", "sum_shift", "hop")
     struct = [
@@ -206,7 +206,7 @@ def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
         *(f"    .{name} = {getattr(design, name)}," for name in sizes),
         f"    .fine = {'true' if design.fine else 'false'},",
         f"    .n_noise = {len(design.noise)},",
-        *(f"    .{name} = {prefix}_{name if text else ''}," for name, text in tables.items() if text),
+        *(f"    .{name} = {prefix}_{name}_q31," for name, text in tables.items() if text),
         "};",
     ]
     return [*parts, *(text for text in tables.values() if text), "\n".join(struct)]
@@ -219,14 +219,14 @@ def configuration(config: WeakConfigQ31, prefix: str) -> str:
     numbers = ("y_bits", "row_sd", "forgetting_groups", "gain", "correlation", "row_weight", "step_limit")
     more = ("kappa_min", "noise_margin", "dead_zone", "divider")
     of_trust = ("kappa_min", "se_max", "misfit_max", "groups_min", "revert_after", "renewal", "neglected")
-    parts = [_numbers("int32_t", f"{prefix}_offset", config.offset)]
+    parts = [_numbers("int32_t", f"{prefix}_offset_q31", config.offset)]
     if config.drive_min is not None:
-        parts.append(_numbers("int32_t", f"{prefix}_drive_min", config.drive_min))
-    drive = f"{prefix}_drive_min" if config.drive_min is not None else "NULL"
+        parts.append(_numbers("int32_t", f"{prefix}_drive_min_q31", config.drive_min))
+    drive = f"{prefix}_drive_min_q31" if config.drive_min is not None else "NULL"
     struct = [
         f"static const pvid_weak_config_q31 {prefix}_config_q31 = {{",
         f"    .design = &{prefix}_design_q31,",
-        f"    .offset = {prefix}_offset,",
+        f"    .offset = {prefix}_offset_q31,",
         f"    .drive_min = {drive},",
         f"    .compensation = {'true' if config.compensation else 'false'},",
         f"    .iterations = {config.iterations},",

@@ -43,7 +43,7 @@ WIDTH_SD = 0.9  # of the logarithm of a sign's width
 _COUPLED = 3  # equations that are solved together
 # Operations of an expression, terms of a determinant: longer ones are not brought into a shorter form, which may take
 # for ever.
-_LONG, _MANY = 2000, 60
+_LONG, _MANY = 2000, 16
 
 
 @dataclass(frozen=True)
@@ -221,6 +221,7 @@ class _Refine:
         self.widths: dict[sp.Symbol, sp.Expr] = {}  # that are refined: argument of the sign
         signs = {one: width_name(one) for one in signs_of(model)}
         width_symbols = {one: sp.Symbol(name, positive=True) for one, name in signs.items()}
+        self._signs = [one if widths is None else with_values(model, one) for one in signs]
         if widths is None:
             self.settings = (*width_symbols.values(), *(one.symbol for one in model.knowns))
         else:
@@ -270,7 +271,8 @@ class _Refine:
         self._matrix = sp.Matrix(len(free), len(free), lambda i, j: sp.diff(equations[i], self.highest[j]))
         self._blocks = self._in_turn(self._matrix)
         self._parameters([*equations, *readings], equations)
-        marked = [self._marked(one, width_symbols) for one in (*equations, *readings)]
+        of_values = dict(zip(self._signs, width_symbols.values(), strict=True))
+        marked = [self._marked(one, of_values) for one in (*equations, *readings)]
         self._solve(marked[: len(equations)])
         self._readings = marked[len(equations) :]
         self.z = [one.xreplace(dict(zip(self.highest, self._h, strict=True))) for one in self._readings]
@@ -513,7 +515,8 @@ class _Refine:
         if determinant == 0:
             return None
         if len(sp.Add.make_args(determinant)) > _MANY:
-            return block.adjugate() * self._symbol(f"over_{name}", 1 / block.det())
+            once, adjugate = self._symbol(f"over_{name}", 1 / block.det()), block.adjugate()
+            return sp.Matrix(3, 3, lambda i, j: self._symbol(f"inverse_{name}_{i}{j}", adjugate[i, j] * once))
         squares = {}
         for one, mark in list(pairs.items()):
             if isinstance(one, sp.cos):
@@ -617,8 +620,8 @@ class _Refine:
             "output": [("z", list(self.z))],
             "output_jacobian": [(key, e) for key, e in readings.items() if e],
         }
-        if signs_of(self.model):
-            groups["signs"] = [("g", list(signs_of(self.model)))]
+        if self._signs:
+            groups["signs"] = [("g", self._signs)]
         return self._generated(groups)
 
     def _reading(

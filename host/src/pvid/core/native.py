@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.core.headers import Filled, Headers, Tables, default_library
+from pvid.core.refusals import refused
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Status
 from pvid.settings.f32 import StrongConfig
@@ -188,6 +189,8 @@ class Stepper:
         Settings with the attributes of the C configuration's fields.
     replay
         pvid_replay_<replay>_<core> steps it.
+    also
+        Further settings that its init checks.
     given
         Fields of the C configuration that the settings do not have.
     """
@@ -195,7 +198,9 @@ class Stepper:
     _configured: str | None = None  # pvid_<..>_config_<core> is the configuration's type; None: <name>
     _prefix = "pvid_"  # of its names in C; generated ones have none
 
-    def __init__(self, native: Native, name: str, core: Core, config: Any, *, replay: str, **given: Any) -> None:
+    def __init__(
+        self, native: Native, name: str, core: Core, config: Any, *, replay: str, also: Sequence[Any] = (), **given: Any
+    ) -> None:
         ffi = native.headers.ffi
         self.native = native
         self.core = core
@@ -208,7 +213,7 @@ class Stepper:
         self.state: Any = ffi.new(f"{self._prefix}{name}_{core} *")
         status = self.initialise()
         if status is not Status.OK:
-            raise PvidError(f"the core refused the configuration: {status.text}")
+            raise PvidError(refused(status, config, *also, in_counts=core == "q31"))
         self._arithmetic = _ARITHMETIC[core]
         self._kind = self._kind_of(self._arithmetic)
         self.n_p, self._n_sums = self._kind.sizes(self.estimator)

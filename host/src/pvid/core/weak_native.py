@@ -115,7 +115,7 @@ class RefinedIdentifier(WeakIdentifier):
         self.refine_filled = native.headers.filled("pvid_refine_config_f32", refine)
         stage, settings = ffi.addressof(library, "pvid_refine_stage_f32"), ffi.addressof(self.refine_filled.struct)
         self._second = ffi.new("pvid_weak_refine_f32 *", [stage, self.refinement, settings])
-        super().__init__(native, config, refine=self._second)
+        super().__init__(native, config, also=(refine,), refine=self._second)
 
     @property
     def refined(self) -> npt.NDArray[np.void] | None:

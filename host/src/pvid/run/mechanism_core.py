@@ -29,9 +29,7 @@ from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.record import Record
 
-# The core and the analysis disagree if they differ by so many standard errors, and by this part of the value.
-_CLASH = 3.0
-_VISIBLE = 1e-3
+_CLASH = 3.0  # standard errors of noise by which the core and the analysis disagree
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +79,8 @@ class CoreAnswer:
 
     def _doubts(self) -> Iterator[Reason]:
         if not self.identified:
+            if self.oracle.identified:
+                yield Reason("not_identified", f"The C core has published no estimate: {self.reason.text}.")
             return
         if apart := [name for name in self.oracle.model.p_names if self._clashes(name)]:
             first = [values[apart[0]] for values in (self.values, self.oracle.values)]
@@ -105,10 +105,10 @@ class CoreAnswer:
 
     def _clashes(self, name: str) -> bool:
         one, other = self.values[name], self.oracle.values[name]
-        if one.value is None or one.se is None or other.value is None or other.se is None:
+        if one.value is None or one.se_noise is None or other.value is None or other.se_noise is None:
             return False
-        apart = abs(one.value - other.value)
-        return apart > _CLASH * math.hypot(one.se, other.se) and apart > _VISIBLE * abs(other.value)
+        # What gains and constants are off by is the same in both.
+        return abs(one.value - other.value) > _CLASH * math.hypot(one.se_noise, other.se_noise)
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""

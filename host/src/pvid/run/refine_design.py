@@ -18,7 +18,7 @@ from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
 from pvid.model.compiled import CompiledModel, Signal
-from pvid.model.signals import Integral, Jet
+from pvid.model.signals import Integral, Jet, jets
 from pvid.models.kapitza.refinement import PARAMETERS
 from pvid.models.registry import DEFAULT
 from pvid.run.engine_design import Run, simulated_run_of
@@ -36,6 +36,10 @@ _STATES = 40  # of the run that are looked at
 _WITH_SIGNS, _WITHOUT = 0.75, 0.95  # part of them for which the step is short enough
 _A_PERIOD = 48.0  # steps in a period
 _SHARP, _SOFT = 1e-6, 1e6  # widths of signs
+_ROUNDED = 1e-4  # likewise, of a state that float32 rounds
+_NEWTON = 4
+_LEAST_WIDTH = 1e-6  # of a sign, over its largest argument
+_LEAST_OF_CORE = 1e-9  # of ranges, limits and widths
 _STEP_FREE, _STEP_FINE = 0.02, 0.001  # limits of a block's last step, in prior_sd
 _REVERSAL = 4.0  # of the noise of a sample: the error is a small part of the jump
 _HALF_TURN = 32767 / 4  # resolutions: an output that turns is kept in quarters of one
@@ -124,12 +128,14 @@ def refine_settings(
         x = np.asarray(run[name], float)
         place = names.index(name)
         margin = {-1: _MORE, 2: _MARGIN_OF_RATES}.get(order, _MARGIN)
-        range_ = margin * abs(scale) * _largest(x, order, rate, block_s)
+        range_ = margin * abs(scale) * _largest(x, order, rate, block_s) or model.signal(name).reach
         if name in turning:
             range_ = _HALF_TURN * _step_of(model.signal(name))
         source = Source.SAMPLED if order == -1 else sources.get(place, Source.SAMPLED)
         signal.append(RefineSignal(place, order, scale, range_, source))
     motion, states, r = GeneratedRefine(made), list(_states(made, run, rate)), r_of(made, p)
+    if not states:
+        raise PvidError(f"{model.name}: the run is too short for the second stage, or its samples are missing")
     if made.runge_kutta and model.refinement.equations:  # whose motion is not that of the weak form's windows
         block_s = min(block_s, _slow_s(motion, r))
     rig = RefineRig(
@@ -144,6 +150,8 @@ def refine_settings(
     )
     rig = _with_steps(rig, made, _jumps(motion, r, states), block_s)
     settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
+    if settings.width is not None:
+        settings = replace(settings, width=np.maximum(settings.width, _least_widths(motion, r, states)))
     if made.observer:
         settings = _with_observer(settings, motion, r, states)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
@@ -310,15 +318,48 @@ def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[
     r = np.where(
         [one.place < 0 and not one.sign for one in made.parameters], [one.prior_sd for one in made.parameters], r
     )
-    q, v = states[len(states) // 2]
-    still = np.where([name.endswith("_1") for name in made.coordinates], np.float32(0), q)
+    arguments = {str(one): made.model.with_knowns(one) for one in signs_of(made.model)}
+
+    def jump(place: int, state: State) -> float:
+        still, reach = _reversal(made, arguments[made.parameters[place].sign], state[0])
+        sharp, soft = r.copy(), r.copy()
+        sharp[place], soft[place] = max(_SHARP, _ROUNDED * reach), _SOFT
+        change = _slopes(motion, sharp, still, state[1]) - _slopes(motion, soft, still, state[1])  # of rank 1
+        return 2 * float(sharp[place]) * abs(float(np.trace(change)))
+
     found = []
     for place in (k for k, one in enumerate(made.parameters) if one.sign):
-        soft = r.copy()
-        soft[place] = _SOFT
-        change = _slopes(motion, r, still, v) - _slopes(motion, soft, still, v)  # of rank 1
-        found.append(2 * _SHARP * abs(float(np.trace(change))))
+        own = jump(place, states[len(states) // 2])
+        found.append(own or max(jump(place, one) for one in states))  # the friction of a load that is lifted there
     return tuple(found)
+
+
+def _reversal(made: RefineFunctions, argument: sp.Expr, q: Float32) -> tuple[Float32, float]:
+    """The nearest state at which a sign's argument is 0, without inputs, and the largest coordinate in the argument
+    there: all rates are 0, or those of a moving belt."""
+    names = [Jet(name) for name in made.coordinates]
+    used = np.array([one in {Jet(str(jet)) for jet in jets(argument)} for one in names])
+    still = np.where(used | [name.endswith("_1") for name in made.coordinates], 0.0, q).astype(np.float64)
+    symbols = [sp.Symbol(str(one), real=True) for one in names]
+    own = {one: sp.Symbol(str(one), real=True) for one in argument.free_symbols}
+    whole = argument.xreplace(own)
+    whole = whole.xreplace(dict.fromkeys(whole.free_symbols - set(symbols), sp.Integer(0)))
+    value = sp.lambdify(symbols, [whole, *(sp.diff(whole, one) for one in symbols)], "numpy")
+    for _ in range(_NEWTON):
+        at, *slope = map(float, value(*still))
+        if at != 0 and any(slope):
+            still -= at * np.array(slope) / np.dot(slope, slope)
+    return still.astype(np.float32), float(np.abs(still[used]).max(initial=0.0))
+
+
+def _least_widths(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> Float32:
+    """Widths of signs below which float32 does not compute them at the largest argument of the run."""
+    made = motion.made
+    m, none = motion.constants(r.astype(np.float32)), np.zeros(len(made.inputs), np.float32)
+    largest = np.max([np.abs(motion.signs(m, q, v, none)) for q, v in states], axis=0)
+    names = [str(one) for one in signs_of(made.model)]
+    widths = [float(largest[names.index(one.sign)]) for one in made.parameters if one.sign]
+    return np.maximum(_LEAST_WIDTH * np.array(widths), _LEAST_OF_CORE).astype(np.float32)
 
 
 def _step_fine(made: RefineFunctions) -> float | None:
@@ -335,10 +376,17 @@ def _step_fine(made: RefineFunctions) -> float | None:
 def _fine_s(made: RefineFunctions, jumps: Sequence[float], block_s: float) -> float:
     """Longest step at the reversal of a friction: an error of its part of the jump, kept for half a block, is small
     beside the noise of a sample."""
-    sd = {f"{name}_1": made.model.signal(name).sd for name in made.outputs}
-    least = min(sd.values())
-    signs = [one.sign for one in made.parameters if one.sign]
-    longest = [_REVERSAL * sd.get(one, least) / (jump * block_s / 2) for one, jump in zip(signs, jumps, strict=True)]
+    sd = {name: made.model.signal(name).sd for name in made.outputs}
+    allowed = {Jet(name): one for name, one in sd.items()}  # of a measured speed
+    allowed |= {Jet(name, 1): one / (block_s / 2) for name, one in sd.items()}
+    least = min(sd.values()) / (block_s / 2)
+    arguments = {str(one): one for one in signs_of(made.model)}
+    signs = [arguments[one.sign] for one in made.parameters if one.sign]
+    longest = [
+        _REVERSAL * min(allowed.get(jet, least) for jet in jets(argument)) / jump
+        for argument, jump in zip(signs, jumps, strict=True)
+        if jump > 0
+    ]
     return min(longest, default=math.inf)
 
 
@@ -367,7 +415,8 @@ def _states(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float
 
 def _state_limit(made: RefineFunctions, run: Mapping[str, npt.ArrayLike], rate: float) -> tuple[float, ...]:
     """Twenty times the largest measured coordinate and rate; of a hidden one as of the largest."""
-    largest = {name: float(np.nanmax(np.abs(np.asarray(run[name], float)))) for name in made.outputs}
+    most_of = {name: float(np.nanmax(np.abs(np.asarray(run[name], float)))) for name in made.outputs}
+    largest = {name: one or made.model.signal(name).reach for name, one in most_of.items()}
     most = max(largest.values())
     if made.order == 2:
         places = [20.0 * largest.get(name, most) for name in made.coordinates]

@@ -146,10 +146,7 @@ def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
     """
     answer = weak.oracle
     config = config_to_identify(answer.model, answer.recording, answer.ranking)
-    try:
-        stages = BothStages.of(answer.model, answer.recording, config)
-    except PvidError as error:
-        raise PvidError(f"--core f32 --refine: {error}") from error
+    stages = BothStages.of(answer.model, answer.recording, config)
     identifier, record = stages.run()
     last, t = identifier.refined, answer.recording.t
     published = np.flatnonzero(record.told == Reason.UPDATED)
