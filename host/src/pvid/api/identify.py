@@ -83,7 +83,7 @@ def identify(
             recording = recording_of_log(path, [one.name for one in compiled.signals])
         else:
             recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
-        answer = advised(identify_mechanism(without_wild_samples(recording.whole(), compiled), compiled))
+        answer = advised(identify_mechanism(without_wild_samples(recording, compiled), compiled))
         engine = ENGINE_CORES.get(core or "")
         return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)

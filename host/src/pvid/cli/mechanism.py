@@ -46,9 +46,15 @@ _STRONG = "strong"  # as --form
 _LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
 
-def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
-    """The longest stretch of a recording without a missing sample, its wild ones interpolated, and the model with the
-    values of the rig."""
+def recording_of(
+    path: Path, rig: MechanismRig | RigFile, columns: str | None, *, whole: bool = True
+) -> tuple[Recording, CompiledModel]:
+    """A recording with its wild samples interpolated, and the model with the values of the rig.
+
+    Parameters
+    ----------
+    whole : the longest stretch without a missing sample alone
+    """
     if isinstance(rig, RigFile):
         return _recording_of_own(path, rig, columns)
     model = model_of(rig)
@@ -61,7 +67,7 @@ def recording_of(path: Path, rig: MechanismRig | RigFile, columns: str | None) -
     else:
         raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals, or a log")
     recording.refuse_damaged()
-    recording = without_wild_samples(recording.whole(), model)
+    recording = without_wild_samples(recording.whole() if whole else recording, model)
     print_notes(recording.notes)
     return recording, model
 
@@ -117,12 +123,13 @@ def identify_run(
         raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
     if refine and in_c and in_c is not FLOAT:
         raise PvidError(f"--refine is in float32 and float64; omit --core {in_c.name}")
-    recording, model = recording_of(path, rig, columns)
+    recording, model = recording_of(path, rig, columns, whole=on is not None or (refine and in_c is not None))
     if in_c or on is not None:
         refuse_too_many_unknowns(model)
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     answer = advised(identify_mechanism(recording, model, weights))
+    print_notes(answer.recording.notes[len(recording.notes) :])
     if refine and not in_c:
         return _refined(answer, as_json=as_json, figure=figure)
     core: CoreAnswer | None = None

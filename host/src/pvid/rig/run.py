@@ -36,6 +36,7 @@ from pvid.rig.gaps import (
     longest_bridged,
     longest_stretch,
     spread,
+    stretches,
     ticks_between,
 )
 from pvid.rig.table import Table, row_place
@@ -95,6 +96,12 @@ class Recording:
                     f"{name} is {values[at]:g} at {self.t[at]:.6g} s, which is too large for any unit: "
                     "is the file damaged?"
                 )
+
+    @property
+    def segments(self) -> tuple[slice, ...]:
+        """Stretches without a missing tick."""
+        there = np.logical_and.reduce([np.isfinite(one) for one in self.signals.values()])
+        return tuple(slice(first, end) for first, end in zip(*(one.tolist() for one in stretches(there)), strict=True))
 
     def whole(self) -> Recording:
         """The longest stretch without a missing tick, for what cannot leave ticks out; itself when none is missing.

@@ -81,6 +81,7 @@ class FixedEngine:
         """The argument of step at every tick [ticks, samples]."""
         columns = [np.rint(np.asarray(run[name]) / lsb) for name, lsb in zip(self.sample_names, self.lsb, strict=True)]
         most = float(np.iinfo(np.int32).max)
+        columns = [np.where(np.isnan(one), most, one) for one in columns]  # beyond every range: a gap
         return np.asarray(np.clip(np.stack(columns, axis=1), -most, most), np.int32)
 
     def values(self, p: npt.ArrayLike) -> Float:
@@ -123,7 +124,7 @@ def fixed_engine(
     found = engine_tables(compiled, run, design, p)
     known = {one.name: one for one in compiled.signals}
     lsb = lsb_of(compiled, functions.samples)
-    largest = [float(np.max(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
+    largest = [float(np.nanmax(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
     limits = most_counts(functions.signal, len(lsb), found.tables.decimation)
     tops = [max(_FULL_SCALE * known[one].reach, top) for one, top in zip(functions.samples, largest, strict=True)]
     if between_counts:
@@ -163,7 +164,7 @@ def fixed_engine(
 def _finer(step: float, samples: npt.ArrayLike, room: float) -> float:
     """A count for samples: the sensor's, by a power of 2 finer where they lie between counts. room: at most so much."""
     counts = np.asarray(samples, np.float64) / step
-    if room < 2 or np.max(np.abs(counts - np.rint(counts))) < _ON_GRID:
+    if room < 2 or np.nanmax(np.abs(counts - np.rint(counts))) < _ON_GRID:
         return step
     return step / 2.0 ** min(_FINER_BITS, math.floor(math.log2(room)))
 

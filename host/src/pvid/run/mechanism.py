@@ -107,7 +107,7 @@ def model_of(rig: MechanismRig) -> CompiledModel:
 
 @np.errstate(all="ignore")  # what diverges is judged, and told in words
 def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weights = "residuals") -> MechanismAnswer:
-    """Parameters of a mechanism from a recording without missing samples.
+    """Parameters of a mechanism from all segments of a recording.
 
     Parameters
     ----------
@@ -121,7 +121,27 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
     refuse_constant(recording, model)
     model = as_sampled(model, recording.ticks_between)
     found = identified_by(model, recording.signals, recording.sample_rate, weights=weights)
-    return MechanismAnswer(model, found, _values(model, found), recording, weights)
+    noted = replace(recording, notes=(*recording.notes, *_of_segments(recording, found)))
+    return MechanismAnswer(model, found, _values(model, found), noted, weights)
+
+
+def _of_segments(recording: Recording, found: Identified) -> tuple[str, ...]:
+    """A note on the segments of a recording that has several."""
+    whole = recording.segments
+    if len(whole) < 2:
+        return ()
+    grid, rate = found.fit.rows.record.grid, recording.sample_rate
+    first = [int(grid.places[part.start]) for part in grid.parts]
+    used = [(part.stop - part.start) / rate for part in whole if any(part.start <= one < part.stop for one in first)]
+    left = [(part.stop - part.start) / rate for part in whole]
+    for one in used:
+        left.remove(one)
+    text = f"identified from {len(used)} segments together, of {min(used):.3g} s to {max(used):.3g} s"
+    if left:
+        text += (
+            f"; left out, as too short for a window or behind a lost integral: {len(left)}, {sum(left):.3g} s in all"
+        )
+    return (text,)
 
 
 def as_sampled(model: CompiledModel, ticks_between: Mapping[str, float]) -> CompiledModel:
@@ -144,7 +164,7 @@ def as_sampled(model: CompiledModel, ticks_between: Mapping[str, float]) -> Comp
 def refuse_constant(recording: Recording, model: CompiledModel) -> None:
     """A sensor that never moves is dead or not connected."""
     for one in model.signals:
-        if one.kind == "sensor" and np.ptp(recording.signals[one.name]) == 0:
+        if one.kind == "sensor" and np.nanmax(values := recording.signals[one.name]) == np.nanmin(values):
             raise PvidError(f"{one.name} has the same value in all {len(recording)} samples: is the sensor connected?")
 
 

@@ -52,8 +52,8 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
         return ()
     run = answer.recording.signals
     for one in answer.model.signals:
-        if one.kind == "input" and np.ptp(run[one.name]) == 0:
-            value = float(run[one.name][0])
+        if one.kind == "input" and np.nanmax(run[one.name]) == np.nanmin(run[one.name]):
+            value = float(np.nanmin(run[one.name]))
             shown = with_unit(value, one.unit, 3) if value else "0"
             return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
     found = list(_tried(answer))

@@ -148,7 +148,7 @@ def _as_pendulum(answer: MechanismAnswer) -> RefinedPendulum:
     PvidError
         For another mechanism with such an input.
     """
-    model, recording = answer.model, answer.recording
+    model, recording = answer.model, answer.recording.whole()
     if model.name != DEFAULT:
         raise PvidError(
             f"an input of {model.name} is the derivative of a sample, which the refinement in float64 has for the "
@@ -173,7 +173,7 @@ def _as_pendulum(answer: MechanismAnswer) -> RefinedPendulum:
 
 def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMechanism | RefinedPendulum | None, str]:
     """The answer after a refinement that starts from it, the refinement, and what became of it in a clause."""
-    weak, model, recording = answer.found, answer.model, answer.recording
+    weak, model, recording = answer.found, answer.model, answer.recording.whole()
     refined: RefinedMechanism | RefinedPendulum
     try:
         if has_skew(model):
@@ -199,6 +199,8 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
     p, covariance = refined.problem.values(found, made.places_of_p)
     values = values_of(model, p, covariance, refined_gains_of(model, weak), identified=answer.identified)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
+    if len(answer.recording.segments) > 1:
+        text += f"; of the longest segment alone, {recording.t[0]:.6g} s to {recording.t[-1]:.6g} s"
     for place in refined.problem.kernel.widths:
         if found.covariance[place, place] > 0:
             text += (

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from pvid.model.signals import Jet
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.front import weights_of
+from pvid.oracle.weak.front import segments_of, weights_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import Compiled
 
@@ -31,8 +31,14 @@ def rates_of_drives(model: Compiled) -> list[Jet]:
 def blur_of(model: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> float:
     """Largest rms error of such a derivative over its own rms, on this run; 0 where there is none."""
     return max(
-        (_blur(np.asarray(run[jet.of], np.float64), design, jet.order) for jet in rates_of_drives(model)), default=0.0
+        (_blur(_longest(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates_of_drives(model)),
+        default=0.0,
     )
+
+
+def _longest(x: Float) -> Float:
+    """Its longest segment."""
+    return max((x[part] for part in segments_of({"": x})), key=len, default=x[:0])
 
 
 def _blur(x: Float, design: WeakDesign, order: int) -> float:

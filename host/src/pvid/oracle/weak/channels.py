@@ -6,7 +6,7 @@ sum_terms factor (-1)^order sum chi^(order) channel.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -297,6 +297,39 @@ class Record:
         self.channels, self.grid, self.gains, self.integrands = channels, grid, gains, integrands
         self.signs, self.arguments = signs, arguments
 
+    @classmethod
+    def joined(cls, records: Sequence[Record], firsts: Sequence[int], samples: int) -> Record:
+        """Of a run of so many samples from those of its segments, which begin at `firsts`."""
+        if len(records) == 1 and records[0].grid.raw_size == samples:
+            return records[0]
+        hop = records[0].grid.design.hop
+        sizes = [one.grid.size // hop * hop for one in records[:-1]] + [records[-1].grid.size]
+        ends = np.cumsum(sizes)
+        starts = ends - sizes
+        cut = [slice(0, size) for size in sizes]
+
+        def together(arrays: Iterable[Float]) -> Float:
+            return np.concatenate([one[part] for one, part in zip(arrays, cut, strict=True)])
+
+        grids = [one.grid for one in records]
+        raw = {name: np.full(samples, np.nan) for name in grids[0].raw}
+        for grid, first in zip(grids, firsts, strict=True):
+            for name, values in grid.raw.items():
+                raw[name][first : first + len(values)] = values
+        jets = {jet: together(grid.jets[jet] for grid in grids) for jet in grids[0].jets}
+        places = np.concatenate(
+            [grid.places[part] + first for grid, part, first in zip(grids, cut, firsts, strict=True)]
+        )
+        parts = tuple(slice(int(first), int(end)) for first, end in zip(starts, ends, strict=True))
+        return cls(
+            records[0].channels,
+            Grid(grids[0].design, jets, raw, places, parts),
+            np.concatenate([one.gains[:, part] for one, part in zip(records, cut, strict=True)], axis=1),
+            [together(one.integrands[k] for one in records) for k in range(len(records[0].integrands))],
+            tuple(reversals.joined([one.signs[k] for one in records], sizes) for k in range(len(records[0].signs))),
+            [together(one.arguments[k] for one in records) for k in range(len(records[0].arguments))],
+        )
+
     def sums(self, functions: TestFunctions) -> Float:
         """(S_0, Re S_1, Im S_1, ...) of every channel and window [channels, windows, 2 H + 1]."""
         plain = [k for k, one in enumerate(self.channels.channels) if one.fold == 0]
@@ -305,17 +338,21 @@ class Record:
         out[plain] = of_plain
         for k, one in enumerate(self.channels.channels):
             if one.fold:
-                out[k] = self._integral_sums(k, one.fold, functions)
+                out[k] = 0.0
+                for part in self.grid.parts:
+                    first = part.start // functions.hop
+                    own = self._integral_sums(k, one.fold, functions, part)
+                    out[k, first : first + len(own)] = own
         return out
 
-    def _integral_sums(self, k: int, fold: int, functions: TestFunctions) -> Float:
-        """Sums of gain I^fold[integrand], the integral from each window's start [windows, 2 H + 1].
+    def _integral_sums(self, k: int, fold: int, functions: TestFunctions, part: slice) -> Float:
+        """Sums of gain I^fold[integrand], the integral from each window's start [windows of a segment, 2 H + 1].
 
         Each half has integrals from its own start; those of the first half at its end give the polynomial that the
         second half's lack: sum_m E_(fold - m) t^m / m!.
         """
-        f = np.asarray(self.integrands[k])
-        gain = functions.halves(self.gains[k])
+        f = np.asarray(self.integrands[k])[part]
+        gain = functions.halves(self.gains[k][part])
         running = running_integrals(f, functions.hop, fold, functions.dt)
         own = functions.half_sums(gain * running[fold][:, :-1])
         second = own[1:].copy()

@@ -22,7 +22,7 @@ from pvid.oracle.weak.blur import blur_of, rates_of_drives
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.failures import FAILURES
-from pvid.oracle.weak.front import samples_of
+from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, WeakRows
@@ -127,7 +127,7 @@ def power_of(model: Compiled) -> int:
     return max(6, 2 * ((model.channels.top + 3) // 2), 8 if model.channels.top >= 4 else 6)
 
 
-def lengths(samples: int, sample_rate: float, fewest: int = _FEWEST_WINDOWS) -> list[float]:
+def lengths(samples: float, sample_rate: float, fewest: int = _FEWEST_WINDOWS) -> list[float]:
     """Windows to try [s], the longest first."""
     longest = 2 * samples / sample_rate / (fewest + 1)
     shortest = _SHORTEST_STEPS / sample_rate
@@ -135,6 +135,15 @@ def lengths(samples: int, sample_rate: float, fewest: int = _FEWEST_WINDOWS) -> 
         return []
     count = min(_LENGTHS, 1 + int(np.log2(max(longest / shortest, 1.0))))
     return [float(f"{longest / 2**k:.2g}") for k in range(count)]
+
+
+def _unbroken(parts: Sequence[int], fewest: int) -> float:
+    """Samples of a run without a gap in which the fewest windows are as long as in segments of so many samples."""
+    if len(parts) == 1:
+        return parts[0]
+    tried = [2 * part / (k + 1) for part in parts for k in range(1, fewest + 1)]
+    fitting = [length for length in tried if sum(max(int(2 * one / length + 1e-9) - 1, 0) for one in parts) >= fewest]
+    return max(fitting, default=0.0) * (fewest + 1) / 2
 
 
 def chosen(
@@ -169,7 +178,7 @@ def ranked(
     reversals : how signs are summed; "averaged": of the weak engine in C, which whitens the kinds of rows one by one
     """
     plain = {name: x for name, x in run.items()}
-    samples = next(iter(samples_of(model.bare, plain).values())).size
+    parts = [part.stop - part.start for part in segments_of(samples_of(model.bare, plain))]
     rates = any(jet.order for jet in model.channels.needed)
     basis = WeakDesign(
         sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3, reversals=reversals
@@ -187,7 +196,7 @@ def ranked(
 
     windows: list[float] = []
     for fewest in (_FEWEST_WINDOWS, _SHORT_RUN):
-        longer = lengths(samples, sample_rate, fewest)
+        longer = lengths(_unbroken(parts, fewest), sample_rate, fewest)
         windows = sorted({*windows, *longer}, reverse=True)
         attempt(made(basis, window_s=one) for one in longer)
         if not any(one.known for one in tried):
@@ -195,7 +204,8 @@ def ranked(
         if any(one.known for one in tried):
             break
     if not tried:
-        raise PvidError(f"the run of {samples / sample_rate:.3g} s is too short for {model.model.name}: record longer")
+        longest = max(parts, default=0) / sample_rate
+        raise PvidError(f"the run of {longest:.3g} s is too short for {model.model.name}: record longer")
     best = min(tried, key=_order)
     if best.chi2 > MODEL_ERROR and equation_error:
         errors, of_sensors = True, tried[:]

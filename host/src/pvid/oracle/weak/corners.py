@@ -16,5 +16,6 @@ def with_jumps(
     for jump, name in jumps.items():
         if name in run:
             u = np.asarray(run[name], np.float64)
-            out[jump] = np.diff(u, prepend=u[:1]) / (12 * sample_rate)
+            jumped = np.diff(u, prepend=u[:1]) / (12 * sample_rate)
+            out[jump] = np.where(np.isnan(jumped) & np.isfinite(u), 0.0, jumped)
     return out

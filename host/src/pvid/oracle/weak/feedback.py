@@ -18,7 +18,7 @@ import sympy as sp
 
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Jet
-from pvid.oracle.weak.front import filtered, weights_of
+from pvid.oracle.weak.front import filtered, segments_of, weights_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason
@@ -46,6 +46,8 @@ def of_feedback(model: CompiledModel, run: Mapping[str, npt.ArrayLike], fit: Fit
     """
     out = []
     samples = {one.name: np.asarray(run[one.name], np.float64) for one in model.signals}
+    longest = max(segments_of(samples), key=lambda one: one.stop - one.start)
+    samples = {name: x[longest] for name, x in samples.items()}
     outputs = [one for one in model.signals if one.kind == "sensor" and not one.driven]
     for one in model.signals:
         if one.kind != "input" or len(np.unique(samples[one.name])) <= _LEVELS:
@@ -116,10 +118,10 @@ def _moves_nothing(model: CompiledModel, fit: Fit, given: Signal, outputs: list[
         order = _order_of(model, one.name)
         if order < 1:
             continue
-        z = filtered(grid.raw[one.name], weights_of(grid.design, 0))[grid.places]
+        z = filtered(np.nan_to_num(grid.raw[one.name]), weights_of(grid.design, 0))[grid.places]
         law.append(z)
         if order > 1 and (grid.design.rate_taps > 1 or grid.design.taps > 1):
-            law.append(filtered(grid.raw[one.name], weights_of(grid.design, 1))[grid.places])
+            law.append(filtered(np.nan_to_num(grid.raw[one.name]), weights_of(grid.design, 1))[grid.places])
         if one.unit == "rad":
             law += [np.sin(z), np.cos(z)]
     basis = np.stack([sums(x) for x in law], axis=1)

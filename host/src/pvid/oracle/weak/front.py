@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,19 +37,31 @@ class Grid:
     ----------
     design : of these steps
     jets : jet -> values [n]
-    raw : name -> samples as recorded, held ones filtered
+    raw : name -> samples as recorded, held ones filtered; NaN between segments
     places : sample of each step [n]
+    parts : steps of each segment, all but the last whole half windows
     """
 
     design: WeakDesign
     jets: dict[Jet, Float]
     raw: dict[str, Float]
     places: npt.NDArray[np.int64]
+    parts: tuple[slice, ...]
 
     @property
     def size(self) -> int:
         """Steps."""
         return len(self.places)
+
+    @property
+    def raw_size(self) -> int:
+        """Samples."""
+        return len(next(iter(self.raw.values())))
+
+    @property
+    def across(self) -> npt.NDArray[np.int64]:
+        """Numbers of the windows that would lie across two segments."""
+        return np.array([part.stop // self.design.hop - 1 for part in self.parts[:-1]], np.int64)
 
 
 def weights_of(design: WeakDesign, order: int) -> Float:
@@ -107,7 +119,25 @@ def grid_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], design: Weak
         for signal in model.signals
     }
     jets = {jet: filtered(raw[jet.of], weights_of(design, jet.order))[places] for jet in needed if jet.of in raw}
-    return Grid(design, jets, raw, places)
+    return Grid(design, jets, raw, places, (slice(0, len(places)),))
+
+
+def segments_of(samples: Mapping[str, Float]) -> list[slice]:
+    """Stretches of a run in which no signal misses a sample."""
+    there = np.logical_and.reduce([np.isfinite(one) for one in samples.values()])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
+    return [slice(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def in_segments(x: Float, change: Callable[[Float], Float]) -> Float:
+    """A change of a signal [n] in each of its segments by itself; NaN between them."""
+    parts = segments_of({"": x})
+    if len(parts) == 1 and parts[0] == slice(0, len(x)):
+        return change(x)
+    out = np.full(len(x), np.nan)
+    for part in parts:
+        out[part] = change(x[part])
+    return out
 
 
 def density(signal: Signal, design: WeakDesign) -> float:

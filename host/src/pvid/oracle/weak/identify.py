@@ -303,7 +303,7 @@ def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:
     for one in model.signals:
         if one.neglected:
             x = np.asarray(run[one.name], np.float64)
-            errors.append(one.neglected * float(np.max(np.abs(x - np.mean(x)))) ** 2)
+            errors.append(one.neglected * float(np.nanmax(np.abs(x - np.nanmean(x)))) ** 2)
     return max(errors)
 
 

@@ -68,7 +68,9 @@ class NoiseFilters:
         for (_, _, depth), slope in zip(self.entries, slopes, strict=True):
             chain = [slope]
             for _ in range(depth):
-                chain.append(slope_of(chain[-1], smooth, design.dt))
+                chain.append(
+                    np.concatenate([slope_of(chain[-1][part], smooth, design.dt) for part in record.grid.parts])
+                )
             chains.append(chain)
         out = []
         for row in self.channels.rows:

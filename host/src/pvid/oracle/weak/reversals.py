@@ -7,6 +7,7 @@ around it get the values with which the sum equals the integral of sgn(v) g(t) f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +44,22 @@ class Signs:
     reversals: int
     stuck: npt.NDArray[np.bool_]
     slopes: Float
+
+
+def joined(signs: Sequence[Signs], sizes: Sequence[int]) -> Signs:
+    """Of segments, one behind the other, of which so many steps are kept."""
+    if len(signs) == 1:
+        return signs[0]
+    firsts = np.cumsum([0, *sizes[:-1]])
+    kept = [one.times < size for one, size in zip(signs, sizes, strict=True)]
+    return Signs(
+        np.concatenate([one.values[:size] for one, size in zip(signs, sizes, strict=True)]),
+        np.concatenate([one.times[use] + first for one, use, first in zip(signs, kept, firsts, strict=True)]),
+        np.concatenate([one.variances[use] for one, use in zip(signs, kept, strict=True)]),
+        sum(one.reversals for one in signs),
+        np.concatenate([one.stuck[:size] for one, size in zip(signs, sizes, strict=True)]),
+        np.concatenate([one.slopes[:size] for one, size in zip(signs, sizes, strict=True)]),
+    )
 
 
 def soft(v: Float, width: float) -> Signs:

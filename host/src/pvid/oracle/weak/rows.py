@@ -13,10 +13,11 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import with_corners
+from pvid.model.signals import Integral
 from pvid.oracle.weak.channels import Channels, Record
 from pvid.oracle.weak.corners import with_jumps
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.front import grid_of
+from pvid.oracle.weak.front import grid_of, samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.noise import NoiseFilters, NoiseModel, ReversalNoise
 from pvid.oracle.weak.parameters import Parameters
@@ -99,9 +100,29 @@ class WhiteRows:
 
 
 def record_of(compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> Record:
-    """Channels of a run (name -> samples) at every step."""
-    whole = with_jumps(run, compiled.jumps, design.sample_rate)
-    return compiled.channels.record(grid_of(compiled.model, whole, design, compiled.channels.needed))
+    """Channels of a run (name -> samples) at every step; a segment between missing samples is a run of its own.
+
+    A model with an integral since the start of the run has one segment, the longest: behind a gap nobody knows it.
+    """
+    samples = samples_of(compiled.model, with_jumps(run, compiled.jumps, design.sample_rate))
+    segments = segments_of(samples)
+    if any(one.has(Integral) for one in compiled.channels.opaque.values()):
+        segments = [max(segments, key=lambda one: one.stop - one.start)] if segments else []
+    size = len(next(iter(samples.values())))
+    records, firsts = [], []
+    refused = PvidError("no window of the run is whole: every one has a missing sample")
+    for part in segments:
+        own = {name: values[part] for name, values in samples.items()}
+        try:
+            grid = grid_of(compiled.model, own, design, compiled.channels.needed)
+        except PvidError as error:
+            refused = error
+            continue
+        records.append(compiled.channels.record(grid))
+        firsts.append(part.start)
+    if not records:
+        raise refused
+    return Record.joined(records, firsts, size)
 
 
 class WeakRows:
@@ -122,6 +143,7 @@ class WeakRows:
         self.functions = record.grid.design.test_functions
         columns = record.columns(self.functions)
         whole = np.all([np.isfinite(one).all(axis=(1, 2)) for one in columns], axis=0)
+        whole[record.grid.across] = False
         if not whole.any():
             raise PvidError("no window of the run is whole: every one has a missing sample")
         self.numbers = np.flatnonzero(whole)
@@ -155,9 +177,9 @@ class WeakRows:
 
     def end_times(self) -> Float:
         """Time [s] of the last sample of each window, from the run's first one."""
-        grid = self.record.grid
-        first = grid.places[0] / grid.design.sample_rate
-        return np.asarray(first + self.functions.dt * self.functions.hop * (2 + self.numbers))
+        grid, functions = self.record.grid, self.functions
+        first = grid.places[functions.hop * self.numbers] / grid.design.sample_rate
+        return np.asarray(first + functions.dt * functions.hop * 2)
 
     def covariance(self, kinds: Sequence[int], theta: Sequence[Float], errors: Sequence[EquationError]) -> Float:
         """R0(p) and the equations' errors [R, R]; located reversals come on top, in each window its own."""

@@ -22,7 +22,7 @@ from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Jet
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import clustered_variance
-from pvid.oracle.weak.front import filtered
+from pvid.oracle.weak.front import filtered, in_segments
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.polynomials import polynomial_weights
 from pvid.oracle.weak.rows import WhiteRows, record_of
@@ -139,7 +139,7 @@ class SensorErrors:
                 yield self._test(name, "gain", [self._gain(signal)], _LARGEST_GAIN)
             if signal.kind == "sensor" and not signal.driven and signal.resolution:
                 yield self._test(name, "play", [self._play(signal)], _LARGEST * signal.resolution)
-                if signal.unit == "rad" and np.ptp(self.run[signal.name]) > _TURNS:
+                if signal.unit == "rad" and _reach(self.run[signal.name]) > _TURNS:
                     yield self._test(name, "eccentric", self._eccentric(signal), _LARGEST * signal.resolution)
         yield from self._frictions()
         yield from self._lacking()
@@ -179,7 +179,7 @@ class SensorErrors:
         for signal in self.model.signals:
             if signal.kind != "sensor" or signal.driven or Jet(signal.name, 1) in known or signal.name not in self.run:
                 continue
-            turns = np.sign(filtered(self.run[signal.name], rate))[grid.places]
+            turns = np.nan_to_num(np.sign(filtered(self.run[signal.name], rate)))[grid.places]
             whole = functions.window_sums(turns) @ functions.combine(0)
             for kind, row in enumerate(self.model.rows):
                 change = [np.zeros((self.fit.rows.windows, functions.count)) for _ in self.model.rows]
@@ -215,16 +215,18 @@ class SensorErrors:
         """Column of a delay [s]."""
         values = self.run[signal.name]
         step = 1 / self.design.sample_rate
-        late = np.concatenate([values[:1], values[:-1]])
-        early = np.concatenate([values[1:], values[-1:]])
-        return self._column({signal.name: values + (late - early) / 2}, step)
+        return self._column({signal.name: in_segments(values, _later)}, step)
 
     def _play(self, signal: Signal) -> Float:
         """Column of a play's width."""
         values = self.run[signal.name]
-        smooth = filtered(values, polynomial_weights(_SMOOTHED, 2, 0))
-        width = _PLAY * signal.resolution
-        return self._column({signal.name: values + _PART * (with_play(smooth, width) - smooth)}, _PART * width)
+        weights, width = polynomial_weights(_SMOOTHED, 2, 0), _PLAY * signal.resolution
+
+        def played(x: Float) -> Float:
+            smooth = filtered(x, weights) if len(x) >= len(weights) else x
+            return np.asarray(x + _PART * (with_play(smooth, width) - smooth))
+
+        return self._column({signal.name: in_segments(values, played)}, _PART * width)
 
     def _eccentric(self, signal: Signal) -> list[Float]:
         """Columns of an error once a turn."""
@@ -259,6 +261,15 @@ class SensorErrors:
             return rows
         q = np.linalg.qr(nuisances.transpose(0, 2, 1))[0]
         return np.asarray(rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows)))
+
+
+def _later(x: Float) -> Float:
+    """Half the difference of the sample before and the one behind on top of each [n]."""
+    return np.asarray(x + (np.concatenate([x[:1], x[:-1]]) - np.concatenate([x[1:], x[-1:]])) / 2)
+
+
+def _reach(x: Float) -> float:
+    return float(np.nanmax(x) - np.nanmin(x))
 
 
 def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> list[Reason]:
