@@ -156,7 +156,7 @@ def explained(fit: Fit) -> list[float]:
     for kind, th in enumerate(theta):
         white = fit.alone(kind)
         reference = float(np.sum(white.known**2))
-        if reference == 0:
+        if not fit.rows.compiled.bare.rows[kind].known:  # nothing is known but corners
             reference = max(float(np.sum((white.regressors[:, j] * th[j]) ** 2)) for j in range(len(th)))
         out.append(1 - float(np.sum(white.residuals(theta) ** 2)) / max(reference, 1e-300))
     return out
