@@ -18,7 +18,7 @@ LOCK = ROOT / "tools" / "requirements.txt"
 # Lines between which tools/bootstrap.sh takes what it installs at a time.
 USE, MORE, TESTS = "# to use pvid", "# for parquet, mcap and campaigns", "# for the tests alone"
 USED_EXTRAS = ["models", "page", "plot", "serial"]
-MORE_EXTRAS = ["cluster", "cycles", "foxglove", "mcap", "parquet"]
+MORE_EXTRAS = ["cluster", "cycles", "excel", "foxglove", "hdf5", "mcap", "parquet", "ros"]
 BUILDERS = ("setuptools",)
 _WINDOWS = re.compile(r"os_name == 'nt'|sys_platform == 'win32'")
 HEADER = "# Written by tools/lock.py from host/pyproject.toml: do not edit.\n"

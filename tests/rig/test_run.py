@@ -214,7 +214,7 @@ def test_non_file_is_refused(tmp_path: Path) -> None:
             read_run(path)
         assert str(path) in str(caught.value)
     with pytest.raises(PvidError, match="must end in"):
-        read_run(tmp_path / "run.xlsx")
+        read_run(tmp_path / "run.tdms")
     folder = tmp_path / "folder.csv"
     folder.mkdir()
     with pytest.raises(PvidError, match="directory"):
@@ -241,7 +241,6 @@ def test_faults_of_archives_are_named(tmp_path: Path) -> None:
     assert "column y" in refused(path, whole_npz(t=t, phi=t, y=np.array(["a"] * 50)))
     assert "column y" in refused(path, whole_npz(t=t, phi=t, y=np.array([1j] * 50)))
     assert "50, 50 and 49" in refused(path, whole_npz(t=t, phi=t, y=t[1:]))
-    assert "row 8, column phi" in refused(path, whole_npz(t=t, phi=np.where(np.arange(50) == 7, np.inf, t), y=t))
     assert "row 21, column t" in refused(path, whole_npz(t=np.where(np.arange(50) < 20, t, t + 1.0), phi=t, y=t))
     refused(path, whole_npz(t=t, phi=t, y=np.array([{}] * 50, dtype=object)))
     single = io.BytesIO()

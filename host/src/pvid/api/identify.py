@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import numpy.typing as npt
 
 from pvid.api.result import Result, of_core, of_mechanism, of_pendulum
@@ -46,8 +47,8 @@ def identify(
     Parameters
     ----------
     data
-        A table (csv, npz, parquet, ...), the log of a board, a data frame, or a mapping of names to arrays, shape
-        (n,): the time t [s] and the signals of the mechanism; of the pendulum phi [rad] and y [m].
+        A table (csv, npz, parquet, ...), the log of a board, a data frame, a structured array, or a mapping of names
+        to arrays, shape (n,): the time t [s] and the signals of the mechanism; of the pendulum phi [rad] and y [m].
     model
         A mechanism of `pvid models` or a model file; the rig file's or the pendulum by default.
     rig
@@ -105,13 +106,24 @@ def _recording(data: Data, path: Path | None, rate: float | None, columns: Colum
     if path is not None:
         recording = read_recording(path, rate, columns)
     else:
-        frame: Any = data
-        names = frame.keys() if isinstance(data, Mapping) else getattr(frame, "columns", None)
-        if names is None:
-            raise PvidError(f"data: a path, a data frame or a mapping of arrays is wanted, not {type(data).__name__}")
-        recording = recording_of_arrays({str(one): frame[one] for one in names}, rate, columns)
+        recording = recording_of_arrays(_named(data), rate, columns)
     recording.refuse_damaged()
     return recording
+
+
+def _named(data: Any) -> dict[str, Any]:
+    """Arrays by name, of a mapping, a data frame, an Arrow table or a structured array."""
+    if isinstance(data, np.ndarray) and data.dtype.names:
+        return {one: data[one] for one in data.dtype.names}
+    names = data.keys() if isinstance(data, Mapping) else getattr(data, "column_names", getattr(data, "columns", None))
+    if names is None:
+        kind = type(data).__name__
+        raise PvidError(f"data: a path, a data frame, a structured array or a mapping of arrays is wanted, not {kind}")
+    named = {str(one): data[one] for one in names}
+    index = getattr(data, "index", None)
+    if index is not None and isinstance(getattr(index, "name", None), str):
+        named.setdefault(index.name, index)
+    return named
 
 
 def _toml(value: Any) -> str:

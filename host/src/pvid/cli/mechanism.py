@@ -23,7 +23,7 @@ from pvid.rig.columns import parsed
 from pvid.rig.described import described
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig, channels_of
-from pvid.rig.run import Recording, is_run, read_recording
+from pvid.rig.run import Recording, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.compare import Comparison
 from pvid.run.engine_identify import ALL_ALIKE
@@ -62,10 +62,8 @@ def recording_of(
         if columns is not None:
             raise PvidError(f"{path} is a log with known columns: omit --columns")
         recording = recording_of_log(path, [one.name for one in model.signals])
-    elif is_run(path):
-        recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
     else:
-        raise PvidError(f"{path} is no recording: {model.name} is identified from a table of its signals, or a log")
+        recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
     recording.refuse_damaged()
     recording = without_wild_samples(recording.whole() if whole else recording, model)
     print_notes(recording.notes)

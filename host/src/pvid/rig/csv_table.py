@@ -65,7 +65,12 @@ def read_csv(path: Path, columns: Columns) -> Table:
     PvidError
         For whatever is wrong with the file.
     """
-    return _TextTable(path, columns).read()
+    return text_table(path, columns, lambda: blocks(path))
+
+
+def text_table(path: Path, columns: Columns, lines: Callable[[], Iterator[bytes]], line: str = "line") -> Table:
+    """Reads a table of what begins to give blocks of lines anew at every call; `line` is what its lines are called."""
+    return _TextTable(path, columns, lines, line).read()
 
 
 def write_csv(path: Path, named: dict[str, FloatArray]) -> bytes:
@@ -83,9 +88,9 @@ def write_csv_gz(path: Path, named: dict[str, FloatArray]) -> bytes:
 class _TextTable:
     """A file, with what is found out about it from its first block."""
 
-    def __init__(self, path: Path, columns: Columns) -> None:
-        self._path = path
-        first = next(blocks(path), b"")
+    def __init__(self, path: Path, columns: Columns, blocks_of: Callable[[], Iterator[bytes]], line: str) -> None:
+        self._path, self._blocks, self._line = path, blocks_of, line
+        first = next(blocks_of(), b"")
         lines = first.decode(errors="replace").split("\n", _SEARCHED_LINES)[:_SEARCHED_LINES]
         if not any(line.strip() for line in lines):
             raise PvidError(f"{path} is empty.")
@@ -151,7 +156,7 @@ class _TextTable:
     def _body(self) -> Iterator[tuple[int, bytes]]:
         """Blocks of lines from the first row on, with the number of their first line."""
         first, body = 1, self._layout.body
-        for block in blocks(self._path):
+        for block in self._blocks():
             count = block.count(b"\n")
             if first + count >= body:
                 yield max(first, body), _from_line(block, body - first)
@@ -196,7 +201,7 @@ class _TextTable:
                 raise PvidError(f"{self._path}, column {self._columns['t'].name}: {error}") from error
         style_notes = style_note({self._columns[one].name: style for one, style in style_of.items()})
         notes = (*notes, *style_notes, *reader.notes(self._columns))
-        return Table(self._path, t, found, self._columns, reader.place(self._layout.body), notes)
+        return Table(self._path, t, found, self._columns, reader.place(self._layout.body, self._line), notes)
 
 
 def _layout(lines: Sequence[str], columns: Columns) -> Layout | None:
@@ -521,11 +526,11 @@ class _Reader:
             notes.append(f"cells without a number, taken as missing: {listed(parts)}")
         return tuple(notes)
 
-    def place(self, body: int) -> Callable[[int], str]:
+    def place(self, body: int, line: str) -> Callable[[int], str]:
         """What calls the line of a row."""
         skipped = np.concatenate(self._skipped) if self._skipped else np.empty(0, np.int64)
         rows_before = skipped - body - np.arange(skipped.size)
-        return lambda row: f"line {body + row + int(np.searchsorted(rows_before, row, side='right'))}"
+        return lambda row: f"{line} {body + row + int(np.searchsorted(rows_before, row, side='right'))}"
 
 
 class _Split:

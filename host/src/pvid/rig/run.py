@@ -23,10 +23,11 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed, reason
 from pvid.models.model import Channel
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.array_table import read_npz, read_parquet, table_of, write_npz, write_parquet
+from pvid.rig.array_table import read_arrow, read_npz, read_parquet, table_of, write_npz, write_parquet
 from pvid.rig.clock import Uniform, uniform
 from pvid.rig.columns import Columns
 from pvid.rig.csv_table import read_csv, write_csv, write_csv_gz
+from pvid.rig.excel_table import read_excel
 from pvid.rig.gaps import (
     SLOW_GAP,
     bridge,
@@ -39,7 +40,10 @@ from pvid.rig.gaps import (
     stretches,
     ticks_between,
 )
+from pvid.rig.mcap_table import read_mcap
 from pvid.rig.table import Table, row_place
+from pvid.rig.text_lines import is_text
+from pvid.rig.tree_table import read_hdf5, read_matlab
 from pvid.rig.turns import joined
 
 FloatArray = npt.NDArray[np.float64]
@@ -188,7 +192,7 @@ def read_run(path: str | os.PathLike[str], rate: float | None = None, columns: C
 def read_recording(
     path: str | os.PathLike[str], rate: float | None = None, columns: Columns | None = None
 ) -> Recording:
-    """Read a text table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, also ``.gz``), ``.npz`` or ``.parquet``.
+    """Read a text table of any suffix, ``.npz``, ``.parquet``, ``.arrow``, ``.mat``, ``.h5``, ``.xlsx`` or ``.mcap``.
 
     Parameters
     ----------
@@ -206,7 +210,7 @@ def read_recording(
     if rate is not None and not 0 < rate < float("inf"):
         raise PvidError(f"The sample rate must be a positive number of Hz, not {rate:g}.")
     path = Path(path)
-    read = _format(path, _READERS)
+    read = _read_as(path)
     try:
         if path.is_dir():
             raise PvidError(f"{path} is a directory, not a recorded run.")
@@ -242,7 +246,7 @@ def recording_of_arrays(
         For anything that is wrong with the data and cannot be bridged.
     """
     names = [str(one) for one in named]
-    arrays = dict(zip(names, map(np.asarray, named.values()), strict=True))
+    arrays = dict(zip(names, named.values(), strict=True))
     return _recording(_checked(table_of(Path(name), names, arrays.__getitem__, columns or Columns())), rate)
 
 
@@ -406,10 +410,36 @@ def _gap_notes(
     return notes
 
 
+_TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc", ".prn", ".tab", ".lvm")
 _READERS: dict[str, Callable[[Path, Columns], Table]] = {
-    **{f"{suffix}{zipped}": read_csv for suffix in (".csv", ".tsv", ".txt", ".dat") for zipped in ("", ".gz")},
+    **{f"{suffix}{zipped}": read_csv for suffix in _TEXT for zipped in ("", ".gz")},
     ".npz": read_npz,
     ".parquet": read_parquet,
+    **dict.fromkeys((".feather", ".arrow"), read_arrow),
+    ".mat": read_matlab,
+    **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
+    **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
+    ".mcap": read_mcap,
+}
+# How other kinds of files become one of these.
+_CONVERTED = {
+    ".bag": "ROS 1: `mcap convert RUN.bag RUN.mcap`",
+    ".db3": "ROS 2: `ros2 bag convert` to the storage mcap",
+    ".ulg": "PX4: `ulog2csv RUN.ulg` of the Python package pyulog",
+    ".bin": "ArduPilot: `mavlogdump.py --format csv --types TYPE RUN.BIN` of the Python package pymavlink",
+    ".wpilog": "WPILib: export it as CSV in AdvantageScope",
+    ".tdms": "LabVIEW: `tdmsinfo` and `as_dataframe().to_csv(...)` of the Python package npTDMS",
+    ".mf4": "ASAM MDF: `MDF(RUN).export('csv')` of the Python package asammdf",
+    ".blf": "CAN: export the decoded signals as CSV",
+    ".xls": "save it as .xlsx",
+    ".ods": "save it as .xlsx",
+    ".json": "write its rows as CSV",
+    ".jsonl": "write its rows as CSV",
+    ".npy": "numpy.savez('RUN.npz', t=..., and an array for each signal)",
+    ".pkl": "write the data frame with to_parquet or to_csv",
+    ".zip": "unpack it",
+    ".tar": "unpack it",
+    ".7z": "unpack it",
 }
 _WRITERS: dict[str, Callable[[Path, dict[str, FloatArray]], bytes]] = {
     ".csv": write_csv,
@@ -419,8 +449,18 @@ _WRITERS: dict[str, Callable[[Path, dict[str, FloatArray]], bytes]] = {
 }
 
 
+def _read_as(path: Path) -> Callable[[Path, Columns], Table]:
+    """The reader of a file: that of its suffix, and that of text tables for text with another one."""
+    if path.is_file() and not is_run(path) and path.suffix.lower() not in _CONVERTED and is_text(path):
+        return read_csv
+    return _format(path, _READERS)
+
+
 def _format(path: Path, formats: Mapping[str, Function]) -> Function:
     for suffix, function in formats.items():
         if path.name.lower().endswith(suffix):
             return function
-    raise PvidError(f"{path} has no name of a run: it must end in {', '.join(formats)}.")
+    suffix = path.suffix.lower()
+    how = f"; {_CONVERTED[suffix]}" if suffix in _CONVERTED else ""
+    shown = [one for one in formats if not one.endswith(".gz")]
+    raise PvidError(f"{path} has no name of a run: it must end in {listed(shown, 'or')}{how}.")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import codecs
 import gzip
-import io
 import re
 import zlib
 from collections.abc import Iterator
@@ -46,9 +45,12 @@ def blocks(path: Path) -> Iterator[bytes]:
         raise PvidError(f"{path} is not a whole gzip file: {reason(error)}.") from error
 
 
-def blocks_of(text: str) -> Iterator[bytes]:
-    """The same of a text that is in memory."""
-    yield from _lines(Path("text"), io.BytesIO(text.encode()))
+def is_text(path: Path) -> bool:
+    """Whether a file begins as text in an encoding that `blocks` reads."""
+    with path.open("rb") as file:
+        first = file.read(_SEEN)
+    mark, encoding = _encoding(first)
+    return bool(encoding) or len(_CONTROL.findall(first[mark:])) <= _CONTROL_SHARE * len(first)
 
 
 def _lines(path: Path, file: BinaryIO) -> Iterator[bytes]:

@@ -1,0 +1,110 @@
+"""Files that hold arrays in folders or structures: MATLAB (.mat) and HDF5 (.h5).
+
+An array is named by its path, `run.signals.x`, or by the last part of it where no other array has the same. A matrix
+has a column each: `data[1]`, `data[2]`, ..., as MATLAB counts.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.base.packages import lacking
+from pvid.base.wording import reason
+from pvid.rig.array_table import table_of
+from pvid.rig.columns import Columns
+from pvid.rig.size import refuse_beyond
+from pvid.rig.table import Table
+
+Array = npt.NDArray[Any]
+
+_MOST_COLUMNS = 64  # of a matrix; more are pictures or spectra
+
+
+def read_matlab(path: Path, columns: Columns) -> Table:
+    """Reads the arrays of a .mat file of any version; PvidError for whatever is wrong with it."""
+    import scipy.io
+
+    try:
+        content = scipy.io.loadmat(path, struct_as_record=True, squeeze_me=True)
+    except NotImplementedError:  # version 7.3 is HDF5
+        return read_hdf5(path, columns)
+    except Exception as error:  # scipy raises many kinds on damaged files
+        raise PvidError(f"{path} is not a readable MATLAB file: {reason(error)}.") from error
+    arrays = {
+        name: array
+        for key, value in content.items()
+        if not key.startswith("__")
+        for name, array in _of_structure(key, value)
+    }
+    return _table(path, arrays, columns, {})
+
+
+def read_hdf5(path: Path, columns: Columns) -> Table:
+    """Reads the datasets of a file; PvidError for whatever is wrong with it."""
+    try:
+        import h5py
+    except ImportError as error:
+        raise lacking(f"{path}: an HDF5 file", "h5py") from error
+    arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    try:
+        with h5py.File(path, "r") as file:
+
+            def visit(name: str, item: Any) -> None:
+                if not isinstance(item, h5py.Dataset) or item.ndim not in (1, 2) or name.startswith("#refs#"):
+                    return
+                refuse_beyond(path, max(item.shape, default=0))
+                name = name.replace("/", ".")
+                unit = item.attrs.get("units", item.attrs.get("unit", ""))
+                for column, array in _of_structure(name, item[()]):
+                    arrays[column] = array
+                    if isinstance(unit, str | bytes) and unit:
+                        units[column] = unit.decode(errors="replace") if isinstance(unit, bytes) else unit
+
+            file.visititems(visit)
+    except PvidError:
+        raise
+    except Exception as error:  # h5py raises many kinds on damaged files
+        raise PvidError(f"{path} is not a readable HDF5 file: {reason(error)}.") from error
+    return _table(path, arrays, columns, units)
+
+
+def _of_structure(name: str, value: Any) -> Iterator[tuple[str, Array]]:
+    """Columns in an array or a structure, and in what it contains."""
+    array = np.asarray(value)
+    if array.dtype.names:
+        for field in array.dtype.names:
+            inner = array[field]
+            yield from _of_structure(f"{name}.{field}", inner.item() if inner.ndim == 0 else inner)
+    elif array.ndim == 0 and array.dtype.kind == "O" and isinstance(array.item(), np.ndarray | np.void):
+        yield from _of_structure(name, array.item())
+    elif array.ndim == 1 and array.size > 1 and not (array.dtype.kind == "O" and isinstance(array[0], np.ndarray)):
+        yield name, array
+    elif array.ndim == 2 and min(array.shape) == 1 and array.size > 1:
+        yield name, array.reshape(-1)
+    elif array.ndim == 2 and 1 < min(array.shape) <= _MOST_COLUMNS and array.dtype.kind != "O":
+        long = array if array.shape[0] >= array.shape[1] else array.T  # MATLAB's order is the other one in HDF5
+        for k in range(long.shape[1]):
+            yield f"{name}[{k + 1}]", long[:, k]
+
+
+def _table(path: Path, arrays: dict[str, Array], columns: Columns, units: dict[str, str]) -> Table:
+    if not arrays:
+        raise PvidError(f"{path} has no array of samples.")
+    last = Counter(name.rpartition(".")[2] for name in arrays)
+    short = {name: name.rpartition(".")[2] for name in arrays}
+    wanted = {*columns.wanted}
+    # By the whole path where that is wanted or needed, else by its last part.
+    names = {
+        name if name in wanted or last[short[name]] > 1 or short[name] in arrays else short[name]: name
+        for name in arrays
+    }
+    stated = {shown: units[name] for shown, name in names.items() if name in units}
+    return table_of(path, list(names), lambda name: arrays[names[name]], columns, stated)
