@@ -222,5 +222,5 @@ def test_each_mistake_has_one_sentence(port: int, monkeypatch: pytest.MonkeyPatc
     with pytest.raises(PvidError, match=r"is no address to send to: udp://host:port, .* or foxglove://host:port"):
         live_stream("foxglove://127.0.0.1")
     monkeypatch.setitem(sys.modules, "foxglove", None)
-    with pytest.raises(PvidError, match=r"^foxglove://h:1 needs foxglove-sdk: pip install 'pvid\[foxglove\]'$"):
+    with pytest.raises(PvidError, match=r"^foxglove://h:1 needs foxglove-sdk: .* -m pip install foxglove-sdk$"):
         live_stream("foxglove://h:1", Mechanism(PENDULUM.model))
