@@ -34,12 +34,12 @@ from pvid.core.host_compiler import compiled_once
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
 
-COMMAND = re.compile(r"(?:\./tools/|build/venv/|cmake |cd |cc |pip |head |python3? |stty )")
+COMMAND = re.compile(r"(?:\./tools/|build/venv/|cmake |cd |cc |pip |head |python3? )")
 
 # ---- commands that are not executed, only parsed: pattern, reason
 NOT_EXECUTED = (
     (r"^\./tools/pvid (bench|campaign)\b", "takes minutes to hours; tests/bench executes its short form"),
-    (r"^(stty|timeout) ", "needs a board; tests/deploy/test_deploy_avr.py runs the sketch"),
+    (r"^\./tools/pvid log /dev/ttyACM0 \w+\.csv", "needs a board; tests/log/test_text_table.py has one that prints"),
     (r"^\./tools/pvid demo", "tests/cli/test_cli.py and test_mechanism_demo.py execute it"),
     (r"^\./tools/pvid sizes", "builds every image; tests/board/test_targets.py measures some of them"),
     (r"^\./tools/(test|release)\b", "executes the tests themselves; tests/tools/test_release.py executes parts of it"),
@@ -173,9 +173,11 @@ def pvid(words: list[str]) -> Printed:
     """`./tools/pvid WORDS` in this process and folder."""
     from pvid.base.console import BAD_INPUT
     from pvid.base.errors import PvidError
+    from pvid.base.replacing import replacing
     from pvid.cli.main import commands
 
-    done = CliRunner().invoke(commands, words, standalone_mode=False)
+    with replacing():  # the files at hand are those of the page's reader
+        done = CliRunner().invoke(commands, words, standalone_mode=False)
     if isinstance(done.exception, PvidError | click.ClickException):
         return Printed(BAD_INPUT, f"{done.output}pvid: {done.exception}")
     if done.exception is not None and not isinstance(done.exception, SystemExit):

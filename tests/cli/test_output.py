@@ -17,6 +17,7 @@ import pytest
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import format_of
+from pvid.base.replacing import replacing
 from pvid.rig.file import RigFile
 from pvid.rig.run import write_run
 from pvid.sim.pendulum import simulate
@@ -110,7 +111,7 @@ def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     names = [tmp_path / name for name in ("rig.toml", "figure.png", "run.csv")]
     for path in names:
         path.write_text("old", encoding="utf-8")
-    with files_up_to(100):
+    with files_up_to(100), replacing():
         with pytest.raises(PvidError, match="rig.toml: cannot be written: File too large"):
             RigFile.standard().write(names[0])
         with pytest.raises(PvidError, match="cannot write the figure .*File too large"):
@@ -129,12 +130,16 @@ def test_a_device_is_written_to_and_stays_one() -> None:
     assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
 
 
-def test_a_link_stays_and_its_target_is_replaced(tmp_path: Path) -> None:
+def test_a_link_is_refused_and_by_force_stays_while_its_target_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     target, link = tmp_path / "there" / "rig.toml", tmp_path / "link.toml"
     target.write_text("old", encoding="utf-8")
     link.symlink_to(target)
-    write_whole(link, "new")
+    with pytest.raises(PvidError, match=r"link.toml is a link to .*rig.toml: name that file"):
+        write_whole(link, "new")
+    assert target.read_text(encoding="utf-8") == "old"
+    with replacing():
+        write_whole(link, "new")
     assert link.is_symlink() and target.read_text(encoding="utf-8") == "new"
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet
 import pytest
+from click.testing import CliRunner
 from conftest import ROOT
 from program import pvid
 
@@ -64,6 +65,17 @@ def inline(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def asked(**keys: Any) -> Question:
     return Question(settings={"l1": "0.3"}, **keys)
+
+
+def test_a_name_that_is_no_utf_8_is_written_escaped(tmp_path: Path) -> None:
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/r\xffun.csv")
+    Path(path).write_text("no run\n")
+    words = [path, "-o", str(tmp_path / "rows.parquet"), "--workers", "1"]
+    done = CliRunner().invoke(command, words, standalone_mode=False)
+    assert done.return_value == 3, done.exception
+    (row,) = read_rows(tmp_path / "rows.parquet")
+    assert row.path.endswith("r\\udcffun.csv") and row.failure
+    assert "r\\udcffun.csv" in (tmp_path / "rows.html").read_text(encoding="utf-8")
 
 
 def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> None:

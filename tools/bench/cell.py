@@ -131,7 +131,7 @@ def write(folder: Path) -> list[Path]:
     for load, path in zip(LOADS, paths, strict=True):
         write_recording(path, record(load), CHANNELS)
     note = folder / "PROVENANCE.md"
-    write_whole(note, provenance().encode())
+    write_whole(note, provenance().encode(), freely=True)
     return [*paths, note]
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.figure_file import save
+from pvid.base.replacing import replacing
 from pvid.model.compiled import CompiledModel
 from pvid.model.report import check_report
 from pvid.models.mechanisms import compiled_of, path_of
@@ -162,8 +163,9 @@ def write_page(docs: Path, name: str) -> None:
     (docs / "mechanisms").mkdir(exist_ok=True)
     (docs / "images" / "mechanisms").mkdir(parents=True, exist_ok=True)
     example = example_of(name)
-    picture(example, docs / "images" / "mechanisms" / f"{name}.png")
+    with replacing():  # pictures of any version
+        picture(example, docs / "images" / "mechanisms" / f"{name}.png")
     measured = (docs / "benchmarks" / "mechanisms.md").read_text(encoding="utf-8")
     tables = {heading: errors_of(table, measured, name) for table, heading in TABLES.items()}
     errors = {heading: "\n".join(lines) for heading, lines in tables.items() if lines}
-    write_whole(docs / "mechanisms" / f"{name}.md", page(name, example, errors))
+    write_whole(docs / "mechanisms" / f"{name}.md", page(name, example, errors), freely=True)

@@ -189,10 +189,10 @@ def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
         paths.append(place / f"{name}.csv.gz")
         write_recording(paths[-1], source.cut(checkouts, piece), source.channels)
     paths.append(place / "PROVENANCE.md")
-    write_whole(paths[-1], provenance(source).encode())
+    write_whole(paths[-1], provenance(source).encode(), freely=True)
     if isinstance(source.origin, Package):
         paths.append(place / "LICENSE.txt")
-        write_whole(paths[-1], (checkouts / source.origin.folder / source.origin.licence).read_bytes())
+        write_whole(paths[-1], (checkouts / source.origin.folder / source.origin.licence).read_bytes(), freely=True)
     return paths
 
 

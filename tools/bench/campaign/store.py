@@ -100,7 +100,7 @@ class Store:
         )
         table = self._arrow.Table.from_pylist([{_KEY: self.key, **record} for record in records], schema=schema)
         try:
-            with appearing(self.out) as unfinished:
+            with appearing(self.out, freely=True) as unfinished:
                 self._parquet.write_table(table, unfinished)
             self.partial.unlink(missing_ok=True)
         except OSError as error:

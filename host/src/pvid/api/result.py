@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from pvid.base.replacing import replacing
 from pvid.base.rounding import with_error
 from pvid.run import answer
 from pvid.run.identify import Identification
@@ -83,24 +84,29 @@ class Result:
         )
         return f"<table>{rows}</table>" + "".join(f"<p>{escape(one)}</p>" for one in self._doubts)
 
-    def plot(self, path: str | Path) -> Path:
+    def plot(self, path: str | Path, *, force: bool = False) -> Path:
         """Writes a figure of the estimates over time with their standard errors (png, svg or pdf) and returns its path,
         which a notebook shows as a picture.
+
+        Parameters
+        ----------
+        force : replace a file that pvid did not write, too
 
         Raises
         ------
         PvidError
-            When it cannot be written.
+            When it cannot be written, or there is such a file.
         """
         out = Picture(path)
-        if isinstance(self._answer, Identification):
-            from pvid.show.figures import convergence
+        with replacing(force):
+            if isinstance(self._answer, Identification):
+                from pvid.show.figures import convergence
 
-            convergence(self._answer, out)
-        else:
-            from pvid.show.mechanism_figure import convergence as of_mechanism
+                convergence(self._answer, out)
+            else:
+                from pvid.show.mechanism_figure import convergence as of_mechanism
 
-            of_mechanism(self._answer, out)
+                of_mechanism(self._answer, out)
         return out
 
 

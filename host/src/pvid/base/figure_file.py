@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
+from pvid.base.replacing import CREATOR
 from pvid.base.wording import printable, reason
 
 if TYPE_CHECKING:
@@ -38,9 +39,10 @@ def save(figure: Figure, path: Path, dpi: int) -> None:
         When it cannot be written.
     """
     kind = format_of(path)
+    key = "Software" if kind == "png" else "Creator"
     try:
         with appearing(path) as temporary:
-            figure.savefig(temporary, dpi=dpi, format=kind)
+            figure.savefig(temporary, dpi=dpi, format=kind, metadata={key: CREATOR})
     except (OSError, ValueError) as error:
         raise PvidError(f"cannot write the figure {path}: {reason(error)}") from error
 

@@ -14,6 +14,11 @@ def built_under(own: Path) -> Path:
     private temporary one."""
     if _may_write(own / "targets"):
         return own
+    return private_folder()
+
+
+def private_folder() -> Path:
+    """The folder of pvid in the user's cache, else a temporary one of the user's."""
     return user_cache() or _temporary()
 
 

@@ -27,6 +27,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+def in_utf8(text: str) -> str:
+    """``text`` as a file in UTF-8 holds it: the bytes of a file's name that are no UTF-8 are escaped."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def with_unit(value: float, unit: str, digits: int) -> str:
     """``0.0046 rad``: a number of so many digits, with its unit where it has one."""
     return f"{value:.{digits}g} {unit}".rstrip()

@@ -315,7 +315,7 @@ def write_budget(path: Path, footprints: dict[Configuration, Footprint]) -> None
     if OPENING not in old or CLOSING not in old:
         raise PvidError(f"{path} does not contain the marker lines of the budget, {OPENING} and {CLOSING}")
     head, rest = old.split(OPENING, 1)
-    write_whole(path, f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}")
+    write_whole(path, f"{head}{OPENING}\n{budget_text(footprints)}\n{CLOSING}{rest.split(CLOSING, 1)[1]}", freely=True)
 
 
 def _targets_in(path: Path) -> dict[str, dict[str, int]]:

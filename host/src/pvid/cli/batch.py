@@ -11,7 +11,8 @@ import click
 from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import columns_option, rig_options
+from pvid.base.replacing import refuse_foreign
+from pvid.cli.input import NewFile, columns_option, force_option, rig_options
 
 _SHOWN = 20  # failures
 
@@ -26,9 +27,10 @@ _SHOWN = 20  # failures
 @columns_option
 @rig_options
 @click.option("--no-verify", is_flag=True, help="Do not compute logs again with the twin.")
-@click.option("--page", type=click.Path(path_type=Path), help="Summary page.  [default: OUT with .html]")
+@click.option("--page", type=NewFile(), help="Summary page.  [default: OUT with .html]")
 @click.option("--scheduler", metavar="ADDRESS", help="A running scheduler of dask.distributed (tcp://HOST:PORT).")
 @click.option("--workers", type=click.IntRange(1), help="Processes on this machine.  [default: one a processor]")
+@force_option
 def command(
     patterns: tuple[str, ...],
     out: Path,
@@ -60,9 +62,12 @@ def command(
     rig = None if rig_path is None else str(rig_path)
     question = Question(rig=rig, settings=given, verify=not no_verify, **asked)
     paths = _files(patterns)
+    if not out.name:
+        raise PvidError(f"{out}: -o is a Parquet file to write")
+    place = page or out.with_suffix(".html")
+    refuse_foreign(place)
     with progress_bar("identifying", len(paths)) as advance:
         rows = run(paths, question, Store(out), advance, scheduler=scheduler, workers=workers)
-    place = page or out.with_suffix(".html")
     write_whole(place, summary(rows, f"pvid batch {' '.join(patterns)}"))
     for name, count in counts_of(rows).items():
         click.echo(f"{name}: {count} of {len(rows)}")

@@ -10,7 +10,7 @@ import click
 from pvid.base.console import write_stderr
 from pvid.board.boards import BOARDS
 from pvid.board.target import HOST_TARGET
-from pvid.cli.input import FigurePath
+from pvid.cli.input import FigurePath, force_option
 from pvid.models.registry import DEFAULT
 
 BOARD = BOARDS["mps2-an386"]
@@ -42,6 +42,7 @@ def target() -> Target:
     help="File of the figure (png, svg, pdf).  [default: pvid-demo.png]",
 )
 @click.option("--seed", default=1, show_default=True, help="Seed of the sensors' noise and of the start.")
+@force_option
 def command(model: str, figure: Path, seed: int) -> int:
     """Simulates the rig of MODEL, streams it to the firmware on an emulated board and compares every bit.
 

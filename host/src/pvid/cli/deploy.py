@@ -10,7 +10,7 @@ import click
 
 from pvid.base.console import DONE, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import columns_option
+from pvid.cli.input import columns_option, force_option
 from pvid.cli.rig_design import model_of_rig, recorded
 from pvid.settings.engine_cores import ENGINE_CORES, FIXED, FLOAT
 
@@ -32,6 +32,7 @@ _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "am
 @columns_option
 @click.option("--core", type=click.Choice(list(ENGINE_CORES)), default=_DEFAULT, show_default=True, help="Arithmetic.")
 @click.option("--functions", type=click.IntRange(4, 64), help="Test functions of the design.  [default: chosen]")
+@force_option
 def command(
     model: str,
     target: str,

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pvid.base.console import DONE
-from pvid.cli.input import log_argument, log_rig
+from pvid.cli.input import force_option, log_argument, log_rig
 from pvid.log.rig import mechanism_of_log
 from pvid.rig.file import load
 
@@ -17,6 +17,7 @@ from pvid.rig.file import load
 @log_rig
 @click.option("--to", "form", type=click.Choice(["csv", "parquet", "mcap", "npz"]), required=True, help="Format.")
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Output without extension.  [default: beside LOG]")
+@force_option
 def command(log: Path, rig_path: Path | None, form: str, out: Path | None) -> int:
     """Writes samples, estimates, status and events of a LOG in SI units, for other programs.
 

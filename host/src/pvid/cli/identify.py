@@ -11,7 +11,7 @@ import click
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import FigurePath, form_options, print_notes, read_input, with_overrides
+from pvid.cli.input import FigurePath, force_option, form_options, print_notes, read_input, with_overrides
 from pvid.cli.result import print_result, print_warning, write_figure, write_refined_figure
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
@@ -46,6 +46,7 @@ from pvid.settings.engine_cores import FLOAT
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
+@force_option
 def command(
     run_path: Path,
     model: str | None,

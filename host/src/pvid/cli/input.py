@@ -13,6 +13,7 @@ import click
 from pvid.base.console import write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import format_of
+from pvid.base.replacing import refuse_foreign, replacing
 from pvid.log.rig import LOG_SUFFIX, run_of_log
 from pvid.rig.columns import parsed
 from pvid.rig.file import RigFile
@@ -79,8 +80,20 @@ log_argument = click.argument("log", type=click.Path(path_type=Path))
 log_rig = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
 
 
-class FigurePath(click.Path):
-    """Path of a figure to write; its format is checked before any computation."""
+def force_option(command: Command) -> Command:
+    """Adds --force: inside the command any file may be replaced."""
+    return click.option(
+        "--force",
+        is_flag=True,
+        is_eager=True,  # before the paths, whose files are refused
+        expose_value=False,
+        callback=lambda ctx, _, given: ctx.with_resource(replacing()) if given else None,
+        help="Replace files that pvid did not write, or that were changed since.",
+    )(command)
+
+
+class NewFile(click.Path):
+    """Path of a file to write; what must not be replaced is refused before any computation."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
@@ -88,8 +101,17 @@ class FigurePath(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """See click."""
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
-        format_of(path)
+        refuse_foreign(path)
         return path
+
+
+class FigurePath(NewFile):
+    """Path of a figure to write; its format is checked before any computation."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """See click."""
+        format_of(Path(os.fsdecode(value)))
+        return super().convert(value, param, ctx)
 
 
 def read_input(path: Path, rig: RigFile, columns: str | None = None, *, whole: bool = False) -> Run:

@@ -8,7 +8,7 @@ import click
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.console import DONE
-from pvid.cli.input import log_argument, log_rig
+from pvid.cli.input import NewFile, force_option, log_argument, log_rig
 from pvid.log.rig import mechanism_of_log
 from pvid.rig.file import load
 
@@ -17,7 +17,8 @@ from pvid.rig.file import load
 @log_argument
 @log_rig
 @click.option("--for", "program", type=click.Choice(["plotjuggler", "foxglove"]), required=True, help="Program.")
-@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="File.  [default: standard output]")
+@click.option("-o", "--out", type=NewFile(), help="File.  [default: standard output]")
+@force_option
 def command(log: Path, rig_path: Path | None, program: str, out: Path | None) -> int:
     """Writes a layout file with the plots of a LOG's samples, estimates, standard errors and quality.
 

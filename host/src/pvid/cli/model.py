@@ -14,7 +14,7 @@ from rich.table import Table
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import columns_option
+from pvid.cli.input import NewFile, columns_option, force_option
 from pvid.cli.rig_design import model_of_rig, recorded
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
@@ -148,6 +148,7 @@ def predict(
 @click.option("--run", "run_path", type=click.Path(path_type=Path), help="A recording of the rig, for its design.")
 @columns_option
 @click.option("--functions", type=click.IntRange(4, 64), help="Test functions of the design.  [default: chosen]")
+@force_option
 def build(
     model: str,
     out: Path,
@@ -225,7 +226,7 @@ def build(
 
 @command.command()
 @_MODEL
-@click.argument("out", type=click.Path(path_type=Path))
+@click.argument("out", type=NewFile())
 @click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.")
 @click.option("--duration", type=_ABOVE_0, help="Length [s].  [default: the rig's; of a model file 20]")
 @click.option("--rate", type=_ABOVE_0, help="Sample rate [Hz].  [default: the rig's; of a model file 1000]")
@@ -246,6 +247,7 @@ def build(
     metavar="KIND.SIGNAL=SIZE",
     help="backlash or eccentricity [LSB], skew [s], gain [true over recorded]; repeatable.",
 )
+@force_option
 def simulate(
     model: str,
     out: Path,

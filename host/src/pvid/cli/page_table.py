@@ -39,7 +39,7 @@ def put_table(page: Path | None, marker: str, text: str) -> None:
     if page is None:
         click.echo(text)
         return
-    write_whole(page, with_table(page, marker, text))
+    write_whole(page, with_table(page, marker, text), freely=True)
     write_stderr(f"{page}: table {marker} written")
 
 

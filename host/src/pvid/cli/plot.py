@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from pvid.base.console import DONE
-from pvid.cli.input import FigurePath, columns_option, print_notes, rig_options
+from pvid.base.replacing import refuse_foreign
+from pvid.cli.input import FigurePath, columns_option, force_option, print_notes, rig_options
 from pvid.log.rig import LOG_SUFFIX, described_document_of_log, mechanism_of_log
 from pvid.log.rig_settings import rig_for
 from pvid.models.registry import MODELS
@@ -20,26 +21,27 @@ from pvid.rig.run import is_run
 @rig_options
 @columns_option
 @click.option("-o", "--out", type=FigurePath(), help="Figure file: png, svg or pdf.  [default: LOG with .png]")
+@force_option
 def command(log: Path, rig_path: Path | None, settings: tuple[str, ...], columns: str | None, out: Path | None) -> int:
     """Draws a report of a LOG: convergence, residuals and their autocorrelation, spectra, phase plot.
 
     A run (.csv, .npz, .parquet, ...), or a log without estimates, is identified on this machine first. Of the log of a
     described mechanism the estimates are drawn under the names that the board gave.
     """
+    place = out or (log.with_suffix(".png") if log.name else log)  # a folder is refused as a recording
+    refuse_foreign(place)
     if rig_path is None and not is_run(log) and log.suffix == LOG_SUFFIX:
         mechanism = mechanism_of_log(log)
         if mechanism.model.name not in MODELS or described_document_of_log(log) is not None:
             from pvid.show.log_figure import write_log_figure
 
-            out = out or log.with_suffix(".png")
-            write_log_figure(log, mechanism, out)
-            click.echo(out)
+            write_log_figure(log, mechanism, place)
+            click.echo(place)
             return DONE
     from pvid.show.report import recording_of, write_report  # matplotlib and scipy, which other commands do not need
 
     recording = recording_of(log, rig_for(log, rig_path, settings), parsed(columns))
     print_notes(recording.run.notes)
-    out = out or log.with_suffix(".png")
-    write_report(recording, out)
-    click.echo(out)
+    write_report(recording, place)
+    click.echo(place)
     return DONE

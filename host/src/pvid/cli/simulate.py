@@ -10,6 +10,8 @@ import click
 import numpy as np
 
 from pvid.base.console import DONE, write_stderr
+from pvid.base.replacing import refuse_foreign
+from pvid.cli.input import NewFile, force_option
 from pvid.rig.file import RigFile, rig_path_of
 from pvid.rig.run import write_run
 from pvid.sim.pendulum import (
@@ -33,7 +35,7 @@ def tone(text: str) -> Tone:
 
 
 @click.command(name="simulate")
-@click.argument("out", type=click.Path(path_type=Path))
+@click.argument("out", type=NewFile())
 @click.option("--duration", default=40.0, show_default=True, help="Length [s].")
 @click.option("--rate", default=1000.0, show_default=True, help="Sample rate [Hz].")
 @click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
@@ -62,7 +64,8 @@ def tone(text: str) -> Tone:
 @click.option("--dry", default=0.0, show_default=True, help="Dry friction of both joints per unit mass [m^2/s^2].")
 @click.option("--slant", default=0.0, show_default=True, help="Of the pivot's slide against the vertical [rad].")
 @click.option("--seed", default=0, show_default=True)
-@click.option("--rig", "rig_out", type=click.Path(path_type=Path), help="Rig file to write.  [default: OUT with .toml]")
+@click.option("--rig", "rig_out", type=NewFile(), help="Rig file to write.  [default: OUT with .toml]")
+@force_option
 def command(**options: Any) -> int:
     """Simulates a rig; writes the run OUT (.csv, .csv.gz, .npz, .parquet) and its rig file."""
     pendulum = Pendulum(
@@ -94,8 +97,9 @@ def command(**options: Any) -> int:
         seed=options["seed"],
     )
     out: Path = options["out"]
-    write_run(out, simulation.run)
     rig_path: Path = options["rig_out"] or rig_path_of(out)
+    refuse_foreign(rig_path)
+    write_run(out, simulation.run)
     standard = RigFile.standard()
     rig = replace(
         standard,

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pvid.base.errors import PvidError
-from pvid.cli.input import FigurePath, columns_option, rig_options
+from pvid.cli.input import FigurePath, columns_option, force_option, rig_options
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
 
@@ -23,6 +23,7 @@ from pvid.log.rig_settings import rig_for
     help="Fit the full equations to the whole run, and show the distance of each design's estimate from that answer.",
 )
 @click.option("--figure", type=FigurePath(), help="With --refine: measured and simulated signals (png, svg, pdf).")
+@force_option
 def command(
     run_path: Path,
     model: str | None,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pvid.base.atomic_write import appearing
+from pvid.base.atomic_write import write_files
 from pvid.base.errors import PvidError
 from pvid.codegen import (
     files_design,
@@ -281,13 +281,7 @@ def build(
     """
     files = files_of(compiled, command or _command(compiled), options)
     directory.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name, text in files.items():
-        (directory / name).parent.mkdir(exist_ok=True)
-        with appearing(directory / name) as path:
-            path.write_text(text, encoding="utf-8")
-        paths.append(directory / name)
-    return paths
+    return write_files(directory, files)
 
 
 def check(compiled: CompiledModel, directory: Path, command: str | None = None, options: Options | None = None) -> None:

@@ -220,5 +220,5 @@ def _compiled(text: str) -> str:
     recompiler.make_py_source(ffi, "pvid_headers", out)
     with suppress(OSError):
         place.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(place, out.getvalue())
+        write_whole(place, out.getvalue(), freely=True)
     return out.getvalue()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from pvid.base.atomic_write import write_whole
+from pvid.base.atomic_write import write_files
 from pvid.base.errors import PvidError
 from pvid.deploy import amalgamation, arduino, cmake, cubemx, esp_idf, platformio, zephyr
 from pvid.deploy.deployment import Deployment, Files
@@ -44,7 +44,4 @@ def write_package(deployment: Deployment, target: str, folder: Path) -> list[Pat
             raise PvidError(
                 f"{folder} has files that are not of this package, {strange[0]} for one: name an empty folder"
             )
-    for name, text in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        write_whole(folder / name, text)
-    return [folder / name for name in files]
+    return write_files(folder, files)

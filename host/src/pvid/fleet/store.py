@@ -13,6 +13,7 @@ from typing import Any
 from pvid.base.atomic_write import appearing
 from pvid.base.errors import PvidError
 from pvid.base.json_lines import append_json_line, read_json_lines
+from pvid.base.wording import in_utf8
 from pvid.fleet.row import Row
 
 _PARAMETERS = "parameters"
@@ -88,7 +89,7 @@ class Store:
             schema += [arrow.field(one, arrow.float64(), metadata=about) for one in (name, name + _SE)]
         table = arrow.Table.from_pylist([_flat(row) for row in found], schema=arrow.schema(schema))
         try:
-            with appearing(self.out) as unfinished:
+            with appearing(self.out, freely=True) as unfinished:
                 parquet.write_table(table, unfinished)
             self.partial.unlink(missing_ok=True)
         except OSError as error:
@@ -96,7 +97,7 @@ class Store:
 
 
 def _flat(row: Row) -> Mapping[str, Any]:
-    flat = {name: getattr(row, name) for name in _FIXED}
+    flat = {name: in_utf8(one) if isinstance(one := getattr(row, name), str) else one for name in _FIXED}
     for name, (value, se, _) in row.parameters.items():
         flat |= {name: value, name + _SE: se}
     return flat

@@ -11,6 +11,7 @@ from html import escape
 
 import numpy as np
 
+from pvid.base.replacing import CREATOR
 from pvid.base.rounding import with_error
 from pvid.fleet.row import EQUAL, Row
 
@@ -114,7 +115,10 @@ def page(rows: Sequence[Row], title: str) -> str:
         "<h2>Recordings without a good answer</h2>",
         _trouble(rows),
     ]
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{escape(title)}</title>'
+    head = (
+        f'<meta charset="utf-8"><meta name="generator" content="{CREATOR}">'
+        f'<meta name="viewport" content="width=device-width"><title>{escape(title)}</title>'
+    )
     body = "".join(parts)
     return f'<!doctype html><html lang="en"><head>{head}<style>{_STYLE}</style></head><body>{body}</body></html>\n'
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.replacing import refuse_foreign
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
@@ -205,8 +206,9 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     """
     model, rate = simulation.model, simulation.rig.sample_rate
     signals = {one.name: run[one.name] for one in model.signals}
-    write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
     settings = rig_path_of(path)
+    refuse_foreign(settings)
+    write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
     exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven}
     exact |= {name: {"neglected": 0.0} for name in simulation.linearised}
     MechanismRig(name or model.name, rate, known=simulation.rig.knowns, sensor=exact).write(settings)
