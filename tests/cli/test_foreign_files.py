@@ -175,6 +175,26 @@ def test_the_same_file_runs_by_the_option_of_the_call(folder: Path) -> None:
     assert isinstance(asked_for(model), Path) and asked_for("dc_motor") == "dc_motor"
 
 
+def test_a_log_of_an_own_mechanism_is_verified_with_its_model_file(folder: Path) -> None:
+    """Recorded from a board that runs it, named by another path, and refused where the file has changed since."""
+    (folder / "foreign.toml").unlink()
+    model, log = folder / "notes.py", folder / "own.pvlog"
+    given = ["--model", str(model), "--run", str(folder / "foreign.csv"), "--paced", "-q"]
+    assert run(["log", "stream-host", str(log), *given]).return_value == 0
+    (folder / "moved").mkdir()
+    moved = model.rename(folder / "moved" / "notes.py")
+    checked = run(["verify", str(log), "--model", str(moved)])
+    assert checked.return_value == 0 and "equal in every bit" in checked.output, checked.output
+    assert abs(pvid.identify(log, model=moved)["m"].value / 1.3 - 1) < 0.02
+    (folder / "moved" / "executed").unlink()
+    for refused in (["verify", str(log)], ["verify", str(log), "--model", "dc_motor"]):
+        assert "notes.py" in str(run(refused).exception)
+    assert not (folder / "moved" / "executed").exists()
+    moved.write_text(MODEL.replace("c * x.d() + ", "c * x.d() + 2 * "))
+    changed = run(["verify", str(log), "--model", str(moved)])
+    assert changed.return_value != 0 and "another model than the log's" in changed.output
+
+
 @pytest.mark.parametrize("name", ["../notes.py", "C:\\x\\notes.py", "notes", "", "x\x1b[31m.py", "dc_motor.py"])
 def test_no_text_names_a_file(name: str) -> None:
     with pytest.raises(PvidError) as refused:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import itertools
 import json
@@ -29,6 +30,7 @@ from click.testing import CliRunner
 from conftest import ROOT
 
 from bench.field import field_log, throughput
+from pvid.base import file_lock
 from pvid.base.errors import PvidError
 from pvid.board.target import HOST_TARGET, open_target
 from pvid.cli.main import commands
@@ -168,6 +170,37 @@ def test_restarted_board_is_no_loss(tmp_path: Path, sent: list[bytes]) -> None:
     without_hello = [*sent[:200], *sent[4:]]
     _, account = read(written(tmp_path / "b.pvlog", without_hello))
     assert (account.restarts, account.missing_samples) == (1, 0)
+
+
+def test_a_log_has_one_recorder_at_a_time_and_any_number_of_readers(tmp_path: Path, sent: list[bytes]) -> None:
+    path = tmp_path / "a.pvlog"
+    first = LogWriter(path)
+    first.begin("a port", None)
+    first.take(b"".join(sent[:50]))
+    before = path.read_bytes()
+    with pytest.raises(PvidError, match=r"a\.pvlog is being recorded by another `pvid log`"):
+        LogWriter(path, append=True)
+    assert path.read_bytes() == before and read(path)[1].frames == 50
+    first.end("the end")
+    first.close()
+    LogWriter(path, append=True).close()
+
+
+@pytest.mark.parametrize("cause", ["no such locks", "no fcntl"])
+def test_a_log_is_written_where_files_have_no_locks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cause: str
+) -> None:
+    class Without:
+        LOCK_EX, LOCK_NB = 2, 4
+
+        @staticmethod
+        def flock(*_: object) -> None:
+            raise OSError(errno.ENOTSUP, "not supported")
+
+    monkeypatch.setattr(file_lock, "fcntl", Without if cause == "no such locks" else None)
+    writers = [LogWriter(tmp_path / "a.pvlog", append=True) for _ in range(2)]
+    for one in writers:
+        one.close()
 
 
 def test_segments_follow_each_other_in_one_file(tmp_path: Path, sent: list[bytes]) -> None:
@@ -599,7 +632,8 @@ def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -
     (tmp_path / "run.csv").write_text("t,phi,y\n" + 100 * "0,0,0\n")
     with pytest.raises(PvidError, match="run.csv is not a log of pvid: nothing is appended"):
         refuse_to_append(tmp_path / "run.csv", rig)
-    arguments = ["log", "nowhere", str(tmp_path / "run.csv"), "--append"]
+    (tmp_path / "run.csv").rename(tmp_path / "run")
+    arguments = ["log", "nowhere", str(tmp_path / "run"), "--append"]
     with pytest.raises(PvidError, match="is not a log of pvid"):
         CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
 

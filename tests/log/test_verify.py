@@ -285,7 +285,7 @@ def test_unverifiable_segment_has_its_reason(tmp_path: Path, sent: Sent) -> None
         "its session began before this segment did, and the samples before tick 160 are not in it"
     )
     other = MechanismBoard.of_rig_file(replace(field_board.rig(), l1=0.31))
-    refused = "the board's image was made for other settings than the log's, or by another version"
+    refused = "the board's image was made for other settings or another model than the log's, or by another version"
     assert reason("d", sent, other) == refused
     assert reason("e", sent, MechanismBoardQ31.of_rig_file(field_board.rig())) == refused
     former = "the log has no settings of the weak engine: a version before it recorded the log"

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
+from pvid.base.wording import printable
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.simulated_sensors import sensor_macros
 from pvid.board.stream_image import StreamImage, c_string
@@ -35,8 +36,7 @@ from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Messag
 from pvid.link.names import BoardNames, shown_of_refined
 from pvid.model.compiled import CompiledModel
 from pvid.models.kapitza.refinement import refine_rig
-from pvid.models.mechanisms import names as shipped
-from pvid.models.registry import DEFAULT
+from pvid.models.registry import DEFAULT, asked_for, is_named, shipped
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.described import rig_of_document
@@ -418,21 +418,30 @@ _KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismB
 BOARDS = dict(zip(ENGINE_CORES, _KINDS, strict=True))
 
 
-def board_of(text: str) -> MechanismBoard | MechanismBoardQ31 | None:
+def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismBoardQ31 | None:
     """From the text of a log; None: that of another kind of rig.
+
+    Parameters
+    ----------
+    model : name or model file of this call; a log of one's own mechanism needs it
 
     Raises
     ------
     PvidError
-        Where it breaks off, or its mechanism is none of the shipped ones.
+        Where it breaks off, or names a mechanism that is not shipped and not that of this call.
     """
     document = toml_document(text)
     engine = document.pop(_TABLE, None)
     if not isinstance(engine, dict):
         return None
     rig = rig_of_document(document)
-    if isinstance(rig, MechanismRig) and rig.model not in shipped():
-        raise PvidError(f"the log is of the mechanism {rig.model}, which is none of {', '.join(shipped())}")
+    named = str(rig.model) if isinstance(rig, MechanismRig) else rig.model.name
+    if model is None:
+        shipped(named)
+    elif not is_named(asked_for(model), named):
+        raise PvidError(f"the log is of the mechanism {printable(named)}, and not of --model {model}")
+    elif isinstance(rig, MechanismRig):
+        rig = replace(rig, model=asked_for(model))
     try:
         return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)
     except (KeyError, TypeError, ValueError, IndexError) as error:

@@ -16,20 +16,21 @@ from pvid.base.errors import PvidError
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig, stream_rig
 from pvid.board.target import EMULATORS, HOST_TARGET, open_target
+from pvid.cli.log_text import record_text
 from pvid.link.frames import Configuration, Source
 from pvid.link.port import BAUD
 from pvid.log.live_stream import live_stream
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.reader import Account, Observer
-from pvid.log.recorder import EmulatorSource, Logger, PortSource
-from pvid.log.rig import refuse_to_append
+from pvid.log.recorder import EmulatorSource, Logger, PortSource, TextError
+from pvid.log.rig import LOG_SUFFIX, refuse_to_append
 from pvid.log.status import StatusLine
 from pvid.log.values import UNKNOWN_RIG
 from pvid.models.model import Mechanism
 from pvid.rig.columns import parsed
 from pvid.rig.file import RigFile, load
 from pvid.rig.mechanism_file import channels_of
-from pvid.rig.run import read_recording
+from pvid.rig.run import is_run, read_recording
 from pvid.show.page import DEFAULT as LIVE_PAGE
 from pvid.show.page import is_local, page
 from pvid.show.view import LiveView
@@ -115,12 +116,27 @@ def command(
     the board is back, in a new segment of the same log. The file contains every received byte and can be read even if
     this program is killed. With a rig file, a board that waits for its settings is started.
 
+    A board that prints lines of numbers instead, as a sketch of Arduino does, is recorded with an OUT that ends in
+    .csv: the table of its rows, which `identify` reads. Its line of names is the header.
+
     A mechanism other than kapitza is named by --model or in the rig file, with a recording of it: --run RUN.csv, and
     RUN.toml beside it by default. With --model alone it is a shipped one, whose simulated rig the board reads.
 
     On a terminal the estimates are shown as they arrive; otherwise a status line is printed every 10 s.
     """
     emulated = port in (HOST_TARGET, *EMULATORS)
+    if is_run(out):
+        frames_only = {
+            "--rig": rig_path, "--model": model, "--run": run_path, "--core": core, "--refine": refine,
+            "--append": append, "--restart": restart, "--paced": paced, "--live": live, "--web": web,
+            port: emulated,
+        }  # fmt: skip
+        for name, given in frames_only.items():
+            if given:
+                raise PvidError(
+                    f"{name} is for frames, whose log is named {out.with_suffix(LOG_SUFFIX)}: {out} is for text"
+                )
+        return record_text(port, out, duration, samples, allow_loss, quiet=quiet)
     described = _described(rig_path, model, run_path, core, refine)
     rig = None if rig_path is None or described is not None else load(rig_path)
     if emulated and rig is None and described is None:
@@ -157,6 +173,8 @@ def command(
         )
         try:
             account = logger.run()
+        except TextError:
+            raise
         except PvidError:
             if logger.stream.account.begun:
                 print_account(logger.stream.account, 1.0, logger.failures)  # earlier data are in the log

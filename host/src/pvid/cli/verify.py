@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 _MOST_STRETCHES = 100  # that are printed
 
 
-def _rig_of(log: Path, rig_path: Path | None) -> RigFile | EngineBoard | None:
+def _rig_of(log: Path, rig_path: Path | None, model: str | None) -> RigFile | EngineBoard | None:
     """Of the strong form the rig file; of the weak form the board, whose settings are in the log or follow from the
     rig file."""
     text = None if rig_path is not None else engine_text_of_log(log)
     if text is not None:
         from pvid.board.mechanism_board import board_of  # loads SymPy
 
-        return board_of(text)
+        return board_of(text, model)
     if rig_path is None:
         return rig_of_log(log)
     rig = load(rig_path)
@@ -43,8 +43,9 @@ def _rig_of(log: Path, rig_path: Path | None) -> RigFile | EngineBoard | None:
 @click.command(name="verify")
 @log_argument
 @log_rig
+@click.option("--model", help="The model file of a log of your own mechanism.  [default: the log's, if it is shipped]")
 @click.option("--partial", is_flag=True, help="Exit code 0 even if only a part is verified.")
-def command(log: Path, rig_path: Path | None, partial: bool) -> int:
+def command(log: Path, rig_path: Path | None, model: str | None, partial: bool) -> int:
     """Computes a whole LOG again with the numpy twin and compares every estimate and hash, bit for bit.
 
     Prints the first difference. A sample is verified if an equal hash covers it. Samples after a lost sample cannot
@@ -55,7 +56,7 @@ def command(log: Path, rig_path: Path | None, partial: bool) -> int:
     """
     from pvid.log.verify import Verdict, Verifier  # the twins, which other commands do not need
 
-    rig = _rig_of(log, rig_path)
+    rig = _rig_of(log, rig_path, model)
     reader = LogReader(log)
     verdict = Verdict()
     with progress_bar("verifying", None) as advance:

@@ -121,7 +121,7 @@ def row_of(path: str, question: Question) -> Row:
         result.identified,
         result.status,
         result.warning,
-        _verified(place) if question.verify and place.suffix == LOG_SUFFIX else None,
+        _verified(place, question.model) if question.verify and place.suffix == LOG_SUFFIX else None,
         parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
         took=time.monotonic() - start,
     )
@@ -148,12 +148,12 @@ def _origin(path: Path) -> tuple[str, float]:
     return (f"{hello.board} in {path.parent}" if hello is not None else str(path.parent)), began
 
 
-def _verified(path: Path) -> str:
-    """EQUAL, or what is not."""
+def _verified(path: Path, model: str | None) -> str:
+    """EQUAL, or what is not. `model`: of the question."""
     verdict, first = Verdict(), ""
     try:
         text = engine_text_of_log(path)
-        rig = rig_of_log(path) if text is None else board_of(text)
+        rig = rig_of_log(path) if text is None else board_of(text, model)
         for stretch in Verifier(rig).stretches(LogReader(path)):
             verdict.add(stretch)
             if not first and (stretch.difference is not None or stretch.why_not is not None):

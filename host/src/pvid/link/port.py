@@ -24,9 +24,13 @@ class Port(Protocol):
     def close(self) -> None: ...
 
 
-def open_port(name: str) -> Port:
+def open_port(name: str, *, keeps_input: bool = False) -> Port:
     """A serial port by device or URL, 115200 baud, for this program alone; DTR and RTS low, so that opening resets no
     board.
+
+    Parameters
+    ----------
+    keeps_input : whether what a device has received before is read, too; of a socket it always is
 
     Raises
     ------
@@ -34,7 +38,7 @@ def open_port(name: str) -> Port:
         When it cannot be opened; the sentence contains the cause.
     """
     try:
-        port = _unopened(name)
+        port = _unopened(name, keeps_input)
         port.port, port.baudrate, port.timeout, port.write_timeout = name, BAUD, _READ_S, _WRITE_S
         if "://" not in name:
             port.exclusive = True
@@ -49,10 +53,11 @@ def open_port(name: str) -> Port:
     return opened
 
 
-def _unopened(name: str) -> Any:
+def _unopened(name: str, keeps_input: bool) -> Any:
     """Of pyserial, which what opens no port does without.
 
-    Opening a socket of pyserial throws away what a board has sent by then; this one keeps it.
+    Opening a port of pyserial throws away what a board has sent by then; that of a socket keeps it, that of a device
+    where it is asked to.
     """
     import serial
     from serial.urlhandler import protocol_socket
@@ -61,7 +66,13 @@ def _unopened(name: str) -> Any:
         def reset_input_buffer(self) -> None:
             pass
 
-    return Socket() if name.startswith("socket://") else serial.serial_for_url(name, do_not_open=True)
+    class Device(serial.Serial):
+        def _reset_input_buffer(self) -> None:
+            pass
+
+    if name.startswith("socket://"):
+        return Socket()
+    return Device() if keeps_input and "://" not in name else serial.serial_for_url(name, do_not_open=True)
 
 
 def opening_failure(name: str, error: Exception) -> str:

@@ -31,6 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from pvid.base.errors import PvidError
+from pvid.base.file_lock import lock
 from pvid.base.version import __version__
 from pvid.base.wording import printable
 from pvid.link import frames as link
@@ -139,7 +140,7 @@ class LogWriter:
     Raises
     ------
     PvidError
-        When the file exists, or cannot be made or written; so do the methods.
+        When the file exists, another recorder writes it, or it cannot be made or written; so do the methods.
     """
 
     def __init__(self, path: Path, *, rig: str | None = None, append: bool = False) -> None:
@@ -147,6 +148,7 @@ class LogWriter:
         self._rig = rig
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | (0 if append else os.O_EXCL), 0o644)
+            self._lock()
             self.start = os.fstat(self._file).st_size
             key = _key_of(path) if self.start else None
         except FileExistsError as error:
@@ -163,6 +165,13 @@ class LogWriter:
         self._marked = self._synced = time.time_ns()
         self._write(b"" if self._between else b"\0")
         self._write(self._frame(Schema(LOG_SCHEMA_TEXT.encode())))
+
+    def _lock(self) -> None:
+        try:
+            lock(self._file, self.path)
+        except PvidError:
+            self.close()
+            raise
 
     def _write(self, data: bytes) -> None:
         self._unsynced += len(data)

@@ -4,12 +4,12 @@ them."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import Any
 
 from pvid.base.toml_text import toml_document
 from pvid.log.rig import LOG_SUFFIX, described_document_of_log
-from pvid.models.registry import DEFAULT, MODELS, asked_for, shipped
+from pvid.models.registry import DEFAULT, MODELS, asked_for, is_named, shipped
 from pvid.rig.file import parsed_file, rig_path_of
 from pvid.rig.mechanism_file import MechanismRig, with_settings
 from pvid.rig.run import is_run
@@ -48,11 +48,6 @@ def mechanism_rig(
     if isinstance(name, str) and name in MODELS and not _is_described(document):
         return None
     return _of_document(with_settings(document, settings), asked, where)
-
-
-def is_named(asked: str | Path, name: str) -> bool:
-    """Whether a log's text names the mechanism of this call: of a model file it has the name without the folder."""
-    return asked == name if isinstance(asked, str) else PureWindowsPath(name).name == asked.name
 
 
 def _of_document(document: Mapping[str, Any], asked: str | Path | None, where: str) -> MechanismRig:

@@ -25,6 +25,7 @@ from pvid.link.port import Port, loss_cause, open_port
 from pvid.log.file import LogWriter, Segment
 from pvid.log.reader import Account, LogStream, Observer, Record
 from pvid.log.tail import LogTail
+from pvid.log.text_table import TextTable
 
 _CHUNK = 1 << 14
 _NEAR = 1 << 10  # bytes: some frames
@@ -72,6 +73,7 @@ class PortSource:
 
     name: str
     usb: dict[str, Any] | None = None
+    keeps_input: bool = False  # what had come before it was opened
 
     def open(self) -> Target:
         """See Source."""
@@ -83,7 +85,8 @@ class PortSource:
             self.usb = _lasting(devices.get(place), list(devices.values()))
         else:
             place = _find(self.usb, devices, self.name)
-        return Target(self.name, "unknown", open_port(place))
+        port = open_port(place, keeps_input=True) if self.keeps_input else open_port(place)
+        return Target(self.name, "unknown", port)
 
 
 def _identity(info: Any) -> dict[str, Any] | None:
@@ -243,6 +246,10 @@ class RefusedError(PvidError):
     """The board does not take its configuration."""
 
 
+class TextError(PvidError):
+    """The board prints text."""
+
+
 class Starter:
     """An observer that configures a board which is not, so that it samples by itself.
 
@@ -301,8 +308,15 @@ class Starter:
         """See logreader.Observer."""
 
 
+class Stoppable(Protocol):
+    """A recording that can be ended."""
+
+    stop: threading.Event
+    why: str
+
+
 @contextlib.contextmanager
-def _asked_to_end(recorder: Recorder) -> Iterator[None]:
+def asked_to_end(recorder: Stoppable) -> Iterator[None]:
     """SIGINT and SIGTERM end the recording instead of the program; a second one ends the program."""
 
     def ask(number: int, _: object) -> None:
@@ -353,6 +367,7 @@ class Logger:
     failures: list[str] = field(default_factory=list)
     _observers: list[Observer] = field(default_factory=list)
     _decoded: int = 0  # bytes of this recording
+    _text: TextTable = field(default_factory=TextTable)
 
     def run(self) -> Account:
         """Until SIGINT, SIGTERM or the duration; in the main thread.
@@ -362,17 +377,22 @@ class Logger:
         PvidError
             When the source is not there at the start, the board refuses its configuration, or the log cannot be
             written; what came is in the log.
+        TextError
+            When the port sends lines of numbers: there is no log then.
         """
         writer = LogWriter(self.out, rig=self.rig, append=self.append)
         recorder = Recorder(self.source, writer, None if self.samples is None else lambda: self._room(writer))
         starter = None if self.begin is None else Starter(recorder.send, self.begin, self.restart)
         self._observers = [*self.observers, *([] if starter is None else [starter])]
-        with _asked_to_end(recorder), self.out.open("rb") as file:
+        with asked_to_end(recorder), self.out.open("rb") as file:
             file.seek(writer.start)
             recorder.start()
             try:
                 self._follow(LogTail(file, self.stream), recorder)
                 self._hand_out(self.stream.end)
+            except TextError:
+                self.out.unlink()
+                raise
             finally:
                 recorder.stop.set()
                 recorder.join()
@@ -411,9 +431,21 @@ class Logger:
         wanted = (self.samples or 0) - self.stream.account.samples
         return max(_NEAR, _LEAST_SAMPLE * wanted) - (writer.written - self._decoded)
 
+    def _refuse_text(self, data: bytes) -> None:
+        """PvidError where the port sends lines of a table, and no frame so far."""
+        if not self.stream.account.frames and not self.append:
+            self._text.feed(data)
+            if self._text.is_text:
+                table = self.out.with_suffix(".csv")
+                raise TextError(
+                    f'{self.source.name} sends text ("{printable(self._text.example)}"), not frames: record it as a '
+                    f"table with `pvid log {self.source.name} {table}`"
+                )
+
     def _catch_up(self, data: bytes) -> bool:
         self._hand_out(lambda: self.stream.feed(data))
         self._decoded = self.stream.account.bytes
+        self._refuse_text(data)
         self._each(lambda one: one.idle(self.stream.account))
         return bool(data)
 

@@ -342,7 +342,9 @@ class Verifier:
         if self._number is None:
             self._number = self.rig.stream_image.number
         if configuration.settings != self._number:
-            raise PvidError("the board's image was made for other settings than the log's, or by another version")
+            raise PvidError(
+                "the board's image was made for other settings or another model than the log's, or by another version"
+            )
         twin = self.rig.twin_of(configuration)
         if isinstance(twin, BothStagesTwin):
             return _RefinedTwin(twin, self.rig.matrix), self.rig.p_names

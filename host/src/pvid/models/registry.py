@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 import pvid.models
 from pvid.base.errors import PvidError
@@ -39,6 +39,12 @@ def names() -> tuple[str, ...]:
 def asked_for(model: str | os.PathLike[str]) -> str | Path:
     """The mechanism that `--model` of this call, or the argument `model` of a function, names."""
     return str(model) if str(model) in names() else Path(model)
+
+
+def is_named(asked: str | Path, name: str) -> bool:
+    """Whether the text of a log names the mechanism of this call; of a model file it has the name without the folder,
+    but older versions wrote the path."""
+    return asked == name if isinstance(asked, str) else PureWindowsPath(name).name == asked.name
 
 
 def shipped(name: str, where: str = "this recording") -> str:
