@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import re
 import time
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 import sympy as sp
 
 from pvid.base.errors import PvidError
+from pvid.codegen.build import files_of
 from pvid.model import Integral, Model, cos, sgn, sin
 from pvid.model.corners import with_corners
 from pvid.model.signals import Jet
@@ -230,3 +233,67 @@ def test_corners_of_the_current_are_channels_of_the_motor_and_of_no_other() -> N
     assert first["R/L"] == {0: jump}
     assert second["k/L"] == {0: -jump}
     assert motor.rows[0].known == {0: Jet("V"), 1: -jump}
+
+
+OPENING = "from math import cosh\nimport math\nimport numpy as np\nfrom sympy import Heaviside, Max, Min, Piecewise\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("model.equation(x / 0 - u)", "-u + zoo*x is not finite: is something divided by 0?"),
+        ("model.equation(m * x.d(2) + float('inf') * x - u)", "is not finite: is something divided by 0?"),
+        ("model.output('q', 'kg', m / 0)", "zoo*m is not finite: is something divided by 0?"),
+        ("model.equation(m * math.sin(x) - u)", "math.sin takes numbers: use sin of pvid.model"),
+        ("model.equation(m * np.cos(x) - u)", "np.cos takes numbers: use cos of pvid.model"),
+        ("model.equation(m * np.exp(x) - u)", "np.exp takes numbers: use sin, cos, sgn (or the built-in abs)"),
+        ("model.equation(m * cosh(x) - u)", "a function of math or numpy takes numbers: use sin, cos"),
+        ("model.equation(m * Max(x, 0) - u)", "Max is not supported: max(a, b) is (a + b + abs(a - b))/2"),
+        ("model.equation(m * Min(x, 0) - u)", "Min is not supported: min(a, b) is (a + b - abs(a - b))/2"),
+        ("model.equation(m * Piecewise((x, x > 0), (0, True)) - u)", "Piecewise is not supported: (1 + sgn(x))/2 is 1"),
+        ("model.equation(m * Heaviside(x) - u)", "Heaviside is not supported: (1 + sgn(x))/2 is 1"),
+        ("model.output('q\\n', 'kg', m)", "is no name: letters, digits and _ after a letter"),
+        ("model.sensor('y\\n', 'm', resolution=1)", "is no name: letters, digits and _ after a letter"),
+        ("model = Model(3)", "the title 3 is no text"),
+    ],
+)
+def test_what_is_no_equation_of_signals_is_named_with_its_line(tmp_path: Path, line: str, said: str) -> None:
+    with pytest.raises(PvidError) as refused:
+        compiled_of(written(tmp_path, OPENING + FINE_LINES + line + "\n"))
+    assert said in str(refused.value) and str(refused.value).startswith("mine.py, line 10: ")
+
+
+TITLES = [
+    "*/ int evil; /*",
+    '""" + evil() + """',
+    "a\nint evil;\r\nb",
+    "nul\0\x1b[31m",
+    "a */*/ b /*/* c",
+    "ends in \\",
+    "ends in ??/",
+    '"); $(shell,evil) ${evil} $ENV{evil} {0} `evil`',
+    "<b>&amp;\u202eevil</b>",
+]
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_a_title_ends_no_comment_and_no_string_of_what_is_generated(title: str) -> None:
+    model = Model(title)
+    x = model.sensor("x", "m", resolution=1e-4)
+    u, m = model.input("u", "N", hold="zoh"), model.unknown("m", "kg", 1.0)
+    model.equation(m * x.d(2) - u)
+    for name, text in files_of(model.compiled("mine"), "pvid model build mine").items():
+        if name.endswith(".py"):
+            text = ast.unparse(ast.parse(text).body[1:])  # type: ignore[arg-type]
+        else:
+            text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        assert "evil" not in text.replace("# pvid", "") and "*/" not in text and "/*" not in text, name
+    assert model.title.isprintable() and not set('"\\$`{}') & set(model.title)
+    assert Model("Motor, Kt = Ke: 20 % (ünïcode)").title == "Motor, Kt = Ke: 20 % (ünïcode)"
+
+
+def test_a_model_of_the_librarys_name_is_not_built(tmp_path: Path) -> None:
+    path = written(tmp_path, FINE_LINES + FINE_EQUATION).rename(tmp_path / "pvid.py")
+    assert compiled_of(path).name == "pvid"
+    with pytest.raises(PvidError, match="pvid is the library's name, whose macros the C of this model"):
+        files_of(compiled_of(path), "a command")

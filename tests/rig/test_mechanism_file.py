@@ -129,3 +129,9 @@ def test_what_the_model_does_not_have_is_named(table: dict[str, dict[str, Any]],
 def test_a_setting_that_is_none_is_refused(setting: str, sentence: str) -> None:
     with pytest.raises(PvidError, match=sentence):
         with_settings({"sample_rate": 5}, [setting])
+
+
+def test_a_setting_of_a_hundred_thousand_parts_is_one_sentence() -> None:
+    with pytest.raises(PvidError, match="has too many parts: it is KEY=VALUE, as in --set known.g=9.81") as refused:
+        with_settings({}, ["known." + "a." * 100_000 + "b=1"])
+    assert len(str(refused.value)) < 200

@@ -111,6 +111,18 @@ def test_the_page_listens_on_the_loopback_alone_and_answers_no_other_name(tmp_pa
     assert not _answers(address)
 
 
+def test_a_page_for_the_network_answers_numbers_and_its_own_names_alone(tmp_path: Path) -> None:
+    with page("0.0.0.0:0", tmp_path / "none.pvlog", "title") as address:
+        there = address.replace("0.0.0.0", "127.0.0.1")
+        until(lambda: _answers(there))
+        name = socket.gethostname()
+        for own in ("192.0.2.7:8765", "[2001:db8::1]:80", "localhost", name, f"{name}.local"):
+            assert json.loads(get(there, "state", host=own))["title"] == "title"
+        for foreign in ("evil.example", "evil.example:1", "192.0.2.7.evil.example", "", "a b", "[evil]", "localhost.a"):
+            with pytest.raises(urllib.error.HTTPError, match="400"):
+                get(there, "state", host=foreign)
+
+
 def _answers(address: str) -> bool:
     try:
         return bool(get(address, "state"))

@@ -14,6 +14,7 @@ from pvid.base.wording import shown
 MOST_BYTES = 64_000
 TOO_LONG = f"is no TOML for pvid: it is longer than {MOST_BYTES // 1000} kB"
 _LONGEST_LINE = 4000
+_MOST_PARTS = 4  # of a key, as sensor.phi.resolution
 
 
 def key_and_value(setting: str, example: str) -> tuple[str, Any]:
@@ -27,6 +28,8 @@ def key_and_value(setting: str, example: str) -> tuple[str, Any]:
     key, equals, text = (part.strip() for part in setting.partition("="))
     if not equals or not key or not text:
         raise PvidError(f"--set {shown(setting)} is not KEY=VALUE, as in --set {example}")
+    if key.count(".") >= _MOST_PARTS:
+        raise PvidError(f"--set {shown(setting)} has too many parts: it is KEY=VALUE, as in --set {example}")
     try:
         return key, toml_document(f"value = {text}")["value"]
     except PvidError:

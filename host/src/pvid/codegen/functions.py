@@ -161,9 +161,11 @@ def functions_of(
     Raises
     ------
     PvidError
-        Where a parameter is in no theta, or an expression has no C.
+        Where a parameter is in no theta, an expression has no C, or the model has the library's name.
     """
     name = identifiers([model.name])[0]
+    if name.lower() == "pvid":
+        raise PvidError(f"{name} is the library's name, whose macros the C of this model would define again: rename it")
     plain = _Plain(model)
     bases, terms, kinds = _columns(model, plain)
     integrals = sorted({one for base in bases for one in base.atoms(Integral)}, key=sp.default_sort_key)

@@ -75,7 +75,7 @@ target_sources(app PRIVATE src/main.c src/{name}_example.c)
 
 _SAMPLE = """\
 sample:
-  name: {title}
+  name: "{title}"
 tests:
   sample.{library}:
     harness: console

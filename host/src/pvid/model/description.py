@@ -19,7 +19,9 @@ from pvid.model.refusal import ModelError, place_of_caller
 from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
 from pvid.model.units import Dimension, dimension_of, dimension_of_unit
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+# What ends a comment, a string or a line of a generated file, or is expanded in one (C, Python, YAML, Kconfig, CMake).
+_NOT_IN_A_TITLE = {"\\": "/", '"': "'", "*/": "* /", "/*": "/ *", "$": "S", "{": "(", "}": ")", "??": "?", "`": "'"}
 _GAIN_SD = 0.01  # of what is driven, unless given: no residual shows a torque constant that is 1 % off
 _TAKEN = {"t": "the time", "theta": "the coefficients of a row"}
 
@@ -31,7 +33,9 @@ class Model:
     """
 
     def __init__(self, title: str) -> None:
-        self.title = title
+        if not isinstance(title, str):
+            raise ModelError(f"the title {title!r} is no text: Model('motor on a shaft')", place_of_caller())
+        self.title = _plain(title)
         self.signals: list[Signal] = []
         self.unknowns: list[Unknown] = []
         self.knowns: list[Known] = []
@@ -185,6 +189,7 @@ class Model:
 
     def output(self, name: str, unit: str, expression: sp.Expr) -> None:
         """A physical parameter that follows from the unknowns."""
+        self._is_name(name)
         value = rational(expression)
         self._declared(value)
         if jets(value):
@@ -249,6 +254,8 @@ class Model:
         """
         if not 0 < sd < math.inf:
             raise self._refused(f"{name}: sd must be positive")
+        if optional is not None:
+            self._is_name(optional)
         symbol = self._symbol(name, unit)
         self._extras.append(Extra(symbol, unit, float(sd), optional or ""))
         return symbol
@@ -353,9 +360,12 @@ class Model:
         except ModelError as error:
             raise error.at(place_of_caller()) from None
 
-    def _new(self, name: str, unit: str) -> None:
-        if not isinstance(name, str) or not _NAME.match(name):
+    def _is_name(self, name: str) -> None:
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise self._refused(f"{name!r} is no name: letters, digits and _ after a letter")
+
+    def _new(self, name: str, unit: str) -> None:
+        self._is_name(name)
         if name in _TAKEN:
             raise self._refused(f"{name} is {_TAKEN[name]}: choose another name")
         signals = [jet.of for jet in self._jets()]
@@ -395,6 +405,15 @@ class Model:
             dimension_of(expression, self._dimensions)
         except ModelError as error:
             raise self._refused(f"{title}: {error.cause}") from None
+
+
+def _plain(title: str) -> str:
+    """One line that may stand in a comment, a string or a docstring of any generated file."""
+    line = " ".join("".join(one if one.isprintable() else " " for one in title).split())
+    for mark, instead in _NOT_IN_A_TITLE.items():
+        while mark in line:
+            line = line.replace(mark, instead)
+    return line
 
 
 def _inserted(expression: sp.Expr, defined: dict[Jet, sp.Expr]) -> sp.Expr:

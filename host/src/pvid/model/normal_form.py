@@ -15,9 +15,27 @@ from pvid.model.terms import varies
 _FUNCTIONS = (sp.sin, sp.cos, sp.Abs, sgn, Integral)
 
 
+_WITHOUT = {
+    "Max": "max(a, b) is (a + b + abs(a - b))/2",
+    "Min": "min(a, b) is (a + b - abs(a - b))/2",
+    "Piecewise": "(1 + sgn(x))/2 is 1 where x is positive and 0 where it is negative",
+    "Heaviside": "(1 + sgn(x))/2 is 1 where x is positive and 0 where it is negative",
+}
+
+
 def rational(expression: sp.Expr) -> sp.Expr:
-    """Floats as the decimal fractions that they are written as."""
+    """Floats as the decimal fractions that they are written as.
+
+    Raises
+    ------
+    ModelError
+        Where a number is infinite or undefined, or a function is one of SymPy's that abs and sgn do without.
+    """
     whole = sp.sympify(expression)
+    if whole.has(sp.zoo, sp.nan, sp.oo, -sp.oo):
+        raise ModelError(f"{readable(sp.sympify(expression))} is not finite: is something divided by 0?")
+    for one in whole.atoms(sp.Max, sp.Min, sp.Piecewise, sp.Heaviside):
+        raise ModelError(f"{type(one).__name__} is not supported: {_WITHOUT[type(one).__name__]}")
     return whole.xreplace({one: sp.Rational(repr(float(one))) for one in whole.atoms(sp.Float)})
 
 

@@ -5,6 +5,7 @@ Here alone a model file runs, and only one that is given as a Path: see pvid.mod
 
 from __future__ import annotations
 
+import re
 import sys
 import traceback
 from functools import lru_cache
@@ -62,7 +63,8 @@ def described(mechanism: str | Path) -> Model:
         raise PvidError(f"{Path(error.filename or path).name}, line {error.lineno}: {error.msg}") from None
     except (Exception, SystemExit) as error:
         where = str(Place(str(path), _line(error, path))).removesuffix(": ") or path.name
-        raise PvidError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}{_import(error)}") from None
+        said = f"{type(error).__name__}: {' '.join(str(error).split())}{_import(error)}"
+        raise PvidError(f"{where}: {_of_numbers(error, path) or said}") from None
     finally:
         sys.path.remove(folder)
     return _left_in(space, path)
@@ -85,6 +87,17 @@ def _import(error: BaseException) -> str:
     """How to get what a model file forgot to import; "": it is nothing of ours."""
     name = error.name if isinstance(error, NameError) else None
     return f"; add `from pvid.model import {name}`" if name in language.__all__ else ""
+
+
+def _of_numbers(error: BaseException, path: Path) -> str:
+    """What a function of math or numpy was given a signal for; "": it was not that."""
+    if not isinstance(error, TypeError) or not re.search("expression to float|ufunc|to complex", str(error)):
+        return ""
+    lines = [frame.line or "" for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    called = re.search(r"\b(math|cmath|np|numpy)\.(\w+)\s*\(", lines[-1]) if lines else None
+    taken = f"{called[1]}.{called[2]}" if called else "a function of math or numpy"
+    own = called[2] if called and called[2] in language.__all__ else ""
+    return f"{taken} takes numbers: use {own or 'sin, cos, sgn (or the built-in abs)'} of pvid.model"
 
 
 def _line(error: BaseException, path: Path) -> int:

@@ -5,7 +5,7 @@ A separate process serves it and follows the log like any other reader.
 The page requests the next state when it has drawn the last one: a slow browser skips states, and no queue grows. The
 recording neither waits for this process nor shares its memory, and it has the higher priority.
 
-    python -m pvid.show.page FD LOG TITLE        serves on the listening socket FD until its standard input ends
+    python -m pvid.show.page FD LOG TITLE ADDRESS    serves on the listening socket FD until its standard input ends
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from ipaddress import ip_address
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from pvid.base.errors import PvidError
 from pvid.base.hosts import addresses
@@ -80,7 +82,7 @@ def page(at: str, log: Path, title: str) -> Iterator[str]:
     if lacking:
         raise PvidError(f"the live page needs {' and '.join(lacking)}: {installing(*lacking)}")
     listening, address = listen(at)
-    command = [sys.executable, "-P", "-m", "pvid.show.page", str(listening.fileno()), str(log), title]
+    command = [sys.executable, "-P", "-m", "pvid.show.page", str(listening.fileno()), str(log), title, address]
     with listening, open(os.devnull, "wb") as nowhere:
         process = subprocess.Popen(
             command,
@@ -97,14 +99,37 @@ def page(at: str, log: Path, title: str) -> Iterator[str]:
         process.communicate()
 
 
-def _serve(listening: socket.socket, log: Path, title: str) -> None:
+def own_names(listening: socket.socket, address: str) -> Callable[[str], bool]:
+    """Whether the `Host` of a request is this page: the name of a page elsewhere that is made to point here is not.
+
+    Where only this machine can see the page, its loopback names; else any address by number, which no name server gave,
+    the names of this machine, and the one that `--web` was given.
+    """
+    names = {*_LOOPBACK}
+    local = listening.getsockname()[0] in _LOOPBACK
+    if not local:
+        host = socket.gethostname().lower()
+        names |= {host, f"{host}.local", socket.getfqdn().lower(), (urlsplit(address).hostname or "").lower()}
+
+    def is_own(given: str) -> bool:
+        host = re.sub(r":\d*$", "", given).strip("[]").lower().rstrip(".")
+        if host in names:
+            return True
+        with contextlib.suppress(ValueError):
+            return not local and bool(ip_address(host))
+        return False
+
+    return is_own
+
+
+def _serve(listening: socket.socket, log: Path, title: str, address: str) -> None:
     import uvicorn
     from starlette.applications import Starlette
     from starlette.middleware import Middleware
-    from starlette.middleware.trustedhost import TrustedHostMiddleware
     from starlette.requests import Request
-    from starlette.responses import FileResponse, Response
+    from starlette.responses import FileResponse, PlainTextResponse, Response
     from starlette.routing import Route
+    from starlette.types import ASGIApp, Receive, Scope, Send
 
     from pvid.show.page_state import LiveState
     from pvid.show.patience import Impatient
@@ -121,13 +146,21 @@ def _serve(listening: socket.socket, log: Path, title: str) -> None:
     def respond_state(_: Request) -> Response:
         return Response(state.as_json(), media_type="application/json", headers=headers)
 
+    is_own = own_names(listening, address)
+
+    class Guard:
+        """Answers requests for this page alone."""
+
+        def __init__(self, app: ASGIApp) -> None:
+            self._app = app
+
+        async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+            given = dict(scope.get("headers", ())).get(b"host", b"").decode("latin-1")
+            answer = self._app if scope["type"] != "http" or is_own(given) else PlainTextResponse("Invalid host", 400)
+            await answer(scope, receive, send)
+
     files = [one for one in sorted(_ASSETS.iterdir()) if one.suffix in _TYPES]
-    host = listening.getsockname()[0]
-    # a page elsewhere whose name is made to point here gets nothing
-    guard = [Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost", "[::1]"])]
-    application = Starlette(
-        routes=[*map(asset, files), Route("/state", respond_state)], middleware=guard if host in _LOOPBACK else []
-    )
+    application = Starlette(routes=[*map(asset, files), Route("/state", respond_state)], middleware=[Middleware(Guard)])
     state.start()
     settings = uvicorn.Config(
         application, http=Impatient, ws="none", log_level="critical", limit_concurrency=_MOST_CLIENTS, lifespan="off"
@@ -142,10 +175,10 @@ def _end_with_input() -> None:
 
 def main() -> None:
     """See the module."""
-    number, log, title = sys.argv[1:]
+    number, log, title, address = sys.argv[1:]
     os.nice(_NICENESS)
     threading.Thread(target=_end_with_input, daemon=True).start()
-    _serve(socket.socket(fileno=int(number)), Path(log), title)
+    _serve(socket.socket(fileno=int(number)), Path(log), title, address)
 
 
 if __name__ == "__main__":
