@@ -154,8 +154,7 @@ def test_forty_thousand_rows_load_at_once(tmp_path: Path) -> None:
         (changed(1, "T,PHI,Y"), ["line 1", "'PHI'"]),
         ("\n".join(GOOD[1:]), ["no column", "'1', '2', '3'", "--columns t=1:s,phi=2:rad,y=3:m"]),
         (changed(12, "0.009,0.1,0"), ["line 12", "column t", "repeats"]),
-        (changed(12, "0.005,0.1,0"), ["line 12", "column t", "back"]),
-        ("\n".join([*GOOD[:20], "9,0,0", "9.001,0,0"]), ["line 21", "column t", "a gap of 8.982 s", "8982 periods"]),
+        ("\n".join([GOOD[0], *GOOD[:0:-1]]), ["line 3", "column t", "back"]),
         ("\n".join(GOOD[:MIN_ROWS]) + "\n", [f"{MIN_ROWS - 1} rows", f"at least {MIN_ROWS}"]),
     ],
 )
@@ -241,7 +240,7 @@ def test_faults_of_archives_are_named(tmp_path: Path) -> None:
     assert "column y" in refused(path, whole_npz(t=t, phi=t, y=np.array(["a"] * 50)))
     assert "column y" in refused(path, whole_npz(t=t, phi=t, y=np.array([1j] * 50)))
     assert "50, 50 and 49" in refused(path, whole_npz(t=t, phi=t, y=t[1:]))
-    assert "row 21, column t" in refused(path, whole_npz(t=np.where(np.arange(50) < 20, t, t + 1.0), phi=t, y=t))
+    assert "row 2, column t" in refused(path, whole_npz(t=t[::-1], phi=t, y=t))
     refused(path, whole_npz(t=t, phi=t, y=np.array([{}] * 50, dtype=object)))
     single = io.BytesIO()
     np.save(single, t)

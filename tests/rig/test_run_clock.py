@@ -319,8 +319,10 @@ STRETCHED = uniform(1.0) + 5e-5 * np.sin(np.arange(1000))  # a twentieth of a pe
 @pytest.mark.parametrize(
     ("times", "part"),
     [
-        (np.concatenate([uniform(1.0), uniform(1.0)]), "line 1002, column t: 0.0 s runs back from .*two recordings"),
-        (np.concatenate([uniform(1.0), 1e9 + uniform(1.0)]), "line 1002, column t: a gap of 1e.09 s"),
+        (
+            uniform(1.0)[::-1],
+            "line 3, column t: 0.998 s runs back from the time before it, 0.999 s, as at 998 more rows",
+        ),
         (np.zeros(100), "line 3, column t: 0.0 s repeats the time before it, as all times do"),
         (
             np.sort(np.append(STRETCHED, STRETCHED[500])),
@@ -329,7 +331,7 @@ STRETCHED = uniform(1.0) + 5e-5 * np.sin(np.arange(1000))  # a twentieth of a pe
         (np.array([0.0, 1.0, 2.0, 1e308, 1.1e308]), "too far from the first time"),
         (np.array([-1e308, 0.0, 1.0, 2.0, 1e308]), "too far from the first time"),
     ],
-    ids=["backwards", "a jump of years", "no time at all", "a repeated row", "huge", "huge both ways"],
+    ids=["backwards", "no time at all", "a repeated row", "huge", "huge both ways"],
 )
 def test_unexplainable_clock_is_refused(times: Float, part: str, tmp_path: Path) -> None:
     phi = np.random.default_rng(1).standard_normal(times.size)

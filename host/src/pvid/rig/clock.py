@@ -21,6 +21,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.rig.gaps import spread
+from pvid.rig.stamps import with_rising_stamps, without_repeated_rows
 from pvid.rig.table import Table
 
 FloatArray = npt.NDArray[np.float64]
@@ -49,7 +50,6 @@ _LONGEST_S = 1e20  # nanoseconds taken for seconds, since 1970, are 2e18
 _ROWS_BESIDE_GAP = 20
 # So few gaps in exact stamps are no rounding.
 _CERTAIN_GAPS = 2
-_REPEATED_SHARE = 0.01
 # Stamps that come in bursts (a PC's, of what a serial port hands over) are late by up to this [s].
 _LATE_S = 0.05
 _BURST_SHARE = 0.1
@@ -113,19 +113,21 @@ def uniform(table: Table, promised: float | None) -> Uniform:
         if period > 0 and _largest_departure(t, period) <= _JITTER_PERIODS:
             rate, note = _rate(table, 1 / period, _end_error(t, period), promised)
             return Uniform(t, table.signals, rate, (*table.notes, *note))
-        return _from_stamps(table, promised)
+        return _from_stamps(with_rising_stamps(table), promised)
 
 
 def _from_stamps(table: Table, promised: float | None) -> Uniform:
     steps = np.diff(table.t)
     if (steps < 0).any():
         row = int(np.argmax(steps < 0)) + 1
-        before = f"the time before it, {table.t[row - 1]!s} s (two recordings in one file?)"
+        more = int(np.count_nonzero(steps < 0)) - 1
+        before = f"the time before it, {table.t[row - 1]!s} s, as at {more} more rows: is this column the time?"
         raise table.error(row, "t", f"{table.t[row]!s} s runs back from {before}")
     if table.t[-1] == table.t[0]:
         raise table.error(1, "t", f"{table.t[1]!s} s repeats the time before it, as all times do")
     table = _on_one_clock(table)
-    table, steps = _without_repeated_rows(table, np.diff(table.t))
+    table = without_repeated_rows(table)
+    steps = np.diff(table.t)
     quantum = _quantum(table.t)
     fit = _chosen(_fits(table, steps, quantum), quantum)
     repeats = steps == 0
@@ -192,19 +194,6 @@ def means_of_held(times: FloatArray, values: FloatArray, at: FloatArray, spans: 
     until = [whole[k] + values[k] * (end - times[k]) for k, end in ((first, at), (last, at + spans))]
     means = np.clip((until[1] - until[0]) / spans, values.min(), values.max())
     return np.where(last <= first, values[first], means)
-
-
-def _without_repeated_rows(table: Table, steps: FloatArray) -> tuple[Table, FloatArray]:
-    """Rows that a logger wrote twice are left out; not where t is rounded so coarsely that it repeats anyway."""
-    again = np.flatnonzero(steps == 0) + 1
-    if not 0 < again.size < _REPEATED_SHARE * table.t.size:
-        return table, steps
-    if any((signal[again] != signal[again - 1]).any() for signal in table.signals.values()):
-        return table, steps
-    kept = np.delete(np.arange(table.t.size), again)
-    note = f"rows that repeat the one before them, left out: {again.size} (first: {table.place(int(again[0]))})"
-    less = table.rows(kept, lambda row: table.place(int(kept[row])), note)
-    return less, np.diff(less.t)
 
 
 def _with_jitter(

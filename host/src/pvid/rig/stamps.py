@@ -1,0 +1,164 @@
+"""Time stamps that do not rise: counters that wrap, rows out of order, wild stamps, clocks that start over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.rig.gaps import longest_bridged
+from pvid.rig.table import Table
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+# Periods of the counters that time stamps come from [s], and in the column's own unit.
+_COUNTERS = [2.0**bits * tick for bits in (16, 24, 32) for tick in (1e-9, 1e-6, 1e-3)]
+_COUNTS = [2.0**bits for bits in (16, 24, 32)]
+# A wrap leaves a step that is the usual one within this part, or both ends of the counter's range beside it.
+_USUAL_PART = 0.25
+_AT_ENDS = 50.0  # usual steps
+_LEAST_TICKS = 8.0  # usual steps of a counter's period
+_REGULAR_PART = 0.5  # of a step, that rows brought to their place may depart
+_FARTHEST = 16  # rows that a row out of order stands from its place
+_WILD_SHARE = 0.01  # of the stamps, at most
+_SEGMENT_ROWS = 50  # rows of a segment, as a rule: with more jumps the stamps mean nothing
+# Ticks between segments, at least: no gap is interpolated over so many. Longer pauses are shortened where more of the
+# run would be missing than there.
+_APART = 64
+_SLOW_SAMPLES = 4  # of the slowest sensor between two segments
+# So few rows are taken for repeated, of all; of more only where hardly another row is like the one before it.
+_FEW_REPEATED, _RESTING = 0.01, 0.1
+
+
+def with_rising_stamps(table: Table) -> Table:
+    """A table whose stamps do not run back, with a note on what was done; itself where nothing can be.
+
+    Wraps of a counter are joined. A few rows out of order are sorted. A single stamp that is 0 or wild gets the mean of
+    those beside it. Where the clock runs back by anything else, or pauses for longer than the run lasts, a segment
+    begins: its times follow the ones before it, some ticks apart.
+    """
+    steps = np.diff(table.t)
+    if not steps.size or not np.isfinite(steps).all():
+        return table
+    forward = steps[steps > 0]
+    usual = float(np.median(forward)) if forward.size else 0.0
+    if not usual or (steps.min() >= 0 and steps.max() <= _APART * usual):
+        return table
+    for repaired in (_unwrapped, _sorted, _without_wild, _in_segments):
+        table = repaired(table, usual)
+    return table
+
+
+def _unwrapped(table: Table, usual: float) -> Table:
+    t, steps = table.t, np.diff(table.t)
+    unit = abs(float(table.columns["t"].in_si(np.ones(1))[0]))
+    for period in sorted({*_COUNTERS, *(unit * counts for counts in _COUNTS)}):
+        back = np.flatnonzero(steps < -period / 2)
+        if not back.size or period < _LEAST_TICKS * usual:
+            continue
+        over = steps[back] + period
+        fits = np.abs(over - usual) <= _USUAL_PART * usual
+        near = (over > 0) & (over < _AT_ENDS * usual)
+        for low in (0.0, -period / 2):
+            ends = (t[back] > low + period - _AT_ENDS * usual) & (t[back + 1] < low + _AT_ENDS * usual)
+            fits |= near & ends & (t[back] < low + period) & (t[back + 1] >= low)
+        if fits.all():
+            t = t + period * np.concatenate([[0], np.cumsum(steps < -period / 2)])
+            times = "once" if back.size == 1 else f"{back.size} times"
+            note = (
+                f"{table.columns['t'].name} starts over after {period:.10g} s, {times} (first: "
+                f"{table.place(int(back[0]) + 1)}): joined (a counter of the board)"
+            )
+            return replace(table, t=t, notes=(*table.notes, note))
+    return table
+
+
+def _sorted(table: Table, usual: float) -> Table:
+    """Rows that stand a few rows from their place are brought there if the stamps are then as regular as the others."""
+    if not (np.diff(table.t) < 0).any():
+        return table
+    order = np.argsort(table.t, kind="stable")
+    moved = np.flatnonzero(order != np.arange(order.size))
+    if np.abs(order[moved] - moved).max() > _FARTHEST or moved.size > order.size * _FARTHEST * _WILD_SHARE:
+        return table
+    beside = np.unique(np.clip(np.concatenate([moved, moved - 1]), 0, order.size - 2))
+    if np.abs(np.diff(table.t[order])[beside] / usual - 1).max() > _REGULAR_PART:
+        return table
+    back = int(np.count_nonzero(np.diff(table.t) < 0))
+    note = f"rows out of order: {back} (first: {table.place(int(moved[0]))}), sorted by {table.columns['t'].name}"
+    return replace(table.rows(order, lambda row: table.place(int(order[row])), note), t=table.t[order])
+
+
+def _without_wild(table: Table, usual: float) -> Table:
+    """Single stamps beside their neighbours, which are two steps apart, get the mean of these."""
+    t = table.t.copy()
+    between = t[2:] - t[:-2]
+    wild = (between > 0) & (between < 4 * usual) & ((t[1:-1] <= t[:-2]) | (t[1:-1] >= t[2:]))
+    wild &= np.abs(t[1:-1] - (t[2:] + t[:-2]) / 2) > 0.7 * between
+    places = np.flatnonzero(wild) + 1
+    if not 0 < places.size <= max(1, _WILD_SHARE * t.size):
+        return table
+    note = (
+        f"{table.columns['t'].name} is {t[places[0]]:.6g} s between {t[places[0] - 1]:.6g} s and "
+        f"{t[places[0] + 1]:.6g} s ({table.place(int(places[0]))})"
+        + (f", and {places.size - 1} more like it" if places.size > 1 else "")
+        + ": interpolated"
+    )
+    t[places] = (t[places - 1] + t[places + 1]) / 2
+    return replace(table, t=t, notes=(*table.notes, note))
+
+
+def _in_segments(table: Table, usual: float) -> Table:
+    t, steps = table.t, np.diff(table.t)
+    pauses = steps > _APART * usual
+    if float(steps[pauses].sum()) < usual * t.size:
+        pauses[:] = False
+    begins = (steps < 0) | pauses
+    count = int(np.count_nonzero(begins))
+    if not 0 < count <= max(1, t.size // _SEGMENT_ROWS):
+        return table
+    slowest = max(float(np.median(np.diff(np.flatnonzero(np.isfinite(one))))) for one in table.signals.values())
+    apart = usual * max(_APART, longest_bridged(1 / usual) + 2, round(_SLOW_SAMPLES * slowest))
+    shift = np.cumsum(np.where(begins, apart - steps, 0.0))
+    first = int(np.argmax(begins))
+    how = "runs back" if steps[first] < 0 else "jumps"
+    note = (
+        f"{table.columns['t'].name} {how} from {t[first]:.6g} s to {t[first + 1]:.6g} s ({table.place(first + 1)})"
+        + (f", and at {count - 1} more places" if count > 1 else "")
+        + ": a new segment begins there, and its times follow those before it"
+    )
+    return replace(table, t=t + np.concatenate([[0.0], shift]), notes=(*table.notes, note))
+
+
+def without_repeated_rows(table: Table) -> Table:
+    """Rows that a logger wrote twice are left out: with the same stamp and the same numbers, or with the stamp of the
+    next row. Not where t is rounded so coarsely that it repeats anyway."""
+    steps = np.diff(table.t)
+    again = np.flatnonzero(steps == 0) + 1
+    if not again.size:
+        return table
+    alike = _alike(table)
+    twice = again[alike[again]]
+    stale = again[~alike[again]] - 1
+    if not alike[stale].all():
+        return table
+    gone = np.union1d(twice, stale)
+    kept = np.delete(np.arange(table.t.size), gone)
+    left = np.diff(table.t[kept])
+    # where a mechanism rests, rows are alike whatever their stamps
+    others = np.count_nonzero(alike) - gone.size
+    few = gone.size < _FEW_REPEATED * table.t.size
+    if (left <= 0).any() or not (few or others <= _RESTING * table.t.size):
+        return table
+    note = f"rows that repeat the one before them, left out: {gone.size} (first: {table.place(int(gone[0]))})"
+    return table.rows(kept, lambda row: table.place(int(kept[row])), note)
+
+
+def _alike(table: Table) -> BoolArray:
+    """Whether each row has the numbers of the one before it [n]."""
+    same = np.logical_and.reduce(
+        [(one[1:] == one[:-1]) | (np.isnan(one[1:]) & np.isnan(one[:-1])) for one in table.signals.values()]
+    )
+    return np.concatenate([[False], same])
