@@ -22,7 +22,7 @@ Float = npt.NDArray[np.float64]
 
 _FINE = 0.05  # of a step times the fastest rate
 _SUBS = (4, 400)  # steps between two samples
-_SAMPLES = (2500, 7000)
+_SAMPLES = (2000, 5000)
 _SLOWEST = 1 / 150  # slower modes than this part of the fastest one are taken for drifts
 _NOISE = 0.5  # standard deviation in steps of a sensor, the default of model.sensor
 _ODD_STEP = 1e-4  # of differences, relative to a parameter or to its scale
@@ -263,13 +263,12 @@ def _drive(one: Driven, source: np.random.Generator, n: int, subs: int, rate: fl
         growth = math.log(high / low) / length
         wave = np.sin(2 * math.pi * low * np.expm1(growth * t) / growth)
     else:
-        shortest, longest = max(2, round(rate / fast)), max(4, round(rate / slow))
-        levels: list[float] = []
-        while len(levels) < n + subs:
-            hold = int(math.exp(source.uniform(math.log(shortest), math.log(longest))))
-            level = source.uniform(-1, 1) if one.shape == "steps" else float(source.choice((-1.0, 1.0)))
-            levels += [level] * max(hold, 1)
-        wave = np.broadcast_to(np.array(levels[:n])[:, None, None], t.shape)
+        length = n / rate
+        many = math.ceil(length * fast) + 2
+        lasts = np.exp(source.uniform(math.log(max(1 / fast, 2 / rate)), math.log(max(1 / slow, 4 / rate)), many))
+        levels = source.uniform(-1, 1, many) if one.shape == "steps" else source.choice((-1.0, 1.0), many)
+        begins = np.broadcast_to(t[..., :1], t.shape)  # a measured step comes between two samples, but within no step
+        wave = levels[np.searchsorted(np.cumsum(lasts), begins)]
     return np.asarray(one.mean + one.amplitude * wave / max(float(np.abs(wave).max()), 1e-300))
 
 

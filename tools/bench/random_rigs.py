@@ -275,12 +275,13 @@ class Sketch:
         ----------
         smooth : sines or a chirp; not held where it is an input
         measured : by a sensor with noise
-        internal, feedback : see Driven
+        internal, feedback : see Driven; feedback of a held input alone
         """
         shape = _SMOOTH[self.count(0, 1)] if smooth else _SHAPES[self.count(0, 3)]
         held = not smooth and not measured
         known = "servo" if internal else "held input" if held else "sampled input"
         self.features |= {shape, "measured drive" if measured else known}
+        feedback = feedback if held else ""
         if feedback:
             self.features.add("feedback")
         self._c[name] = f"u[{len(self._driven)}]"
