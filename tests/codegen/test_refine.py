@@ -22,12 +22,14 @@ from pvid.codegen.build import refine_functions
 from pvid.codegen.operations import Argument, Literal, Operation
 from pvid.codegen.refine import RefineFunctions, refine_functions_of
 from pvid.core.host_compiler import host_compiler
+from pvid.core.model_library import NATIVE, core_of, of_second_stage
 from pvid.core.sources import INCLUDES, source
 from pvid.model import Model
 from pvid.model.signals import Jet, sgn
 from pvid.models import mechanisms
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
+from pvid.settings.engine_cores import FLOAT
 
 WARNINGS = (
     "-Werror",
@@ -407,3 +409,23 @@ def test_an_option_adds_its_parameters_and_nothing_else() -> None:
     assert [one.sign for one in dry.parameters[:2]] == ["a1_1 - a2_1", "a1_1"]
     assert (slanted.runge_kutta, dry.runge_kutta) == (False, True)
     assert functions("kapitza dry_friction slant").model.refinement.extras != pendulum.refinement.extras
+
+
+def test_the_second_stage_of_a_mechanism_without_an_input_is_strict_c(tmp_path: Path) -> None:
+    """Coasts down: C has no array without elements, and every unsigned number is at least 0."""
+    model = Model("coast")
+    v = model.sensor("v", "m/s", resolution=1e-3, reach=20)
+    m, b = model.known("m", "kg", 80.0), model.unknown("b", "N*s/m", 2.0)
+    drag = model.unknown("drag", "kg/m", 0.3)
+    model.equation(m * v.d() + b * v + drag * v * abs(v))
+    made = refine_functions(model.compiled("coast"))
+    assert made.inputs == ()
+    (tmp_path / "pvid").mkdir()
+    (tmp_path / "pvid" / "refine_shape.h").write_text(files_refine.shape(made, "test"), encoding="utf-8")
+    (tmp_path / "refine_model_f32.h").write_text(files_refine.header(made, "test"), encoding="utf-8")
+    sources = map(str, (one for one in core_of(FLOAT, refined=True) if of_second_stage(one)))
+    options = ("-std=c99", "-O1", "-c", *WARNINGS, f"-I{tmp_path}", *INCLUDES, f"-I{NATIVE}", "-DPVID_MAX_P=3")
+    done = subprocess.run(
+        [host_compiler("this test"), *options, *sources], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")

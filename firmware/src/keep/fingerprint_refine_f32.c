@@ -37,7 +37,7 @@ uint32_t pvid_fingerprint_refine_model_f32(uint32_t hash)
     float r[PVID_REFINE_PARAMETERS];
     float m[PVID_REFINE_CONSTANTS];
     float state[PVID_REFINE_STATES];
-    float u[PVID_REFINE_INPUTS];
+    float u[PVID_REFINE_ROOM_U];
     float a[PVID_REFINE_COORDINATES];
     float z[PVID_REFINE_OUTPUTS];
     const float *v = &state[PVID_REFINE_STATES - PVID_REFINE_COORDINATES];

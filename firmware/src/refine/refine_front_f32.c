@@ -49,18 +49,18 @@ PVID_COLD void pvid_refine_front_init_f32(pvid_refine_front_f32 *self, const pvi
         self->sample[i] = signal->sample;
         self->derived[i] = signal->order == 2;
 #if PVID_REFINE_INTEGRALS
-        if (i < (size_t)INPUTS) {
+        if (PVID_REFINE_IS_INPUT(i)) {
             self->half_tick[i] = (signal->order == -1) ? (0.5f / config->sample_rate_hz) : 0.0f;
         }
 #endif
 #if PVID_REFINE_TURNING
-        if (i >= (size_t)INPUTS) {
+        if (!PVID_REFINE_IS_INPUT(i)) {
             const bool turns = pvid_refine_turning[i - INPUTS] != 0u;
             self->turn[i - INPUTS] = turns ? (65536.0f * self->from_counts[i]) : 0.0f;
         }
 #endif
 #if PVID_REFINE_RUNGE_KUTTA
-        if (i < (size_t)INPUTS) {
+        if (PVID_REFINE_IS_INPUT(i)) {
             self->held_between[i] = signal->source == (uint8_t)PVID_SIGNAL_HELD;
         }
 #endif
@@ -130,7 +130,7 @@ void pvid_refine_front_between_f32(const pvid_refine_front_f32 *self, uint32_t e
     float weight[2][4];
     weights_of_samples(t, weight[0]);
     weights_of_means(self, t, weight[1]);
-    for (size_t i = 0; i < INPUTS; i++) {
+    for (size_t i = 0; PVID_REFINE_IS_INPUT(i); i++) {
         const float *own = weight[self->held_between[i] ? 1 : 0];
         float sum = 0.0f;
         for (uint32_t j = 0; j < 4u; j++) {
@@ -210,7 +210,7 @@ static int16_t enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *
     }
     const float scaled = value * self->to_counts[signal];
 #if PVID_REFINE_TURNING
-    const bool turns = (signal >= (size_t)INPUTS) && (pvid_refine_turning[signal - INPUTS] != 0u);
+    const bool turns = (!PVID_REFINE_IS_INPUT(signal)) && (pvid_refine_turning[signal - INPUTS] != 0u);
     const int16_t count = turns ? counts_of_turning(&self->rest[signal], scaled) : counts(&self->rest[signal], scaled);
 #else
     const int16_t count = counts(&self->rest[signal], scaled);
@@ -224,7 +224,7 @@ static int16_t enter(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *
  * block's. */
 static void about_the_ticks(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config, const float sample[])
 {
-    for (size_t i = 0; i < INPUTS; i++) {
+    for (size_t i = 0; PVID_REFINE_IS_INPUT(i); i++) {
         if (config->signal[i].source == (uint8_t)PVID_SIGNAL_HELD) {
             const float last = sample[self->sample[i]] - self->reference[i];
             self->sum[i] += 0.5f * (self->held[i] - last);
@@ -301,7 +301,7 @@ PVID_COLD static void end_period(pvid_refine_front_f32 *self, const pvid_refine_
     }
     self->postponed = false;
     for (size_t i = 0; i < SIGNALS; i++) {
-        if ((config->outlier_gate > 0.0f) && ((i >= (size_t)INPUTS) || self->derived[i])) {
+        if ((config->outlier_gate > 0.0f) && ((!PVID_REFINE_IS_INPUT(i)) || self->derived[i])) {
             self->usual[i] = self->peak[i];
             self->peak[i] = 0.0f;
         }
@@ -317,7 +317,7 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
 #else
     about_the_ticks(self, config, sample);
 #endif
-    for (size_t i = 0; i < INPUTS; i++) {
+    for (size_t i = 0; PVID_REFINE_IS_INPUT(i); i++) {
         if (!pvid_finite_f32(self->sum[i])) {
             return PVID_REFINE_BROKEN;
         }
@@ -337,14 +337,14 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
         }
         float entry = middle - (self->droop[i] * second);
 #if PVID_REFINE_RUNGE_KUTTA
-        if ((i < (size_t)INPUTS) && self->held_between[i]) {
+        if (PVID_REFINE_IS_INPUT(i) && self->held_between[i]) {
             entry = (self->held[i] + self->ahead[i]) * self->share;
             self->held[i] = self->sum[i] - self->ahead[i];
         }
 #endif
         if (known) {
             const int16_t count = enter(self, config, i, entry);
-            if ((i < (size_t)INPUTS) && (count == INT16_MIN)) {
+            if (PVID_REFINE_IS_INPUT(i) && (count == INT16_MIN)) {
                 return PVID_REFINE_BROKEN; /* beyond its range */
             }
         }
@@ -372,7 +372,7 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
 PVID_COLD void pvid_refine_front_refer_f32(pvid_refine_front_f32 *self, const pvid_refine_config_f32 *config,
                                            const float sample[])
 {
-    for (size_t i = 0; i < INPUTS; i++) {
+    for (size_t i = 0; PVID_REFINE_IS_INPUT(i); i++) {
         const float x = sample[config->signal[i].sample];
 #if PVID_REFINE_INTEGRALS
         self->before[i] = -x; /* the first trapezoid is empty */

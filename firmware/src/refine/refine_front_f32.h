@@ -12,10 +12,10 @@
 /* Signals of an entry of the ring: inputs, and outputs (NaN: missing). Of a part of a step of Runge-Kutta: inputs at
  * its beginning, its middle and its end, outputs at the end of the step. */
 typedef struct {
-    float u[PVID_REFINE_INPUTS];
+    float u[PVID_REFINE_ROOM_U];
 #if PVID_REFINE_RUNGE_KUTTA
-    float middle[PVID_REFINE_INPUTS];
-    float end[PVID_REFINE_INPUTS];
+    float middle[PVID_REFINE_ROOM_U];
+    float end[PVID_REFINE_ROOM_U];
 #endif
     float z[PVID_REFINE_OUTPUTS];
 } pvid_refine_signals_f32;
@@ -68,7 +68,7 @@ PVID_ALWAYS_INLINE bool pvid_refine_front_add_f32(pvid_refine_front_f32 *self, c
 {
 #if PVID_REFINE_RUNGE_KUTTA
     if (self->wait == self->middle) {
-        for (size_t i = 0; i < PVID_REFINE_INPUTS; i++) {
+        for (size_t i = 0; PVID_REFINE_IS_INPUT(i); i++) {
             const float x = sample[self->sample[i]] - self->reference[i];
             self->ahead[i] = self->between ? (self->sum[i] + (0.5f * x)) : self->sum[i];
         }
@@ -78,12 +78,12 @@ PVID_ALWAYS_INLINE bool pvid_refine_front_add_f32(pvid_refine_front_f32 *self, c
     {
         const float x = sample[self->sample[i]];
 #if PVID_REFINE_INTEGRALS
-        if ((i < (size_t)PVID_REFINE_INPUTS) && (self->half_tick[i] > 0.0f)) {
+        if (PVID_REFINE_IS_INPUT(i) && (self->half_tick[i] > 0.0f)) {
             self->sum[i] += pvid_refine_integrated(self, i, x);
             continue;
         }
 #endif
-        self->sum[i] += (i < (size_t)PVID_REFINE_INPUTS) ? (x - self->reference[i]) : x;
+        self->sum[i] += PVID_REFINE_IS_INPUT(i) ? (x - self->reference[i]) : x;
     }
     self->wait--;
     return self->wait == 0u;
@@ -116,7 +116,7 @@ PVID_ALWAYS_INLINE void pvid_refine_front_read_f32(const pvid_refine_front_f32 *
                                                    pvid_refine_signals_f32 *signals)
 {
     const int16_t *value = self->ring[entry & ((uint32_t)PVID_REFINE_RING - 1u)];
-    PVID_UNROLL for (size_t i = 0; i < PVID_REFINE_INPUTS; i++)
+    PVID_UNROLL for (size_t i = 0; PVID_REFINE_IS_INPUT(i); i++)
     {
         signals->u[i] = (float)value[i] * self->from_counts[i];
     }

@@ -61,13 +61,18 @@ PVID_ALWAYS_INLINE void add_residuals(pvid_refine_pass_f32 *self, const float e[
     }
 }
 
+#if PVID_REFINE_STILL > 0
+#define OF_STILL (PVID_REFINE_OUTPUTS * PVID_REFINE_STATES)
+#else
+#define OF_STILL 0 /* there are none: nothing is written */
+#endif
+
 /* dz/dq, dz/dv, dz/dr of the entries that do not move, each [output][entry]. */
 PVID_ALWAYS_INLINE void output_derivatives(const pvid_refine_pass_f32 *self, const float r[], const float x[],
                                            const float u[], float derivatives[])
 {
     pvid_refine_output_jacobian(self->constants, r, x, &x[RATES], u, derivatives,
-                                &derivatives[PVID_REFINE_OUTPUTS * RATES],
-                                &derivatives[PVID_REFINE_OUTPUTS * PVID_REFINE_STATES]);
+                                &derivatives[PVID_REFINE_OUTPUTS * RATES], &derivatives[OF_STILL]);
 }
 
 #if PVID_REFINE_SKEW

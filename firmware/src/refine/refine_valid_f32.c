@@ -23,13 +23,12 @@ static pvid_status signals_are_valid(const pvid_refine_config_f32 *config, size_
     }
     for (size_t i = 0; i < PVID_REFINE_SIGNALS; i++) {
         const pvid_refine_signal_f32 *signal = &config->signal[i];
-        const bool derived = (signal->order == 2) && (i < (size_t)PVID_REFINE_INPUTS) && (config->second != NULL);
-        const bool integrated = (signal->order == -1) && (i < (size_t)PVID_REFINE_INPUTS) &&
-                                (signal->source == (uint8_t)PVID_SIGNAL_SAMPLED);
+        const bool derived = (signal->order == 2) && PVID_REFINE_IS_INPUT(i) && (config->second != NULL);
+        const bool integrated =
+            (signal->order == -1) && PVID_REFINE_IS_INPUT(i) && (signal->source == (uint8_t)PVID_SIGNAL_SAMPLED);
         if (((signal->order != 0) && !derived && !(integrated && (PVID_REFINE_INTEGRALS != 0))) ||
             (signal->sample >= samples) ||
-            (signal->source >
-             (((i < (size_t)PVID_REFINE_INPUTS)) ? (uint8_t)PVID_SIGNAL_HELD : (uint8_t)PVID_SIGNAL_SAMPLED)) ||
+            (signal->source > ((PVID_REFINE_IS_INPUT(i)) ? (uint8_t)PVID_SIGNAL_HELD : (uint8_t)PVID_SIGNAL_SAMPLED)) ||
             !pvid_within_f32(signal->scale, -1.0e9f, 1.0e9f)) {
             return PVID_BAD_DESIGN;
         }

@@ -9,6 +9,13 @@
 #define PVID_REFINE_SUB 4  /* steps of the motion in a big step: of the columns and of a row of each output */
 #define PVID_REFINE_PAST 6 /* of the differences of a signal's means */
 #define PVID_REFINE_SIGNALS (PVID_REFINE_INPUTS + PVID_REFINE_OUTPUTS)
+#if PVID_REFINE_INPUTS > 0
+#define PVID_REFINE_ROOM_U PVID_REFINE_INPUTS
+#define PVID_REFINE_IS_INPUT(i) ((i) < (size_t)PVID_REFINE_INPUTS)
+#else
+#define PVID_REFINE_ROOM_U 1 /* C has no array without elements */
+#define PVID_REFINE_IS_INPUT(i) false
+#endif
 #define PVID_REFINE_COLUMNS (PVID_REFINE_STATES + PVID_REFINE_MOVING)                      /* that are integrated */
 #define PVID_REFINE_STILL (PVID_REFINE_PARAMETERS - PVID_REFINE_MOVING - PVID_REFINE_SKEW) /* of the outputs alone */
 #define PVID_REFINE_UNKNOWNS (PVID_REFINE_STATES + PVID_REFINE_PARAMETERS)                 /* of a block */
@@ -31,11 +38,11 @@ typedef struct {
     uint8_t sample[PVID_REFINE_SIGNALS]; /* places in the argument of step */
     bool derived[PVID_REFINE_SIGNALS];   /* of order 2 */
 #if PVID_REFINE_RUNGE_KUTTA
-    bool held_between[PVID_REFINE_INPUTS]; /* held from tick to tick: an entry is the mean from it to the next one */
+    bool held_between[PVID_REFINE_ROOM_U]; /* held from tick to tick: an entry is the mean from it to the next one */
     bool flat;                             /* a step is one tick */
     bool between;                          /* the middle of a block is between two ticks */
     uint8_t middle;                        /* `wait` before the sample in the middle of a block, or before it */
-    float ahead[PVID_REFINE_INPUTS];       /* of held ones: the part of the sum before that middle */
+    float ahead[PVID_REFINE_ROOM_U];       /* of held ones: the part of the sum before that middle */
 #endif
     uint8_t behind;                         /* entries by which the slowest signal is behind */
     uint16_t place;                         /* of the newest entry of `line` */
@@ -45,22 +52,22 @@ typedef struct {
     float to_counts[PVID_REFINE_SIGNALS];   /* 32767 / range, with the scale of the signal */
     float from_counts[PVID_REFINE_SIGNALS]; /* range / 32767 */
 #if PVID_REFINE_INTEGRALS
-    float half_tick[PVID_REFINE_INPUTS]; /* [s]; 0: no integral is taken */
-    float before[PVID_REFINE_INPUTS];    /* the last sample */
-    float integral[PVID_REFINE_INPUTS];
+    float half_tick[PVID_REFINE_ROOM_U]; /* [s]; 0: no integral is taken */
+    float before[PVID_REFINE_ROOM_U];    /* the last sample */
+    float integral[PVID_REFINE_ROOM_U];
 #endif
 #if PVID_REFINE_TURNING
     float turn[PVID_REFINE_OUTPUTS]; /* 65536 counts of a turning output, else 0 */
 #endif
     float sum[PVID_REFINE_SIGNALS];                      /* of the block */
     float rest[PVID_REFINE_SIGNALS];                     /* what rounding left of the last entry [counts] */
-    float reference[PVID_REFINE_INPUTS];                 /* the first sample since the restart */
-    float held[PVID_REFINE_INPUTS];                      /* the last sample of the block before, less the reference */
+    float reference[PVID_REFINE_ROOM_U];                 /* the first sample since the restart */
+    float held[PVID_REFINE_ROOM_U];                      /* the last sample of the block before, less the reference */
     float past[PVID_REFINE_SIGNALS][PVID_REFINE_PAST];   /* the last mean, its differences of orders 1 to 4, the
                                                             fourth difference before */
     float peak[PVID_REFINE_SIGNALS];                     /* largest fourth difference of the present period */
     float usual[PVID_REFINE_SIGNALS];                    /* of the period before */
-    float line[PVID_REFINE_INPUTS][PVID_REFINE_LINE];    /* means of inputs of order 2, circular, twice */
+    float line[PVID_REFINE_ROOM_U][PVID_REFINE_LINE];    /* means of inputs of order 2, circular, twice */
     int16_t ring[PVID_REFINE_RING][PVID_REFINE_SIGNALS]; /* INT16_MIN: missing or beyond its range */
 } pvid_refine_front_f32;
 
