@@ -121,7 +121,7 @@ class Rig:
     def sizes(self) -> dict[int, float]:
         """Largest sum of |channel| over a window, integrals counted from the start of the window, by place."""
         design = self.design
-        made = steps(jets(self.counts, design), design, np.zeros(design.model.runs, np.int64), 2)
+        made = steps(jets(self.counts, design), design, np.zeros(design.model.runs, np.int64))
         out = {}
         for place, one in enumerate(design.model.channel):
             if one.gain == NONE:

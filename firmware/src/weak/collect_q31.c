@@ -81,6 +81,13 @@ pvid_weak_tick pvid_weak_collect_end_q31(pvid_weak_collect_q31 *self)
             pvid_weak_sums_next_q31(&self->sums, design, index, self->values.half);
             pvid_weak_values_next_q31(&self->values, design->hop);
         }
+    } else if (!self->values.ran && (PVID_COUNT(PVID_EXACT_RUNS, design->model->runs) > 0u)) {
+        bool first = false;
+        if (pvid_weak_front_early_q31(&self->front, design, jet, &first)) {
+            pvid_weak_values_begin_q31(&self->values, design, jet, first);
+        }
+    } else {
+        /* the line fills */
     }
     if (design->decimation > 1u) {
         return PVID_WEAK_BUSY;

@@ -30,6 +30,36 @@ void pvid_weak_values_reset_q31(pvid_weak_values_q31 *self)
     memset(self->owed, 0, sizeof self->owed);
 }
 
+void pvid_weak_values_begin_q31(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t jet[],
+                                bool first)
+{
+    int32_t rate[2 * PVID_MAX_INTEGRANDS];
+    const bool within = design->model->prepare(jet, rate);
+    for (size_t i = 0; i < design->model->runs; i++) {
+        const int64_t x = within ? (int64_t)rate[i] : 0;
+        self->run[i] = first ? x : (self->run[i] + (2 * x));
+    }
+}
+
+/* The runs at the first step: what came before it counts where the derivatives, `newest`, do not depend on those of
+ * signals; else that of the first step. */
+static void end_lead(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t jet[],
+                     const int32_t newest[])
+{
+    const pvid_weak_model_q31 *model = design->model;
+    int32_t plain[PVID_MAX_INPUTS];
+    int32_t rate[2 * PVID_MAX_INTEGRANDS];
+    for (size_t i = 0; i < model->jets; i++) {
+        plain[i] = (model->jet[i].order == 0u) ? jet[i] : 0;
+    }
+    const bool within = model->prepare(plain, rate);
+    for (size_t i = 0; i < model->runs; i++) {
+        const bool known = (self->lead > 0u) && within && (rate[i] == newest[i]);
+        const int64_t held = (2 * ((int64_t)newest[i] * (int64_t)self->lead)) / (int64_t)design->decimation;
+        self->run[i] = known ? (self->run[i] + newest[i]) : held;
+    }
+}
+
 /* Mean of sgn over a step: v 2/|g| within +-1, with the slope g = (after - before)/2; 0 for 0. Q30. */
 static int32_t mean_sign(int64_t before, int32_t v, int32_t after)
 {
@@ -64,15 +94,11 @@ static void take_newest(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *
                         const int32_t newest[])
 {
     const pvid_weak_model_q31 *model = design->model;
+    if (!self->ran && (PVID_COUNT(PVID_EXACT_RUNS, model->runs) > 0u)) {
+        end_lead(self, design, jet, newest);
+    }
     for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_RUNS, model->runs); i++) {
-        int64_t rise = 0; /* over a gap */
-        if (self->known > 0u) {
-            rise = (int64_t)self->rate[i] + newest[i];
-        } else if (!self->ran) { /* from the first sample to the first step */
-            rise = (2 * ((int64_t)newest[i] * (int64_t)self->lead)) / (int64_t)design->decimation;
-        } else {
-            /* the run stays */
-        }
+        const int64_t rise = (self->known > 0u) ? ((int64_t)self->rate[i] + newest[i]) : 0; /* 0: over a gap */
         self->run[i] = pvid_clamp_q31(self->run[i] + rise, PVID_WIDE);
         self->rate[i] = newest[i];
     }

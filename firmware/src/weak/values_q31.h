@@ -33,6 +33,10 @@ void pvid_weak_values_reset_q31(pvid_weak_values_q31 *self);
 pvid_weak_outcome pvid_weak_values_step_q31(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design,
                                             const int32_t jet[], pvid_weak_entry_q31 channel[]);
 
+/* Before the first step of a run: its runs move by a step, by half of one at the first output, with these jets. */
+void pvid_weak_values_begin_q31(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *design, const int32_t jet[],
+                                bool first);
+
 /* To the next step. */
 void pvid_weak_values_next_q31(pvid_weak_values_q31 *self, uint16_t hop);
 

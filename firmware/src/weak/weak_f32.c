@@ -373,12 +373,25 @@ static void watch(pvid_weak_f32 *self, const float sample[])
     }
 }
 
+/* A block before the first step of a run. */
+PVID_COLD static void lead(pvid_weak_f32 *self)
+{
+    float *jet = self->history.inputs[self->history.newest];
+    bool first = false;
+    if (pvid_weak_front_early_f32(&self->front, self->design, jet, &first)) {
+        pvid_weak_step_begin_f32(&self->history, self->design, self->dt, jet, first);
+    }
+}
+
 /* The last tick of a block. */
 PVID_SELDOM static pvid_reason end_block(pvid_weak_f32 *self, const float sample[])
 {
     const uint8_t decimation = pvid_weak_decimation(self->front.decimation);
     const bool steps = pvid_weak_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
     self->resume = self->rest;
+    if (!steps && !self->history.ran && (PVID_COUNT(PVID_EXACT_RUNS, self->design->model->runs) > 0u)) {
+        lead(self);
+    }
     if (steps && self->watches && (self->history.known > 1u)) {
         watch(self, sample);
     }

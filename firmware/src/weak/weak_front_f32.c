@@ -66,6 +66,23 @@ uint16_t pvid_weak_front_lead_f32(const pvid_weak_front_f32 *self)
     return (uint16_t)((uint32_t)self->decimation * ((uint32_t)lost(self) + self->half));
 }
 
+PVID_COLD bool pvid_weak_front_early_f32(const pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design,
+                                         float jet[], bool *first)
+{
+    const uint32_t length = (2u * (uint32_t)self->half) + 1u;
+    const uint32_t number = ((uint32_t)lost(self) + length) - ((uint32_t)self->missing + 1u);
+    const uint32_t newest = ((self->head == 0u) ? length : self->head) - 1u;
+    const float *output = &self->line[(3u + newest) * (size_t)self->signals];
+    *first = number == 0u;
+    /* The first block's output lacks what was before it: its weights D .. 1 are to have the sum 1. */
+    const float scale = (number == 0u) ? ((2.0f * self->ticks) / (self->ticks + 1.0f)) : 1.0f;
+    for (size_t i = 0; i < design->model->jets; i++) {
+        const pvid_weak_jet one = design->model->jet[i];
+        jet[i] = (one.order == 0u) ? (scale * output[one.signal]) : 0.0f;
+    }
+    return number < ((uint32_t)lost(self) + self->half);
+}
+
 void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self)
 {
     self->head = 0;

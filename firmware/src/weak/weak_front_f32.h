@@ -27,6 +27,11 @@ void pvid_weak_front_init_f32(pvid_weak_front_f32 *self, const pvid_weak_design_
 /* Ticks from the first sample after a restart to the instant of the first step. */
 uint16_t pvid_weak_front_lead_f32(const pvid_weak_front_f32 *self);
 
+/* Behind a block that gave no step: whether its output lies before the first step since a restart; then writes the
+ * jets there, as far as the output alone has them: signals unfiltered, 0 of derivatives. `first`: it is the first. */
+bool pvid_weak_front_early_f32(const pvid_weak_front_f32 *self, const pvid_weak_design_f32 *design, float jet[],
+                               bool *first);
+
 /* An empty line. */
 void pvid_weak_front_reset_f32(pvid_weak_front_f32 *self);
 

@@ -144,6 +144,28 @@ static int32_t jet_of(const pvid_weak_filter_q31 *filter, uint8_t order, const i
     return (int32_t)pvid_clamp_q31(pvid_round_shift_q31(sum, filter->down), INT32_MAX);
 }
 
+bool pvid_weak_front_early_q31(const pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design, int32_t jet[],
+                               bool *first)
+{
+    const uint32_t length = (2u * (uint32_t)self->half) + 1u;
+    const uint32_t number = ((uint32_t)lost(self) + length) - ((uint32_t)self->missing + 1u);
+    const uint32_t newest = ((self->head == 0u) ? length : self->head) - 1u;
+    const int32_t *output = &self->line[(3u + newest) * (size_t)self->signals];
+    const int64_t ticks = self->decimation;
+    *first = number == 0u;
+    for (size_t i = 0; i < design->model->jets; i++) {
+        const pvid_weak_jet one = design->model->jet[i];
+        const pvid_weak_filter_q31 *filter = &design->filter[i];
+        int64_t x = output[one.signal];
+        if (*first) { /* it lacks what was before it: its weights D .. 1 are to have the sum of all */
+            x = (x * 2 * ticks) / (ticks + 1);
+        }
+        const int64_t whole = (one.order == 0u) ? (*filter->weights * x) : 0;
+        jet[i] = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(whole, filter->down), INT32_MAX);
+    }
+    return number < ((uint32_t)lost(self) + self->half);
+}
+
 bool pvid_weak_front_step_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design, int32_t jet[])
 {
     const pvid_weak_model_q31 *model = design->model;

@@ -31,6 +31,11 @@ bool pvid_weak_front_derive_q31(pvid_weak_front_q31 *self, const pvid_weak_desig
  * jets. */
 bool pvid_weak_front_step_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design, int32_t jet[]);
 
+/* Behind a block that gave no step: whether its output lies before the first step since a restart; then writes the
+ * jets there, as far as the output alone has them: signals unfiltered, 0 of derivatives. `first`: it is the first. */
+bool pvid_weak_front_early_q31(const pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design, int32_t jet[],
+                               bool *first);
+
 /* A reading about its offset; |offset| <= 2^30, so that one beyond 2^31 stays beyond full scale. */
 static inline int32_t pvid_weak_count_q31(int32_t reading, int32_t offset)
 {

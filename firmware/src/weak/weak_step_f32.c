@@ -8,7 +8,8 @@
  *   sign        width > 0:  tanh(v / width);   width 0: the mean of sgn over the step, v linear there,
  *               2 v_k / |g| within -1..1, g = (v_(k+1) - v_(k-1)) / 2  (at the first step v_1 - v_0)
  *   run         + dt/2 (r_(k-1) + r_k), r its derivative, with what rounding takes off kept (Kahan); from the first
- *               sample to the first step r stays that of the first step
+ *               sample to the first step by the same rule over the outputs of the blocks there, or, if r depends on
+ *               derivatives of signals, r stays that of the first step
  *   I^1_k       I^1_(k-1) + dt/24 (-f_(k-2) + 13 f_(k-1) + 13 f_k - f_(k+1))
  *   I^2_k       I^2_(k-1) + dt/2 (I^1_(k-1) + I^1_k) + dt^2/60 (f_(k+1) - f_(k-2) - 8 (f_k - f_(k-1)))
  *   of 1:       t and t^2/2
@@ -26,6 +27,32 @@ void pvid_weak_step_init_f32(pvid_weak_history_f32 *self, float lead)
 {
     self->lead = lead;
     pvid_weak_step_reset_f32(self);
+}
+
+PVID_COLD void pvid_weak_step_begin_f32(pvid_weak_history_f32 *self, const pvid_weak_design_f32 *design, float dt,
+                                        const float jet[], bool first)
+{
+    float arguments[PVID_MAX_INPUTS];
+    design->model->prepare(jet, arguments);
+    for (size_t i = 0; i < design->model->runs; i++) {
+        self->run[i] = first ? ((0.5f * dt) * arguments[i]) : (self->run[i] + (dt * arguments[i]));
+    }
+}
+
+/* The runs at the first step, whose derivatives there are `rate`; `place` is written. */
+PVID_COLD static void end_lead(pvid_weak_history_f32 *self, const pvid_weak_model_f32 *model, float dt,
+                               const float jet[], const float rate[], float place[])
+{
+    float arguments[PVID_MAX_INPUTS]; /* without derivatives of signals */
+    for (size_t i = 0; i < model->jets; i++) {
+        place[i] = (model->jet[i].order == 0u) ? jet[i] : 0.0f;
+    }
+    model->prepare(place, arguments);
+    for (size_t i = 0; i < model->runs; i++) {
+        const bool known = (self->lead > 0.0f) && (arguments[i] >= rate[i]) && (arguments[i] <= rate[i]);
+        self->run[i] = known ? (self->run[i] + ((0.5f * dt) * rate[i])) : (self->lead * rate[i]);
+    }
+    self->ran = true;
 }
 
 void pvid_weak_step_reset_f32(pvid_weak_history_f32 *self)
@@ -146,11 +173,8 @@ bool pvid_weak_step_take_f32(pvid_weak_history_f32 *self, const pvid_weak_design
             model->form(now, self->integral, dt * (float)index, channel);
         }
         move_runs(self, runs, 0.5f * dt, arguments);
-    } else if (!self->ran) {
-        for (size_t i = 0; i < runs; i++) {
-            self->run[i] = self->lead * arguments[i];
-        }
-        self->ran = true;
+    } else if ((runs > 0u) && !self->ran) {
+        end_lead(self, model, dt, newest, arguments, before);
     } else {
         /* a gap: the runs stay */
     }

@@ -10,6 +10,10 @@
 /* No step is known. lead: from a run's first sample to its first step [s]. `self` is all zeros. */
 void pvid_weak_step_init_f32(pvid_weak_history_f32 *self, float lead);
 
+/* Before the first step of a run: its runs move by dt, by half of it at the first output, with these jets. */
+void pvid_weak_step_begin_f32(pvid_weak_history_f32 *self, const pvid_weak_design_f32 *design, float dt,
+                              const float jet[], bool first);
+
 /* No step is known; the integrals since the start of the run are kept. */
 void pvid_weak_step_reset_f32(pvid_weak_history_f32 *self);
 

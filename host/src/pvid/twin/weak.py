@@ -121,7 +121,8 @@ class WeakTwin:
         """All that comes of a stretch of finite samples [ticks, samples] but the estimate; moves the runs."""
         design, hop = self.design, self.design.hop
         jets = weak_front.jets(samples, design, self.config.sample_rate)
-        values = weak_step.values(jets, design, self.runs, self.dt)
+        early = weak_front.early_jets(samples, design, self.config.sample_rate)
+        values = weak_step.values(jets, design, self.runs, self.dt, early)
         steps = np.full(len(samples), -1)
         ticks = np.array([self.ticks.tick_of(step) for step in range(jets.shape[1])], np.int64)
         steps[ticks] = np.arange(len(ticks))

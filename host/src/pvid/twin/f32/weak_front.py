@@ -64,12 +64,29 @@ def filtered(x: Float32, weights: Float32, order: int, centres: Places) -> Float
     return middle + total if order == 0 else total
 
 
+def _outputs(samples: Float32, design: WeakDesign32, sample_rate: float) -> Float32:
+    of_ticks = signals(samples, design.model, sample_rate)
+    return block_means(of_ticks[: len(samples) - front_ticks(design).held], design.decimation)
+
+
+def early_jets(samples: Float32, design: WeakDesign32, sample_rate: float) -> Float32:
+    """Jets [jets, outputs] of the outputs before the first step of a stretch: signals unfiltered, 0 of derivatives."""
+    ticks, model = front_ticks(design), design.model
+    outputs = _outputs(samples, design, sample_rate)[: ticks.lost + ticks.half]
+    d = _F(design.decimation)
+    outputs[:1] = ((_F(2) * d) / (d + _F(1))) * outputs[:1]
+    out = np.zeros((model.jets, len(outputs)), np.float32)
+    for place, jet in enumerate(model.jet):
+        if jet.order == 0:
+            out[place] = outputs[:, jet.signal]
+    return out
+
+
 def jets(samples: Float32, design: WeakDesign32, sample_rate: float) -> Float32:
     """Jets [jets, steps] of one stretch of finite samples [ticks, samples]."""
     ticks, model = front_ticks(design), design.model
     centres = ticks.lost + ticks.half + np.arange(ticks.steps(len(samples)))
-    of_ticks = signals(samples, model, sample_rate)
-    outputs = block_means(of_ticks[: len(samples) - ticks.held], design.decimation)
+    outputs = _outputs(samples, design, sample_rate)
     out = np.empty((model.jets, len(centres)), np.float32)
     with np.errstate(all="ignore"):
         for place, (jet, one) in enumerate(zip(model.jet, design.compensator, strict=True)):

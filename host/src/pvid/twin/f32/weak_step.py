@@ -35,8 +35,15 @@ class Runs:
         nothing = np.zeros(design.model.runs, np.float32)
         return cls(nothing, nothing, lead)
 
-    def at_steps(self, rates: Float32, dt: np.float32) -> Float32:
-        """Their values at the steps of a stretch [runs, steps] from their derivatives [runs, steps]."""
+    def at_steps(self, rates: Float32, dt: np.float32, before: Float32, plain: Float32) -> Float32:
+        """Their values at the steps of a stretch [runs, steps] from their derivatives [runs, steps].
+
+        Parameters
+        ----------
+        before : their derivatives at the outputs before the first step [runs, outputs]
+        plain : at the first step without derivatives of signals [runs, 1]; where it differs from `rates`, that of the
+            first step counts since the first sample
+        """
         out = np.empty_like(rates)
         half_dt = _F(0.5) * dt
         for step in range(rates.shape[1]):
@@ -46,7 +53,12 @@ class Runs:
                 self.low = rise - (moved - self.value)
                 self.value = moved
             elif not self.ran:
-                self.value, self.ran = self.lead * rates[:, step], True
+                whole = np.zeros_like(self.value)
+                for place in range(before.shape[1]):
+                    whole = whole + dt * before[:, place] if place else half_dt * before[:, place]
+                known = (self.lead > 0) & (plain[:, 0] == rates[:, 0])
+                self.value = np.where(known, whole + half_dt * rates[:, 0], self.lead * rates[:, 0])
+                self.ran = True
             out[:, step] = self.value
         return out
 
@@ -100,15 +112,26 @@ def _integrals(f: Float32, hop: int, dt: np.float32) -> tuple[Float32, Float32]:
     return once, np.add.accumulate(more, axis=1, dtype=np.float32)
 
 
-def values(jets: Float32, design: WeakDesign32, runs: Runs, dt: np.float32) -> Values:
-    """Channels of a stretch from its jets [jets, steps]; moves the runs."""
+def _leads(jets: Float32, design: WeakDesign32, early: Float32) -> tuple[Float32, Float32]:
+    """Derivatives of the runs before the first step [runs, outputs], and at it without those of signals [runs, 1]."""
+    model = design.model
+    if not model.runs or model.prepare is None:
+        return np.zeros((0, 0), np.float32), np.zeros((0, 1), np.float32)
+    orders = np.array([one.order for one in model.jet])
+    plain = np.where(orders[:, None] == 0, jets[:, :1], _F(0))
+    return model.prepare(early)[: model.runs], model.prepare(plain)[: model.runs]
+
+
+def values(jets: Float32, design: WeakDesign32, runs: Runs, dt: np.float32, early: Float32) -> Values:
+    """Channels of a stretch from its jets [jets, steps] and those before the first step [jets, outputs]; moves the
+    runs."""
     model, hop = design.model, design.hop
     steps = jets.shape[1]
     summed = [one for one in model.channel if one.gain != NONE]
     nothing = Values(np.zeros((0, len(summed)), np.float32), np.zeros((0, 2, model.integrands), np.float32))
     with np.errstate(all="ignore"):
         arguments = np.zeros((0, steps), np.float32) if model.prepare is None else model.prepare(jets)
-        of_runs = runs.at_steps(arguments[: model.runs], dt)
+        of_runs = runs.at_steps(arguments[: model.runs], dt, *_leads(jets, design, early))
         if steps <= _LATER:
             return nothing
         v = arguments[model.runs :]

@@ -9,7 +9,7 @@ import numpy as np
 
 from pvid.settings.weak_q31 import WeakDesignQ31
 from pvid.twin.q31.integer import Int
-from pvid.twin.q31.weak_front import front_ticks, jets
+from pvid.twin.q31.weak_front import early_jets, front_ticks, jets
 from pvid.twin.q31.weak_sums import windows
 from pvid.twin.q31.weak_values import LATER, steps
 from pvid.twin.weak_ticks import FrontTicks
@@ -107,15 +107,15 @@ def collect(counts: Int, design: WeakDesignQ31) -> Collected:
     runs = np.zeros(design.model.runs, np.int64)
     found, played = [np.zeros((0, len(design.model.channel), design.highest + 1, 2), np.int64)], []
     spreads = [np.zeros((0, len(counts)), np.int64)]
-    lead = plan.front.first
+    ran = False
     first = 0
     while first < total:
         beyond = np.flatnonzero(~within[first:])
         last = first + int(beyond[0]) if len(beyond) else total
         of_steps = jets(counts[:, first:last], design)
-        made = steps(of_steps, design, runs, lead)
-        if of_steps.shape[1] and made.beyond != 0:
-            lead = 0
+        early = None if ran else early_jets(counts[:, first:last], design)
+        made = steps(of_steps, design, runs, early, plan.front.first)
+        ran = ran or bool(of_steps.shape[1] and made.beyond != 0)
         if made.beyond is not None:
             last = first + plan.front.tick_of(made.beyond)
         ticks = plan.play(last - first, made.channels.shape[1])

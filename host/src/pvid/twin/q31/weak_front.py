@@ -66,6 +66,18 @@ def _jet(x: Int, one: WeakFilterQ31, order: int, centres: Int) -> Int:
     return clamp(round_shift(total, one.down), _MOST)
 
 
+def early_jets(counts: Int, design: WeakDesignQ31) -> Int:
+    """Those of the outputs before the first step [jets, outputs]: signals unfiltered, 0 of derivatives."""
+    ticks, d = front_ticks(design), design.decimation
+    x = block_sums(signals(counts, design), design)[:, : ticks.lost + ticks.half]
+    x[:, :1] = np.sign(x[:, :1]) * (np.abs(x[:, :1]) * 2 * d // (d + 1))
+    found = np.zeros((len(design.model.jet), x.shape[1]), np.int64)
+    for k, (jet, one) in enumerate(zip(design.model.jet, design.filter, strict=True)):
+        if jet.order == 0:
+            found[k] = clamp(round_shift(int(one.weights[0]) * x[jet.signal], one.down), _MOST)
+    return found
+
+
 def jets(counts: Int, design: WeakDesignQ31) -> Int:
     """Of counts [samples, ticks] within full scale: [jets, steps]."""
     ticks = front_ticks(design)

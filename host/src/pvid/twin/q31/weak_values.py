@@ -40,13 +40,30 @@ class Steps:
     beyond: int | None
 
 
-def steps(jets: Int, design: WeakDesignQ31, runs: Int, lead: int = 0) -> Steps:
+def _before(jets: Int, rates: Int, design: WeakDesignQ31, early: Int | None, lead: int) -> Int:
+    """What the runs are at the first step, behind the outputs before it [runs, 1]."""
+    model = design.model
+    if early is None or model.prepare is None or not model.runs:
+        return np.zeros((model.runs, 1), np.int64)
+    held = np.sign(rates[:, :1]) * (2 * np.abs(rates[:, :1]) * lead // design.decimation)
+    found, fits = model.prepare(early)
+    found = np.where(fits, found[: model.runs], 0)
+    weights = np.full(early.shape[1], 2)
+    weights[:1] = 1
+    orders = np.array([one.order for one in model.jet])
+    plain, within = model.prepare(np.where(orders[:, np.newaxis] == 0, jets[:, :1], 0))
+    known = (lead > 0) & within & (plain[: model.runs] == rates[:, :1])
+    return np.where(known, found @ weights[:, np.newaxis] + rates[:, :1], held)
+
+
+def steps(jets: Int, design: WeakDesignQ31, runs: Int, early: Int | None = None, lead: int = 0) -> Steps:
     """From jets [jets, n] of a stretch.
 
     Parameters
     ----------
     runs : the sums before it
-    lead : ticks from the first sample to the first step, where the runs begin with this stretch
+    early : jets of the outputs before the first step [jets, outputs], where the runs begin with this stretch
+    lead : ticks from the first sample to the first step there
     """
     model = design.model
     n = jets.shape[1]
@@ -58,7 +75,7 @@ def steps(jets: Int, design: WeakDesignQ31, runs: Int, lead: int = 0) -> Steps:
     n = n if beyond is None else beyond
     jets, newest = jets[:, :n], newest[:, :n]
     rates, v = newest[: model.runs], newest[model.runs :]
-    begun = np.sign(rates[:, :1]) * (2 * np.abs(rates[:, :1]) * lead // design.decimation)
+    begun = _before(jets, rates, design, early, lead)
     rises = np.concatenate([begun, rates[:, 1:] + rates[:, :-1]], axis=1)
     sums = clamp(runs[:, np.newaxis] + np.cumsum(rises, axis=1), WIDE)
     nothing = np.zeros((len(model.channel), 0), np.int64)
