@@ -120,6 +120,23 @@ AROUND: dict[str, tuple[str | bytes, str | None, str]] = {
         "",
     ),
     "middleware, no mark typed": (of("%time,frame,F,x", *(f"{t},base,{f},{x}" for t, f, x in CELLS)), "t=time", ""),
+    "names in another order in a comment": (of("# t,x,F", "# as above", HEAD, *PLAIN), None, ""),
+    "a column of remarks": (of(HEAD + ",Comment", *PLAIN), None, ""),
+    "LabVIEW": (
+        of(
+            "LabVIEW Measurement",
+            "Separator\tTab",
+            "***End_of_Header***",
+            "",
+            "Channels\t2",
+            "Samples\t120\t120",
+            "***End_of_Header***",
+            "X_Value\tForce\tPlace\tComment",
+            *("\t".join(cells) for cells in CELLS),
+        ),
+        "t=X_Value,F=Force,x=Place",
+        "in front",
+    ),
     "names and units in comments": (of("# t,F,x", "# s,N,mm", *IN_MM), None, "units"),
     "text with a comma beside": (of("t;F;x;ch", *(";".join(c) + ";1,2" for c in CELLS)), None, ""),
     "quoted text beside": (

@@ -25,6 +25,7 @@ _LABEL = re.compile(r"([A-Za-z_][^\s:=,;]*)\s*[:=]\s*([^\s:=]*)")
 _DATE = r"\d{4}-\d\d-\d\d[T ]"
 _STAMP = re.compile(rf"\s*\[?((?:{_DATE})?\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?)(?:\]\s*(?:[-=]?>)?|\s*[-=]?>)\s*")
 _MOSTLY = 0.8
+_REMARKS = ("comment", "comments", "remark", "remarks", "note", "notes")  # a last column that most rows lack
 
 STAMP = "stamp"  # name of a monitor's stamps in front of the lines; "t" where no other column is called so
 
@@ -206,18 +207,23 @@ def _has_number(line: _Line) -> bool:
 
 
 def _head(lines: Sequence[_Line], wanted: Sequence[str]) -> tuple[_Line, list[str]] | None:
-    """The first line with all names, and its names as wanted: with the mark of a comment or without."""
+    """The last line in front of the numbers with all names, and its names as wanted: with the mark of a comment or
+    without."""
+    found: tuple[_Line, list[str]] | None = None
     if not wanted:
         return None
     for line in lines:
         if len(line.cells) < len(wanted):
             continue
+        if found is not None and not line.is_comment and sum(kind in "nt" for kind in line.kinds) >= len(wanted):
+            break
         for cells in (line.cells, line.bare, [_GARBAGE.sub("", line.cells[0]), *line.cells[1:]]):
             if cells[0] and not cells[0].strip(_MARKS):
                 continue  # the mark of a comment is no name
             if all(name in cells for name in wanted):
-                return line, cells
-    return None
+                found = line, cells
+                break
+    return found
 
 
 def _labels(lines: Sequence[_Line]) -> tuple[tuple[str, ...], int] | None:
@@ -253,6 +259,8 @@ def _with_head(
     names = [str(k + 1) for k in range(width)] if head is None else list(head[1])
     if len(names) == width + 1 and not names[-1]:
         names.pop()
+    elif len(names) == width + 1 and names[-1].lower() in _REMARKS:
+        names.pop()  # where there are any
     elif len(names) == width - 1:
         if not any(one.cells[-1] for one in usual):
             names.append("")  # each row ends with a separator

@@ -46,21 +46,54 @@ class TimesOfDay:
         self._orders: set[bool] = set()  # what dates allow one reading alone, such as 5/13/2024: month first or not
         self._first: int | None = None  # [ns]
         self._minutes: dict[tuple[str | None, str, str], int | None] = {}  # [ns]
+        self._known: dict[tuple[str, str], int] = {}  # [ns], by what stands in front of the seconds and behind
+        self._form, self._scale = (-1, 0, 0, ""), 1
         self._either = ""  # a date that allows both
         self._period = 0  # [s], after which it starts over; 0: there are dates
 
     def seconds(self, cells: Sequence[str]) -> FloatArray:
         """Since the first time that was read; NaN where a cell is none."""
-        first = self._first
         out = np.full(len(cells), np.nan)
         for k, cell in enumerate(cells):
-            match = _TIME.fullmatch(cell)
-            at = None if match is None else self._nanoseconds(match)
-            if at is not None:
-                if first is None:
-                    first = self._first = at
-                out[k] = (at - first) / 1e9
+            at = self._alike(cell)
+            if at is None:
+                match = _TIME.fullmatch(cell)
+                at = None if match is None else self._nanoseconds(match)
+                if match is None or at is None:
+                    continue
+                self._remember(match)
+            if self._first is None:
+                self._first = at
+            out[k] = (at - self._first) / 1e9
         return out
+
+    def _remember(self, match: re.Match[str]) -> None:
+        """Where the seconds are in a time, for others of the same length."""
+        if match["s"] is None or match["f"] is None:
+            return
+        start, end = match.start("s"), match.end("f")
+        scale = 10 ** (9 - (end - start - 3)) if end - start - 3 <= 9 else 0
+        self._form = (len(match[0]), start, end, match[0][start + 2]) if scale else self._form
+        self._scale = scale or self._scale
+
+    def _alike(self, cell: str) -> int | None:
+        """Of a time that differs in its seconds alone from one that was read [ns]; None of any other."""
+        length, start, end, mark = self._form
+        if len(cell) != length or cell[start + 2] != mark:
+            return None
+        key = (cell[:start], cell[end:])
+        minute = self._known.get(key)
+        if minute is None:
+            match = _TIME.fullmatch(cell)
+            if match is None or match.span("s")[0] != start or match.end("f") != end:
+                return None
+            self._nanoseconds(match)
+            minute = self._minutes[(match["day"], match["clock"], match["rest"])]
+            if minute is None:
+                return None
+            self._known[key] = minute
+        digits = cell[start : start + 2] + cell[start + 3 : end]
+        return minute + int(digits) * self._scale if digits.isascii() and digits.isdigit() else None
 
     @property
     def are_month_first(self) -> bool:
