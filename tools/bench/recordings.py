@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
+from pvid.base.replacing import replacing
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
 from pvid.models.model import Channel
@@ -187,7 +188,8 @@ def write_source(source: Source, checkouts: Path, folder: Path) -> list[Path]:
     paths = []
     for name, piece in source.pieces.items():
         paths.append(place / f"{name}.csv.gz")
-        write_recording(paths[-1], source.cut(checkouts, piece), source.channels)
+        with replacing():  # a piece of any version
+            write_recording(paths[-1], source.cut(checkouts, piece), source.channels)
     paths.append(place / "PROVENANCE.md")
     write_whole(paths[-1], provenance(source).encode(), freely=True)
     if isinstance(source.origin, Package):
