@@ -1,9 +1,11 @@
 """Systematic errors of a sensor are found in the residuals, with their size; a perfect rig has none."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from bench.mechanisms import design_of, start_of
@@ -11,6 +13,8 @@ from pvid.models.mechanisms import names
 from pvid.oracle.weak.identify import Identified, identify
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
+
+Float = npt.NDArray[np.float64]
 
 
 @cache
@@ -101,3 +105,38 @@ def test_declared_gain_is_part_of_the_standard_errors_and_needs_no_note() -> Non
     np.testing.assert_allclose((declared.se / declared.p)[positive], 0.01, rtol=0.05)
     texts = [next(reason.text for reason in one.verdict.reasons if reason.name == "scale") for one in (plain, declared)]
     assert "F (1 % of" in texts[0] and "F (" not in texts[1]
+
+
+def cell(change: Callable[[dict[str, Float]], dict[str, Float]]) -> Identified:
+    """The cell with its signals changed, by the shipped design."""
+    simulation = simulation_of("battery_2rc")
+    run = simulation.run(3)
+    return identify(
+        simulation.model, run | change(run), simulation.rig.sample_rate, design=design_of(simulation, PERFECT)
+    )
+
+
+def test_error_that_explains_little_is_no_cause() -> None:
+    """A resistance that is 10 % larger for one direction looks like a delay of i by 0.14 s, ten standard errors; but
+    that removes a twentieth of the residuals."""
+    found = cell(lambda run: {"v": run["v"] - 0.002 * np.maximum(run["i"], 0.0)})
+    assert found.sensor_error is not None and found.sensor_error.kind == "unknown"
+    assert found.sensor_error.share < 0.2
+    texts = {one.name: one.text for one in found.verdict.reasons if one.alarm}
+    assert "sensor" not in texts and found.verdict.status != "good"
+    assert "for an unknown reason" in texts["unexplained"] and "R0" in texts["unexplained"]
+
+
+@pytest.mark.parametrize(("samples", "tolerance"), [(0.3, 0.1), (0.5, 0.1), (1.0, 0.3)])
+def test_delay_is_named_with_what_explains_the_run_alike(samples: float, tolerance: float) -> None:
+    """Of one input and one output no residual shows which is late: of the two, the delay comes first. The size is that
+    at the estimate, where a sample's delay has moved R1 by a fifth."""
+
+    def late(run: dict[str, Float]) -> dict[str, Float]:
+        place = np.arange(len(run["v"]), dtype=np.float64)
+        return {"v": np.interp(place - samples, place, run["v"])}
+
+    error = cell(late).sensor_error
+    assert error is not None and (error.signal, error.kind, error.other) == ("v", "delay", "i")
+    assert error.size == pytest.approx(samples / simulation_of("battery_2rc").rig.sample_rate, rel=tolerance)
+    assert error.share > 0.9 and "v seems to be delayed by" in error.text and "or i to be advanced" in error.text

@@ -3,8 +3,9 @@
 An error a f(t) in a recorded signal z moves the residuals by a c, c = (e(z + step f) - e(z))/step. Residuals e are then
 fitted by J dp + a c: a and its standard error show whether the error is there, dp how far p moves with it. Errors that
 are tried: a delay, a play (backlash), an eccentric encoder, the gain of an input, a friction that does not switch at
-once. Where a gain only scales p no data
-show it: p is then off by what `by_gain` gives, and that belongs to its standard errors.
+once. An error is the cause if it removes most of what the sensors' noise does not explain of the residuals: something
+else that the equations lack looks like a small delay as well. Where a gain only scales p no data show it: p is then off
+by what `by_gain` gives, and that belongs to its standard errors.
 """
 
 from __future__ import annotations
@@ -30,12 +31,16 @@ from pvid.oracle.weak.solve import Fit, inverse
 from pvid.oracle.weak.verdict import Reason
 from pvid.sim.imperfections import with_play
 
-Kind = Literal["delay", "play", "eccentric", "gain", "friction", "lacking"]
+Kind = Literal["delay", "play", "eccentric", "gain", "friction", "lacking", "unknown"]
 
 # An error is reported if it is this many standard errors from 0 and moves a parameter by so many of its own.
 _CERTAIN = 6.0
 _CERTAIN_OF_FRICTION = 8.0  # what is located wrongly near a reversal looks like a narrow soft friction
 _MOVES = 1.0
+# It is named if it removes this share of what the sensors do not explain; else the cause is unknown.
+_MOST = 0.5
+_PASSES = 2  # that improve the size of a delay
+_ALIKE = 0.03  # of a share: two delays that differ by less explain the run alike
 
 # An encoder shows an eccentricity only where it turns by this much [rad].
 _TURNS = 2.0
@@ -63,12 +68,14 @@ class SensorError:
     Attributes
     ----------
     signal : name; of a soft friction the argument of sgn
-    kind : what it is; "lacking": a friction that turns with the signal's rate
+    kind : what it is; "lacking": a friction that turns with the signal's rate; "unknown": none that is tried
     size : delay [s], width of the play or amplitude of the eccentricity [unit of the signal], gain less 1; width over
         which a friction changes its sign [unit of the argument]; a lacking friction [unit of the equation]
     certainty : size over its standard error
     unit : of the signal; of a friction that of the argument, "" where it is not one signal's rate
     shift : by how much p moves when the error is taken off [n_p]
+    other : of a delay: a signal whose opposite delay explains the run alike, "" where there is none
+    share : of the squared residuals beyond the sensors' noise, that the error removes; of an unknown one the largest
     row : of a lacking friction: the equation's name
     """
 
@@ -79,13 +86,21 @@ class SensorError:
     shift: Float
     unit: str = ""
     row: str = ""
+    other: str = ""
+    share: float = 1.0
 
     @property
     def text(self) -> str:
         """In words."""
+        if self.kind == "unknown":
+            return (
+                "the residuals exceed the sensors' noise for an unknown reason: of the errors of sensors and frictions "
+                f"that are tried none removes more than {100 * self.share:.0f} % of the excess"
+            )
         if self.kind == "delay":
-            shifted = "delayed" if self.size > 0 else "advanced"
-            return f"{self.signal} seems to be {shifted} by {abs(self.size):.2g} s"
+            shifted, opposite = ("delayed", "advanced") if self.size > 0 else ("advanced", "delayed")
+            text = f"{self.signal} seems to be {shifted} by {abs(self.size):.2g} s"
+            return f"{text}, or {self.other} to be {opposite}" if self.other else text
         if self.kind == "friction":
             return f"the friction seems to be soft: sgn({self.signal}) changes over a width of about {self._size}"
         if self.kind == "lacking":
@@ -121,12 +136,36 @@ class SensorErrors:
         information = np.einsum("wkp,wkq->pq", self.designs, self.designs) + np.diag(fit.parameters.prior(fit.start))
         self.inverse = inverse(information)
         self.unit = fit.parameters.unit(fit.p)
+        self.excess = self._excess()
         self._bare = self._raw(fit.rows.columns)
 
     def found(self, se: Float) -> SensorError | None:
-        """The surest of the errors that are there and move p by more than its standard errors [n_p] allow."""
+        """The error that removes most of the residuals beyond the sensors' noise, of those that are there and move p by
+        more than its standard errors [n_p] allow; an unknown one where it removes less than half."""
         out = [one for one in self.tried() if one.certainty > _CERTAIN and np.any(np.abs(one.shift) > _MOVES * se)]
-        return max(out, key=lambda one: one.certainty, default=None)
+        best = max(out, key=lambda one: one.share, default=None)
+        if best is None or best.share > _MOST:
+            return best if best is None else self._in_full(_with_alternative(best, out))
+        shift = np.max(np.abs([one.shift for one in out]), axis=0)
+        return SensorError("", "unknown", 0.0, max(one.certainty for one in out), shift, share=best.share)
+
+    def _in_full(self, error: SensorError) -> SensorError:
+        """With the size of a delay from residuals without all of it: they are not linear in what is long."""
+        if error.kind != "delay":
+            return error
+        signal = self.model.signal(error.signal)
+        for _ in range(_PASSES):
+            column = self._column({signal.name: self._late(signal, -error.size)}, -error.size)
+            again = self._test(signal.name, "delay", [column], _LONGEST * self.design.window_s)
+            if not again.certainty or again.share < error.share - _ALIKE:
+                break
+            error = replace(again, other=error.other)
+        return error
+
+    def _late(self, signal: Signal, delay: float) -> Float:
+        """Samples of a signal [n], later by a delay [s]."""
+        place = np.arange(len(self.run[signal.name]), dtype=np.float64)
+        return np.interp(place - delay * self.design.sample_rate, place, self.run[signal.name])
 
     def tried(self) -> Iterator[SensorError]:
         """All tests."""
@@ -143,6 +182,19 @@ class SensorErrors:
                     yield self._test(name, "eccentric", self._eccentric(signal), _LARGEST * signal.resolution)
         yield from self._frictions()
         yield from self._lacking()
+
+    def _excess(self) -> float:
+        """Sum of the squared residuals beyond what the sensors' noise explains."""
+        total = float(np.sum(self.residuals**2))
+        functions, errors = self.fit.rows.functions, self.fit.errors
+        for white, e in zip(self.fit.white, self.fit.residuals(), strict=True):
+            count = functions.count
+            own = np.zeros((len(white.kinds) * count,) * 2)
+            for place, kind in enumerate(white.kinds):
+                rows = slice(place * count, (place + 1) * count)
+                own[rows, rows] = errors[kind].variance * functions.gram(errors[kind].order, errors[kind].order)
+            total -= white.free * (1 - white.whitener.trace(own) / e.size)
+        return total
 
     def by_gain(self, signal: Signal) -> Float:
         """What p is off by if a signal is recorded (1 + g) times as large as it is, over g [n_p]."""
@@ -185,8 +237,19 @@ class SensorErrors:
                 change = [np.zeros((self.fit.rows.windows, functions.count)) for _ in self.model.rows]
                 change[kind] = whole[self.fit.rows.numbers]
                 found = self._test(signal.name, "lacking", [self._whitened(change)], np.inf)
-                certain = found.certainty > _CERTAIN_OF_FRICTION
+                certain = found.certainty > _CERTAIN_OF_FRICTION and found.size * self._inertia(signal.name, kind) >= 0
                 yield replace(found, row=row.name, certainty=found.certainty if certain else 0.0)
+
+    def _inertia(self, name: str, kind: int) -> float:
+        """What the highest derivative of a signal is multiplied with in a row: a friction has the same sign; 0: none."""
+        row = self.fit.rows.compiled.model.rows[kind]  # with the corners of held inputs
+        place = {
+            order: theta
+            for part, theta in zip(row.regressors, self.theta[kind], strict=True)
+            for order, psi in part.items()
+            if psi == Jet(name)
+        }
+        return float(place[max(place)]) if place and max(place) else 0.0
 
     def _test(self, signal: str, kind: Kind, columns: list[Float], largest: float) -> SensorError:
         c = np.stack(columns, axis=-1)
@@ -203,7 +266,9 @@ class SensorErrors:
         shift = -self.unit * (self.inverse @ (mixed @ size))
         amount = float(size[0]) if len(size) == 1 else float(np.hypot(*size))
         certainty = float(np.max(np.abs(size) / np.sqrt(variance))) if abs(amount) < largest else 0.0
-        return SensorError(signal, kind, amount, certainty, shift, self._unit(signal))
+        removed = float(np.sum(self.residuals**2) - np.sum(left**2))
+        share = min(removed / self.excess, 1.0) if self.excess > 0 else 0.0
+        return SensorError(signal, kind, amount, certainty, shift, self._unit(signal), share=share)
 
     def _unit(self, name: str) -> str:
         """Of a signal or of a signal's rate, as in q1_1."""
@@ -272,12 +337,27 @@ def _reach(x: Float) -> float:
     return float(np.nanmax(x) - np.nanmin(x))
 
 
+def _with_alternative(best: SensorError, found: list[SensorError]) -> SensorError:
+    """Of the errors that explain a run alike the one that is usual: a delay, in place of another signal that is ahead;
+    then the surest."""
+    alike = [one for one in found if one.kind == best.kind and one.share > best.share - _ALIKE]
+    first = max(alike, key=lambda one: (one.kind == "delay" and one.size > 0, one.certainty))
+    if first.kind != "delay":
+        return first
+    others = [one for one in alike if one.size * first.size < 0]
+    return replace(first, other=max(others, key=lambda one: one.certainty).signal) if others else first
+
+
 def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> list[Reason]:
     """An error explains the residuals."""
     if error is None:
         return []
     names = [model.p_names[k] for k in np.argsort(-np.abs(error.shift) / se) if abs(error.shift[k]) > _MOVES * se[k]]
-    text = f"{error.text} ({error.certainty:.0f} standard errors from 0). This error biases {listed(names)}."
+    if error.kind == "unknown":
+        return [Reason("unexplained", f"{error.text[0].upper()}{error.text[1:]}. It may bias {listed(names)}.")]
+    sure = f"{error.certainty:.0f} standard errors from 0"
+    text = f"{error.text} ({sure}; it removes {100 * error.share:.0f} % of what the sensors' noise does not explain)"
+    text += f". This error biases {listed(names)}."
     return [Reason("friction" if error.kind in ("friction", "lacking") else "sensor", text)]
 
 
