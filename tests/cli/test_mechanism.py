@@ -25,6 +25,14 @@ J, G = model.unknown("J", "kg*m^2", 1.0), model.unknown("G", "N*m", 1.0)
 model.equation(J * a.d(2) + G * sin(a) - F)
 """
 
+SWING = """
+from pvid.model import Model, sin
+model = Model("free pendulum")
+theta = model.sensor("theta", "rad", resolution=1e-3, reach=2)
+w, b = model.unknown("w", "1/s^2", 20.0), model.unknown("b", "1/s", 0.1)
+model.equation(theta.d(2) + b * theta.d() + w * sin(theta))
+"""
+
 
 def pvid(*arguments: str | Path) -> Result:
     """A command in this process; a refusal raises."""
@@ -222,6 +230,29 @@ def test_predict_compares_drives() -> None:
     assert answer["advice"].startswith("Best drive: steps. Its worst parameter is ")
     with pytest.raises(PvidError, match="zigzag is no drive; known are constant, steps"):
         pvid("model", "predict", "dc_motor", "--drive", "zigzag")
+
+
+def test_mechanism_without_an_input_needs_a_release(tmp_path: Path) -> None:
+    """At rest it stays there: no run is long enough."""
+    model = tmp_path / "swing.py"
+    model.write_text(SWING, encoding="utf-8")
+    short = ("--duration", "10", "--rate", "100")
+    for command in (("predict", model), ("simulate", model, tmp_path / "swing.csv")):
+        sentence = (
+            "swing has no input and starts at rest, so that nothing moves: give a release, as in --start theta=0.5"
+        )
+        if command[0] == "simulate":
+            with pytest.raises(PvidError, match=sentence):
+                pvid("model", *command, *short)
+        else:
+            answer = pvid("model", *command, *short)
+            assert answer.return_value == NOTHING_IDENTIFIED and sentence in answer.stderr
+    answer = json.loads(pvid("model", "predict", model, *short, "--start", "theta=0.8", "--json").stdout)
+    assert set(answer["relative_se"]) == {"a release"} and answer["relative_se"]["a release"]["w"] < 0.01
+    with pytest.raises(PvidError, match="x is no state of the simulation; states are theta, theta_1"):
+        pvid("model", "simulate", model, tmp_path / "swing.csv", *short, "--start", "x=1")
+    pvid("model", "simulate", model, tmp_path / "swing.csv", *short, "--start", "theta=0.8")
+    assert json.loads(pvid("identify", tmp_path / "swing.csv", "--model", model, "--json").stdout)["identified"]
 
 
 def test_build_writes_what_check_accepts(tmp_path: Path) -> None:

@@ -28,6 +28,13 @@ if TYPE_CHECKING:  # SymPy takes a third of a second to load
 
 _MODEL = click.argument("model", metavar="MODEL")
 _ABOVE_0 = click.FloatRange(min=0.0, min_open=True)
+_START = click.option(
+    "--start",
+    "starts",
+    multiple=True,
+    metavar="STATE=VALUE",
+    help="Coordinate or rate at the first sample, as in q=0.5 or q_1=2; repeatable.  [default: the rig's; 0]",
+)
 
 
 @click.group(name="model")
@@ -65,6 +72,7 @@ def check(model: str) -> int:
 @click.option("--share", default=0.5, show_default=True, help="Largest value of a drive over the reach of its signal.")
 @click.option("--duration", type=_ABOVE_0, help="Of a run [s].  [default: the rig's, 20]")
 @click.option("--rate", type=_ABOVE_0, help="Sample rate [Hz].  [default: the rig's, 1000]")
+@_START
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def predict(
     model: str,
@@ -73,12 +81,14 @@ def predict(
     share: float,
     duration: float | None,
     rate: float | None,
+    starts: tuple[str, ...],
     as_json: bool,
 ) -> int:
     """Predicts the standard errors of MODEL's parameters for several drives, and names the best one.
 
-    Each drive is simulated with its sensors at the model's guesses, and identified. The first column is the shipped
-    mechanism's own rig. The last rows name the parameter that is known worst, and the one whose change looks alike.
+    Each drive is simulated with its sensors at the model's guesses, and identified; a mechanism without an input is
+    released by --start. The first column is the shipped mechanism's own rig. The last rows name the parameter that is
+    known worst, and the one whose change looks alike.
     """
     from pvid.models.mechanisms import compiled_of
     from pvid.models.mechanisms import names as names_of_shipped
@@ -93,15 +103,20 @@ def predict(
     length = duration or (own.duration if own else 20.0)
     hz = rate or (own.sample_rate if own else 1000.0)
     low, high = band or (10 / length, hz / 50)
+    start = _numbers(starts, "--start", "--start q=0.5")
     names = [only] if only else list(DRIVES)
     drive_named(names[0], 1.0, low, high)  # a wrong name or band is refused before anything is simulated
+    driven = any(one.driven or one.kind == "input" for one in compiled.signals)
     cases = [] if own is None or only else [("its own rig", RigSimulation.of(compiled, own))]
     cases += [
         (
-            name,
-            RigSimulation.of(compiled, rig_of_guess(compiled, name, low, high, rate=hz, duration=length, share=share)),
+            name if driven else "a release",
+            RigSimulation.of(
+                compiled,
+                rig_of_guess(compiled, name, low, high, rate=hz, duration=length, share=share, start=start),
+            ),
         )
-        for name in names
+        for name in (names if driven else names[:1])
     ]
     with progress_bar("drives", len(cases)) as advance:
         found = []
@@ -238,6 +253,7 @@ def build(
     metavar="UNKNOWN=VALUE",
     help="Its true value; repeatable.  [default: the rig's; of a model file the guess]",
 )
+@_START
 @click.option("--friction", type=click.Choice(["sharp", "soft"]), default="sharp", show_default=True)
 @click.option("--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp.")
 @click.option(
@@ -256,6 +272,7 @@ def simulate(
     rate: float | None,
     drive: str | None,
     truths: tuple[str, ...],
+    starts: tuple[str, ...],
     friction: str,
     stiction: float,
     imperfect: tuple[str, ...],
@@ -276,7 +293,8 @@ def simulate(
     for name in true:
         if name not in compiled.p_names:
             raise PvidError(f"--truth {name}: the model has no such unknown; it has {', '.join(compiled.p_names)}")
-    rig = replace(rig, truth={**rig.truth, **true})
+    start = _numbers(starts, "--start", "--start q=0.5")
+    rig = replace(rig, truth={**rig.truth, **true}, start={**rig.start, **start})
     law = Imperfections("sharp" if friction == "sharp" else "soft", stiction, **sizes_of(imperfect))
     simulation = RigSimulation.of(compiled, rig)
     run = simulation.run(seed, law)

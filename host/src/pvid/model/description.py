@@ -23,7 +23,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # What ends a comment, a string or a line of a generated file, or is expanded in one (C, Python, YAML, Kconfig, CMake).
 _NOT_IN_A_TITLE = {"\\": "/", '"': "'", "*/": "* /", "/*": "/ *", "$": "S", "{": "(", "}": ")", "??": "?", "`": "'"}
 _GAIN_SD = 0.01  # of what is driven, unless given: no residual shows a torque constant that is 1 % off
-_TAKEN = {"t": "the time", "theta": "the coefficients of a row"}
+_TAKEN = {"t": "the time"}
 
 
 class Model:

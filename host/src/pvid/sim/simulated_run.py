@@ -80,7 +80,13 @@ class RigSimulation:
         return self._motions[key]
 
     def run(self, seed: int = 0, imperfections: Imperfections = PERFECT) -> dict[str, Float]:
-        """t [s] and every signal in its unit, as recorded, each [samples]."""
+        """t [s] and every signal in its unit, as recorded, each [samples].
+
+        Raises
+        ------
+        PvidError
+            Where nothing drives the mechanism and it starts at rest.
+        """
         rig = self.rig
         step = 1.0 / rig.sample_rate / rig.substeps
         delays = {name: skew / step for name, skew in imperfections.skew.items()}
@@ -89,6 +95,8 @@ class RigSimulation:
             if abs(delay - round(delay)) > 1e-6 or delay < 0:
                 raise PvidError(f"the skew of {name} must be a multiple of the integration's step, {step:g} s")
         fine = self.motion(imperfections, seed=seed, every_step=bool(delays))
+        if not rig.drive:
+            self._refuse_rest(fine)
         rng = np.random.default_rng([seed, 0])
         out = {"t": np.arange(self.samples) / rig.sample_rate}
         for signal in self.model.signals:
@@ -98,6 +106,14 @@ class RigSimulation:
                 values = values[at]
             out[signal.name] = sensed(signal, self._imperfect(signal, values, imperfections), rng)
         return out
+
+    def _refuse_rest(self, motion: Trajectory) -> None:
+        """Where no signal moves."""
+        if all(np.ptp(self._quantity(one, motion)) == 0 for one in self.model.signals):
+            raise PvidError(
+                f"{self.model.name} has no input and starts at rest, so that nothing moves: give a release, as in "
+                f"--start {self.model.signals[0].name}=0.5"
+            )
 
     def _quantity(self, signal: Signal, motion: Trajectory) -> Float:
         """What a signal measures, at the times of the motion."""
@@ -173,9 +189,17 @@ def simulation_of(name: str) -> RigSimulation:
 
 
 def rig_of_guess(
-    model: CompiledModel, drive: str, low_hz: float, high_hz: float, *, rate: float, duration: float, share: float = 0.5
+    model: CompiledModel,
+    drive: str,
+    low_hz: float,
+    high_hz: float,
+    *,
+    rate: float,
+    duration: float,
+    share: float = 0.5,
+    start: Mapping[str, float] | None = None,
 ) -> SimulatedRig:
-    """A rig whose truth is the model's guess, at rest, with every driven signal on a drive of the list.
+    """A rig whose truth is the model's guess, with every driven signal on a drive of the list.
 
     Parameters
     ----------
@@ -185,11 +209,14 @@ def rig_of_guess(
         [Hz] and [s].
     share
         Largest value of each drive over the reach of its signal.
+    start
+        Coordinates and rates at the first sample, as in q or q_1 [SI]; 0 where none is given.
     """
     driven = [one for one in model.signals if one.driven or one.kind == "input"]
     return SimulatedRig(
         model=model.name,
         truth={one.name: one.guess for one in model.unknowns},
+        start=dict(start or {}),
         drive={
             one.name: drive_named(drive, share * one.reach, low_hz, high_hz, number)
             for number, one in enumerate(driven)

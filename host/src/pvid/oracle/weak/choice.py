@@ -204,8 +204,9 @@ def ranked(
         if any(one.known for one in tried):
             break
     if not tried:
-        longest = max(parts, default=0) / sample_rate
-        raise PvidError(f"the run of {longest:.3g} s is too short for {model.model.name}: record longer")
+        longest = max(parts, default=0)
+        many = f"the run of {longest} samples ({longest / sample_rate:.3g} s)"
+        raise PvidError(f"{many} is too short for {model.model.name}: record more samples")
     best = min(tried, key=_order)
     if best.chi2 > MODEL_ERROR and equation_error:
         errors, of_sensors = True, tried[:]

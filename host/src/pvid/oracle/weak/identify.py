@@ -23,6 +23,7 @@ from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.weak.samples import follows, of_samples
 from pvid.oracle.weak.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
 from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
 from pvid.oracle.weak.verdict import Halves, Reason, Verdict
@@ -169,7 +170,9 @@ def identify(
     reasons = verdict.not_identified(compiled, fit, se)
     if not fit.diverged:
         reasons += attempt.reasons(_checks(rows, run, fit, found, halves, with_error))
-        reasons += of_sensors(compiled, error, found.se) + of_scale(compiled, by_gain, fit.p, found.se)
+        if error is not None and not follows(error, reasons, sample_rate):
+            reasons += of_sensors(compiled, error, found.se)
+        reasons += of_scale(compiled, by_gain, fit.p, found.se)
         reasons += attempt.failed
     return Identified(
         names=compiled.p_names,
@@ -258,6 +261,7 @@ def _checks(
 
     return {
         "the search": lambda: verdict.settled(fit),
+        "the samples": lambda: of_samples(bare, run, design.sample_rate, fit),
         "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
         "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
         "feedback": lambda: of_feedback(bare, run, fit, _determined(bare, fit, found)),

@@ -241,7 +241,7 @@ class SensorErrors:
                 yield replace(found, row=row.name, certainty=found.certainty if certain else 0.0)
 
     def _inertia(self, name: str, kind: int) -> float:
-        """What the highest derivative of a signal is multiplied with in a row: a friction has the same sign; 0: none."""
+        """Factor of the highest derivative of a signal in a row, whose sign a friction has; 0: none."""
         row = self.fit.rows.compiled.model.rows[kind]  # with the corners of held inputs
         place = {
             order: theta

@@ -1,0 +1,128 @@
+"""Clipping, standstill, a rate that is too low, guesses off by one factor: named in one sentence, and only where so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from bench.mechanisms import design_of
+from pvid.model import Model, sgn
+from pvid.model.compiled import CompiledModel
+from pvid.models.drive import RandomSteps
+from pvid.models.mechanisms import names
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.identify import Identified, identify
+from pvid.sim.simulated_run import PERFECT, RigSimulation, simulation_of
+
+Float = npt.NDArray[np.float64]
+Run = dict[str, Float]
+
+OWN = ("clipped", "resting", "rate", "guesses", "unchecked")
+
+
+def texts(found: Identified) -> dict[str, str]:
+    return {one.name: one.text for one in found.verdict.reasons}
+
+
+@cache
+def driven(rate: float) -> RigSimulation:
+    """The shipped motor, L/R = 2.5 ms, with a voltage of random levels, held for 20 ms."""
+    shipped = simulation_of("dc_motor")
+    levels = {"V": RandomSteps(4.0, 0.02, seed=1, normal=True)}
+    substeps = round(shipped.rig.substeps * 1000 / rate)
+    rig = replace(shipped.rig, drive=levels, sample_rate=rate, substeps=substeps)
+    return RigSimulation.of(shipped.model, rig)
+
+
+def motor(rate: float, change: Callable[[Run], Run] = dict) -> dict[str, str]:
+    """All reasons."""
+    simulation = driven(rate)
+    run = simulation.run(3)
+    return texts(identify(simulation.model, run | change(run), rate, design=WeakDesign(rate, 1.0, 12, 6)))
+
+
+@pytest.mark.parametrize("name", names())
+def test_perfect_rig_is_silent(name: str) -> None:
+    simulation = simulation_of(name)
+    found = identify(
+        simulation.model, simulation.run(3), simulation.rig.sample_rate, design=design_of(simulation, PERFECT)
+    )
+    assert not set(texts(found)) & set(OWN)
+
+
+@pytest.mark.parametrize("rate", [200.0, 100.0])
+def test_rate_too_low_for_the_current_is_named_in_place_of_its_consequences(rate: float) -> None:
+    found = motor(rate)
+    assert found["rate"].startswith(f"L is hardly identifiable at {rate:g} Hz: its time constant is 0.00")
+    assert "Sample at" in found["rate"]
+    assert not {"feedback", "sensor", "unexplained"} & set(found)
+
+
+def test_rate_that_shows_the_current_is_not_named() -> None:
+    assert "rate" not in motor(1000.0)
+
+
+def test_delay_of_a_sample_is_named_at_a_low_rate_too() -> None:
+    """The current is read a sample late: no motion within a sample looks like this."""
+    found = motor(200.0, lambda run: {"i": np.concatenate([run["i"][:1], run["i"][:-1]])})
+    assert "i seems to be delayed by 0.004 s" in found["sensor"]
+
+
+@pytest.mark.parametrize("limit", [0.8, 1.5])
+@pytest.mark.parametrize("side", ["both", "largest", "smallest"])
+def test_sensor_that_clips_is_named(limit: float, side: str) -> None:
+    low, high = (-limit if side != "largest" else -np.inf), (limit if side != "smallest" else np.inf)
+    found = motor(1000.0, lambda run: {"i": np.clip(run["i"], low, high)})
+    value = f"-{limit:g} A" if side == "smallest" else f"{limit:g} A"
+    assert f"i stands at its {side if side != 'both' else 'largest'} value, {value}" in found["clipped"]
+    assert not {"sensor", "unexplained"} & set(found)
+
+
+def flywheel() -> CompiledModel:
+    model = Model("flywheel")
+    u = model.input("u", "N*m", hold="zoh", reach=1, gain_sd=0)
+    a = model.sensor("a", "rad", resolution=2 * np.pi / 4096, reach=1000)
+    J, b, Tc = model.unknown("J", "kg*m^2", 0.01), model.unknown("b", "N*m*s", 0.01), model.unknown("Tc", "N*m", 0.02)
+    model.equation(J * a.d(2) + b * a.d() + Tc * sgn(a.d()) - u)
+    return model.compiled("flywheel")
+
+
+def flywheel_run(rest_s: float) -> Run:
+    """12 s with sines, then rest."""
+    rate, lsb = 500, 2 * np.pi / 4096
+    moving, n = 12 * rate, 12 * rate + round(rest_s * rate)
+    t, random = np.arange(n) / rate, np.random.default_rng(1)
+    u = np.where(t < 12, 0.25 * np.sin(3 * t) + 0.2 * np.sin(11 * t), 0.0)
+    angle, speed, a = 0.0, 0.0, np.empty(n)
+    for k in range(n):
+        a[k] = angle
+        for _ in range(8 if k < moving or abs(speed) > 1e-3 else 0):
+            speed += (u[k] - 0.012 * speed - 0.03 * np.tanh(speed / 0.002)) / 0.013 / rate / 8
+            angle += speed / rate / 8
+    return {"u": u, "a": np.rint(a / lsb + 0.5 + random.normal(0, 0.2, n)) * lsb}
+
+
+@pytest.mark.parametrize("rest_s", [0.0, 12.0])
+def test_encoder_that_toggles_at_rest_is_named(rest_s: float) -> None:
+    run = flywheel_run(rest_s)
+    if rest_s:  # half a step from the next one
+        rest = run["a"][12 * 500 + 400 :]
+        rest[:] = rest[0] + 2 * np.pi / 4096 * np.random.default_rng(2).integers(0, 2, len(rest))
+    found = texts(identify(flywheel(), run, 500.0, design=WeakDesign(500.0, 1.0, 12, 6)))
+    assert ("resting" in found) == bool(rest_s)
+    if rest_s:
+        assert "a toggles between two values in 4" in found["resting"]
+
+
+@pytest.mark.parametrize(("factor", "named"), [(1.0, False), (3.0, False), (255 / 12, True), (1e-3, True)])
+def test_guesses_off_by_one_factor_are_named(factor: float, named: bool) -> None:
+    """PWM counts in place of volts: every parameter is 21 times its guess, with residuals as small as before."""
+    found = motor(1000.0, lambda run: {"V": factor * run["V"]})
+    assert ("guesses" in found) == named
+    if named:
+        assert f"L, R and k are all about {factor:.2g} times their guesses: is V in another unit" in found["guesses"]
