@@ -310,6 +310,7 @@ def test_any_table_of_text(header: str, rows: list[str], end: str, tmp_path: Pat
 @relaxed
 def test_a_good_file_with_damaged_bytes(suffix: str, data: st.DataObject, tmp_path: Path) -> None:
     path = tmp_path / f"good{suffix}"
+    path.unlink(missing_ok=True)  # that of the example before, which is damaged
     write_run(path, run_of())
     content = bytearray(path.read_bytes())
     for position in data.draw(st.lists(st.integers(0, len(content) - 1), min_size=1, max_size=4)):

@@ -428,14 +428,24 @@ def test_dates_that_can_be_read_in_two_ways_are_refused_past_midnight(tmp_path: 
         (["t,F,x [mm]"], "x=x [mm]", "x in mm"),
         (["t,F,x (mm)"], "x=3", "x in mm"),
         (["time,force,place", "s,N,mm"], "t=1,F=2,x=3", "x in mm"),
+        (["Source,CH1,CH2,,", "s,N,mm"], "t=1,F=2,x=3", "x in mm"),
+        (["Source,CH1,CH2,,", "s,N,mm"], "t=Source,F=CH1,x=CH2", "x in mm"),
+        (["Scope 1000", "s,N,mm"], "t=1,F=2,x=3", "x in mm"),
+        (["s,N,mm"], "t=1,F=2,x=3", "x in mm"),
         (["time,force,place", "sec,N,V"], f"{NAMES}:mm", "line 2 states units"),
-        ([HEAD, "second,Volt,Volt"], "x=x:mm", "'Volt' of column 'F' is no unit"),
+        ([HEAD, "second,Volt,Volt"], "x=x:mm", "'Volt' of column 'F' is no unit of its signal"),
     ],
 )
 def test_units_of_the_file(head: list[str], columns: str | None, note: str, tmp_path: Path) -> None:
     found = table(tmp_path, of(*head, *IN_MM), columns)
     assert_same(found, rtol=1e-14)
     assert note in "; ".join(found.notes), found.notes
+
+
+def test_an_index_in_brackets_is_no_unit(tmp_path: Path) -> None:
+    found = table(tmp_path, of("t,u[1],u[2]", *PLAIN), "F=u[1],x=u[2]")
+    assert_same(found)
+    assert found.notes == ()
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,8 @@ class Columns:
                 used.append(f"{signal} in {spelled(unit)}")
         notes: tuple[str, ...] = (f"units as the file states them: {listed(used)}",) if used else ()
         if unknown:
-            notes += (f"{listed(unknown)} is no unit of its signal: taken as SI; type its unit in --columns",)
+            what = "is no unit of its signal" if len(unknown) == 1 else "are no units of their signals"
+            notes += (f"{listed(unknown)} {what}: taken as SI unless --columns has a unit",)
         return replace(self, named=MappingProxyType(named)), notes
 
     @property
@@ -258,4 +259,4 @@ def _unit_in(name: str, si: str) -> str | None:
 def unit_in_brackets(name: str) -> str:
     """The unit at the end of a column's name: `h (mm)`, `time [ms]`; "" where there is none."""
     match = _IN_BRACKETS.search(name)
-    return match["unit"] if match is not None and is_unit(match["unit"]) else ""
+    return match["unit"] if match is not None and match["unit"] != "1" and is_unit(match["unit"]) else ""  # not x[1]

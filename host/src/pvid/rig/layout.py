@@ -257,10 +257,10 @@ def _with_head(
         if head is not None and not sought[0] and len(head[1]) != width:
             head = None  # every column has a position
     names = [str(k + 1) for k in range(width)] if head is None else list(head[1])
-    if len(names) == width + 1 and not names[-1]:
+    while len(names) > width and not names[-1]:
         names.pop()
-    elif len(names) == width + 1 and names[-1].lower() in _REMARKS:
-        names.pop()  # where there are any
+    if len(names) == width + 1 and names[-1].lower() in _REMARKS:
+        names.pop()
     elif len(names) == width - 1:
         if not any(one.cells[-1] for one in usual):
             names.append("")  # each row ends with a separator
@@ -277,7 +277,7 @@ def _with_head(
     beside = (len(wide[-1].cells), wide[-1].number) if wide else (0, 0)
     if wide:
         first = wide[0].number
-    between = [one for one in lines if number < one.number < first and not one.is_blank] if number else []
+    between = [one for one in lines if number < one.number < first and not one.is_blank] if head else []
     units = next((one for one in between if _are_units(one, len(names))), None)
     return Layout(
         separator,
@@ -314,6 +314,13 @@ def _guessed(lines: Sequence[_Line], first: int, width: int, numbers: Sequence[i
     for k, one in enumerate(text[:-1]):
         if _are_units(one, width):
             return text[k + 1], text[k + 1].cells
+    if all(is_unit(cell) for cell in text[-1].cells if cell):  # the names are in a line of another width, or nowhere
+        above = [one for one in before if one.number < text[-1].number and not one.is_comment][-1:]
+        for one in above:
+            if len(one.cells) > width and not any(one.cells[width:]):
+                return one, one.cells[:width]
+        nowhere = replace(text[-1], number=text[-1].number - 1)
+        return nowhere, [str(k + 1) for k in range(width)]
     return text[0], text[0].cells
 
 
