@@ -10,7 +10,7 @@ import pytest
 
 from pvid.base.errors import PvidError
 from pvid.rig.run import read_run
-from pvid.rig.turns import joined
+from pvid.rig.turns import counted_on, joined
 
 Float = npt.NDArray[np.float64]
 
@@ -60,7 +60,49 @@ def test_nothing_else_is_joined(phi: Float) -> None:
     before = phi.copy()
     got, jumps = joined(phi)
     assert jumps == 0 and got is phi
+    assert counted_on(phi, 1.0) is None and counted_on(np.rint(phi / LSB), 1.0) is None
     np.testing.assert_array_equal(phi, before)
+
+
+COUNTS: Float = np.rint(np.cumsum(90 + 60 * np.sin(3 * T)) + 0.5 * np.random.default_rng(3).standard_normal(T.size))
+
+
+@pytest.mark.parametrize("modulus", [4096, 65536, 20_000, 36_000, 30_011])
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("unit", [1.0, 1.3e-5])
+def test_counter_of_any_modulus_is_joined(modulus: int, signed: bool, unit: float) -> None:
+    low = -(modulus // 2) if signed else 0
+    x = ((COUNTS - low) % modulus + low) * unit
+    found = counted_on(x, 1.0)
+    assert found is not None
+    assert found.modulus == pytest.approx(modulus * unit, abs=1.01 * unit)
+    assert found.jumps == np.count_nonzero(np.abs(np.diff(x)) > modulus * unit / 2)
+    moved = found.values / unit - COUNTS
+    assert np.ptp(moved) < 1e-6 + abs(found.modulus / unit - modulus) * found.jumps
+
+
+def test_single_wrap_is_joined_only_of_a_word() -> None:
+    whole = np.rint(np.cumsum(np.full(1200, 60.0)))
+    found = counted_on(whole % 2**16, 1.0)
+    assert found is not None and found.modulus == 2**16 and found.jumps == 1
+    assert counted_on(whole % 50_000, 1.0) is None
+
+
+def test_counter_is_joined_beside_wild_samples() -> None:
+    x = COUNTS % 2**16
+    places = np.random.default_rng(4).choice(T.size - 20, 12, replace=False) + 10
+    x[places] = 0.0
+    found = counted_on(x, 1.0)
+    assert found is not None and found.modulus == 2**16
+    sound = np.setdiff1d(np.arange(T.size), places)
+    assert np.ptp((found.values - COUNTS)[sound]) < 1e-6
+
+
+def test_encoder_that_is_zeroed_on_the_way_is_not_joined() -> None:
+    x = COUNTS - COUNTS[0]
+    x[1000:] -= x[1000]
+    x[2100:] -= x[2100]
+    assert counted_on(x, 1.0) is None
 
 
 def test_run_of_wrapping_counts_is_read_with_a_note(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ from pvid.rig.mcap_table import read_mcap
 from pvid.rig.table import Table, row_place
 from pvid.rig.text_lines import is_text
 from pvid.rig.tree_table import read_hdf5, read_matlab
-from pvid.rig.turns import joined
+from pvid.rig.turns import counted_on, joined
 
 FloatArray = npt.NDArray[np.float64]
 Function = TypeVar("Function")
@@ -344,8 +344,24 @@ def _recording(table: Table, rate: float | None) -> Recording:
             name = table.columns[angle].name
             note = f"{name} jumps by a turn, {jumps} times: joined (the encoder starts over there)"
             table = replace(table, signals={**table.signals, angle: values}, notes=(*table.notes, note))
+    table = _counted_on(table)
     clocked = uniform(table, rate)
     return _bridged(clocked, table)
+
+
+def _counted_on(table: Table) -> Table:
+    """Angles and lengths without the jumps of counters that start over at any modulus."""
+    for name, unit in table.columns.units.items():
+        if unit not in ("rad", "m") or name in table.columns.held:
+            continue
+        column = table.columns[name]
+        count = abs(float(column.in_si(np.ones(1))[0]))
+        found = counted_on(table.signals[name], count)
+        if found is not None:
+            times = "once" if found.jumps == 1 else f"{found.jumps} times"
+            note = f"{column.name} starts over after {found.modulus / count:.10g}, {times}: joined (a counter)"
+            table = replace(table, signals={**table.signals, name: found.values}, notes=(*table.notes, note))
+    return table
 
 
 def _bridged(clocked: Uniform, table: Table) -> Recording:
