@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from pvid.models.kapitza.modes import modes_hz
 from pvid.rig.file import Nominal, RigFile
 from pvid.rig.run import Run, write_run
 from pvid.run.advised import answered
-from pvid.run.residuals import Residuals, residuals_of
+from pvid.run.residuals import Residuals, residuals_of, residuals_of_fit
 from pvid.show import report
 from pvid.show.report import recording_of, write_report
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
@@ -168,6 +169,10 @@ def test_plot_of_a_run_identifies_it_first(tmp_path: Path) -> None:
     assert CliRunner().invoke(commands, arguments, standalone_mode=False).return_value == 0
     text = shown(tmp_path / "a.svg")
     assert "run.csv: refinement in float64 after the weak form, stationary law, core f32" in text
+    # the numbers are those of the refinement, and so are the curves and the residuals
+    assert "answer ±2 s.e." in text and "Residuals of the angle, simulated with the estimate" in text
+    (of_g,) = re.findall(r"estimate: g = (\S+ ± \S+) m/s²", text)
+    assert f"<!-- {of_g} -->" in text
     assert "10000 samples" in text
     assert CliRunner().invoke(commands, arguments[:2], standalone_mode=False).return_value == 0  # run.toml is there
     assert (tmp_path / "run.png").is_file()
@@ -227,6 +232,9 @@ def test_a_report_and_identify_give_the_same_estimate(native: Native, tmp_path: 
         answered(run, RigFile.standard(), native),
     )
     assert recording.estimate == {name: (result.value[name], result.se[name]) for name in result.value}
+    assert recording.fit is not None
+    white = residuals_of_fit(recording.fit, 0.0)
+    assert float(np.mean(white.rms**2)) == pytest.approx(1, abs=0.4)  # 12 windows of 16 means: its s.d. is 10 %
 
 
 # ---- measured against simulated

@@ -58,7 +58,7 @@ class Result:
     advice: tuple[str, ...]
     notes: tuple[str, ...]
     details: Mapping[str, Any]
-    _answer: Identification | MechanismAnswer
+    _answer: Identification | MechanismAnswer | CoreAnswer
 
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -85,8 +85,8 @@ class Result:
         return f"<table>{rows}</table>" + "".join(f"<p>{escape(one)}</p>" for one in self._doubts)
 
     def plot(self, path: str | Path, *, force: bool = False) -> Path:
-        """Writes a figure of the estimates over time with their standard errors (png, svg or pdf) and returns its path,
-        which a notebook shows as a picture.
+        """Writes a figure of the estimates over time, with the answer and its standard errors, and of the measured
+        against the simulated signals (png, svg or pdf). Returns its path, which a notebook shows as a picture.
 
         Parameters
         ----------
@@ -104,9 +104,9 @@ class Result:
 
                 convergence(self._answer, out)
             else:
-                from pvid.show.mechanism_figure import convergence as of_mechanism
+                from pvid.show.mechanism_figure import write_figure
 
-                of_mechanism(self._answer, out)
+                write_figure(self._answer, out)
         return out
 
 
@@ -127,11 +127,11 @@ def of_core(found: CoreAnswer) -> Result:
     verdict = found.verdict
     notes = (*found.oracle.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
     status = verdict.status if found.published else found.reason.text
-    return _result(found.oracle, found.as_json(), found.identified, status, verdict.warning, notes)
+    return _result(found, found.as_json(), found.identified, status, verdict.warning, notes)
 
 
 def _result(
-    found: Identification | MechanismAnswer,
+    found: Identification | MechanismAnswer | CoreAnswer,
     details: Mapping[str, Any],
     identified: bool,
     status: str,

@@ -37,6 +37,8 @@ from pvid.setup.weak_sizes import refuse_too_many_unknowns
 if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
     from pvid.run.mechanism_core import CoreAnswer
+    from pvid.run.refined_mechanism import RefinedMechanism
+    from pvid.run.refined_pendulum import RefinedPendulum
 
 _FORM = ("form", "weak")
 _IN_C = tuple(("core", name) for name in ENGINE_CORES)
@@ -154,10 +156,7 @@ def identify_run(
     if core is None and not model.following.is_usual:
         write_stderr(f"pvid: note: {ALL_ALIKE}")
     if figure is not None:
-        from pvid.show.mechanism_figure import convergence  # loads matplotlib
-
-        convergence(answer, figure)
-        click.echo(f"figure: {figure}")
+        _draw(shown, None, figure)
     for one in (core.verdict if core is not None else answer.found.verdict).reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and shown.identified else 'note'}: {one.text}")
     _print_advice(answer)
@@ -209,6 +208,38 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
     return core
 
 
+def _draw(answer: MechanismAnswer | CoreAnswer, fit: RefinedMechanism | RefinedPendulum | None, figure: Path) -> None:
+    """What was printed, as a figure."""
+    from pvid.show.mechanism_figure import write_figure  # loads matplotlib
+
+    write_figure(answer, figure, fit)
+    click.echo(f"figure: {figure}")
+
+
+def plot_run(path: Path, rig: MechanismRig | RigFile, columns: str | None, figure: Path, *, refine: bool) -> None:
+    """Identifies a recording of a described mechanism as `identify` does, and writes the answer as a figure.
+
+    Parameters
+    ----------
+    refine : the equations are fitted to the whole run, as `identify --refine` does
+    """
+    from pvid.show.mechanism_figure import write_figure
+
+    recording, model = recording_of(path, rig, columns)
+    answer = weak = advised(identify_mechanism(recording, model))
+    fit, text = None, f"weak form, float64; status {weak.found.verdict.status}; chi2 {weak.found.chi2:.2g}"
+    if refine:
+        from pvid.run.refined_mechanism import refined_answer
+
+        answer, fit, text = refined_answer(weak)
+    verdict = weak.found.verdict
+    lines = [f"{path.name}: {model.title}", text if answer.identified else f"nothing identified; {text}"]
+    if answer is weak and verdict.warning:
+        lines.append(f"warning: {verdict.warning}")
+    lines += [f"advice: {sentence}" for sentence in answer.advice]
+    write_figure(answer, figure, None if answer is weak else fit, "\n".join(lines))
+
+
 def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core, refined: bool) -> bool:
     """Streams a recording to a target and prints the account; whether every hash is that of this machine."""
     from pvid.board.engine_board import verify_recording
@@ -224,7 +255,6 @@ def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, co
 
 def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> int:
     """Refines an answer and prints it."""
-    from pvid.cli.result import write_refined_figure
     from pvid.run.refined_mechanism import refined_answer
 
     weak = answer
@@ -236,8 +266,8 @@ def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> 
     else:
         _print(answer, "weak form" if answer is weak else "refined")
         click.echo(text)
-    if figure is not None and refined is not None:
-        write_refined_figure(refined, figure)
+    if figure is not None:
+        _draw(answer, None if answer is weak else refined, figure)
     _print_advice(answer)
     if not answer.identified:
         write_stderr("pvid: nothing identified")

@@ -27,9 +27,9 @@ def write_figure(result: Identification, path: Path, truths: dict[str, float] | 
 
 def write_refined_figure(outcome: RefinedPendulum | RefinedMechanism, path: Path) -> None:
     """Measured against simulated signals."""
-    from pvid.show.refined_figure import measured_and_simulated  # loads matplotlib
+    from pvid.show.mechanism_figure import write_comparison  # loads matplotlib
 
-    measured_and_simulated(outcome.problem, outcome.found, path)
+    write_comparison(outcome, path)
     click.echo(f"figure: {path}")
 
 

@@ -116,14 +116,37 @@ def refine_mechanism(
     widths : of signs, by argument; from the sampling by default
     """
     problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
-    made = problem.kernel.made
-    sd = np.array([LOG_SD if one.log and not one.sign else one.prior_sd for one in made.parameters])
-    prior = Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~problem.is_width)
+    prior = _prior(problem, r)
     samples = max(8, round(block_s * rate))
     found = refined(problem, prior, (max(8, samples // 3), samples))
     if problem.kernel.widths and found.slow_chi2 > NOISE:
         found, prior = _softer(problem, prior, found)
     return RefinedMechanism(problem, without_outliers(problem, prior, found))
+
+
+def _prior(problem: Problem, r: Float) -> Prior:
+    parameters = problem.kernel.made.parameters
+    sd = np.array([LOG_SD if one.log and not one.sign else one.prior_sd for one in parameters])
+    return Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~problem.is_width)
+
+
+def simulated_at(answer: MechanismAnswer, p: Float) -> RefinedMechanism:
+    """The motion of a recording at p [n_p]: the starts of its blocks, of two windows each, are fitted to it.
+
+    Raises
+    ------
+    PvidError
+        Where the equations are not simulated: an input is the derivative of a sample.
+    """
+    model, recording = answer.model, answer.recording
+    if has_skew(model):
+        raise PvidError(f"an input of {model.name} is the derivative of a sample")
+    rate = recording.sample_rate
+    problem, r = problem_of(model, recording.signals, rate, start_of(kernel_of(model), p))
+    cut = problem.cut(max(8, round(2 * answer.found.design.window_s * rate)))
+    starts = problem.first_starts(cut, r)
+    found = problem.searched(r, _prior(problem, r), cut, starts, problem.used(cut), move=False)
+    return RefinedMechanism(problem, found)
 
 
 def _softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:

@@ -12,11 +12,14 @@ from pvid.oracle import strong as oracle
 from pvid.oracle.weak.rows import EquationError
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
+from pvid.run.refined_pendulum import RefinedPendulum
 from pvid.run.trial import rows_near
 from pvid.setup.f32 import bank_of, strong_config
 
 Float = npt.NDArray[np.float64]
 
+_MEAN = 16  # samples: residuals of a refinement, whose errors of the equations are slow
+_GROUP = 16  # means
 _MOST_ROWS = 200_000  # of the strong form, from the run's end: one a sample
 
 
@@ -68,6 +71,31 @@ def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
         When the run is too short for one group of rows, or its pivot stands still.
     """
     return _weak(run, rig, p) if rig.identifier.form == "weak" else _strong(run, rig, p)
+
+
+def residuals_of_fit(fit: RefinedPendulum, began: float) -> Residuals:
+    """Residuals of a refinement: means of consecutive samples, in groups, times the root of how many they are.
+
+    Parameters
+    ----------
+    began : time of the run's first sample [s]
+
+    Raises
+    ------
+    PvidError
+        When a block of the refinement is shorter than a group.
+    """
+    problem, found = fit.problem, fit.found
+    m, cut = problem.measured, found.cut
+    error = (cut.rows(m.z) - problem.simulated(found.r, cut, found.starts))[..., 0] / m.sd[0]
+    length = _MEAN * _GROUP
+    groups = cut.samples // length
+    if not groups:
+        raise PvidError(f"a block of {cut.samples} samples is too short for residuals: {length} are needed")
+    parts = error[:, : groups * length].reshape(-1, _GROUP, _MEAN)
+    e = np.nan_to_num(np.nanmean(parts, axis=-1)) * np.sqrt(_MEAN / m.grown)
+    ends = cut.first[:, None] + length * np.arange(1, groups + 1)
+    return Residuals(began + ends.ravel() / m.rate, e, _GROUP, length / m.rate, expected=True, shared=0)
 
 
 def _weak(run: Run, rig: RigFile, p: Float) -> Residuals:

@@ -36,9 +36,10 @@ from pvid.rig.file import RigFile
 from pvid.rig.run import Run, is_run, read_run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advised import identified
-from pvid.run.residuals import Residuals, residuals_of
+from pvid.run.refined_pendulum import RefinedPendulum
+from pvid.run.residuals import Residuals, residuals_of, residuals_of_fit
 from pvid.settings.enums import Reason, Stage
-from pvid.show.axis_limits import interesting
+from pvid.show.axis_limits import draw_answer, interesting, plain_ticks
 from pvid.sim.simulated_angle import simulated_angle
 
 Float = npt.NDArray[np.float64]
@@ -101,6 +102,7 @@ class Recording:
     breaks: tuple[float, ...]
     account: str
     refined: Refined | None = None
+    fit: RefinedPendulum | None = None
 
 
 def recording_of(path: Path, rig: RigFile | None, columns: Columns | None = None) -> Recording:
@@ -215,7 +217,9 @@ def _of_run(path: Path, run: Run, rig: RigFile) -> Recording:
     result = identified(given, rig, native)
     names = [name for name in result.model.p_names if name in result.value]
     advices = tuple(f"advice: {sentence}" for sentence in result.advice)
+    refined = result.refinement is not None and result.refinement.adopted
     return Recording(
+        fit=result.refinement.outcome if refined else None,
         title=f"{path.name}: {result.method}, {run.sample_rate:g} samples per second",
         clock="of the run",
         rig=resolved(rig, given),  # as it was identified
@@ -247,7 +251,10 @@ def write_report(recording: Recording, path: Path) -> None:
     PvidError
         When the run is too short for the residuals, or the file cannot be written.
     """
-    residuals = residuals_of(recording.run, recording.rig, recording.p)
+    if recording.fit is None:
+        residuals = residuals_of(recording.run, recording.rig, recording.p)
+    else:
+        residuals = residuals_of_fit(recording.fit, float(recording.run.t[0]))
     figure = plt.figure(figsize=(15, 17), layout="constrained")
     try:
         rows: list[Any] = [["angle", "angle"], ["difference", "difference"]]
@@ -342,6 +349,7 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
     shown = recording.rig.mechanism.model.physical
     for column, (one, axis) in enumerate(zip(shown, axes[:-1], strict=True)):
         of_weak = "estimate" if recording.estimate else "not published"
+        of_weak = "weak form" if recording.fit is not None else of_weak
         curves = [(t, recording.physical, recording.physical_se, of_weak)]
         if (refined := recording.refined) is not None:
             curves[0] = (*curves[0][:3], "weak form")
@@ -353,9 +361,12 @@ def _converge(recording: Recording, axes: npt.NDArray[Any]) -> None:
             axis.plot(at, value, color=f"C{k}", linewidth=1.2, label=name)
             low, high = interesting(value, band)
             limits += [(low, high)] if math.isfinite(low) and low < high else []
+        if recording.fit is not None and one.name in recording.estimate:
+            draw_answer(axis, *recording.estimate[one.name])
         if limits:
             axis.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         axis.set_ylabel(one.label)
+        plain_ticks(axis)
     axes[0].set_title("Convergence")
     kappa = axes[len(shown)]
     kappa.semilogy(t, np.where(recording.kappa > 0, recording.kappa, np.nan), color="C2", label="kappa")
@@ -384,7 +395,11 @@ def _residuals(recording: Recording, residuals: Residuals, axis: Axes) -> None:
         unit = "its standard deviation"
     reach = 1.15 * max(float(np.quantile(np.abs(e), 0.999)), 1.0)
     axis.set_ylim(-reach, 1.45 * reach)  # room for the legend
-    axis.set_title(f"Residuals of the rows at the {'last estimate' if recording.estimate else 'guess'}")
+    if recording.fit is not None:
+        mean_ms = 1e3 * residuals.step_s / residuals.e.shape[1]
+        axis.set_title(f"Residuals of the angle, simulated with the estimate (means over {mean_ms:.2g} ms)")
+    else:
+        axis.set_title(f"Residuals of the rows at the {'last estimate' if recording.estimate else 'guess'}")
     axis.set_ylabel(f"residual [1 = {unit}]")
     axis.set_xlabel(_clock(recording))
     axis.set_xlim(run.t[0], run.t[-1])

@@ -1,0 +1,85 @@
+"""A figure of a described mechanism shows the answer that is printed, for every shipped mechanism."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+import pvid
+from pvid.base.rounding import with_error
+from pvid.cli.main import commands
+from pvid.models.mechanisms import names, path_of
+from pvid.show.axis_limits import plain_ticks
+
+MOTOR = "dc_motor"
+SECONDS = {"kapitza": "20", "battery_2rc": "7200", "rigid_body": "10"}  # the others: 8
+
+
+def run_pvid(*words: str | Path) -> Result:
+    return CliRunner().invoke(commands, [str(one) for one in words], standalone_mode=False, catch_exceptions=False)
+
+
+def texts(svg: Path) -> str:
+    """matplotlib draws texts as curves and keeps them in comments."""
+    return "\n".join(re.findall(r"<!-- (.*?) -->", svg.read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def motor(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("figure") / "motor.csv"
+    run_pvid("model", "simulate", MOTOR, path, "--duration", "8")
+    return path
+
+
+def shown_in(drawn: str, result: pvid.Result, parameters: Sequence[str]) -> None:
+    for name in parameters:
+        one = result[name]
+        value, error = with_error(one.value, one.se)
+        assert f"{name} = {value} ± {error} {one.unit}".rstrip() in drawn, name
+
+
+@pytest.mark.parametrize("core", [None, "f32"])
+def test_result_plot_draws_the_numbers_of_the_result(motor: Path, core: str | None, tmp_path: Path) -> None:
+    result = pvid.identify(motor, core=core)  # type: ignore[arg-type]
+    drawn = texts(result.plot(tmp_path / "a.svg"))
+    shown_in(drawn, result, ["R", "L", "k", "J", "b", "Tc", "i0"])
+    for words in ("answer ± 2 s.e.", "simulated with the answer", "phi [rad]", "time of the run [s]"):
+        assert words in drawn, words
+    assert ("each window, in C" in drawn) == (core is not None)
+
+
+def test_plot_takes_a_model_file_and_the_refinement(motor: Path, tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.write_text(path_of(MOTOR)[1].read_text(encoding="utf-8"), encoding="utf-8")
+    run = tmp_path / "recorded.csv"
+    run.write_bytes(motor.read_bytes())
+    done = run_pvid("plot", run, "--model", own, "--refine", "-o", tmp_path / "a.svg")
+    assert done.return_value == 0 and done.output.endswith("a.svg\n")
+    drawn = texts(tmp_path / "a.svg")
+    assert "recorded.csv: " in drawn and "refined over" in drawn and "simulated with the answer" in drawn
+    rms = re.search(r"phi: rms difference ([\d.e-]+) rad", drawn)
+    assert rms is not None and float(rms[1]) < 2e-3  # the encoder's step is 2 pi / 4096, 1.5e-3 rad
+
+
+@pytest.mark.parametrize("name", names())
+def test_plot_draws_every_shipped_mechanism(name: str, tmp_path: Path) -> None:
+    """The rig file beside the run names the mechanism; no option is needed."""
+    run = tmp_path / "run.csv"
+    run_pvid("model", "simulate", name, run, "--duration", SECONDS.get(name, "8"))
+    assert run_pvid("plot", run, "-o", tmp_path / "a.svg").return_value == 0
+    drawn = texts(tmp_path / "a.svg")
+    assert "run.csv: " in drawn and "weak form, float64; status good" in drawn and "± " in drawn
+
+
+def test_numbers_at_an_axis_are_whole_and_apart() -> None:
+    from matplotlib.figure import Figure
+
+    axis = Figure().add_subplot()
+    axis.set_ylim(1.19999, 1.20001)
+    plain_ticks(axis)
+    labels = [axis.yaxis.get_major_formatter()(value, 0) for value in (1.199995, 1.2, 1.200005)]
+    assert len(set(labels)) == 3 and float(labels[0]) == pytest.approx(1.199995, abs=1e-9)
