@@ -99,7 +99,7 @@ def write_comparison(fit: Fit, path: Path) -> None:
     """Writes the second part of it alone."""
     figure = plt.figure(figsize=(10, 2 * _PANEL * len(fit.problem.kernel.made.outputs)), layout="constrained")
     try:
-        _compare(fit.problem, fit.found, 0.0, figure.subfigures(1, 1))
+        _compare(fit.problem, fit.found, 0.0, figure.subfigures(1, 1, squeeze=False)[0, 0])
         save(figure, path, dpi=110)
     finally:
         plt.close(figure)
