@@ -75,6 +75,16 @@ def test_plot_draws_every_shipped_mechanism(name: str, tmp_path: Path) -> None:
     assert "run.csv: " in drawn and "weak form, float64; status good" in drawn and "± " in drawn
 
 
+def test_plot_of_a_run_with_a_gap_simulates_its_longest_segment(motor: Path, tmp_path: Path) -> None:
+    header, *rows = motor.read_text(encoding="utf-8").splitlines()
+    gap = [*rows[:3000], *rows[3100:]]
+    (tmp_path / "run.csv").write_text("\n".join([header, *gap]) + "\n", encoding="utf-8")
+    (tmp_path / "run.toml").write_bytes(motor.with_suffix(".toml").read_bytes())
+    assert run_pvid("plot", tmp_path / "run.csv", "-o", tmp_path / "a.svg").return_value == 0
+    drawn = texts(tmp_path / "a.svg")
+    assert "status good" in drawn and "simulated with the answer" in drawn
+
+
 def test_numbers_at_an_axis_are_whole_and_apart() -> None:
     from matplotlib.figure import Figure
 

@@ -225,7 +225,7 @@ def plot_run(path: Path, rig: MechanismRig | RigFile, columns: str | None, figur
     """
     from pvid.show.mechanism_figure import write_figure
 
-    recording, model = recording_of(path, rig, columns)
+    recording, model = recording_of(path, rig, columns, whole=False)
     answer = weak = advised(identify_mechanism(recording, model))
     fit, text = None, f"weak form, float64; status {weak.found.verdict.status}; chi2 {weak.found.chi2:.2g}"
     if refine:

@@ -131,14 +131,15 @@ def _prior(problem: Problem, r: Float) -> Prior:
 
 
 def simulated_at(answer: MechanismAnswer, p: Float) -> RefinedMechanism:
-    """The motion of a recording at p [n_p]: the starts of its blocks, of two windows each, are fitted to it.
+    """The motion of a recording's longest segment at p [n_p]: the starts of its blocks, of two windows each, are fitted
+    to it.
 
     Raises
     ------
     PvidError
         Where the equations are not simulated: an input is the derivative of a sample.
     """
-    model, recording = answer.model, answer.recording
+    model, recording = answer.model, answer.recording.whole()
     if has_skew(model):
         raise PvidError(f"an input of {model.name} is the derivative of a sample")
     rate = recording.sample_rate

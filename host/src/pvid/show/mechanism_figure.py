@@ -88,7 +88,7 @@ def _write(answer: Answer, fit: Fit | None, path: Path, title: str) -> None:
         parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         _converge(answer, oracle, parts[0])
         if fit is not None:
-            _compare(fit.problem, fit.found, float(oracle.recording.t[0]), parts[1])
+            _compare(fit.problem, fit.found, float(oracle.recording.whole().t[0]), parts[1])
         figure.suptitle("\n".join(lines), parse_math=False)
         save(figure, path, dpi=110)
     finally:
