@@ -74,28 +74,24 @@ def residuals_of(run: Run, rig: RigFile, p: Float) -> Residuals:
 
 
 def residuals_of_fit(fit: RefinedPendulum, began: float) -> Residuals:
-    """Residuals of a refinement: means of consecutive samples, in groups, times the root of how many they are.
+    """Residuals of a refinement: means of consecutive samples, times the root of how many they are, in groups; fewer of
+    them where its blocks are short.
 
     Parameters
     ----------
     began : time of the run's first sample [s]
-
-    Raises
-    ------
-    PvidError
-        When a block of the refinement is shorter than a group.
     """
     problem, found = fit.problem, fit.found
     m, cut = problem.measured, found.cut
     error = (cut.rows(m.z) - problem.simulated(found.r, cut, found.starts))[..., 0] / m.sd[0]
-    length = _MEAN * _GROUP
+    group = min(_GROUP, cut.samples)
+    mean = min(_MEAN, cut.samples // group)
+    length = group * mean
     groups = cut.samples // length
-    if not groups:
-        raise PvidError(f"a block of {cut.samples} samples is too short for residuals: {length} are needed")
-    parts = error[:, : groups * length].reshape(-1, _GROUP, _MEAN)
-    e = np.nan_to_num(np.nanmean(parts, axis=-1)) * np.sqrt(_MEAN / m.grown)
+    parts = np.nan_to_num(error[:, : groups * length]).reshape(-1, group, mean)
+    e = parts.sum(axis=-1) / np.sqrt(mean * m.grown)
     ends = cut.first[:, None] + length * np.arange(1, groups + 1)
-    return Residuals(began + ends.ravel() / m.rate, e, _GROUP, length / m.rate, expected=True, shared=0)
+    return Residuals(began + ends.ravel() / m.rate, e, group, length / m.rate, expected=True, shared=0)
 
 
 def _weak(run: Run, rig: RigFile, p: Float) -> Residuals:
