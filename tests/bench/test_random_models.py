@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bench.random_models import Road, roads, table_of
+from bench.random_models import Road, road_of, roads, table_of
 from bench.random_motion import random_run
 from bench.random_rigs import IN_C, KINDS, random_rig
 
-SHORT = (2, 3)  # seeds
+# Seeds; together they have most kinds, known and measured inputs or none, hidden coordinates, friction, no mass.
+WHOLE = (2, 65, 1001, 1003)
+ANALYSED = (0, 3, 4, 62, 64, 66, 70)
 
 
-@pytest.mark.parametrize("seed", SHORT)
+@pytest.mark.parametrize("seed", WHOLE)
 def test_a_random_rig_goes_the_whole_road(seed: int) -> None:
-    (road,) = roads(range(seed, seed + 1))
+    road = road_of(seed)
     assert road.failures == []
     assert {"identify", "f32", "q31", "build", "compile", "deploy", "fixed deploy"} <= set(road.reached)
+
+
+@pytest.mark.parametrize("seed", ANALYSED)
+def test_a_random_rig_is_identified_and_refined_in_float64(seed: int) -> None:
+    road = road_of(seed, in_c=False)
+    assert road.failures == []
+    assert {"check", "identify", "refine"} <= set(road.reached)
+    assert road.outcome != "refused"
 
 
 def test_every_kind_draws_the_same_rig_again_and_others_from_other_seeds() -> None:
@@ -51,6 +63,12 @@ def test_a_block_slides_and_stops_as_coulomb_says(tmp_path: Path) -> None:
     step = run.rig.sensed[0].resolution
     assert np.abs(v - np.maximum(rig.start[0] - decay * t, 0.0)).max() < 5 * step
     assert run.stuck == pytest.approx(0.5, abs=0.01)
+
+
+def test_rigs_that_were_kept_are_not_travelled_again(tmp_path: Path) -> None:
+    kept = tmp_path / "kept.jsonl"
+    kept.write_text(json.dumps(asdict(Road(7, "cell", [], "good", {"E": 0.5}))) + "\n", encoding="utf-8")
+    assert [one.kind for one in roads(range(7, 8), kept)] == ["cell"]
 
 
 def test_the_table_counts_failures_by_kind() -> None:

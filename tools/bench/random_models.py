@@ -139,8 +139,8 @@ def _is_of_machinery(sentence: str) -> bool:
     return "C compiler refused" in sentence or "core refused" in sentence
 
 
-def road_of(seed: int, kind: str | None = None) -> Road:
-    """Takes the rig of a seed the whole road."""
+def road_of(seed: int, kind: str | None = None, *, in_c: bool = True) -> Road:
+    """Takes the rig of a seed the whole road; in_c=False: as far as the float64 analysis and refinement go."""
     rig = random_rig(seed, kind)
     road = Road(seed, rig.kind, sorted(rig.features))
     began = _processor_s()
@@ -152,7 +152,14 @@ def road_of(seed: int, kind: str | None = None) -> Road:
     signal.setitimer(signal.ITIMER_PROF, _LIMIT_S)
     try:
         with tempfile.TemporaryDirectory() as folder:
-            _travel(road, random_run(rig, seed, Path(folder)), Path(folder))
+            run = random_run(rig, seed, Path(folder))
+            answer = _analysed(road, run, Path(folder))
+            if answer is not None and in_c:
+                with road.stage("size"):
+                    refuse_too_many_unknowns(answer.model)
+                if "size" in road.reached:
+                    _in_c(road, run, answer)
+                _built(road, answer, Path(folder))
     except _TooLongError as error:
         last = next(one for one in reversed(traceback.extract_tb(error.__traceback__)) if "/pvid/" in one.filename)
         road.failures.append(f"no end within {_LIMIT_S:g} s, in {Path(last.filename).name}:{last.name}")
@@ -168,7 +175,8 @@ def _processor_s() -> float:
     return own.user + own.system + own.children_user + own.children_system
 
 
-def _travel(road: Road, run: RandomRun, folder: Path) -> None:
+def _analysed(road: Road, run: RandomRun, folder: Path) -> MechanismAnswer | None:
+    """Check, identification and refinement in float64; None: it is refused."""
     path, recorded = folder / "rig.py", folder / "run.csv"
     path.write_text(run.rig.text, encoding="utf-8")
     table = np.stack(list(run.signals.values()), 1)
@@ -179,7 +187,7 @@ def _travel(road: Road, run: RandomRun, folder: Path) -> None:
         possible = identifiable(compiled).identifiable
         assert "sum of theta * N = Y" in check_report(compiled)
     if "check" not in road.reached:
-        return
+        return None
     with road.stage("identify"):
         recording, model = recording_of(recorded, MechanismRig(path), None)
         answer = advised(identify_mechanism(recording, model))
@@ -188,7 +196,7 @@ def _travel(road: Road, run: RandomRun, folder: Path) -> None:
     if "identify" not in road.reached:
         if determined < _DETERMINED and "identify" in road.refusals:
             road.failures.append(f"identify: refused, of a run that determines all: {road.refusals['identify']}")
-        return
+        return None
     verdict = answer.found.verdict
     road.outcome = verdict.status.replace("_", " ")
     _judge(road, run, answer.values, good=verdict.status == "good")
@@ -203,11 +211,7 @@ def _travel(road: Road, run: RandomRun, folder: Path) -> None:
         json.dumps(refined.as_json(), allow_nan=False)
         if refined is not answer:
             _judge(road, run, refined.values, good=verdict.status == "good", stage="refine")
-    with road.stage("size"):
-        refuse_too_many_unknowns(model)
-    if "size" in road.reached:
-        _in_c(road, run, answer)
-    _built(road, answer, folder)
+    return answer
 
 
 def _size(run: RandomRun, name: str) -> float:
