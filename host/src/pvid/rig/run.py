@@ -1,4 +1,4 @@
-"""Recorded runs on disk: text tables, NPZ and Parquet, with every check a stranger's file needs.
+"""Recorded runs on disk: text tables, arrays, workbooks and messages, with every check a stranger's file needs.
 
 A recording has the column ``t`` [s] and one for each signal of its mechanism (of the pendulum ``phi`` [rad] and ``y``
 [m]), in any order and among others; `Columns` maps other names and units. Jumps of a whole turn are joined (`turns`),
