@@ -242,6 +242,6 @@ def test_readme_is_short_and_begins_with_what_a_reader_runs() -> None:
     text = text_of(README)
     shown = re.sub(r"(?ms)^```.*?^```|^\|.*?$|^ {4}.*?$", "", text)
     assert len(shown.split()) <= 800
-    order = ["./tools/pvid demo", "identify recorded.csv", "import pvid", "model check", "```c"]
+    order = ["./tools/pvid demo", "pvid identify", "import pvid", "model check", "```c"]
     places = [text.index(one) for one in order]
     assert places == sorted(places) and text[: places[0]].count("\n") < 20
