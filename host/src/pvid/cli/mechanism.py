@@ -436,7 +436,11 @@ def _table(values: Mapping[str, Value], title: str) -> None:
     for column in table.columns[1:]:
         column.justify = "right"
     for name, one in values.items():
-        assert one.value is not None and one.se is not None and one.se_noise is not None
         label = escape(f"{name} [{one.unit}]" if one.unit else name)
-        table.add_row(label, *with_error(one.value, one.se), f"{one.se_noise:.2g}")
+        if one.value is None or one.se is None or one.se_noise is None:
+            table.add_row(label, "not determined", "", "")
+            continue
+        estimate, error = with_error(one.value, one.se)
+        below = "" if one.below is None else f" (below {one.below:.2g})"
+        table.add_row(label, estimate + below, error, f"{one.se_noise:.2g}")
     Console().print(table)

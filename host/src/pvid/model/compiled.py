@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -76,6 +77,7 @@ class Unknown:
     positive : identified in its logarithm, never crosses 0
     low, high : range of the plausible
     sd : how far off the guess can be [unit]; of positive ones 2 |guess| unless given
+    bounds : low and high where the author gave them: the search stays between them
     """
 
     symbol: sp.Symbol
@@ -85,6 +87,7 @@ class Unknown:
     low: float
     high: float
     sd: float
+    bounds: tuple[float, float] = (-math.inf, math.inf)
 
     @property
     def name(self) -> str:

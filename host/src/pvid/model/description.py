@@ -167,7 +167,9 @@ class Model:
         ----------
         guess : rough value [unit]
         positive : it cannot be 0 or below
-        low, high : range of the plausible [unit]; a hundredth and a hundred times the guess, or 10 sd around it
+        low, high
+            range of the plausible [unit], which the search does not leave where given; else a hundredth and a hundred
+            times the guess, or 10 sd around it, with a warning beyond
         sd : how far off the guess can be [unit]; 2 |guess|
         """
         if not math.isfinite(guess) or positive and guess <= 0:
@@ -184,7 +186,10 @@ class Model:
         if not least <= guess <= most:
             raise self._refused(f"{name}: the guess {guess} is outside {least} to {most}")
         symbol = self._symbol(name, unit)
-        self.unknowns.append(Unknown(symbol, unit, float(guess), positive, float(least), float(most), float(spread)))
+        bounds = (-math.inf if low is None else float(low), math.inf if high is None else float(high))
+        self.unknowns.append(
+            Unknown(symbol, unit, float(guess), positive, float(least), float(most), float(spread), bounds)
+        )
         return symbol
 
     def output(self, name: str, unit: str, expression: sp.Expr) -> None:

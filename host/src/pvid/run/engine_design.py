@@ -17,8 +17,8 @@ from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.identify import neglected, ready
+from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
-from pvid.oracle.weak.verdict import UNKNOWN
 from pvid.rig.run import Recording
 from pvid.settings.weak import WeakConfig, WeakDesign32
 from pvid.setup.weak import LONGEST_HOP, config_of, design_tables, for_engine

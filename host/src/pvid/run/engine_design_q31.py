@@ -18,8 +18,7 @@ from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
-from pvid.oracle.weak.parameters import Parameters
-from pvid.oracle.weak.verdict import UNKNOWN
+from pvid.oracle.weak.parameters import UNKNOWN, Parameters
 from pvid.rig.run import Recording
 from pvid.run.engine_design import Run, design_and_p, engine_tables, neglected_part, simulated_run_of
 from pvid.settings.weak_q31 import WeakConfigQ31

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.oracle.weak.choice import MODEL_ERROR
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.verdict import UNKNOWN
+from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.rig.described import described, refuse_strong
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
@@ -129,12 +129,14 @@ def _of_core(found: CoreAnswer, run: Run) -> _Core:
         se = _growing(analysis.se, len(t))
     names = found.oracle.model.p_names
     given = [found.values[name].value for name in names]
-    last = np.array([np.nan if one is None else one for one in given]) if found.identified else found.oracle.found.p
+    # The physical map needs every parameter.
+    whole = found.identified and None not in given
+    last = np.array(given, np.float64) if whole else found.oracle.found.p
     reasons = found.verdict.reasons
     return _Core(
         dict(found.values),
         last,
-        found.identified,
+        whole,
         found.reason,
         found.misfit,
         len(published.t),
@@ -152,14 +154,15 @@ def _of_core(found: CoreAnswer, run: Run) -> _Core:
 def _of_analysis(answer: MechanismAnswer, run: Run) -> _Core:
     found, reasons = answer.found, answer.found.verdict.reasons
     windows = len(found.times)
+    whole = answer.identified and all(one.value is not None for one in answer.values.values())
     return _Core(
         dict(answer.values),
         found.p,
-        answer.identified,
-        Reason.UPDATED if answer.identified else Reason.HELD_UNCERTAIN,
+        whole,
+        Reason.UPDATED if whole else Reason.HELD_UNCERTAIN,
         found.chi2,
         windows,
-        {(Reason.UPDATED if answer.identified else Reason.HELD_UNCERTAIN).text: windows},
+        {(Reason.UPDATED if whole else Reason.HELD_UNCERTAIN).text: windows},
         None,
         Publications(np.zeros(0), np.zeros((0, len(found.p))), np.zeros((0, len(found.p))), np.zeros(0, np.bool_)),
         tuple(one.text for one in reasons if one.alarm),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from pvid.models.registry import MODELS
 from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.identify import Identified, given
 from pvid.oracle.weak.identify import identify as identified_by
+from pvid.oracle.weak.verdict import Judged, ParameterStatus
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
@@ -26,13 +27,28 @@ Float = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter, or what follows from p: its value, its standard error and the part of it that is from noise; None
-    where it is not identified."""
+    """A parameter, or what follows from p.
+
+    Attributes
+    ----------
+    value, se, se_noise : its standard error, and the part of it that is from noise; None where it is not identified
+    status, reason : whether the run determines it; a clause where it does not, or where it may be 0
+    below : it is below this with 95 %, where it may be 0
+    """
 
     unit: str
     value: float | None
     se: float | None
     se_noise: float | None
+    status: ParameterStatus = "identified"
+    reason: str | None = None
+    below: float | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Its entry in the object of `identify --json`."""
+        out = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise, "status": self.status}
+        out |= {} if self.reason is None else {"reason": self.reason}
+        return out | ({} if self.below is None else {"below": self.below})
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +74,7 @@ class MechanismAnswer:
 
     @property
     def identified(self) -> bool:
-        """Whether every parameter is."""
+        """Whether at least one parameter is."""
         return self.found.verdict.identified
 
     @property
@@ -69,10 +85,7 @@ class MechanismAnswer:
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
         found = self.found
-        parameters = {
-            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
-            for name, one in self.values.items()
-        }
+        parameters = {name: one.as_json() for name, one in self.values.items()}
         return {
             "identified": self.identified,
             "status": found.verdict.status,
@@ -172,7 +185,7 @@ def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
     # The correlations of the rows, with the published standard errors but for gains and constants.
     widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
-    return values_of(model, found.p, covariance, gains_of(model, found), identified=found.verdict.identified)
+    return values_of(model, found.p, covariance, gains_of(model, found), found.judged)
 
 
 def noise_of(model: CompiledModel, found: Identified) -> Float:
@@ -191,26 +204,39 @@ def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
     return gains_of(model, found)[:-1] if model.refinement.equations else gains_of(model, found)
 
 
-def values_of(model: CompiledModel, p: Float, covariance: Float, gains: Float, *, identified: bool) -> dict[str, Value]:
+def values_of(
+    model: CompiledModel, p: Float, covariance: Float, gains: Float, judged: Sequence[Judged]
+) -> dict[str, Value]:
     """Outputs of the model, then p, by name.
 
     Parameters
     ----------
     covariance : of p by noise [n_p, n_p]
     gains : see gains_of
-    identified : whether values are shown
+    judged : of each parameter; an output is identified where all parameters that it depends on are
     """
     whole = covariance + gains.T @ gains
 
-    def shown(unit: str, value: float, slope: Float) -> Value:
-        if not identified:
-            return Value(unit, None, None, None)
-        return Value(unit, value, *(float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance)))
+    def shown(unit: str, value: float, slope: Float, of: Judged) -> Value:
+        if of.status == "not_identified":
+            return Value(unit, None, None, None, of.status, of.reason)
+        se, se_noise = (float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance))
+        return Value(unit, value, se, se_noise, of.status, of.reason, of.below)
 
-    values = {one.name: shown(one.unit, *_output(model, p, one)) for one in model.outputs}
-    for k, one in enumerate(model.unknowns):
-        values[one.name] = shown(one.unit, float(p[k]), np.eye(len(p))[k])
+    values = {}
+    for one in model.outputs:
+        used = [of for symbol, of in zip(model.p, judged, strict=True) if one.value.has(symbol)]
+        missing = next((of for of in used if of.status == "not_identified"), Judged())
+        slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := _output(model, p, one))[1])
+        values[one.name] = shown(one.unit, found[0], slope, missing)
+    for k, unknown in enumerate(model.unknowns):
+        values[unknown.name] = shown(unknown.unit, float(p[k]), np.eye(len(p))[k], judged[k])
     return values
+
+
+def unless_held(judged: Sequence[Judged], reason: str | None) -> Sequence[Judged]:
+    """Of each parameter; with a reason (a clause) why an identifier publishes nothing, none is identified."""
+    return judged if reason is None else [Judged("not_identified", reason)] * len(judged)
 
 
 def outputs_at(model: CompiledModel, p: Float) -> dict[str, float]:

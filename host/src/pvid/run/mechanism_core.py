@@ -23,7 +23,7 @@ from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import engine_to_identify
 from pvid.run.identify import Publications, counted
-from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, values_of
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, unless_held, values_of
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
@@ -50,6 +50,7 @@ class CoreAnswer:
     hash : running hash of its state after the last tick
     publications : every estimate that was published; their standard errors contain what `values` contains
     reasons : count of each reason, in ticks
+    by_analysis : nothing is published, because a parameter may be 0; the values are those of the oracle
     """
 
     oracle: MechanismAnswer
@@ -66,11 +67,12 @@ class CoreAnswer:
     hash: int
     publications: Publications
     reasons: Mapping[str, int]
+    by_analysis: bool = False
 
     @property
     def identified(self) -> bool:
-        """Whether the core has published, and the recording shows every parameter."""
-        return self.published and self.oracle.identified
+        """Whether the core has published, or need not, and the recording shows a parameter."""
+        return (self.published or self.by_analysis) and self.oracle.identified
 
     @property
     def verdict(self) -> Verdict:
@@ -81,6 +83,13 @@ class CoreAnswer:
         if not self.identified:
             if self.oracle.identified:
                 yield Reason("not_identified", f"The C core has published no estimate: {self.reason.text}.")
+            return
+        if self.by_analysis:
+            yield Reason(
+                "held",
+                f"The C core publishes nothing ({self.reason.text}), as a parameter may be 0: the values are those of "
+                "the float64 analysis.",
+            )
             return
         if apart := [name for name in self.oracle.model.p_names if self._clashes(name)]:
             first = [values[apart[0]] for values in (self.values, self.oracle.values)]
@@ -112,10 +121,7 @@ class CoreAnswer:
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
-        parameters = {
-            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
-            for name, one in self.values.items()
-        }
+        parameters = {name: one.as_json() for name, one in self.values.items()}
         return self.oracle.as_json() | {
             "identified": self.identified,
             "parameters": parameters,
@@ -223,7 +229,11 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
     # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
     wider = np.maximum(noise_of(model, found) / np.sqrt(np.diag(run.covariance)), 1.0)
     covariance = run.covariance * np.outer(wider, wider)
-    values = values_of(model, run.p, covariance, gains, identified=published and answer.identified)
+    # A core searches logarithms: of what may be 0 it stays uncertain, and publishes nothing.
+    by_analysis = not published and any(one.status == "near_zero" for one in found.judged)
+    outcome = Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP
+    judged = unless_held(found.judged, None if published else outcome.text)
+    values = answer.values if by_analysis else values_of(model, run.p, covariance, gains, judged)
     misfit = identifier.misfit
     return CoreAnswer(
         oracle=answer,
@@ -234,12 +244,13 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
         averages_signs=run.signs > 0,
         values=values,
         published=published,
-        reason=Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP,
+        reason=outcome,
         misfit=None if not published or np.isnan(misfit) else misfit,
         windows=int(len(ends)),
         hash=identifier.running_hash,
         publications=_published(answer, run, gains, wider),
         reasons=counted(record.reason),
+        by_analysis=by_analysis,
     )
 
 

@@ -96,7 +96,7 @@ class RefinedCoreAnswer:
 
     @property
     def identified(self) -> bool:
-        """Whether a stage has published, and the recording shows every parameter."""
+        """Whether a stage has published, and the recording shows a parameter."""
         return (self.adopted and self.weak.oracle.identified) or self.weak.identified
 
     @property
@@ -115,10 +115,7 @@ class RefinedCoreAnswer:
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
-        parameters = {
-            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
-            for name, one in self.values.items()
-        }
+        parameters = {name: one.as_json() for name, one in self.values.items()}
         refinement = {
             "adopted": self.adopted,
             "text": self.text,
@@ -170,7 +167,7 @@ def _values(answer: MechanismAnswer, made: RefineFunctions, estimate: npt.NDArra
     covariance = np.asarray(estimate["covariance"], np.float64) * np.outer(unit, unit)
     places = made.places_of_p
     gains = refined_gains_of(answer.model, answer.found)
-    values = values_of(answer.model, r[places], covariance[np.ix_(places, places)], gains, identified=answer.identified)
+    values = values_of(answer.model, r[places], covariance[np.ix_(places, places)], gains, answer.found.judged)
     for k, one in enumerate(parameters):
         if one.place < 0 and answer.identified:
             se = float(np.sqrt(covariance[k, k]))

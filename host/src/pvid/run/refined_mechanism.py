@@ -221,7 +221,7 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
         return answer, refined, text
     made = refined.problem.kernel.made
     p, covariance = refined.problem.values(found, made.places_of_p)
-    values = values_of(model, p, covariance, refined_gains_of(model, weak), identified=answer.identified)
+    values = values_of(model, p, covariance, refined_gains_of(model, weak), weak.judged)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
     if len(answer.recording.segments) > 1:
         text += f"; of the longest segment alone, {recording.t[0]:.6g} s to {recording.t[-1]:.6g} s"

@@ -12,9 +12,10 @@ from pvid.base.wording import listed
 from pvid.codegen.strong_library import strong_native
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.verdict import UNKNOWN
+from pvid.oracle.weak.parameters import UNKNOWN
+from pvid.oracle.weak.verdict import Judged
 from pvid.rig.run import Recording
-from pvid.run.mechanism import Value, own_keys, refuse_constant, values_of
+from pvid.run.mechanism import Value, own_keys, refuse_constant, unless_held, values_of
 from pvid.run.strong_design import StrongDesign, strong_design
 from pvid.settings.engine_cores import STRONG_CORES
 from pvid.settings.enums import Law, Reason
@@ -115,8 +116,10 @@ def identify_strong_mechanism(
         reason, running = _last(record.reason.tolist()), identifier.running_hash
     unknown = tuple(_unknown(model, p, np.hypot(noise, fitted.change)))
     identified = not unknown and (reason is None or reason in _GOOD)
+    held = None if identified else "the strong form does not determine every parameter"
+    judged = unless_held([Judged()] * len(p), held)
     # What another window changes is common to all parameters, as a gain is.
-    values = values_of(model, p, np.diag(noise**2), fitted.change[np.newaxis], identified=identified)
+    values = values_of(model, p, np.diag(noise**2), fitted.change[np.newaxis], judged)
     doubts = dict(_doubts(model, p, design, noise, unknown))
     core = STRONG_CORES[0 if in_c else 1]
     return StrongAnswer(model, design, values, core, reason, running, doubts, unknown, recording)

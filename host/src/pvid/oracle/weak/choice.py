@@ -21,12 +21,13 @@ from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import blur_of, rates_of_drives
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
-from pvid.oracle.weak.failures import FAILURES
+from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, WeakRows
 from pvid.oracle.weak.starts import starts_about
+from pvid.oracle.weak.zero import ALMOST_0, near_zero
 
 _FEWEST_WINDOWS = 18
 _SHORT_RUN = 10  # windows of a run that has no more: its halves are not compared
@@ -110,16 +111,19 @@ def _scored(
             return None
         fit = gated(rows, start, equation_error=errors, passes=_PASSES)
         found = uncertainty(fit)
+        other = other_line(fit)
     except FAILURES:
         return None
-    size = np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd)
-    other = other_line(fit)
+    small, of_small = attempted(lambda: near_zero(fit, found.se)) or (np.zeros(len(fit.p), np.bool_), found.se)
+    size = np.where(small, fit.parameters.guess, np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd))
+    predicted = np.where(small, of_small, found.predicted)
     apart = np.zeros(len(fit.p)) if other is None else other - fit.p
-    relative = np.hypot(np.hypot(found.predicted, apart) / size, blur_of(model, run, design))
+    relative = np.hypot(np.hypot(predicted, apart) / size, blur_of(model, run, design))
     if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
         return None
-    known = not verdict.not_identified(model.bare, fit, found.se) and not verdict.of_range(model.bare, fit.p)
-    return Scored(design, float(np.exp(np.mean(np.log(relative)))), fit.p, found.chi2, relative * size, known)
+    known = attempted(lambda: verdict.is_known(model.bare, fit, found.se)) or False
+    p = np.where(small, np.maximum(fit.p, ALMOST_0 * of_small), fit.p)
+    return Scored(design, float(np.exp(np.mean(np.log(relative)))), p, found.chi2, relative * size, known)
 
 
 def power_of(model: Compiled) -> int:

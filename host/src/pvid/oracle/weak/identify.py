@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -26,8 +26,9 @@ from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.weak.samples import follows, of_samples
 from pvid.oracle.weak.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
 from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
-from pvid.oracle.weak.verdict import Halves, Reason, Verdict
+from pvid.oracle.weak.verdict import Halves, Judged, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
+from pvid.oracle.weak.zero import estimated_near_zero, on_their_own_scale
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Identified:
     covariance : of p, that of `predicted` [n_p, n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
     verdict : whether to trust it
+    judged : whether the run determines it, of each parameter
     r2 : of each row kind
     times : end of each window [s]
     design : of the windows
@@ -66,6 +68,7 @@ class Identified:
     covariance: Float
     chi2: float
     verdict: Verdict
+    judged: tuple[Judged, ...]
     r2: dict[str, float]
     times: Float
     design: WeakDesign
@@ -145,6 +148,7 @@ def identify(
     if near is not None and not _found(compiled, fit):  # the guesses lead elsewhere
         other = replace(_estimated(rows, near, with_error, compensate), start=fit.start)
         fit = fit if other.diverged and not fit.diverged else other
+    fit = estimated_near_zero(fit, with_error, compensate)
     found = attempted(lambda: uncertainty(fit)) or Uncertainty.unbounded(fit)
     attempt = _Attempts()
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
@@ -159,7 +163,7 @@ def identify(
     by_known = {
         one.name: _or_nan(fit, partial(of_known, compiled, run, fit, one)) for one in compiled.knowns if one.sd > 0
     }
-    by_neglect = fit.parameters.positive * fit.p * neglected(compiled, run)
+    by_neglect = model.parameters.positive * fit.p * neglected(compiled, run)
     parts = [
         verdict.widened(found.se, halves),
         *given(compiled, by_gain, by_known),
@@ -167,9 +171,10 @@ def identify(
         *([] if white is None else [white - fit.p]),
     ]
     se = np.sqrt(np.sum(np.square(parts), axis=0))
-    reasons = verdict.not_identified(compiled, fit, se)
+    judged = tuple(verdict.judged(compiled, fit, se))
+    reasons = verdict.of_parameters(compiled, fit, se, judged, found.r2)
     if not fit.diverged:
-        reasons += attempt.reasons(_checks(rows, run, fit, found, halves, with_error))
+        reasons += attempt.reasons(_checks(rows, run, fit, found, halves, judged, with_error))
         if error is not None and not follows(error, reasons, sample_rate):
             reasons += of_sensors(compiled, error, found.se)
         reasons += of_scale(compiled, by_gain, fit.p, found.se)
@@ -184,6 +189,7 @@ def identify(
         covariance=found.covariance,
         chi2=found.chi2,
         verdict=Verdict(verdict.sorted_by_gravity(reasons)),
+        judged=judged,
         r2={row.name: value for row, value in zip(compiled.rows, found.r2, strict=True)},
         times=fit.rows.end_times(),
         design=used,
@@ -250,10 +256,11 @@ def _checks(
     fit: Fit,
     found: Uncertainty,
     halves: Halves | None,
+    judged: Sequence[Judged],
     equation_error: bool,
 ) -> dict[str, Callable[[], list[Reason]]]:
     """Every check of an estimate, by what it looks at."""
-    model, design = rows.compiled, rows.record.grid.design
+    model, design = fit.rows.compiled, rows.record.grid.design
     bare = model.bare
 
     def compared(judge: Callable[..., list[Reason]], other: Fit | None) -> list[Reason]:
@@ -266,7 +273,7 @@ def _checks(
         "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
         "feedback": lambda: of_feedback(bare, run, fit, _determined(bare, fit, found)),
         "the residuals": lambda: verdict.of_residuals(found, equation_error),
-        "the range": lambda: verdict.of_range(bare, fit.p),
+        "the range": lambda: verdict.of_range(bare, fit.p, judged),
         "spoiled windows": lambda: verdict.of_spoiled(rows, fit),
         "the weights of the sensors": lambda: compared(verdict.of_weights, by_sensors(fit)),
         "windows of another length": lambda: compared(
@@ -291,8 +298,8 @@ def _found(model: CompiledModel, fit: Fit) -> bool:
 
 
 def _determined(model: CompiledModel, fit: Fit, found: Uncertainty) -> bool:
-    """Whether every parameter has a value, within its range."""
-    return not verdict.not_identified(model, fit, found.se) and not verdict.of_range(model, fit.p)
+    """Whether every parameter has a value, within its range, or may be 0."""
+    return bool(attempted(lambda: verdict.is_known(model, fit, found.se)))
 
 
 def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float]) -> list[Float]:
@@ -314,7 +321,9 @@ def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:
 def of_known(compiled: CompiledModel, run: Mapping[str, npt.ArrayLike], fit: Fit, known: Known) -> Float:
     """d p / d constant [n_p], with the weights of the fit: one standard deviation more, and p again."""
     moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in compiled.knowns)
-    rows = WeakRows.of(ready(replace(compiled, knowns=moved)), run, fit.rows.record.grid.design)
+    own_scale = fit.rows.compiled.parameters.positive != ready(compiled).parameters.positive
+    other = on_their_own_scale(ready(replace(compiled, knowns=moved)), own_scale)
+    rows = WeakRows.of(other, run, fit.rows.record.grid.design)
     rows = rows.only(np.isin(rows.numbers, fit.rows.numbers))
     p, prior = fit.p, fit.parameters.prior(fit.start)
     theta = rows.compiled.parameters.theta(p)

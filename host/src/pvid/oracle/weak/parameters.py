@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import copy
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.functions import Float
+
+# A standard error of a positive parameter beyond this part of it means that it may be 0, or that the run does not
+# determine it.
+UNKNOWN = 0.3
 
 
 class Parameters:
@@ -22,6 +28,16 @@ class Parameters:
         self.guess = np.array([one.guess for one in model.unknowns], np.float64)
         self.sd = np.array([one.sd for one in model.unknowns], np.float64)
         self.names = model.p_names
+        bounds = [(min(one.bounds[0], one.guess), max(one.bounds[1], one.guess)) for one in model.unknowns]
+        self.low, self.high = (np.array(one, np.float64) for one in zip(*bounds, strict=True))
+
+    def on_their_own_scale(self, which: npt.NDArray[np.bool_]) -> Parameters:
+        """The same with some of the positive ones [n_p] in steps of their own value, which may be 0 or below."""
+        out = copy.copy(self)
+        out.positive = self.positive & ~which
+        out.sd = np.where(which, self.guess, self.sd)
+        out.low = np.where(which, -np.inf, self.low)
+        return out
 
     @cached_property
     def _functions(self) -> list[tuple[Any, Any]]:
@@ -54,11 +70,16 @@ class Parameters:
         for name, value, positive in zip(self.names, p, self.positive, strict=True):
             if not np.isfinite(value) or (positive and value <= 0):
                 raise PvidError(f"{name} must start at a positive number, not {value:g}")
-        return p.copy()
+        return np.clip(p, self.low, self.high)
 
     def moved(self, p: Float, step: Float) -> Float:
-        """p after a step in logarithms and values."""
-        return np.where(self.positive, p * np.exp(np.where(self.positive, step, 0.0)), p + step)
+        """p after a step in logarithms and values, within its bounds."""
+        moved = np.where(self.positive, p * np.exp(np.where(self.positive, step, 0.0)), p + step)
+        return np.clip(moved, self.low, self.high)
+
+    def blocked(self, p: Float, force: Float) -> npt.NDArray[np.bool_]:
+        """Which are at a bound that a force [n_p], the gradient downhill, holds them to."""
+        return ((p <= self.low) & (force < 0)) | ((p >= self.high) & (force > 0))
 
     def prior(self, start: Float) -> Float:
         """Information of the start in units of a step, diagonal [n_p]: weak, it only bounds what no row tells."""

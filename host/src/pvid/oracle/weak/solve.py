@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float
@@ -103,7 +104,7 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
     after = misfit(moments, theta)
     for k in range(steps):
         s, f = normal(parameters, moments, p, theta)
-        step = solved(s + weak, f)
+        step = _bounded_step(s + weak, f, parameters.blocked(p, f))
         size = float(np.max(np.abs(step) / reach))
         step *= min(1.0, _STEP_LIMIT / max(size, 1e-300))
         first = size if k == 0 else first
@@ -119,6 +120,17 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
         if size < _SETTLED:
             break
     return p, first
+
+
+def _bounded_step(s: Float, f: Float, blocked: npt.NDArray[np.bool_]) -> Float:
+    """S^-1 f of what no bound holds; 0 of the others."""
+    if not blocked.any():
+        return solved(s, f)
+    free = np.flatnonzero(~blocked)
+    step = np.zeros(len(f))
+    if free.size:
+        step[free] = solved(s[np.ix_(free, free)], f[free])
+    return step
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,12 +13,15 @@ from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
 from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.parameters import Parameters
+from pvid.oracle.weak.parameters import UNKNOWN, Parameters
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit, Moments, gauss_newton, inverse, normal
+from pvid.oracle.weak.zero import near_zero, upper_bound
 
 Name = Literal[
     "not_identified",
+    "undetermined",
+    "near_zero",
     "not_settled",
     "chi2",
     "shape",
@@ -45,10 +48,9 @@ Name = Literal[
     "unchecked",
 ]
 Status = Literal["good", "warning", "not_identified"]
+ParameterStatus = Literal["identified", "near_zero", "not_identified"]
 
-# A standard error of a positive parameter beyond this part of it, or of another one beyond this part of its range,
-# means that the run does not determine it.
-UNKNOWN = 0.3
+# Of another parameter: part of its range.
 _UNKNOWN_OF_RANGE = 0.5
 
 # Two estimates disagree if they differ by so many standard errors of the difference ...
@@ -62,9 +64,12 @@ _CHI2_WEIGHTED = 3.0
 
 _FEW_WINDOWS = 8
 
+# R^2 of a run of which a bound of a parameter is no doubt.
+_EXPLAINED = 0.9
+
 _RAN_AWAY = (
-    "The search for the parameters ran away: the equations do not describe this run, or a signal has another unit, "
-    "sign or name."
+    "the search for the parameters ran away: the equations may not describe this run, or a signal may have another "
+    "unit, sign or name"
 )
 
 
@@ -85,6 +90,22 @@ class Reason:
 
 
 @dataclass(frozen=True)
+class Judged:
+    """Whether a run determines a parameter.
+
+    Attributes
+    ----------
+    status : "near_zero": it is smaller than the run shows, and `below` bounds it
+    reason : a clause, of what is not identified or near 0; else None
+    below : with 95 % [unit of the parameter]
+    """
+
+    status: ParameterStatus = "identified"
+    reason: str | None = None
+    below: float | None = None
+
+
+@dataclass(frozen=True)
 class Verdict:
     """Whether p may be used.
 
@@ -97,7 +118,7 @@ class Verdict:
 
     @property
     def identified(self) -> bool:
-        """Every parameter has a value that means something."""
+        """At least one parameter has a value that means something."""
         return not any(one.name == "not_identified" for one in self.reasons)
 
     @property
@@ -122,28 +143,75 @@ class Halves:
     clash: Float
 
 
-def not_identified(model: CompiledModel, fit: Fit, se: Float) -> list[Reason]:
-    """Parameters that the run does not determine, and with what the worst is mixed.
+def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
+    """Of each parameter whether the run determines it.
 
     Parameters
     ----------
     se : standard errors [n_p], those that are published where there are such
     """
     if fit.diverged:
-        return [Reason("not_identified", _RAN_AWAY)]
-    p, parameters = fit.p, fit.parameters
-    # an offset of exactly 0 has an error all the same
-    relative = se / np.where(parameters.positive, UNKNOWN * np.abs(p), _UNKNOWN_OF_RANGE * parameters.sd)
-    bad = [k for k in np.argsort(-relative) if relative[k] > 1 or not np.isfinite(relative[k])]
-    if not bad:
-        return []
-    names = [model.p_names[k] for k in bad]
-    partner = attempted(lambda: partner_of(fit, int(bad[0])))
-    together = f"{names[0]} and {model.p_names[partner]}" if partner is not None else ""
-    mixed = f"; {together} are not identifiable together" if together else ""
-    worst = with_unit(se[bad[0]], model.unknowns[bad[0]].unit, 2)
-    error = f"the standard error of {names[0]} is {worst}"
-    return [Reason("not_identified", f"The run does not determine {listed(names)}: {error}{mixed}.")]
+        return [Judged("not_identified", _RAN_AWAY)] * len(fit.p)
+    parameters = fit.parameters
+    out = []
+    for k, one in enumerate(model.unknowns):
+        p, limit = float(fit.p[k]), UNKNOWN * abs(float(fit.p[k]))
+        own_scale = one.positive and not parameters.positive[k]
+        if not one.positive or own_scale:  # an offset of exactly 0 has an error all the same
+            limit = max(limit if own_scale else 0.0, _UNKNOWN_OF_RANGE * float(parameters.sd[k]))
+        if p in (parameters.low[k], parameters.high[k]):
+            side, bound = ("low", one.bounds[0]) if p == parameters.low[k] else ("high", one.bounds[1])
+            out.append(
+                Judged("not_identified", f"{one.name} is at its bound, {side} = {with_unit(bound, one.unit, 4)}")
+            )
+        elif not se[k] <= limit:
+            out.append(Judged("not_identified", f"the standard error of {one.name} is {with_unit(se[k], one.unit, 2)}"))
+        elif own_scale and se[k] > UNKNOWN * abs(p):
+            below = upper_bound(p, float(se[k]))
+            out.append(Judged("near_zero", f"{one.name} is below {with_unit(below, one.unit, 2)} with 95 %", below))
+        else:
+            out.append(Judged())
+    if any(one.status == "identified" for one in out):
+        return out
+    return [replace(one, status="not_identified") for one in out]  # all at 0: the equations do not describe the run
+
+
+def is_known(model: CompiledModel, fit: Fit, se: Float) -> bool:
+    """Whether every parameter has a value within its range that means something, or may be 0."""
+    small, se = near_zero(fit, se)
+    missing = [one.status == "not_identified" for one in judged(model, fit, se)]
+    outside = of_range(model, np.where(small, fit.parameters.guess, fit.p))
+    return not outside and not np.any(missing & ~small)
+
+
+def of_parameters(
+    model: CompiledModel, fit: Fit, se: Float, found: Sequence[Judged], r2: Sequence[float]
+) -> list[Reason]:
+    """What the run does not determine, with what the worst is mixed, and what may be 0.
+
+    Parameters
+    ----------
+    se, found : standard errors [n_p]; of each parameter
+    r2 : of each row kind: noise in the regressors of a run that is not explained draws parameters to 0
+    """
+    if fit.diverged:
+        return [Reason("not_identified", f"{_RAN_AWAY[0].upper()}{_RAN_AWAY[1:]}.")]
+    out = []
+    size = UNKNOWN * np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd)
+    missing = [k for k in np.argsort(-np.nan_to_num(se / size, nan=np.inf)) if found[k].status == "not_identified"]
+    if missing:
+        partner = attempted(lambda: partner_of(fit, int(missing[0])))
+        names = [model.p_names[k] for k in missing]
+        text = f"The run does not determine {listed(names)}: {found[missing[0]].reason}"
+        if partner is not None:
+            text += f"; {names[0]} and {model.p_names[partner]} are not identifiable together"
+        out.append(Reason("not_identified" if len(missing) == len(found) else "undetermined", f"{text}."))
+    small = [k for k, one in enumerate(found) if one.status == "near_zero"]
+    if small:
+        bounds = listed(f"{found[k].reason}" for k in small)
+        beyond = any((found[k].below or 0.0) > fit.parameters.guess[k] for k in small) or min(r2) < _EXPLAINED
+        out.append(Reason("near_zero", f"The run shows an upper bound alone: {bounds}.", alarm=beyond))
+    return out
 
 
 def partner_of(fit: Fit, worst: int) -> int | None:
@@ -277,12 +345,12 @@ def of_residuals(found: Uncertainty, equation_error: bool = True) -> list[Reason
     return out
 
 
-def of_range(model: CompiledModel, p: Float) -> list[Reason]:
-    """Values beyond what the model calls plausible."""
+def of_range(model: CompiledModel, p: Float, found: Sequence[Judged] = ()) -> list[Reason]:
+    """Values beyond what the model calls plausible; of what is identified."""
     out = [
         one.name
-        for one, value in zip(model.unknowns, p, strict=True)
-        if one.high > one.low and not one.low <= value <= one.high
+        for k, (one, value) in enumerate(zip(model.unknowns, p, strict=True))
+        if one.high > one.low and not one.low <= value <= one.high and (not found or found[k].status == "identified")
     ]
     return [Reason("range", f"Outside the range (low, high): {listed(out)}.", alarm=True)] if out else []
 
