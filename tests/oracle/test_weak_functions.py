@@ -14,6 +14,7 @@ from pvid.oracle.weak import reversals
 from pvid.oracle.weak.channels import running_integrals
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.functions import TestFunctions
+from pvid.oracle.weak.whitener import Whitener
 
 FUNCTIONS = TestFunctions(count=13, power=6, hop=50, dt=0.01)
 T = FUNCTIONS.dt * np.arange(2 * FUNCTIONS.hop)
@@ -167,3 +168,20 @@ def test_designs_that_are_kept_do_not_keep_their_tables() -> None:
     gc.collect()
     assert sum(one() is not None for one in tables) <= 16
     assert designs[-1].test_functions is designs[-1].test_functions
+
+
+def test_more_directions_than_rows_whiten_as_the_sum_of_their_covariances_does() -> None:
+    """A friction that sticks has more doubts in a window than the window has rows."""
+    rng = np.random.default_rng(5)
+    windows, rows, directions = 3, 6, 25
+    root = rng.normal(size=(rows, rows))
+    covariance, u = root @ root.T + np.eye(rows), rng.normal(size=(windows, directions, rows))
+    whitener = Whitener.of_covariance(covariance, u)
+    whole = [covariance + one.T @ one for one in u]
+    x = rng.normal(size=(windows, 2, rows))
+    for place, (one, white) in enumerate(zip(whole, whitener.of(x), strict=True)):
+        assert white @ white.T == pytest.approx(x[place] @ np.linalg.inv(one) @ x[place].T, rel=1e-9, abs=1e-9)
+    expected = np.array([direction @ np.linalg.inv(one) for direction, one in zip(u, whole, strict=True)])
+    assert whitener.inverse_of_directions() == pytest.approx(expected, rel=1e-8, abs=1e-9)
+    assert whitener.total_inverse() == pytest.approx(sum(map(np.linalg.inv, whole)), rel=1e-9)
+    assert whitener.log_determinant() == pytest.approx(sum(np.linalg.slogdet(one)[1] for one in whole))

@@ -6,7 +6,8 @@ V = L^-1 U the rows y = L^-1 x have the covariance I + V V^T. With I + V^T V = K
     x -> (I - V B^T V^T) L^-1 x,   B = K^-T (I + K)^-1
 
 whitens them (Andrews' square root): one factorisation of the run, and matrices of the size of the number of reversals
-for each window.
+for each window. Of a window with more directions than rows, as where a friction sticks, V is replaced by a square factor
+of V V^T.
 """
 
 from __future__ import annotations
@@ -25,12 +26,14 @@ class Whitener:
     Attributes
     ----------
     base : L^-1 [R, R]
-    v : L^-1 U_w [windows, R, r]
-    small : B [windows, r, r]
-    shrink : (I + V^T V)^-1 [windows, r, r]
+    whole : L^-1 U_w [windows, R, r]
+    v : the same, or a factor of as many directions as there are rows where r is larger [windows, R, min(r, R)]
+    small : B [windows, r', r'], r' = min(r, R)
+    shrink : (I + V^T V)^-1 [windows, r', r']
     """
 
     base: Float
+    whole: Float
     v: Float
     small: Float
     shrink: Float
@@ -39,19 +42,21 @@ class Whitener:
     def of_covariance(cls, covariance: Float, directions: Float) -> Whitener:
         """From R [R, R] and the directions of each window [windows, r, R], zeros where there are fewer."""
         base = np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.float64)
-        v = base @ directions.transpose(0, 2, 1)
+        v = whole = base @ directions.transpose(0, 2, 1)
         if not v.shape[2]:
             nothing = np.zeros((len(v), 0, 0))
-            return cls(base, v, nothing, nothing)
+            return cls(base, v, v, nothing, nothing)
+        if v.shape[2] > v.shape[1]:
+            v = np.asarray(np.linalg.qr(v.transpose(0, 2, 1), mode="r")).transpose(0, 2, 1)
         one = np.eye(v.shape[2])
         k = np.linalg.cholesky(one + v.transpose(0, 2, 1) @ v)
         back = np.linalg.inv(k)
         small = back.transpose(0, 2, 1) @ np.linalg.inv(one + k)
-        return cls(base, v, small, back.transpose(0, 2, 1) @ back)
+        return cls(base, whole, v, small, back.transpose(0, 2, 1) @ back)
 
     def only(self, windows: slice) -> Whitener:
         """Of some of the windows."""
-        return Whitener(self.base, self.v[windows], self.small[windows], self.shrink[windows])
+        return Whitener(self.base, self.whole[windows], self.v[windows], self.small[windows], self.shrink[windows])
 
     def of(self, x: Float, rows: slice = slice(None)) -> Float:
         """L_w^-1 x_w for each of several columns x [windows, columns, R]; those that fill some rows only are short."""
@@ -75,7 +80,11 @@ class Whitener:
 
     def inverse_of_directions(self) -> Float:
         """R_w^-1 U_w as rows [windows, r, R]."""
-        return np.asarray(self.shrink @ self.v.transpose(0, 2, 1) @ self.base)
+        back = self.v.transpose(0, 2, 1)
+        if self.whole.shape == self.v.shape:
+            return np.asarray(self.shrink @ back @ self.base)
+        inside = self.whole - self.v @ (self.shrink @ (back @ self.whole))
+        return np.asarray(inside.transpose(0, 2, 1) @ self.base)
 
     def log_determinant(self) -> float:
         """Sum over the windows of log det R_w."""
