@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -96,6 +97,20 @@ def test_a_fit_that_runs_away_is_not_identified_with_its_reason(monkeypatch: pyt
     found = identify(cart(), run(), RATE, design=DESIGN)
     assert found.verdict.status == "not_identified"
     assert "ran away" in found.verdict.reasons[0].text
+
+
+def test_weights_without_a_fixed_point_leave_the_answer_of_the_sensors_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = module.gated
+
+    def unsettled(rows: WeakRows, start: Float | None, equation_error: bool, *rest: Any) -> solve.Fit:
+        fit = plain(rows, start, equation_error, *rest)
+        return replace(fit, p=1e-6 * fit.p, settled=False) if equation_error else fit
+
+    monkeypatch.setattr(module, "gated", unsettled)
+    found = identify(cart(), run(), RATE, design=DESIGN)
+    assert found.p == pytest.approx([1.3, 1.7], rel=0.01) and found.verdict.status == "warning"
+    (reason,) = [one for one in found.verdict.reasons if one.name == "not_settled"]
+    assert reason.alarm and "--weights sensors" in reason.text
 
 
 @pytest.mark.parametrize(

@@ -97,6 +97,11 @@ class Identified:
 _SHORTER = 0.7  # of the samples of a derivative: what blurs falls to a quarter or less
 _STEPS_OF_KNOWN = 10
 
+_NOT_REWEIGHTED = (
+    "The rows, weighted anew by their own residuals, lead from estimate to estimate without an end: the values are "
+    "those of the sensors' weights alone (--weights sensors)."
+)
+
 ready = Recent(Compiled)  # a model with its functions
 
 
@@ -148,7 +153,12 @@ def identify(
     if near is not None and not _found(compiled, fit):  # the guesses lead elsewhere
         other = replace(_estimated(rows, near, with_error, compensate), start=fit.start)
         fit = fit if other.diverged and not fit.diverged else other
-    fit = estimated_near_zero(fit, with_error, compensate)
+    weighted_anew = with_error
+    if with_error and not fit.settled and not _found(compiled, fit):
+        alone = replace(_estimated(rows, near, False, compensate), start=fit.start)
+        if _found(compiled, alone):
+            fit, weighted_anew = alone, False
+    fit = estimated_near_zero(fit, weighted_anew, compensate)
     found = attempted(lambda: uncertainty(fit)) or Uncertainty.unbounded(fit)
     attempt = _Attempts()
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
@@ -179,6 +189,8 @@ def identify(
             reasons += of_sensors(compiled, error, found.se)
         reasons += of_scale(compiled, by_gain, fit.p, found.se)
         reasons += attempt.failed
+        if with_error and not weighted_anew:
+            reasons.append(Reason("not_settled", _NOT_REWEIGHTED))
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),

@@ -6,8 +6,8 @@ V = L^-1 U the rows y = L^-1 x have the covariance I + V V^T. With I + V^T V = K
     x -> (I - V B^T V^T) L^-1 x,   B = K^-T (I + K)^-1
 
 whitens them (Andrews' square root): one factorisation of the run, and matrices of the size of the number of reversals
-for each window. Of a window with more directions than rows, as where a friction sticks, V is replaced by a square factor
-of V V^T.
+for each window. Of a window with more directions than rows, as where a friction sticks, V is replaced by a square
+factor of V V^T.
 """
 
 from __future__ import annotations
