@@ -121,7 +121,7 @@ def _scored(
     relative = np.hypot(np.hypot(predicted, apart) / size, blur_of(model, run, design))
     if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
         return None
-    known = attempted(lambda: verdict.is_known(model.bare, fit, found.se)) or False
+    known = attempted(lambda: verdict.is_known(model.bare, fit, small, of_small)) or False
     p = np.where(small, np.maximum(fit.p, ALMOST_0 * of_small), fit.p)
     return Scored(design, float(np.exp(np.mean(np.log(relative)))), p, found.chi2, relative * size, known)
 

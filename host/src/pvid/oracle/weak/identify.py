@@ -28,7 +28,7 @@ from pvid.oracle.weak.sensor_errors import SensorError, SensorErrors, of_scale, 
 from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
 from pvid.oracle.weak.verdict import Halves, Judged, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
-from pvid.oracle.weak.zero import estimated_near_zero, on_their_own_scale
+from pvid.oracle.weak.zero import estimated_near_zero, near_zero, on_their_own_scale
 
 
 @dataclass(frozen=True)
@@ -311,7 +311,7 @@ def _found(model: CompiledModel, fit: Fit) -> bool:
 
 def _determined(model: CompiledModel, fit: Fit, found: Uncertainty) -> bool:
     """Whether every parameter has a value, within its range, or may be 0."""
-    return bool(attempted(lambda: verdict.is_known(model, fit, found.se)))
+    return bool(attempted(lambda: verdict.is_known(model, fit, *near_zero(fit, found.se))))
 
 
 def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float]) -> list[Float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
@@ -16,7 +17,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import UNKNOWN, Parameters
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit, Moments, gauss_newton, inverse, normal
-from pvid.oracle.weak.zero import near_zero, upper_bound
+from pvid.oracle.weak.zero import upper_bound
 
 Name = Literal[
     "not_identified",
@@ -176,9 +177,13 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
     return [replace(one, status="not_identified") for one in out]  # all at 0: the equations do not describe the run
 
 
-def is_known(model: CompiledModel, fit: Fit, se: Float) -> bool:
-    """Whether every parameter has a value within its range that means something, or may be 0."""
-    small, se = near_zero(fit, se)
+def is_known(model: CompiledModel, fit: Fit, small: npt.NDArray[np.bool_], se: Float) -> bool:
+    """Whether every parameter has a value within its range that means something, or may be 0.
+
+    Parameters
+    ----------
+    small, se : as `near_zero` gives them
+    """
     missing = [one.status == "not_identified" for one in judged(model, fit, se)]
     outside = of_range(model, np.where(small, fit.parameters.guess, fit.p))
     return not outside and not np.any(missing & ~small)
