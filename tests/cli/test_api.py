@@ -50,10 +50,10 @@ def test_data_that_say_nothing_have_an_answer_without_parameters() -> None:
 @pytest.mark.parametrize(
     ("data", "keys", "sentence"),
     [
-        (3, {"l1": 0.3}, "a path, a data frame or a mapping of arrays is wanted, not int"),
+        (3, {"l1": 0.3}, "data: a path, a data frame, a structured array or a mapping of arrays is wanted, not int"),
         ({"t": [0, 1], "phi": [0, 1]}, {"l1": 0.3}, "no column y"),
         ({"t": [0, 1], "phi": [0, 1], "y": [0, 1]}, {}, "--set l1"),
-        ({"t": [0, 1], "phi": ["a", "b"], "y": [0, 1]}, {"l1": 0.3}, "column phi: real numbers are wanted"),
+        ({"t": [0, 1], "phi": ["a", "b"], "y": [0, 1]}, {"l1": 0.3}, "row 1, column phi: 'a' is not a number"),
         ({"t": np.arange(9) / 1e3, "phi": np.zeros(8), "y": np.zeros(9)}, {"l1": 0.3}, "have"),
         ("nowhere.csv", {"l1": 0.3}, "nowhere.csv does not exist"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -136,8 +137,6 @@ BAD_RUNS = {
     + "".join(f"{k / 1000},0.1,0\n" for k in range(400))
     + "0.4,fast,0\n" * 40
     + "0.44,0,0",
-    "gap": "t,phi,y\n" + "".join(f"{(k + (k > 200) * 500) / 1000},0.1,0\n" for k in range(400)),
-    "clock runs back": "t,phi,y\n" + "".join(f"{k % 200 / 1000},0.1,0\n" for k in range(400)),
     "too short": "t,phi,y\n0,0.1,0\n0.001,0.1,0\n0.002,0.1,0\n",
 }
 
@@ -152,6 +151,16 @@ def test_a_bad_run_is_one_sentence_and_exit_code_2(case: str, place: Path, tmp_p
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
     assert "bad.csv" in done.stderr or case == "too short"
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("break_", [lambda k: k + (k > 200) * 500, lambda k: k % 200], ids=["gap", "clock runs back"])
+def test_a_run_of_two_segments_is_read_and_its_fault_is_named(
+    break_: Callable[[int], int], place: Path, tmp_path: Path
+) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text("t,phi,y\n" + "".join(f"{break_(k) / 1000},0.1,0\n" for k in range(400)), encoding="utf-8")
+    done = pvid(tmp_path, "identify", bad, "--rig", place / "run.toml", "--form", "strong")
+    assert done.returncode == 3 and "phi does not move" in done.stderr and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -131,6 +131,7 @@ def test_identify_lists_the_parts_of_the_standard_errors(tmp_path: Path) -> None
     g = answer["parameters"]["g"]
     assert g["se_y_gain"] == pytest.approx(0.01 * g["value"], rel=1e-6)
     assert g["se"] == pytest.approx(np.sqrt(g["se_noise"] ** 2 + g["se_y_gain"] ** 2 + g["se_l1"] ** 2), rel=1e-9)
+    (tmp_path / "run.toml").unlink()
     RigFile.standard().write(tmp_path / "run.toml")
     told = CliRunner().invoke(commands, arguments, standalone_mode=False)
     assert "the gain of y and l1 count as exact" in told.output

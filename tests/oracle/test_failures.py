@@ -15,6 +15,7 @@ from pvid.model.description import Model
 from pvid.oracle.weak import identify as module
 from pvid.oracle.weak import solve
 from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.identify import Identified, identify, ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import DivergedError, batch
@@ -100,7 +101,7 @@ def test_a_fit_that_runs_away_is_not_identified_with_its_reason(monkeypatch: pyt
 
 
 def test_weights_without_a_fixed_point_leave_the_answer_of_the_sensors_weights(monkeypatch: pytest.MonkeyPatch) -> None:
-    plain = module.gated
+    plain = gated
 
     def unsettled(rows: WeakRows, start: Float | None, equation_error: bool, *rest: Any) -> solve.Fit:
         fit = plain(rows, start, equation_error, *rest)

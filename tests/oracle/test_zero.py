@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ DESIGN = WeakDesign(RATE, 1.0, 12)
 M, C, K = 1.3, 1.7, 82.0
 
 
-def cart(more: Callable[..., object] | None = None, **m: float) -> CompiledModel:
+def cart(more: Callable[..., object] | None = None, **m: Any) -> CompiledModel:
     """m x'' + c x' + k x = F, and what a test adds."""
     model = Model("cart")
     x = model.sensor("x", "m", resolution=1e-6)
@@ -122,7 +123,7 @@ def test_the_search_stays_between_low_and_high(bounds: dict[str, float], at: flo
     assert found.judged[0].status == "not_identified" and "bound" in (found.judged[0].reason or "")
 
 
-def _with_guess(bounds: dict[str, float]) -> CompiledModel:
+def _with_guess(bounds: dict[str, Any]) -> CompiledModel:
     model = Model("cart")
     x = model.sensor("x", "m", resolution=1e-6)
     force = model.input("F", "N", hold="zoh", gain_sd=0.0)

@@ -65,12 +65,12 @@ static void start_again(void)
     memcpy(own.term, kapitza_term, sizeof own.term);
     memcpy(own.kind, kapitza_kind, sizeof own.kind);
     memcpy(own.full_scale, kapitza_full_scale_q31, sizeof own.full_scale);
-    memcpy(own.down, kapitza_down, sizeof own.down);
-    memcpy(own.filter, kapitza_filter, sizeof own.filter);
-    memcpy(own.integral, kapitza_integral, sizeof own.integral);
-    memcpy(own.format, kapitza_format, sizeof own.format);
-    memcpy(own.factor, kapitza_factor, sizeof own.factor);
-    memcpy(own.noise, kapitza_noise, sizeof own.noise);
+    memcpy(own.down, kapitza_down_q31, sizeof own.down);
+    memcpy(own.filter, kapitza_filter_q31, sizeof own.filter);
+    memcpy(own.integral, kapitza_integral_q31, sizeof own.integral);
+    memcpy(own.format, kapitza_format_q31, sizeof own.format);
+    memcpy(own.factor, kapitza_factor_q31, sizeof own.factor);
+    memcpy(own.noise, kapitza_noise_q31, sizeof own.noise);
     own.run[0].multiplier = 1;
     point_at_own();
     design.full_scale = own.full_scale;

@@ -20,6 +20,7 @@ from pvid.base.errors import PvidError
 from pvid.base.replacing import replacing
 from pvid.models.mechanisms import compiled_of
 from pvid.models.model import Channel
+from pvid.models.registry import asked_for
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.rows import Compiled, WeakRows
@@ -210,7 +211,7 @@ def outcome(title: str, model_name: str, own: str, other: str) -> Outcome:
     Rows have the weights of the sensors' noise alone: what the model lacks is an error of the voltage, not of the
     equation that is left when the hidden voltages are eliminated.
     """
-    model = compiled_of(model_name)
+    model = compiled_of(asked_for(model_name))
     run = recorded(own)
     fit = batch(WeakRows.of(Compiled(model), run.signals, DESIGN), equation_error=False)
     se = uncertainty(fit).se

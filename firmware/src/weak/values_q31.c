@@ -94,7 +94,7 @@ static void take_newest(pvid_weak_values_q31 *self, const pvid_weak_design_q31 *
                         const int32_t newest[])
 {
     const pvid_weak_model_q31 *model = design->model;
-    if (!self->ran && (PVID_COUNT(PVID_EXACT_RUNS, model->runs) > 0u)) {
+    if (!self->ran && (PVID_COUNT(PVID_EXACT_RUNS, model->runs) > 0u) && (model->prepare != NULL)) {
         end_lead(self, design, jet, newest);
     }
     for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_RUNS, model->runs); i++) {

@@ -173,7 +173,7 @@ bool pvid_weak_step_take_f32(pvid_weak_history_f32 *self, const pvid_weak_design
             model->form(now, self->integral, dt * (float)index, channel);
         }
         move_runs(self, runs, 0.5f * dt, arguments);
-    } else if ((runs > 0u) && !self->ran) {
+    } else if ((runs > 0u) && !self->ran && (model->prepare != NULL)) {
         end_lead(self, model, dt, newest, arguments, before);
     } else {
         /* a gap: the runs stay */

@@ -352,7 +352,8 @@ def of_sensors(model: CompiledModel, error: SensorError | None, se: Float) -> li
     """An error explains the residuals."""
     if error is None:
         return []
-    names = [model.p_names[k] for k in np.argsort(-np.abs(error.shift) / se) if abs(error.shift[k]) > _MOVES * se[k]]
+    order = np.argsort(-np.abs(error.shift) / se)
+    names = [model.p_names[k] for k in order if k == order[0] or abs(error.shift[k]) > _MOVES * se[k]]
     if error.kind == "unknown":
         return [Reason("unexplained", f"{error.text[0].upper()}{error.text[1:]}. It may bias {listed(names)}.")]
     sure = f"{error.certainty:.0f} standard errors from 0"

@@ -72,6 +72,7 @@ _RAN_AWAY = (
     "the search for the parameters ran away: the equations may not describe this run, or a signal may have another "
     "unit, sign or name"
 )
+_UNSETTLED = "the iteration for the parameters did not converge"
 
 
 @dataclass(frozen=True)
@@ -172,9 +173,12 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
             out.append(Judged("near_zero", f"{one.name} is below {with_unit(below, one.unit, 2)} with 95 %", below))
         else:
             out.append(Judged())
-    if any(one.status == "identified" for one in out):
-        return out
-    return [replace(one, status="not_identified") for one in out]  # all at 0: the equations do not describe the run
+    known = [one.status == "identified" for one in out]
+    if not any(known):  # all at 0: the equations do not describe the run
+        return [replace(one, status="not_identified") for one in out]
+    if not fit.settled and any(one.status == "not_identified" for one in out):  # what wanders moves the others
+        return [replace(one, status="not_identified", reason=one.reason or _UNSETTLED) for one in out]
+    return out
 
 
 def is_known(model: CompiledModel, fit: Fit, small: npt.NDArray[np.bool_], se: Float) -> bool:

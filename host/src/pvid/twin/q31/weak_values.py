@@ -53,7 +53,8 @@ def _before(jets: Int, rates: Int, design: WeakDesignQ31, early: Int | None, lea
     orders = np.array([one.order for one in model.jet])
     plain, within = model.prepare(np.where(orders[:, np.newaxis] == 0, jets[:, :1], 0))
     known = (lead > 0) & within & (plain[: model.runs] == rates[:, :1])
-    return np.where(known, found @ weights[:, np.newaxis] + rates[:, :1], held)
+    begun: Int = np.where(known, found @ weights[:, np.newaxis] + rates[:, :1], held)
+    return begun
 
 
 def steps(jets: Int, design: WeakDesignQ31, runs: Int, early: Int | None = None, lead: int = 0) -> Steps:
