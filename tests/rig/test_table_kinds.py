@@ -21,7 +21,11 @@ import pyarrow.feather
 import pyarrow.parquet
 import pytest
 import scipy.io
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
 from mcap.writer import Writer
+from mcap_protobuf.writer import Writer as ProtobufWriter
 from mcap_ros2.writer import Writer as Ros2Writer
 
 from pvid.api.identify import _named
@@ -298,6 +302,28 @@ def test_messages_of_ros_2(tmp_path: Path) -> None:
             message = {"stamp": stamp, "effort": [f, 0.0], "x": x, "name": "a"}
             writer.write_message("/state", schema, message, at, at)
         writer.finish()  # type: ignore[no-untyped-call]
+    assert_same(read_recording(path, columns=columns("t=stamp,F=effort[0]")))
+    assert_same(read_recording(path, columns=columns("F=effort[0]")))
+
+
+def test_messages_of_protobuf_are_rows(tmp_path: Path) -> None:
+    """A message within a message, and a stamp of its own; the type is made here, as a logger's schema is."""
+    file = FileDescriptorProto(name="state.proto", package="lab", syntax="proto3")
+    stamp = file.message_type.add(name="Stamp")
+    stamp.field.add(name="seconds", number=1, type=FieldDescriptorProto.TYPE_INT64, label=1)
+    stamp.field.add(name="nanos", number=2, type=FieldDescriptorProto.TYPE_INT32, label=1)
+    state = file.message_type.add(name="State")
+    state.field.add(name="stamp", number=1, type=FieldDescriptorProto.TYPE_MESSAGE, type_name=".lab.Stamp", label=1)
+    state.field.add(name="x", number=2, type=FieldDescriptorProto.TYPE_DOUBLE, label=1)
+    state.field.add(name="effort", number=3, type=FieldDescriptorProto.TYPE_DOUBLE, label=3)
+    pool = DescriptorPool()
+    pool.Add(file)
+    kind = GetMessageClass(pool.FindMessageTypeByName("lab.State"))
+    path = tmp_path / "lab.mcap"
+    with path.open("wb") as target, ProtobufWriter(target) as writer:
+        for at, f, x in zip(AT, F.tolist(), X.tolist(), strict=True):
+            message = kind(stamp={"seconds": at // 10**9, "nanos": at % 10**9}, x=x, effort=[f, 0.0])
+            writer.write_message("/state", message, log_time=at, publish_time=at)
     assert_same(read_recording(path, columns=columns("t=stamp,F=effort[0]")))
     assert_same(read_recording(path, columns=columns("F=effort[0]")))
 

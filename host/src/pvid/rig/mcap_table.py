@@ -102,11 +102,11 @@ def _fields(content: Any, front: str) -> Iterator[tuple[str, Number]]:
     if isinstance(content, bool | int | float):
         yield front, float(content)
         return
-    if isinstance(content, list | tuple | np.ndarray):
+    if isinstance(content, str | bytes) or content is None:
+        return
+    if isinstance(content, Sequence | np.ndarray):
         for k, one in enumerate(content[:_LONGEST_LIST]):
             yield from _fields(one, f"{front}[{k}]")
-        return
-    if isinstance(content, str | bytes) or content is None:
         return
     named = content if isinstance(content, dict) else _members(content)
     for whole, part in _STAMPS:
