@@ -32,7 +32,7 @@ SLOW = (
     *("bench/accidents", "run/own_mechanisms", "twin/bits", "bench/hard", "twin/trust_q31", "twin/kinds_q31"),
     *("core/sizes_agree", "board/mechanism_board", "codegen/generated_q31", "sim/pendulum", "twin/compare"),
     *("board/port", "codegen/generated_f32", "cli/readme", "core/read_while_stepping", "log/export"),
-    *("codegen/strong_model", "log/untrusted", "board/field", "twin/weak_rows_q31", "oracle/sensor_errors"),
+    *("codegen/strong_model", "log/untrusted", "board/field", "twin/weak_rows_q31", "oracle/missing"),
     *("core/bad_config", "model/elimination", "oracle/weak_identify", "link/link", "bench/campaign_judge"),
     *("core/dead_zone", "twin/weak_sums_q31", "oracle/weak_choice", "codegen/weak_c", "oracle/oracle"),
     *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/mechanism_demo", "bench/model_boards"),

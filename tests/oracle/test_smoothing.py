@@ -20,5 +20,5 @@ def test_derivative_that_is_smoothed_too_long_is_named() -> None:
     )
     assert right.verdict.status == "good"
     assert np.all(np.abs(right.p - simulation.truth) < 4 * right.se)
-    assert np.any(np.abs(blurred.p - simulation.truth) > 10 * blurred.se)
+    assert np.any(np.abs(blurred.p - simulation.truth) > 10 * blurred.clustered)
     assert "smoothing" in [one.name for one in blurred.verdict.reasons if one.alarm]

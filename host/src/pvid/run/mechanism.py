@@ -196,7 +196,7 @@ def noise_of(model: CompiledModel, found: Identified) -> Float:
 def gains_of(model: CompiledModel, found: Identified) -> Float:
     """What p is off by for one standard deviation of each gain and constant that has any, and of what linearised
     equations neglect [gains, n_p]."""
-    return np.array([*given(model, found.by_gain, found.by_known), found.by_neglect])
+    return np.array([*given(model, found.by_gain, found.by_known), found.by_model, found.by_neglect])
 
 
 def refined_gains_of(model: CompiledModel, found: Identified) -> Float:

@@ -22,9 +22,11 @@ from pvid.oracle.weak.failures import FAILURES, Found, attempted
 from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
+from pvid.oracle.weak.library import Library
+from pvid.oracle.weak.missing import Missing, of_missing
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
-from pvid.oracle.weak.samples import follows, of_samples
-from pvid.oracle.weak.sensor_errors import SensorError, SensorErrors, of_scale, of_sensors
+from pvid.oracle.weak.samples import explains, of_samples
+from pvid.oracle.weak.scale import of_scale
 from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
 from pvid.oracle.weak.verdict import Halves, Judged, Reason, Verdict
 from pvid.oracle.weak.weights import Weights, as_white_force
@@ -43,7 +45,8 @@ class Identified:
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
     by_known : of each constant with a standard deviation, what p is off by over the constant's error [n_p]
     by_neglect : what p may be off by because equations are linearised [n_p]
-    sensor_error : the systematic error of a sensor that explains residuals; None: there is none
+    by_model : what p may be off by because the equations lack something, or a signal is not what was recorded [n_p]
+    lacking : what the equations seem to lack; None: the numbers of the test ran away
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     covariance : of p, that of `predicted` [n_p, n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
@@ -80,7 +83,8 @@ class Identified:
     by_gain: dict[str, Float]
     by_known: dict[str, Float]
     by_neglect: Float
-    sensor_error: SensorError | None
+    by_model: Float
+    lacking: Missing | None
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
@@ -162,11 +166,10 @@ def identify(
     found = attempted(lambda: uncertainty(fit)) or Uncertainty.unbounded(fit)
     attempt = _Attempts()
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
-    sensors = attempt("errors of the sensors", lambda: SensorErrors(run, used, fit))
-    error = None if sensors is None else attempt("errors of the sensors", lambda: sensors.found(found.se))
     white = attempt("a white force as the error of the equations", lambda: as_white_force(fit))
+    library = Library(run, used, fit)
     by_gain = {
-        one.name: _or_nan(fit, None if sensors is None else partial(sensors.by_gain, one))
+        one.name: _or_nan(fit, partial(library.by_gain, one.name))
         for one in compiled.signals
         if one.gain_sd > 0 or one.unit != "rad"
     }
@@ -183,10 +186,13 @@ def identify(
     se = np.sqrt(np.sum(np.square(parts), axis=0))
     judged = tuple(verdict.judged(compiled, fit, se))
     reasons = verdict.of_parameters(compiled, fit, se, judged, found.r2)
+    lacking = None if fit.diverged else attempt("what is missing", lambda: Missing.of(library, se))
+    by_model = np.zeros(len(se)) if lacking is None else lacking.error
+    se = np.hypot(se, by_model)
     if not fit.diverged:
         reasons += attempt.reasons(_checks(rows, run, fit, found, halves, judged, with_error))
-        if error is not None and not follows(error, reasons, sample_rate):
-            reasons += of_sensors(compiled, error, found.se)
+        if lacking is not None and lacking.visible.any() and not explains(reasons, lacking.there[0], sample_rate):
+            reasons += attempt("what is missing", lambda: of_missing(library, lacking)) or []
         reasons += of_scale(compiled, by_gain, fit.p, found.se)
         reasons += attempt.failed
         if with_error and not weighted_anew:
@@ -213,7 +219,8 @@ def identify(
         by_gain=by_gain,
         by_known=by_known,
         by_neglect=by_neglect,
-        sensor_error=error,
+        by_model=by_model,
+        lacking=lacking,
     )
 
 
@@ -297,9 +304,9 @@ def _checks(
     }
 
 
-def _or_nan(fit: Fit, computation: Callable[[], Float] | None) -> Float:
-    """What is computed [n_p]; NaN where it cannot be, or its numbers ran away."""
-    found = None if computation is None else attempted(computation)
+def _or_nan(fit: Fit, computation: Callable[[], Float]) -> Float:
+    """What is computed [n_p]; NaN where its numbers ran away."""
+    found = attempted(computation)
     return np.full(len(fit.p), np.nan) if found is None else found
 
 

@@ -14,8 +14,8 @@ from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.signals import Jet, order_of
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.sensor_errors import SensorError
 from pvid.oracle.weak.solve import Fit
+from pvid.oracle.weak.terms import Act, Candidate
 from pvid.oracle.weak.verdict import Reason
 from pvid.sim.motion import motion_of
 
@@ -55,12 +55,14 @@ def of_samples(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_ra
     return out + far_guesses(model, fit)
 
 
-def follows(error: SensorError, reasons: Iterable[Reason], sample_rate: float) -> bool:
-    """Whether what looks like an error of a sensor is but a consequence of another reason: of samples that clip, or of
-    a rate that is too low, where the motion within a sample looks like a delay of a part of it."""
+def explains(reasons: Iterable[Reason], best: Candidate, sample_rate: float) -> bool:
+    """Whether samples that clip, or a rate that is too low, are the cause of the best candidate: the motion within a
+    sample looks like a delay of a part of it, or like any law, but not like a longer delay."""
     names = {one.name for one in reasons}
-    part = error.kind == "unknown" or error.kind == "delay" and abs(error.size) < _PART_OF_SAMPLE / sample_rate
-    return "clipped" in names or "rate" in names and part
+    late = (
+        isinstance(best.kind, Act) and best.kind.measure == "time" and abs(best.number) >= _PART_OF_SAMPLE / sample_rate
+    )
+    return "clipped" in names or "rate" in names and not late
 
 
 def clipped(model: CompiledModel, signal: Signal, samples: Mapping[str, Float]) -> list[Reason]:

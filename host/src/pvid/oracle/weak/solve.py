@@ -263,6 +263,28 @@ def _passes(rows: WeakRows, start: Float | None, equation_error: bool, compensat
     yield Fit(p, rows, white, errors, begun, settled)
 
 
+def resumed(rows: WeakRows, fit: Fit, passes: int) -> Fit:
+    """The estimate from other rows of the same windows, from where a fit came to rest: the errors of the equations keep
+    their orders.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError, FloatingPointError
+        When the numbers run away.
+    """
+    parameters, p, errors = rows.compiled.parameters, fit.p, fit.errors
+    prior = parameters.prior(fit.start)
+    for turn in range(passes + 1):
+        theta = parameters.theta(p)
+        errors = [sharpened(rows, k, theta, one, 1) if one.variance else one for k, one in enumerate(errors)]
+        white = [rows.white(group, theta, errors) for group in rows.groups]
+        if turn < passes:
+            p, _ = gauss_newton(parameters, compensated(rows, white, theta), p, prior, 3)
+    if not np.isfinite(p).all():
+        raise FloatingPointError
+    return Fit(p, rows, white, errors, fit.start, settled=True)
+
+
 def compensated(rows: WeakRows, white: list[WhiteRows], theta: Sequence[Float]) -> Moments:
     """Moments with what noise in the regressors takes from B put back: 1/2 d log det R / d theta, of all windows.
 

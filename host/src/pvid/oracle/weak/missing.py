@@ -1,0 +1,305 @@
+"""What do the equations lack, which parameters are off without it, and is that inside their standard errors?
+
+The largest shift of the plausible candidates is the model's part of the standard errors. An answer is to be doubted
+where that part is larger than all others and visible: relevance, not significance, and no constant on chi^2.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.base.rounding import percent
+from pvid.base.wording import listed, with_unit
+from pvid.model.compiled import CompiledModel
+from pvid.model.signals import total_derivative
+from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.library import Library
+from pvid.oracle.weak.scores import FOLDS, Scores
+from pvid.oracle.weak.solve import Fit, resumed, unlikely
+from pvid.oracle.weak.terms import CONSTANT, SOFT, UNUSUAL, Act, Candidate, Law
+from pvid.oracle.weak.verdict import Name, Reason
+
+# A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
+# 0.05, and with 0.3 to 0.8 of the best.
+_CERTAIN = 6.0  # |size| over its standard error
+_SHARE = 0.01  # of the residuals' energy on unseen windows
+_PLAUSIBLE = 0.5  # of the best candidate's share: what may be meant as well
+
+_MOVES = 2.0  # standard errors
+_VISIBLE = 0.01  # of the value
+
+# Terms are named by fits with them.
+_MOST_TERMS = 3
+_FAMILIES = 4  # that are fitted for each
+_TRIED = 0.3  # of the best share
+_DISTINCT = 0.01  # of a column's square, that is its own: a term with less is the parameters in another guise
+_RIVAL = 0.9  # of the best gain of likelihood
+_NOISE = 2.0  # chi^2 that is the sensors'
+_ALL, _MOST = 0.95, 0.5  # of the residuals beyond it
+_ROUNDS = 6  # of a size
+_SETTLED = 0.01  # of a size
+_FACTORS, _STEPS = (1.25, 1.08, 1.025), 4  # of a level, as often as it gets better
+_PASSES = 3  # of whitening in a fit that begins near its end
+
+
+@dataclass(frozen=True)
+class Missing:
+    """The meaning of scored candidates for an estimate.
+
+    Attributes
+    ----------
+    there : candidates that count, that of the largest share first
+    error : the model's part of the standard errors: largest shift of the plausible ones [n_p]
+    visible : parameters that it moves by more than their standard errors cover and by more than is tolerated [n_p]
+    """
+
+    there: tuple[Candidate, ...]
+    error: Float
+    visible: npt.NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, library: Library, se: Float, fit: Fit | None = None) -> Missing:
+        """For the estimate of a library, with standard errors se [n_p], or for one with terms that were added.
+
+        What is left of such a term goes to the terms of which p explains most: those count no more.
+        """
+        scores = library.scores if fit is None else Scores(fit)
+        scored, p = scores.of(library.candidates), scores.fit.p
+        there = tuple(
+            one
+            for one in scored
+            if one.certainty > _CERTAIN and one.share > _SHARE and one.folds >= FOLDS - 1
+            if fit is None or one.own > _DISTINCT
+        )
+        shifts = [np.abs(one.shift) for one in there if one.share >= _PLAUSIBLE * there[0].share]
+        error = np.max(shifts, axis=0) if shifts else np.zeros(len(p))
+        return cls(there, error, (error > _MOVES * se) & (error > _VISIBLE * np.abs(p)))
+
+    def families(self) -> list[Candidate]:
+        """The best of each family that may be meant."""
+        best: dict[tuple[str, str, str], Candidate] = {}
+        for one in self.there:
+            best_share = self.there[0].share
+            if one.share >= _TRIED * best_share and (one.own > _DISTINCT or one.share == best_share):
+                best.setdefault(one.family, one)
+        return list(best.values())[:_FAMILIES]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A term in place of what was unexplained.
+
+    Attributes
+    ----------
+    chosen : with the size, or the level, of most likelihood
+    rivals : of other families, that explain about as much
+    """
+
+    chosen: Candidate
+    rivals: tuple[Candidate, ...]
+
+
+@dataclass(frozen=True)
+class Explained:
+    """Terms that were added one after the other.
+
+    Attributes
+    ----------
+    named : in this order
+    fit : with all of them
+    share : of the residuals beyond the sensors' noise, that they remove
+    complete : what is left of them moves no parameter by what is visible, or is next to nothing
+    """
+
+    named: tuple[Named, ...]
+    fit: Fit
+    share: float
+    complete: bool
+
+
+def explained(library: Library, found: Missing) -> Explained:
+    """The terms that are missing, the likeliest first.
+
+    What scored best to first order has the weights of a model that lacks it: several families are fitted anew, and the
+    likelihood of the residuals with weights of their own decides between them.
+    """
+    fit, named, share, complete = library.fit, list[Named](), 0.0, False
+    excess = chi2_of_sensors(fit) - 1
+    while len(named) < _MOST_TERMS and not complete:
+        before = unlikelihood(fit)
+        tried = [_refitted(library, fit, one) for one in found.families()]
+        gains = [(before - unlikelihood(with_it), one, with_it) for one, with_it in filter(None, tried)]
+        gains = sorted((one for one in gains if one[0] > 0), key=lambda one: -one[0])
+        if not gains:
+            break
+        alike = [one for one in gains if one[0] > _RIVAL * gains[0][0]]
+        best = min(alike, key=lambda one: _word(one[1]) in UNUSUAL)
+        named.append(Named(best[1], tuple(one[1] for one in alike if one is not best)))
+        fit = best[2]
+        found = Missing.of(library, uncertainty(fit).se, fit)
+        left = chi2_of_sensors(fit)
+        share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
+        complete = left < _NOISE or share > _ALL or share > _MOST and not found.visible.any()
+    return Explained(tuple(named), fit, share, complete)
+
+
+def _word(one: Candidate) -> str:
+    return one.kind.words[one.number < 0] if isinstance(one.kind, Act) else ""
+
+
+def unlikelihood(fit: Fit) -> float:
+    """Minus twice the logarithm of the likelihood of all residuals, but for a constant."""
+    theta = fit.parameters.theta(fit.p)
+    return sum(unlikely(fit.rows, kind, theta, one) for kind, one in enumerate(fit.errors))
+
+
+def corrected(fit: Fit, term: Candidate) -> Fit:
+    """The fit with a term of its size, weights anew."""
+    rows, theta = copy.copy(fit.rows), fit.parameters.theta(fit.p)
+    rows.columns = [one.copy() for one in rows.columns]
+    for own, moved, th in zip(rows.columns, term.change(theta), theta, strict=True):
+        own[:, len(th)] -= term.size * moved
+    return resumed(rows, fit, _PASSES)
+
+
+def _refitted(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit] | None:
+    """A candidate with the size or level of most likelihood, and the fit with it; None: it leads nowhere."""
+    if isinstance(one.kind, Act) and one.kind.exact:
+        one = replace(one, kind=one.kind.exact, level=one.size, size=1.0)
+    try:
+        with_it = _leveled(library, fit, one) if one.leveled else _sized(fit, one)
+    except (np.linalg.LinAlgError, ArithmeticError, PvidError):
+        return None
+    return with_it if with_it is None or np.isfinite(unlikelihood(with_it[1])) else None
+
+
+def _sized(fit: Fit, one: Candidate) -> tuple[Candidate, Fit] | None:
+    with_it = fit
+    for _ in range(_ROUNDS):
+        with_it = corrected(replace(fit, p=with_it.p), one)
+        more = Scores(with_it).of([one])[0].size
+        one = replace(one, size=one.size + more)
+        if abs(one.size) > one.most:
+            return None
+        if abs(more) < _SETTLED * abs(one.size):
+            break
+    return one, with_it
+
+
+def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit]:
+    assert isinstance(one.kind, Act)
+    act, recorded = one.kind, library.recorded(one.signal)
+
+    def at(level: float) -> tuple[float, Candidate, Fit]:
+        own = replace(one, level=level, size=1.0, change=library.act(recorded, act, level).change)
+        with_it = corrected(fit, own)
+        return unlikelihood(with_it), own, with_it
+
+    best = at(one.level)
+    for factor in _FACTORS:
+        for step in (factor, 1 / factor):
+            for _ in range(_STEPS):
+                other = at(best[1].level * step)
+                if not other[0] < best[0]:
+                    break
+                best = other
+    return best[1], best[2]
+
+
+def of_missing(library: Library, found: Missing) -> list[Reason]:
+    """The doubt about an estimate and its cause; "unknown" where no cause explains it."""
+    if not found.visible.any():
+        return []
+    model, p, explained_by = library.model, library.fit.p, explained(library, found)
+    scale = {row.name: scale_of(model, kind, p) for kind, row in enumerate(model.rows)}
+    worst = [k for k in np.argsort(-found.error / np.maximum(np.abs(p), 1e-300)) if found.visible[k]]
+    if not explained_by.complete:
+        biased = listed(f"{model.p_names[k]} by {percent(found.error[k] / max(abs(p[k]), 1e-300))}" for k in worst)
+        text = f"The equations lack something, or a signal is not what was recorded: it may bias {biased}. "
+        text += "The cause is unknown: "
+        if not explained_by.named:
+            return [Reason("missing", text + "no term that was tried explains it.")]
+        best = listed(in_words(model, one.chosen, scale) for one in explained_by.named)
+        text += f"of what was tried most is explained by this, {percent(explained_by.share)}: {best}."
+        return [Reason("missing", text)]
+    causes = listed(in_words(model, one.chosen, scale) for one in explained_by.named)
+    if not isinstance(explained_by.named[0].chosen.kind, Act):  # a signal's name keeps its letters
+        causes = causes[0].upper() + causes[1:]
+    now = explained_by.fit.p
+    moved = [k for k in worst if abs(now[k] - p[k]) > _VISIBLE / 2 * abs(p[k])] or worst[:1]
+    values = listed(
+        f"{model.p_names[k]} would be {with_unit(now[k], model.unknowns[k].unit, 4)} in place of {p[k]:.4g}"
+        for k in moved
+    )
+    text = f"{causes}: with that {values}."
+    rivals = [in_words(model, one, scale) for one in explained_by.named[0].rivals]
+    if rivals:
+        text += f" The run does not distinguish it from these: {listed(rivals, 'or')}."
+    return [Reason(_name_of(explained_by.named[0].chosen), text)]
+
+
+def _name_of(one: Candidate) -> Name:
+    if isinstance(one.kind, Act):
+        return "sensor"
+    return "friction" if one.kind is SOFT or one.kind.text.startswith("sgn({x}.d())") else "missing"
+
+
+def in_words(model: CompiledModel, one: Candidate, scale: Mapping[str, float | None]) -> str:
+    """A term, with its size.
+
+    Parameters
+    ----------
+    scale : of each row, see scale_of
+    """
+    kind = one.kind
+    if kind is SOFT:
+        return kind.text.format(x=one.signal, w=f"{one.level:.2g}")
+    if isinstance(kind, Law):
+        law = kind.text.format(x=one.signal, w=f"{one.level:.2g}")
+        factor = scale[one.where]
+        verb = "seem" if one.where.startswith("equations") else "seems"
+        if factor is None:
+            return f"{one.where} {verb} to lack a term in {law}"
+        size = f"{one.size / factor:.3g}"
+        return f"{one.where} {verb} to lack {f'a constant of {size}' if kind is CONSTANT else f'{size}*{law}'}"
+    signal = model.signal(one.signal)
+    amount = abs(one.number)
+    size = {
+        "signal": with_unit(amount, signal.unit, 3),
+        "time": with_unit(amount, "s", 2),
+        "part": f"{amount:.2g}",
+        "percent": percent(amount),
+    }[kind.measure]
+    text = kind.text.format(size=size, word=_word(one), u=one.signal, top=f"{one.top:.3g}")
+    return f"{one.signal} seems to be {text[3:]}" if text.startswith("is ") else f"{one.signal} {text}"
+
+
+def scale_of(model: CompiledModel, kind: int, p: Float) -> float | None:
+    """A row over the equation that the user wrote, at p; None where the row is no multiple of it."""
+    if len(model.rows) != len(model.equations):
+        return None
+    row, equation = model.rows[kind], model.equations[kind]
+    parts = [(theta, part) for theta, part in zip(row.theta, row.regressors, strict=True)] + [(-1, row.known)]
+    whole = sum(
+        sp.sympify(theta) * total_derivative(psi, order) for theta, part in parts for order, psi in part.items()
+    )
+    at_p = dict(zip(model.p, map(sp.Float, p), strict=True))
+    whole, equation = (model.with_knowns(sp.sympify(one)).xreplace(at_p) for one in (whole, equation))
+    symbols = sorted(whole.free_symbols | equation.free_symbols, key=str)
+    random = np.random.default_rng(1)
+    ratios = []
+    for _ in range(3):
+        at = {one: sp.Float(value) for one, value in zip(symbols, random.uniform(0.5, 1.5, len(symbols)), strict=True)}
+        try:
+            ratios.append(float(whole.xreplace(at)) / float(equation.xreplace(at)))
+        except (TypeError, ZeroDivisionError):
+            return None
+    return ratios[0] if np.allclose(ratios, ratios[0], rtol=1e-6) else None

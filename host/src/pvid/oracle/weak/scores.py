@@ -1,0 +1,136 @@
+"""How much of what is unexplained does a term explain, how large is it, and how far is p off without it?
+
+A term of size a adds a c to the whitened residual rows r. To first order at an estimate, with J the slopes of the rows
+in p and S their information,
+
+    rest = c - J S^-1 J^T c,    a = rest.r / rest.rest,    shift of p = -S^-1 J^T c a.
+
+What counts is the share of the residuals' energy that the term removes from windows that neither p nor a has seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pvid.oracle.weak.errors import clustered_variance
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.rows import WhiteRows
+from pvid.oracle.weak.solve import Fit, inverse
+from pvid.oracle.weak.terms import Candidate
+
+FOLDS = 4  # contiguous parts of a run: p and sizes from three, the share on the fourth
+
+# A column of which the parameters explain all but this part is theirs: no data show it.
+_OWN = 1e-4
+
+# What cancels the known side of the rows leaves 0 = 0, which every estimate explains.
+_CANCELS = 0.25
+
+# What replaces a signal as a whole has a column of size 1.
+_WHOLE = (0.4, 2.5)
+
+
+class Scores:
+    """Of one estimate."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit = fit
+        self.theta = fit.parameters.theta(fit.p)
+        self.slopes = np.concatenate(fit.designs(), axis=1)  # [windows, rows of all kinds, n_p]
+        self.residuals = np.concatenate(fit.residuals(), axis=1)
+        self.prior = np.diag(fit.parameters.prior(fit.start))
+        self.unit = fit.parameters.unit(fit.p)
+        self.inverse = inverse(np.einsum("wkp,wkq->pq", self.slopes, self.slopes) + self.prior)
+
+    def shift(self, one: Candidate) -> Float:
+        """What p moves by when a term of size 1 is added [n_p]."""
+        return np.asarray(-self.unit * (self.inverse @ np.einsum("wkp,wk->p", self.slopes, self.white(one))))
+
+    def white(self, one: Candidate) -> Float:
+        """Column of a candidate [windows, rows of all kinds]."""
+        return self.whitened(one.change(self.theta))
+
+    def whitened(self, change: Sequence[Float]) -> Float:
+        """Of the change of each kind's raw residuals [windows, K]."""
+        out = []
+        for white in self.fit.white:
+            own = np.concatenate([change[kind] for kind in white.kinds], axis=1)
+            out.append(self._without_nuisances(white, white.whitener.of(own[:, np.newaxis, :])[:, 0]))
+        return np.concatenate(out, axis=1)
+
+    def _without_nuisances(self, white: WhiteRows, rows: Float) -> Float:
+        nuisances = self.fit.rows.white_nuisances(white.kinds, white.whitener)
+        if not nuisances.shape[1]:
+            return rows
+        q = np.linalg.qr(nuisances.transpose(0, 2, 1))[0]
+        return np.asarray(rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows)))
+
+    def of(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """With their scores, that of the largest share first."""
+        r, slopes = self.residuals, self.slopes
+        windows = len(r)
+        c = np.stack([self.white(one) for one in candidates], axis=-1)
+        known = np.concatenate([one.known for one in self.fit.white], axis=1)
+        fold = np.minimum(np.arange(windows) * FOLDS // windows, FOLDS - 1)
+        parts = [np.flatnonzero(fold == part) for part in range(FOLDS)]
+        jj = np.array([_products(slopes[own], slopes[own]) for own in parts])
+        jc = np.array([_products(slopes[own], c[own]) for own in parts])
+        jr = np.array([_products(slopes[own], r[own][..., np.newaxis])[:, 0] for own in parts])
+        cc = np.array([np.einsum("wkc,wkc->c", c[own], c[own]) for own in parts])
+        cr = np.array([np.einsum("wkc,wk->c", c[own], r[own]) for own in parts])
+        rr = np.array([float(np.sum(r[own] ** 2)) for own in parts])
+
+        mix, step = self.inverse @ jc.sum(axis=0), self.inverse @ jr.sum(axis=0)
+        own = cc.sum(axis=0) - np.einsum("pc,pc->c", jc.sum(axis=0), mix)
+        part_of_its_own = own / np.maximum(cc.sum(axis=0), 1e-300)
+        real = part_of_its_own > _OWN
+        own = np.where(real, own, 1.0)
+        size = np.where(real, (cr.sum(axis=0) - jr.sum(axis=0) @ mix) / own, 0.0)
+        rest = c - slopes @ mix
+        moves = np.einsum("wkc,wk->wc", rest, r - slopes @ step) - size * np.einsum("wkc,wkc->wc", rest, rest)
+        error = np.sqrt(clustered_variance(moves, np.diag(1 / own)))
+        shift = -self.unit[:, np.newaxis] * mix * size
+
+        gains, before = np.zeros((FOLDS, len(candidates))), 0.0
+        for part in range(FOLDS):
+            b, mixed = jr.sum(axis=0) - jr[part], jc.sum(axis=0) - jc[part]
+            others = inverse(jj.sum(axis=0) - jj[part] + self.prior)
+            plain, turned = others @ b, others @ mixed
+            whole = cc.sum(axis=0) - cc[part] - np.einsum("pc,pc->c", mixed, turned)
+            found = (cr.sum(axis=0) - cr[part] - b @ turned) / np.where(whole > 0, whole, np.inf)
+            p = plain[:, np.newaxis] - turned * found
+            without = rr[part] - 2 * jr[part] @ plain + plain @ jj[part] @ plain
+            with_it = rr[part] - 2 * (jr[part] @ p + cr[part] * found) + np.einsum("pc,pq,qc->c", p, jj[part], p)
+            with_it += 2 * found * np.einsum("pc,pc->c", jc[part], p) + found**2 * cc[part]
+            gains[part], before = without - with_it, before + without
+        share = gains.sum(axis=0) / max(float(before), 1e-300)
+
+        after = np.sum(known**2) - 2 * size * np.einsum("wkc,wk->c", c, known) + size**2 * cc.sum(axis=0)
+        real &= after >= _CANCELS * np.sum(known**2)
+        for place, one in enumerate(candidates):
+            if one.leveled:
+                real[place] &= _WHOLE[0] < size[place] < _WHOLE[1]
+            else:
+                real[place] &= abs(size[place]) < one.most
+        certainty = np.where(real, np.abs(size) / np.maximum(error, 1e-300), 0.0)
+        out = [
+            replace(
+                one,
+                size=float(size[k]),
+                certainty=float(certainty[k]),
+                own=float(part_of_its_own[k]),
+                share=float(share[k]) if real[k] else 0.0,
+                folds=int(np.sum(gains[:, k] > 0)),
+                shift=shift[:, k],
+            )
+            for k, one in enumerate(candidates)
+        ]
+        return sorted(out, key=lambda one: -one.share)
+
+
+def _products(a: Float, b: Float) -> Float:
+    """Sum over windows and rows of a b^T: [windows, R, n], [windows, R, m] -> [n, m]."""
+    return np.asarray(a.reshape(-1, a.shape[-1]).T @ b.reshape(-1, b.shape[-1]))

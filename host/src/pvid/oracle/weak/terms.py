@@ -1,0 +1,353 @@
+"""What equations may lack and what signals may do otherwise than recorded: a table of candidate terms.
+
+A new candidate is one entry of one table. Each is one more column of the rows (`pvid.oracle.weak.library`), and is
+scored by what it explains (`pvid.oracle.weak.scores`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from scipy.signal import lfilter
+
+from pvid.model.compiled import Signal
+from pvid.oracle.weak.front import filtered, in_segments
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.polynomials import polynomial_weights
+from pvid.sim.imperfections import with_play
+
+_SMOOTHED = (21, 2)  # samples and degree, for the direction of a motion that has a play
+_TURNS = 2.0  # an angle that turns by less shows nothing that repeats with the turn [rad]
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law of one signal in an equation.
+
+    Attributes
+    ----------
+    text : as typed in a model file; {x} is the signal, {w} a number [unit of its rate]
+    of : values at the steps from the signal and its rate [n], and w; the law is their derivative of this order
+    order : see `of`; the test functions take the derivative
+    width : w over the root mean square of the rate; 0: the law has none
+    angle : of angles that turn alone
+    """
+
+    text: str
+    of: Callable[[Float, Float, float], Float]
+    order: int = 0
+    width: float = 0.0
+    angle: bool = False
+
+
+def _sign(x: Float) -> Float:
+    """sgn(x) [n]: around each sample the mean over straight lines to its neighbours, which change their signs between
+    samples."""
+    step = np.diff(x)
+    flat = np.abs(step) < 1e-12 * np.max(np.abs(x), initial=1e-300)
+    between = np.where(flat, np.sign(x[1:]), np.diff(np.abs(x)) / np.where(flat, 1.0, step))
+    return np.asarray((np.append(between[:1], between) + np.append(between, between[-1:])) / 2)
+
+
+def _stribeck(x: Float, v: Float, w: float) -> Float:
+    return np.asarray(np.sign(v) / (1 + (v / w) ** 2))
+
+
+_STRIBECK = "sgn({x}.d())/(1 + ({x}.d()/{w})**2)"
+
+CONSTANT = Law("1", lambda x, v, w: np.ones(x.shape))
+LAWS = (
+    Law("{x}", lambda x, v, w: x),
+    Law("abs({x})*{x}", lambda x, v, w: np.abs(x) * x),
+    Law("{x}**3", lambda x, v, w: x**3),
+    Law("sgn({x})", lambda x, v, w: _sign(x)),
+    Law("{x}**2*{x}.d()", lambda x, v, w: x**3 / 3, order=1),
+    Law("{x}.d()", lambda x, v, w: x, order=1),
+    Law("abs({x}.d())*{x}.d()", lambda x, v, w: np.abs(v) * v),
+    Law("{x}.d()**3", lambda x, v, w: v**3),
+    Law("sgn({x}.d())", lambda x, v, w: _sign(v)),
+    Law("abs({x}.d())", lambda x, v, w: np.abs(v)),
+    *(Law(_STRIBECK, _stribeck, width=width) for width in (0.03, 0.1, 0.3)),
+    Law("{x}.d(2)", lambda x, v, w: x, order=2),
+    Law("sin({x})", lambda x, v, w: np.sin(x), angle=True),
+    Law("cos({x})", lambda x, v, w: np.cos(x), angle=True),
+    Law("sin(2*{x})", lambda x, v, w: np.sin(2 * x), angle=True),
+    Law("cos(2*{x})", lambda x, v, w: np.cos(2 * x), angle=True),
+)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A signal as recorded: what an act starts from.
+
+    Attributes
+    ----------
+    signal : as described
+    values : samples [n]; NaN between segments
+    rate : of the samples [Hz]
+    window_s : of the design
+    top : largest magnitude
+    """
+
+    signal: Signal
+    values: Float
+    rate: float
+    window_s: float
+    top: float
+
+    def under(self, act: Act, level: float) -> Float:
+        """What an act gives [n], in each segment by itself."""
+        return in_segments(self.values, lambda x: act.of(replace(self, values=x), level))
+
+
+# What the number of a sentence is measured in.
+Measure = Literal["signal", "time", "part", "percent"]
+
+
+@dataclass(frozen=True)
+class Act:
+    """What a signal really did in place of what was recorded.
+
+    Attributes
+    ----------
+    text : in a sentence, after the signal's name; {size} is the number with its unit, {word} that of its sign, {u} the
+        signal, {top} its largest magnitude
+    of : true samples [n] at a level; without levels what is added to the recorded ones for size 1
+    measure : of the level, or of the size
+    words : of a size above and below 0
+    levels : from what was recorded those that are tried; the size of each is 1. None: the size is free
+    most : from what was recorded the largest believable size
+    applies : to what was recorded
+    exact : of a size that is not small: the same, as levels; `of` is its first order
+    """
+
+    text: str
+    of: Callable[[Recorded, float], Float]
+    measure: Measure
+    words: tuple[str, str] = ("", "")
+    levels: Callable[[Recorded], tuple[float, ...]] | None = None
+    most: Callable[[Recorded], float] = lambda _: np.inf
+    applies: Callable[[Recorded], bool] = lambda _: True
+    exact: Act | None = None
+
+    def tried(self, recorded: Recorded) -> tuple[float, ...]:
+        """Levels."""
+        return (0.0,) if self.levels is None else self.levels(recorded)
+
+
+def _lagged(of: Recorded, tau: float) -> Float:
+    """Behind a first-order lag with this time constant [s]."""
+    decay = float(np.exp(-1 / (tau * of.rate)))
+    return np.asarray(lfilter([1 - decay], [1, -decay], of.values, zi=[decay * of.values[0]])[0])
+
+
+def _shifted(of: Recorded, delay: float) -> Float:
+    """Without a delay of either sign [s]."""
+    place = np.arange(len(of.values), dtype=np.float64)
+    return np.interp(place + delay * of.rate, place, of.values)
+
+
+def _early(of: Recorded, _: float) -> Float:
+    """What is added to a signal that is recorded late by a second, to first order: 1 s of its rate."""
+    z = of.values
+    return np.asarray(np.concatenate([[0.0], (z[2:] - z[:-2]) / 2, [0.0]]) * of.rate)
+
+
+def _dead(of: Recorded, level: float) -> Float:
+    return np.asarray(np.sign(of.values) * np.maximum(np.abs(of.values) - level, 0))
+
+
+def _play(of: Recorded, _: float) -> Float:
+    """Less of the play of a sensor, for a width of one unit: half of it, by the direction of the motion."""
+    weights = polynomial_weights(*_SMOOTHED, 0)
+    smooth = filtered(of.values, weights) if len(of.values) >= len(weights) else of.values
+    width = 3.0 * of.signal.resolution
+    return np.asarray((smooth - with_play(smooth, width)) / width)
+
+
+def _parts(*parts: float) -> Callable[[Recorded], tuple[float, ...]]:
+    """Of the largest magnitude."""
+    return lambda of: tuple(one * of.top for one in parts)
+
+
+def _samples(*samples: float) -> Callable[[Recorded], tuple[float, ...]]:
+    return lambda of: tuple(one / of.rate for one in samples if abs(one) < _quarter(of) * of.rate)
+
+
+def _quarter(of: Recorded) -> float:
+    """Of a window: the longest time that is believed [s]."""
+    return 0.25 * of.window_s
+
+
+def _is_measured(of: Recorded) -> bool:
+    """A sensor of what the mechanism does."""
+    return of.signal.kind == "sensor" and not of.signal.driven
+
+
+def _is_sensor(of: Recorded) -> bool:
+    return of.signal.kind == "sensor"
+
+
+def _is_input(of: Recorded) -> bool:
+    return of.signal.kind == "input"
+
+
+def _is_stepped(of: Recorded) -> bool:
+    return _is_measured(of) and of.signal.resolution > 0
+
+
+def _is_turning(of: Recorded) -> bool:
+    return _is_stepped(of) and of.signal.unit == "rad" and float(np.nanmax(of.values) - np.nanmin(of.values)) > _TURNS
+
+
+def _resolutions(of: Recorded) -> float:
+    return 100 * of.signal.resolution
+
+
+GAIN = Act(
+    "is {size} {word} than recorded",
+    lambda of, _: of.values,
+    "percent",
+    ("larger", "smaller"),
+    most=lambda _: 0.2,
+    applies=_is_input,
+)
+
+_DELAY = Act("is {word} by {size}", _shifted, "time", ("delayed", "advanced"), levels=lambda _: (), applies=_is_sensor)
+_LATE = Act(
+    "acts {word} by {size}",
+    _shifted,
+    "time",
+    ("early", "late"),
+    levels=_samples(-1, -2, -4, -8, -16),
+    applies=_is_input,
+)
+UNUSUAL = ("advanced", "early")
+
+# Levels lie so close that the column of one fits its neighbours' with a size within 0.4 to 2.5.
+ACTS = (
+    Act(
+        "saturates at {size}",
+        lambda of, level: np.clip(of.values, -level, level),
+        "signal",
+        levels=_parts(0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93),
+        applies=_is_input,
+    ),
+    Act(
+        "has a dead band of {size}",
+        _dead,
+        "signal",
+        levels=_parts(0.006, 0.012, 0.025, 0.05, 0.1, 0.2),
+        applies=_is_input,
+    ),
+    Act("acts behind a lag of {size}", _lagged, "time", levels=_samples(0.5, 1, 2, 4, 8, 16), applies=_is_input),
+    _LATE,
+    *(replace(one, of=_early, levels=None, most=_quarter, exact=one) for one in (_DELAY, _LATE)),
+    Act(
+        "acts as {u}*(1 {word} {size}*abs({u})/{top})",
+        lambda of, _: of.values * np.abs(of.values) / of.top,
+        "part",
+        ("+", "-"),
+        most=lambda _: 0.6,
+        applies=_is_input,
+    ),
+    Act(
+        "acts as {u}*(1 {word} {size}*({u}/{top})**2)",
+        lambda of, _: of.values**3 / of.top**2,
+        "part",
+        ("+", "-"),
+        most=lambda _: 0.6,
+        applies=_is_input,
+    ),
+    Act(
+        "acts with {size}*sgn({u}) {word} than recorded",
+        lambda of, _: np.sign(of.values),
+        "signal",
+        ("more", "less"),
+        most=lambda of: 0.4 * of.top,
+        applies=_is_input,
+    ),
+    GAIN,
+    Act("has a backlash of {size}", _play, "signal", most=_resolutions, applies=_is_stepped),
+    *(
+        Act(
+            "has an eccentric encoder of amplitude {size}",
+            lambda of, _, turn=turn: np.sin(of.values + turn),  # type: ignore[misc]
+            "signal",
+            most=_resolutions,
+            applies=_is_turning,
+        )
+        for turn in (0.0, np.pi / 4, np.pi / 2, 3 * np.pi / 4)
+    ),
+    Act(
+        "shows {u}*(1 {word} {size}*({u}/{top})**2)",
+        lambda of, _: of.values**3 / of.top**2,
+        "part",
+        ("-", "+"),
+        most=lambda _: 0.5,
+        applies=_is_measured,
+    ),
+)
+
+
+# What a sign that switches at once is in place of: tanh(v/level), of the argument's root mean square.
+SOFT = Law("the friction is soft: sgn({x}) changes over a width of about {w}", lambda x, v, w: v)
+SOFT_WIDTHS = (0.03, 0.055, 0.1, 0.18, 0.3, 0.55, 1.0)
+
+
+# From theta of each row kind the change of the raw residuals of each kind [windows, K] for size 1.
+Change = Callable[[Sequence[Float]], list[Float]]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A term, with its score.
+
+    Attributes
+    ----------
+    where : name of the row of a law; otherwise of the signal
+    signal : name of the signal; "" of a constant
+    kind : the law or act
+    level : of an act that has levels; of a law its width [unit of the rate]
+    change : see Change
+    top : of an act, largest magnitude of the signal as recorded
+    most : largest believable size
+    size : estimate
+    certainty : |size| over its standard error
+    own : part of the column's square that no change of p explains
+    share : part of the residuals' energy on unseen windows that the term removes
+    folds : parts of the run in which it does
+    shift : what p moves by when the term is added [n_p]
+    """
+
+    where: str
+    signal: str
+    kind: Law | Act
+    level: float
+    change: Change
+    top: float = 0.0
+    most: float = np.inf
+    size: float = 0.0
+    certainty: float = 0.0
+    own: float = 0.0
+    share: float = 0.0
+    folds: int = 0
+    shift: Float = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def family(self) -> tuple[str, str, str]:
+        """The same for all levels."""
+        return self.where, self.signal, self.kind.text
+
+    @property
+    def number(self) -> float:
+        """What is estimated: the level, or the size."""
+        return self.level if self.leveled else self.size
+
+    @property
+    def leveled(self) -> bool:
+        """Whether its level is what is estimated, and its size is 1."""
+        return isinstance(self.kind, Act) and self.kind.levels is not None
