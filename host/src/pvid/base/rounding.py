@@ -25,3 +25,20 @@ def percent(part: float) -> str:
     """A part of 1 to two digits: 0.00312 is "0.31 %"."""
     shown = 100.0 * part
     return f"{shown:.2g} %" if abs(shown) < 100.0 else f"{shown:.0f} %"
+
+
+# Units that take a prefix, and prefixes by the power of 1000.
+_PREFIXED = {"m", "s", "A", "V", "ohm", "H", "F", "N", "W", "J", "Pa", "Hz"}
+_PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M"}
+_PLAIN = (1.0, 1e4)  # values that need none
+
+
+def with_prefix(value: float, error: float, unit: str) -> tuple[str, str, str, float]:
+    """Value and error to the error's second digit, their unit with an SI prefix where the unit takes one, and what a
+    number in that unit is multiplied with: 0.0030002, 8e-7, "H" is ("3.00020", "0.00080", "mH", 1e-3)."""
+    power = 0
+    size = abs(value)
+    if unit in _PREFIXED and size > 0 and not _PLAIN[0] <= size < _PLAIN[1]:
+        power = min(max(math.floor(math.log10(size) / 3), min(_PREFIXES)), max(_PREFIXES))
+    scale = 1000.0**power
+    return *with_error(value / scale, error / scale), f"{_PREFIXES[power]}{unit}", scale

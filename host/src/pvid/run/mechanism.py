@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -244,12 +245,17 @@ def outputs_at(model: CompiledModel, p: Float) -> dict[str, float]:
     return {one.name: _output(model, p, one)[0] for one in model.outputs}
 
 
+@lru_cache(maxsize=256)
+def _gradient(value: sp.Expr, p: tuple[sp.Symbol, ...]) -> Any:
+    """A function of p: the value, then its slopes."""
+    return sp.lambdify(p, [value, *(value.diff(symbol) for symbol in p)], "numpy")
+
+
 def _output(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:
     """Value at p and its gradient [n_p]; NaN where it does not exist at p."""
     value = model.with_knowns(output.value)
-    gradient = sp.lambdify(model.p, [value, *(value.diff(symbol) for symbol in model.p)], "numpy")
     with np.errstate(all="ignore"):
-        at, *slopes = (complex(one) for one in gradient(*p.astype(complex)))
+        at, *slopes = (complex(one) for one in _gradient(value, model.p)(*p.astype(complex)))
     if abs(at.imag) > 0:
         return float("nan"), np.full(len(p), np.nan)
     return at.real, np.array(slopes).real

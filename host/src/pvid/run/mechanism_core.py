@@ -74,6 +74,17 @@ class CoreAnswer:
         """Whether the core has published, or need not, and the recording shows a parameter."""
         return (self.published or self.by_analysis) and self.oracle.identified
 
+    def history(self) -> list[tuple[float, Mapping[str, Value]]]:
+        """Time [s] and values of every publication; correlations are those of the analysis."""
+        own, model = self.publications, self.oracle.model
+        sd = np.sqrt(np.diag(self.oracle.found.covariance))
+        correlation = self.oracle.found.covariance / np.outer(sd, sd)
+        none = np.zeros((1, len(sd)))
+        return [
+            (float(t), values_of(model, p, correlation * np.outer(se, se), none, identified=True))
+            for t, p, se in zip(own.t, own.p, own.se, strict=True)
+        ]
+
     @property
     def verdict(self) -> Verdict:
         """The doubts of the core's own answer, then those of the analysis."""

@@ -83,6 +83,8 @@ class RefinedCoreAnswer:
     first_s : time of the first refined estimate [s]
     level, clash : as in pvid/refine.h
     hash : running hash of both stages after the last tick
+    record, made : every tick; the functions of the refinement
+    covariance : of the last refined estimate, as the core has it; None: there is none
     """
 
     weak: CoreAnswer
@@ -93,6 +95,27 @@ class RefinedCoreAnswer:
     level: float | None
     clash: float | None
     hash: int
+    record: RefinedRecord
+    made: RefineFunctions
+    covariance: npt.NDArray[np.float64] | None
+
+    def history(self) -> list[tuple[float, Mapping[str, Value]]]:
+        """Time [s] and values of every refined estimate; correlations are those of the last one."""
+        if self.covariance is None:
+            return []
+        answer, places = self.weak.oracle, list(self.made.places_of_p)
+        sd = np.sqrt(np.diag(self.covariance))
+        correlation = (self.covariance / np.outer(sd, sd))[np.ix_(places, places)]
+        gains = refined_gains_of(answer.model, answer.found)
+        r = self.record.r[:, places].astype(np.float64)
+        new = np.flatnonzero(np.any(np.diff(r, axis=0) != 0, axis=1)) + 1
+        out = list[tuple[float, Mapping[str, Value]]]()
+        for tick in new:
+            p = r[tick]
+            se = self.record.se[tick, places].astype(np.float64)
+            values = values_of(answer.model, p, correlation * np.outer(se, se), gains, identified=True)
+            out.append((float(answer.recording.t[tick]), values))
+        return out
 
     @property
     def identified(self) -> bool:
@@ -156,6 +179,9 @@ def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
         level=None if last is None else float(last["level"]),
         clash=None if last is None else float(last["clash"]),
         hash=int(record.hash[-1]),
+        record=record,
+        made=stages.made,
+        covariance=None if last is None else np.asarray(last["covariance"], np.float64),
     )
 
 
