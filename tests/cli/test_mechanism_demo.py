@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -12,16 +13,23 @@ from pvid.board.target import HOST_TARGET
 from pvid.cli.mechanism_demo import demo
 
 
-def test_a_mechanism_is_identified_compared_and_streamed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert demo("battery_2rc", HOST_TARGET, "this machine", 0, tmp_path / "a.png") == DONE
+@pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
+def test_a_mechanism_is_identified_compared_and_streamed(
+    target: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert demo("battery_2rc", target, "a board", 0, tmp_path / "a.png") == DONE
     told = capsys.readouterr().out
     assert told.count("equal on board, PC and in numpy in every bit (hash ") == 2
     assert told.count("truth ") == 7 and "✗" not in told
-    assert "14400 ticks of" in told and "Integers only: " in told and "The paper's own form" in told
-    assert len(told.splitlines()) <= 11
+    assert re.search(r"First answer after \d{4} s[;.]", told)
+    assert ("instructions a tick" in told) == (target != HOST_TARGET)
+    assert "14400 ticks of" in told and "Integers only (first stage): " in told and "The paper's own form" in told
+    assert len(told.splitlines()) <= 10
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
 def test_what_is_not_shipped_is_refused() -> None:
     with pytest.raises(PvidError, match="there is no shipped mechanism own; there are "):
         demo("own", HOST_TARGET, "this machine", 0, Path("a.png"))
+    with pytest.raises(PvidError, match=r"two_mass_drive; pvid model simulate own.py simulates a rig of a model file$"):
+        demo("own.py", HOST_TARGET, "this machine", 0, Path("a.png"))

@@ -23,7 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from pvid.base.rounding import with_error
+from pvid.base.rounding import with_error, with_prefix
 from pvid.core.native import Native
 from pvid.link import frames as link
 from pvid.log.history import History, Thinned, envelope
@@ -149,6 +149,25 @@ def test_kappa_in_words_and_as_a_bar() -> None:
 )
 def test_value_is_rounded_to_the_second_digit_of_its_error(value: float, error: float, told: tuple[str, str]) -> None:
     assert with_error(value, error) == told
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "told"),
+    [
+        (0.0030002, 8e-7, "H", ("3.00020", "0.00080", "mH", 1e-3)),
+        (-0.3, 0.01, "N", ("-300", "10", "mN", 1e-3)),
+        (47000.0, 120.0, "ohm", ("47.00", "0.12", "kohm", 1e3)),
+        (0.05, 4.6e-7, "N*m/A", ("0.05000000", "0.00000046", "N*m/A", 1.0)),
+        (3.7, 9.7e-6, "V", ("3.7000000", "0.0000097", "V", 1.0)),
+        (2e-4, 3.5e-9, "kg*m^2", ("2.000000e-04", "3.5e-09", "kg*m^2", 1.0)),
+        (0.0, 0.002, "m", ("0.0000", "0.0020", "m", 1.0)),
+        (3e12, 1e10, "Hz", ("3000000", "10000", "MHz", 1e6)),
+    ],
+)
+def test_a_prefix_brings_a_value_to_1_or_above(
+    value: float, error: float, unit: str, told: tuple[str, str, str, float]
+) -> None:
+    assert with_prefix(value, error, unit) == told
 
 
 def test_a_sparkline_has_its_median_at_half_height() -> None:

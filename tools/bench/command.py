@@ -38,7 +38,8 @@ def bench_demo(update: Path | None) -> int:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != DONE:
         raise PvidError(f"the demo failed: {(done.stderr or done.stdout).strip()[-300:]}")
-    put_table(update, "demo", f"```\n{done.stdout.rstrip()}\n```")
+    lines = "\n".join(line.rstrip() for line in done.stdout.rstrip().splitlines())
+    put_table(update, "demo", f"```\n{lines}\n```")
     return DONE
 
 

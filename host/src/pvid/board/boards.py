@@ -160,7 +160,7 @@ def build(target: Board, tree: Path, options: Mapping[str, str], source: Path = 
                     raise PvidError(f"{target.name}: the image does not fit: its variables exceed the RAM")
                 if any("error: size of array" in line and "is too large" in line for line in lines):
                     raise PvidError(f"{target.name}: the image does not fit: an array is too large for its compiler")
-                errors = [line for line in lines if re.search(r"error|undefined|overflowed|CMake Error", line)]
+                errors = [line for line in lines if re.search(r"\berror:|undefined|overflowed|CMake Error", line)]
                 raise PvidError(f"{target.name}: the build failed: {' '.join((errors or lines or ['no output'])[:2])}")
     return tree
 

@@ -44,6 +44,7 @@ _COVERED = 3.0  # standard errors within which an estimate is marked as right
 _UNITS = {"g": "m/s^2", "l2": "m", "rho2": "m"}
 _BITS = 14  # of the standard rig's encoder
 _FINER = 64  # times, for the strong form: 20 bits in place of 14
+_LONG_S = 1000.0  # without decimals from here on
 _IN_TWO_COLUMNS = 5  # parameters from which on two stand in a line
 
 
@@ -100,12 +101,15 @@ def demo(model: str, target: str, where: str, seed: int, figure: Path) -> int:
     The exit code.
     """
     if model not in shipped():
-        raise PvidError(f"there is no shipped mechanism {model}; there are {', '.join(shipped())}")
+        own = f"; pvid model simulate {model} simulates a rig of a model file" if model.endswith(".py") else ""
+        raise PvidError(f"there is no shipped mechanism {model}; there are {', '.join(shipped())}{own}")
     write_stderr(f"simulating the rig of {model}")
     shown = Demonstrated.of(model, seed)
     title, duration = shown.answer.model.title, float(shown.recording.t[-1])
     rate = shown.recording.sample_rate
-    click.echo(f"Simulated: {title}, {duration:.0f} s at {rate:g} Hz. Identified by {where}, as it runs:")
+    click.echo(
+        f"Simulated: {title}, {duration:.0f} s at {rate:g} Hz. Identified by {where}, as it runs (± standard error):"
+    )
     equal = _in_float(shown, target, figure)
     equal = _in_fixed_point(shown, target) and equal
     _by_the_paper(shown, seed)
@@ -139,10 +143,15 @@ def _in_float(shown: Demonstrated, target: str, figure: Path) -> bool:
         click.echo(f"  nothing identified: {weak.reason.text}")
     stages = "both stages" if refined is not None else "the estimator"
     since = refined.first_s if refined is not None and refined.adopted else _first(weak)
-    texts = [] if since is None else [f"First answer after {since:.2g} s"]
+    texts = (
+        []
+        if since is None
+        else [f"First answer after {since:.3g} s" if since < _LONG_S else f"First answer after {since:.0f} s"]
+    )
     texts += [] if measured is None else [_words(measured)]
-    texts.append(_bits(f"{ticks} ticks of {stages} in float32", there, [first, second]))
-    click.echo(f"{'; '.join(texts)}.")
+    if texts:
+        click.echo(f"{'; '.join(texts)}.")
+    click.echo(f"{_bits(f'{ticks} ticks of {stages} in float32', there, [first, second])}.")
     convergence(answer, weak, refined, shown.truth, shown.names, figure)
     return there.equal and first.equal and (isinstance(second, str) or second.equal)
 
@@ -150,6 +159,8 @@ def _in_float(shown: Demonstrated, target: str, figure: Path) -> bool:
 def _in_fixed_point(shown: Demonstrated, target: str) -> bool:
     """The same by integers alone, in a line."""
     answer, ticks = shown.answer, len(shown.recording)
+    linearised = ", linearised equations" if any(one.neglected for one in answer.model.signals) else ""
+    form = f"Integers only (first stage{linearised})"
     try:
         found = identify_in_c(answer, FIXED.name)
         with progress_bar(f"streaming integers to {target}, comparing with the twin", 2 * ticks) as advance:
@@ -158,10 +169,10 @@ def _in_fixed_point(shown: Demonstrated, target: str) -> bool:
                 answer.model, shown.recording, FIXED.name, lambda done: advance(ticks + done), answer.ranking
             )
     except PvidError as error:
-        click.echo(f"Integers only: {error}.")
+        click.echo(f"{form}: {error}.")
         return True
     said = _line(shown, found.values) if found.identified else f"nothing identified, {found.reason.text}"
-    click.echo(f"Integers only: {said}; {_bits('all ticks', there, [here])}.")
+    click.echo(f"{form}: {said}; {_bits('all ticks', there, [here])}.")
     return there.equal and here.equal
 
 
@@ -218,7 +229,7 @@ def _first(weak: CoreAnswer) -> float | None:
 def _words(cost: Cost) -> str:
     bytes_ = cost.footprint.bss + cost.footprint.data
     return (
-        f"{cost.footprint.mean} instructions a tick in the mean, {cost.footprint.longest} at most as far as observed; "
+        f"{cost.footprint.mean} instructions a tick on average, {cost.footprint.longest} in the longest tick observed; "
         f"{bytes_ / 1000:.1f} kB of RAM"
     )
 

@@ -81,7 +81,7 @@ class CoreAnswer:
         correlation = self.oracle.found.covariance / np.outer(sd, sd)
         none = np.zeros((1, len(sd)))
         return [
-            (float(t), values_of(model, p, correlation * np.outer(se, se), none, identified=True))
+            (float(t), values_of(model, p, correlation * np.outer(se, se), none, self.oracle.found.judged))
             for t, p, se in zip(own.t, own.p, own.se, strict=True)
         ]
 

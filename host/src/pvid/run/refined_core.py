@@ -113,7 +113,7 @@ class RefinedCoreAnswer:
         for tick in new:
             p = r[tick]
             se = self.record.se[tick, places].astype(np.float64)
-            values = values_of(answer.model, p, correlation * np.outer(se, se), gains, identified=True)
+            values = values_of(answer.model, p, correlation * np.outer(se, se), gains, answer.found.judged)
             out.append((float(answer.recording.t[tick]), values))
         return out
 

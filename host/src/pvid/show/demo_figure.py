@@ -14,12 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.figure_file import save
+from pvid.base.rounding import with_prefix
 from pvid.run.mechanism import MechanismAnswer
 from pvid.run.mechanism_core import CoreAnswer
 from pvid.run.refined_core import RefinedCoreAnswer
 
 Float = npt.NDArray[np.float64]
-_FROM = 0.15  # of the publications: what comes before may be off the scale
+_FROM = 0.15  # of the publications: those before may be off the scale
+_IN_A_COLUMN = 3  # parameters
 
 
 def convergence(
@@ -43,38 +45,38 @@ def convergence(
         When it cannot be written.
     """
     t, values, errors = published(weak, refined, names)
-    rows = -(-len(names) // 2) if len(names) > 3 else len(names)
-    columns = 2 if len(names) > 3 else 1
-    units = {name: one.unit for name, one in weak.values.items()}
+    columns = 2 if len(names) > _IN_A_COLUMN else 1
+    rows = -(-len(names) // columns)
     figure, grid = plt.subplots(
         rows,
         columns,
         sharex=True,
         squeeze=False,
-        figsize=(4.6 * columns + 1.2, 1.55 * rows + 0.9),
+        figsize=(4.6 * columns + 1.2, 1.55 * rows + 1.1),
         layout="constrained",
     )
     for k, (name, axis) in enumerate(zip(names, grid.T.flat, strict=False)):
-        if len(t):
-            axis.fill_between(
-                t, values[:, k] - 2 * errors[:, k], values[:, k] + 2 * errors[:, k], step="post", color="C0",
-                alpha=0.25, linewidth=0, label="± 2 standard errors",
-            )  # fmt: skip
-            axis.step(t, values[:, k], where="post", color="C0", linewidth=1.4, label="estimate")
+        *_, unit, scale = with_prefix(truth[name], 0.0, weak.values[name].unit)
+        true, value, error = truth[name] / scale, values[:, k] / scale, errors[:, k] / scale
+        if np.any(np.isfinite(value)):
+            band = (value - 2 * error, value + 2 * error)
+            axis.fill_between(t, *band, step="post", color="C0", alpha=0.25, linewidth=0, label="± 2 standard errors")
+            axis.step(t, value, where="post", color="C0", linewidth=1.4, label="estimate")
             late = slice(int(_FROM * len(t)), None)
-            reach = max(float(np.max(np.abs(values[late, k] - truth[name]))), 3 * float(np.max(errors[late, k])), 1e-12)
-            axis.set_ylim(truth[name] - 1.1 * reach, truth[name] + 1.1 * reach)
-        axis.axhline(truth[name], color="C3", linewidth=1.0, linestyle="--", label="truth")
-        axis.ticklabel_format(useOffset=False)
-        axis.set_ylabel(f"{name} [{units[name]}]" if units.get(name) else name)
+            reach = 1.1 * float(np.nanmax([np.abs(value[late] - true), 3 * error[late]]))
+            axis.set_ylim(true - reach, true + reach)
+        axis.axhline(true, color="C3", linewidth=1.0, linestyle="--", label="truth")
+        axis.ticklabel_format(axis="y", useOffset=False, scilimits=(-3, 5))
+        axis.set_ylabel(f"{name} [{unit}]" if unit else name)
+        axis.set_xlim(0, float(answer.recording.t[-1]))
         axis.grid(alpha=0.3)
+        if k + 1 == len(names) or (k + 1) % rows == 0:
+            axis.set_xlabel("time [s]")
+            axis.tick_params(labelbottom=True)
     for axis in grid.T.flat[len(names) :]:
         axis.set_axis_off()
-    grid[0, 0].legend(loc="upper right", fontsize="small")
-    for axis in grid[-1]:
-        axis.set_xlim(0, float(answer.recording.t[-1]))
-        axis.set_xlabel("time [s]")
-    figure.suptitle(answer.model.title)
+    figure.suptitle(f"{answer.model.title}: estimates of the C core as it runs")
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     try:
         save(figure, path, dpi=110)
     finally:
