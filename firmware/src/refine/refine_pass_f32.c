@@ -201,15 +201,15 @@ PVID_ALWAYS_INLINE void end_rows(pvid_refine_pass_f32 *self, const float derivat
  * residuals are nearly white, and its columns are those of the observer. */
 static void correct(pvid_refine_pass_f32 *self, const float derivatives[])
 {
-    const float (*row)[PVID_REFINE_WIDTH] =
-        (const float (*)[PVID_REFINE_WIDTH])&self->row[self->rows - (uint8_t)PVID_REFINE_OUTPUTS];
+    const size_t first = (size_t)self->rows - PVID_REFINE_OUTPUTS;
     for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
         float correction = 0.0f;
         for (size_t k = 0; k < PVID_REFINE_OUTPUTS; k++) {
+            const float *row = self->row[first + k];
             const float gain = self->observer[(k * PVID_REFINE_STATES) + i];
-            correction += gain * row[k][PVID_REFINE_WIDTH - 1];
+            correction += gain * row[PVID_REFINE_WIDTH - 1];
             for (size_t j = 0; j < PVID_REFINE_COLUMNS; j++) {
-                self->column[j][i] -= gain * row[k][j];
+                self->column[j][i] -= gain * row[j];
             }
         }
         self->state[i] += correction;

@@ -41,7 +41,6 @@ from pvid.sim.simulated_run import RigSimulation
 
 _THE_SAME = 1e-3  # relative, of a guess and the truth
 _COVERED = 3.0  # standard errors within which an estimate is marked as right
-_UNITS = {"g": "m/s^2", "l2": "m", "rho2": "m"}
 _BITS = 14  # of the standard rig's encoder
 _FINER = 64  # times, for the strong form: 20 bits in place of 14
 _LONG_S = 1000.0  # without decimals from here on
@@ -140,7 +139,8 @@ def _in_float(shown: Demonstrated, target: str, figure: Path) -> bool:
     if weak.identified or (refined is not None and refined.identified):
         _table(shown, values)
     else:
-        click.echo(f"  nothing identified: {weak.reason.text}")
+        click.echo(f"The C core publishes nothing ({weak.reason.text}). The float64 analysis on the PC:")
+        _table(shown, answer.values)
     stages = "both stages" if refined is not None else "the estimator"
     since = refined.first_s if refined is not None and refined.adopted else _first(weak)
     texts = (
@@ -180,7 +180,7 @@ def _by_the_paper(shown: Demonstrated, seed: int) -> None:
     """The strong form on this computer, in a line. It differentiates its samples, and needs finer ones."""
     form = f"The paper's own form (derivatives, regressor, M, solve at each tick), sensors {_FINER} times finer"
     try:
-        values = _strong_pendulum(seed) if shown.answer.model.name == DEFAULT else _strong(shown, seed)
+        values = _strong_pendulum(shown, seed) if shown.answer.model.name == DEFAULT else _strong(shown, seed)
     except PvidError as error:
         click.echo(f"{form}: {error}.")
         return
@@ -197,7 +197,7 @@ def _strong(shown: Demonstrated, seed: int) -> Mapping[str, Value]:
     return identify_strong_mechanism(Recording(run.pop("t"), run, rig.sample_rate), finer).values
 
 
-def _strong_pendulum(seed: int) -> Mapping[str, Value]:
+def _strong_pendulum(shown: Demonstrated, seed: int) -> Mapping[str, Value]:
     """By the hand-written C of the paper's identifier."""
     sensors = standard_sensors(_BITS + round(np.log2(_FINER)))
     run = simulate(sensors=sensors, truth="linear", seed=seed).run
@@ -208,7 +208,8 @@ def _strong_pendulum(seed: int) -> Mapping[str, Value]:
         identifier=replace(standard.identifier, form="strong"),
     )
     found = identify(run, rig, Native())
-    return {name: Value(_UNITS[name], found.value[name], found.se[name], None) for name in _UNITS}
+    units = {name: shown.answer.values[name].unit for name in shown.names}
+    return {name: Value(unit, found.value[name], found.se[name], None) for name, unit in units.items()}
 
 
 def _cost(shown: Demonstrated, target: str, refined: bool) -> Cost | None:

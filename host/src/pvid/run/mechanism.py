@@ -201,8 +201,13 @@ def gains_of(model: CompiledModel, found: Identified) -> Float:
 
 
 def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
-    """The same of a refined estimate, whose equations neglect nothing where the refinement has its own."""
-    return gains_of(model, found)[:-1] if model.refinement.equations else gains_of(model, found)
+    """The same of a refined estimate. Where the refinement has its own equations, it neglects nothing: what the linear
+    rows lack counts only where it is more than they neglect."""
+    gains = gains_of(model, found)
+    if not model.refinement.equations:
+        return gains
+    *others, lacking, neglected = gains
+    return np.array([*others, np.where(np.abs(lacking) > neglected, lacking, 0.0)])
 
 
 def values_of(
