@@ -71,6 +71,13 @@ class Result:
     __repr__ = __str__
 
     @property
+    def missing(self) -> Mapping[str, Any] | None:
+        """What the equations seem to lack, as in `details`: terms with size and standard error, and what each parameter
+        would be with them; None: nothing that moves a parameter visibly, or an identifier that does not look for it."""
+        found: Mapping[str, Any] | None = self.details.get("missing")
+        return found
+
+    @property
     def _doubts(self) -> list[str]:
         """The warning and the advice, a line each."""
         warning = [f"warning: {self.warning}"] if self.warning else []

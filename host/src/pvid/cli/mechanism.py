@@ -432,15 +432,18 @@ def _print_core(core: CoreAnswer) -> None:
 
 
 def _table(values: Mapping[str, Value], title: str) -> None:
-    table = Table("parameter", "estimate", "standard error", "of it noise", title=title)
+    lacking = any((one.se_model or 0.0) > (one.se or 0.0) / 2 for one in values.values())
+    names = ("parameter", "estimate", "standard error", "of it noise", *(["of it model"] if lacking else []))
+    table = Table(*names, title=title)
     for column in table.columns[1:]:
         column.justify = "right"
     for name, one in values.items():
         label = escape(f"{name} [{one.unit}]" if one.unit else name)
         if one.value is None or one.se is None or one.se_noise is None:
-            table.add_row(label, "not determined", "", "")
+            table.add_row(label, "not determined")
             continue
         estimate, error = with_error(one.value, one.se)
         below = "" if one.below is None else f" (below {one.below:.2g})"
-        table.add_row(label, estimate + below, error, f"{one.se_noise:.2g}")
+        parts = [one.se_noise, *([one.se_model or 0.0] if lacking else [])]
+        table.add_row(label, estimate + below, error, *(f"{part:.2g}" for part in parts))
     Console().print(table)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -16,8 +17,10 @@ from pvid.model.compiled import CompiledModel, Output
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
 from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.identify import Identified, given
 from pvid.oracle.weak.identify import identify as identified_by
+from pvid.oracle.weak.naming import terms_of
 from pvid.oracle.weak.verdict import Judged, ParameterStatus
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
@@ -32,7 +35,8 @@ class Value:
 
     Attributes
     ----------
-    value, se, se_noise : its standard error, and the part of it that is from noise; None where it is not identified
+    value, se : its standard error; None where it is not identified
+    se_noise, se_model : the parts of it that are from noise, and from what the equations seem to lack
     status, reason : whether the run determines it; a clause where it does not, or where it may be 0
     below : it is below this with 95 %, where it may be 0
     """
@@ -44,10 +48,12 @@ class Value:
     status: ParameterStatus = "identified"
     reason: str | None = None
     below: float | None = None
+    se_model: float | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Its entry in the object of `identify --json`."""
-        out = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise, "status": self.status}
+        out = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise}
+        out |= {"se_model": self.se_model, "status": self.status}
         out |= {} if self.reason is None else {"reason": self.reason}
         return out | ({} if self.below is None else {"below": self.below})
 
@@ -95,6 +101,7 @@ class MechanismAnswer:
             "reasons": {one.name: one.text for one in found.verdict.reasons},
             "parameters": parameters,
             **own_keys(self.model, parameters),
+            "missing": missing_of(found),
             "chi2": found.chi2,
             "r2": found.r2,
             "window_s": found.design.window_s,
@@ -106,6 +113,17 @@ class MechanismAnswer:
             "core": "f64",
             "form": "weak",
         }
+
+
+def missing_of(found: Identified) -> dict[str, Any] | None:
+    """What the equations seem to lack, and the parameters with it; None: nothing that moves a parameter visibly."""
+    named = found.named
+    if named is None:
+        return None
+    with_it = zip(found.names, named.fit.p, uncertainty(named.fit).se, strict=True)
+    parameters = {name: {"value": float(p), "se": float(se)} for name, p, se in with_it}
+    terms = [asdict(one) for one in terms_of(found.fit, named)]
+    return {"explained": named.complete, "share": named.share, "terms": terms, "parameters": parameters}
 
 
 def own_keys(model: CompiledModel, parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -186,18 +204,24 @@ def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
     # The correlations of the rows, with the published standard errors but for gains and constants.
     widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
-    return values_of(model, found.p, covariance, gains_of(model, found), found.judged)
+    return values_of(model, found.p, covariance, gains_of(model, found), found.judged, shifts_of(found))
 
 
 def noise_of(model: CompiledModel, found: Identified) -> Float:
-    """The published standard errors but for gains and constants [n_p]."""
-    return np.asarray(np.sqrt(np.maximum(found.se**2 - np.sum(gains_of(model, found) ** 2, axis=0), 0.0)))
+    """The published standard errors but for gains, constants and what is missing [n_p]."""
+    other = np.sum(gains_of(model, found) ** 2, axis=0) + found.by_model**2
+    return np.asarray(np.sqrt(np.maximum(found.se**2 - other, 0.0)))
+
+
+def shifts_of(found: Identified) -> Float:
+    """What p moves by with each term that the equations may lack [terms, n_p]."""
+    return np.zeros((0, len(found.p))) if found.lacking is None else found.lacking.shifts
 
 
 def gains_of(model: CompiledModel, found: Identified) -> Float:
     """What p is off by for one standard deviation of each gain and constant that has any, and of what linearised
     equations neglect [gains, n_p]."""
-    return np.array([*given(model, found.by_gain, found.by_known), found.by_model, found.by_neglect])
+    return np.array([*given(model, found.by_gain, found.by_known), found.by_neglect])
 
 
 def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
@@ -211,7 +235,12 @@ def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
 
 
 def values_of(
-    model: CompiledModel, p: Float, covariance: Float, gains: Float, judged: Sequence[Judged]
+    model: CompiledModel,
+    p: Float,
+    covariance: Float,
+    gains: Float,
+    judged: Sequence[Judged],
+    shifts: Float | None = None,
 ) -> dict[str, Value]:
     """Outputs of the model, then p, by name.
 
@@ -220,14 +249,17 @@ def values_of(
     covariance : of p by noise [n_p, n_p]
     gains : see gains_of
     judged : of each parameter; an output is identified where all parameters that it depends on are
+    shifts : see shifts_of; None: no terms were tried
     """
     whole = covariance + gains.T @ gains
+    terms = np.zeros((0, len(p))) if shifts is None else shifts
 
     def shown(unit: str, value: float, slope: Float, of: Judged) -> Value:
         if of.status == "not_identified":
             return Value(unit, None, None, None, of.status, of.reason)
         se, se_noise = (float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance))
-        return Value(unit, value, se, se_noise, of.status, of.reason, of.below)
+        se_model = float(np.max(np.abs(terms @ slope), initial=0.0))
+        return Value(unit, value, math.hypot(se, se_model), se_noise, of.status, of.reason, of.below, se_model)
 
     values = {}
     for one in model.outputs:

@@ -23,7 +23,7 @@ from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import engine_to_identify
 from pvid.run.identify import Publications, counted
-from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, unless_held, values_of
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, shifts_of, unless_held, values_of
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
@@ -244,7 +244,7 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
     by_analysis = not published and any(one.status == "near_zero" for one in found.judged)
     outcome = Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP
     judged = unless_held(found.judged, None if published else outcome.text)
-    values = answer.values if by_analysis else values_of(model, run.p, covariance, gains, judged)
+    values = answer.values if by_analysis else values_of(model, run.p, covariance, gains, judged, shifts_of(found))
     misfit = identifier.misfit
     return CoreAnswer(
         oracle=answer,

@@ -23,7 +23,8 @@ from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.library import Library
-from pvid.oracle.weak.missing import Missing, of_missing
+from pvid.oracle.weak.missing import Explained, Missing, explained
+from pvid.oracle.weak.naming import of_missing
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.weak.samples import explains, of_samples
 from pvid.oracle.weak.scale import of_scale
@@ -47,6 +48,7 @@ class Identified:
     by_neglect : what p may be off by because equations are linearised [n_p]
     by_model : what p may be off by because the equations lack something, or a signal is not what was recorded [n_p]
     lacking : what the equations seem to lack; None: the numbers of the test ran away
+    named : the terms that explain it; None: nothing is lacking that moves a parameter visibly
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     covariance : of p, that of `predicted` [n_p, n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
@@ -85,6 +87,7 @@ class Identified:
     by_neglect: Float
     by_model: Float
     lacking: Missing | None
+    named: Explained | None
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
@@ -186,13 +189,15 @@ def identify(
     se = np.sqrt(np.sum(np.square(parts), axis=0))
     judged = tuple(verdict.judged(compiled, fit, se))
     reasons = verdict.of_parameters(compiled, fit, se, judged, found.r2)
+    named: Explained | None = None
     lacking = None if fit.diverged else attempt("what is missing", lambda: Missing.of(library, se))
     by_model = np.zeros(len(se)) if lacking is None else lacking.error
     se = np.hypot(se, by_model)
     if not fit.diverged:
         reasons += attempt.reasons(_checks(rows, run, fit, found, halves, judged, with_error))
         if lacking is not None and lacking.visible.any() and not explains(reasons, lacking.there[0], sample_rate):
-            reasons += attempt("what is missing", lambda: of_missing(library, lacking)) or []
+            named = attempt("what is missing", lambda: explained(library, lacking))
+            reasons += [] if named is None else of_missing(fit, lacking, named)
         reasons += of_scale(compiled, by_gain, fit.p, found.se)
         reasons += attempt.failed
         if with_error and not weighted_anew:
@@ -221,6 +226,7 @@ def identify(
         by_neglect=by_neglect,
         by_model=by_model,
         lacking=lacking,
+        named=named,
     )
 
 

@@ -7,25 +7,19 @@ where that part is larger than all others and visible: relevance, not significan
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-import sympy as sp
 
 from pvid.base.errors import PvidError
-from pvid.base.rounding import percent
-from pvid.base.wording import listed, with_unit
-from pvid.model.compiled import CompiledModel
-from pvid.model.signals import total_derivative
 from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.scores import FOLDS, Scores
 from pvid.oracle.weak.solve import Fit, resumed, unlikely
-from pvid.oracle.weak.terms import CONSTANT, SOFT, UNUSUAL, Act, Candidate, Law
-from pvid.oracle.weak.verdict import Name, Reason
+from pvid.oracle.weak.terms import UNUSUAL, Act, Candidate
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best.
@@ -34,7 +28,7 @@ _SHARE = 0.01  # of the residuals' energy on unseen windows
 _PLAUSIBLE = 0.5  # of the best candidate's share: what may be meant as well
 
 _MOVES = 2.0  # standard errors
-_VISIBLE = 0.01  # of the value
+VISIBLE = 0.01  # of the value
 
 # Terms are named by fits with them.
 _MOST_TERMS = 3
@@ -47,6 +41,7 @@ _ALL, _MOST = 0.95, 0.5  # of the residuals beyond it
 _ROUNDS = 6  # of a size
 _SETTLED = 0.01  # of a size
 _FACTORS, _STEPS = (1.25, 1.08, 1.025), 4  # of a level, as often as it gets better
+_PART = 0.01  # of a level: a step that gives its slope
 _PASSES = 3  # of whitening in a fit that begins near its end
 
 
@@ -57,12 +52,12 @@ class Missing:
     Attributes
     ----------
     there : candidates that count, that of the largest share first
-    error : the model's part of the standard errors: largest shift of the plausible ones [n_p]
+    shifts : what p moves by with each plausible one [plausible, n_p]
     visible : parameters that it moves by more than their standard errors cover and by more than is tolerated [n_p]
     """
 
     there: tuple[Candidate, ...]
-    error: Float
+    shifts: Float
     visible: npt.NDArray[np.bool_]
 
     @classmethod
@@ -79,9 +74,15 @@ class Missing:
             if one.certainty > _CERTAIN and one.share > _SHARE and one.folds >= FOLDS - 1
             if fit is None or one.own > _DISTINCT
         )
-        shifts = [np.abs(one.shift) for one in there if one.share >= _PLAUSIBLE * there[0].share]
-        error = np.max(shifts, axis=0) if shifts else np.zeros(len(p))
-        return cls(there, error, (error > _MOVES * se) & (error > _VISIBLE * np.abs(p)))
+        plausible = [one.shift for one in there if one.share >= _PLAUSIBLE * there[0].share]
+        shifts = np.array(plausible).reshape(-1, len(p))
+        error = np.max(np.abs(shifts), axis=0, initial=0.0)
+        return cls(there, shifts, (error > _MOVES * se) & (error > VISIBLE * np.abs(p)))
+
+    @property
+    def error(self) -> Float:
+        """The model's part of the standard errors: largest of the shifts [n_p]."""
+        return np.asarray(np.max(np.abs(self.shifts), axis=0, initial=0.0))
 
     def families(self) -> list[Candidate]:
         """The best of each family that may be meant."""
@@ -100,10 +101,12 @@ class Named:
     Attributes
     ----------
     chosen : with the size, or the level, of most likelihood
+    error : of that number
     rivals : of other families, that explain about as much
     """
 
     chosen: Candidate
+    error: float
     rivals: tuple[Candidate, ...]
 
 
@@ -141,9 +144,9 @@ def explained(library: Library, found: Missing) -> Explained:
         if not gains:
             break
         alike = [one for one in gains if one[0] > _RIVAL * gains[0][0]]
-        best = min(alike, key=lambda one: _word(one[1]) in UNUSUAL)
-        named.append(Named(best[1], tuple(one[1] for one in alike if one is not best)))
+        best = min(alike, key=lambda one: word_of(one[1]) in UNUSUAL)
         fit = best[2]
+        named.append(Named(best[1], _error_of(library, *best[1:]), tuple(one[1] for one in alike if one is not best)))
         found = Missing.of(library, uncertainty(fit).se, fit)
         left = chi2_of_sensors(fit)
         share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
@@ -151,7 +154,24 @@ def explained(library: Library, found: Missing) -> Explained:
     return Explained(tuple(named), fit, share, complete)
 
 
-def _word(one: Candidate) -> str:
+def _error_of(library: Library, one: Candidate, with_it: Fit) -> float:
+    """Standard error of a term's number, beside all parameters."""
+    step = 1.0
+    if one.leveled:
+        assert isinstance(one.kind, Act)
+        step = _PART * one.level
+        other = library.act(library.recorded(one.signal), one.kind, one.level + step).change
+        near = one.change
+
+        def change(theta: Sequence[Float]) -> list[Float]:
+            return [now - before for now, before in zip(other(theta), near(theta), strict=True)]
+
+        one = replace(one, kind=replace(one.kind, levels=None), change=change)
+    scored = Scores(with_it).of([one])[0]
+    return abs(step * scored.size) / scored.certainty if scored.certainty else float("nan")
+
+
+def word_of(one: Candidate) -> str:
     return one.kind.words[one.number < 0] if isinstance(one.kind, Act) else ""
 
 
@@ -212,94 +232,3 @@ def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit
                     break
                 best = other
     return best[1], best[2]
-
-
-def of_missing(library: Library, found: Missing) -> list[Reason]:
-    """The doubt about an estimate and its cause; "unknown" where no cause explains it."""
-    if not found.visible.any():
-        return []
-    model, p, explained_by = library.model, library.fit.p, explained(library, found)
-    scale = {row.name: scale_of(model, kind, p) for kind, row in enumerate(model.rows)}
-    worst = [k for k in np.argsort(-found.error / np.maximum(np.abs(p), 1e-300)) if found.visible[k]]
-    if not explained_by.complete:
-        biased = listed(f"{model.p_names[k]} by {percent(found.error[k] / max(abs(p[k]), 1e-300))}" for k in worst)
-        text = f"The equations lack something, or a signal is not what was recorded: it may bias {biased}. "
-        text += "The cause is unknown: "
-        if not explained_by.named:
-            return [Reason("missing", text + "no term that was tried explains it.")]
-        best = listed(in_words(model, one.chosen, scale) for one in explained_by.named)
-        text += f"of what was tried most is explained by this, {percent(explained_by.share)}: {best}."
-        return [Reason("missing", text)]
-    causes = listed(in_words(model, one.chosen, scale) for one in explained_by.named)
-    if not isinstance(explained_by.named[0].chosen.kind, Act):  # a signal's name keeps its letters
-        causes = causes[0].upper() + causes[1:]
-    now = explained_by.fit.p
-    moved = [k for k in worst if abs(now[k] - p[k]) > _VISIBLE / 2 * abs(p[k])] or worst[:1]
-    values = listed(
-        f"{model.p_names[k]} would be {with_unit(now[k], model.unknowns[k].unit, 4)} in place of {p[k]:.4g}"
-        for k in moved
-    )
-    text = f"{causes}: with that {values}."
-    rivals = [in_words(model, one, scale) for one in explained_by.named[0].rivals]
-    if rivals:
-        text += f" The run does not distinguish it from these: {listed(rivals, 'or')}."
-    return [Reason(_name_of(explained_by.named[0].chosen), text)]
-
-
-def _name_of(one: Candidate) -> Name:
-    if isinstance(one.kind, Act):
-        return "sensor"
-    return "friction" if one.kind is SOFT or one.kind.text.startswith("sgn({x}.d())") else "missing"
-
-
-def in_words(model: CompiledModel, one: Candidate, scale: Mapping[str, float | None]) -> str:
-    """A term, with its size.
-
-    Parameters
-    ----------
-    scale : of each row, see scale_of
-    """
-    kind = one.kind
-    if kind is SOFT:
-        return kind.text.format(x=one.signal, w=f"{one.level:.2g}")
-    if isinstance(kind, Law):
-        law = kind.text.format(x=one.signal, w=f"{one.level:.2g}")
-        factor = scale[one.where]
-        verb = "seem" if one.where.startswith("equations") else "seems"
-        if factor is None:
-            return f"{one.where} {verb} to lack a term in {law}"
-        size = f"{one.size / factor:.3g}"
-        return f"{one.where} {verb} to lack {f'a constant of {size}' if kind is CONSTANT else f'{size}*{law}'}"
-    signal = model.signal(one.signal)
-    amount = abs(one.number)
-    size = {
-        "signal": with_unit(amount, signal.unit, 3),
-        "time": with_unit(amount, "s", 2),
-        "part": f"{amount:.2g}",
-        "percent": percent(amount),
-    }[kind.measure]
-    text = kind.text.format(size=size, word=_word(one), u=one.signal, top=f"{one.top:.3g}")
-    return f"{one.signal} seems to be {text[3:]}" if text.startswith("is ") else f"{one.signal} {text}"
-
-
-def scale_of(model: CompiledModel, kind: int, p: Float) -> float | None:
-    """A row over the equation that the user wrote, at p; None where the row is no multiple of it."""
-    if len(model.rows) != len(model.equations):
-        return None
-    row, equation = model.rows[kind], model.equations[kind]
-    parts = [(theta, part) for theta, part in zip(row.theta, row.regressors, strict=True)] + [(-1, row.known)]
-    whole = sum(
-        sp.sympify(theta) * total_derivative(psi, order) for theta, part in parts for order, psi in part.items()
-    )
-    at_p = dict(zip(model.p, map(sp.Float, p), strict=True))
-    whole, equation = (model.with_knowns(sp.sympify(one)).xreplace(at_p) for one in (whole, equation))
-    symbols = sorted(whole.free_symbols | equation.free_symbols, key=str)
-    random = np.random.default_rng(1)
-    ratios = []
-    for _ in range(3):
-        at = {one: sp.Float(value) for one, value in zip(symbols, random.uniform(0.5, 1.5, len(symbols)), strict=True)}
-        try:
-            ratios.append(float(whole.xreplace(at)) / float(equation.xreplace(at)))
-        except (TypeError, ZeroDivisionError):
-            return None
-    return ratios[0] if np.allclose(ratios, ratios[0], rtol=1e-6) else None

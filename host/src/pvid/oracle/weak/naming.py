@@ -1,0 +1,168 @@
+"""What is missing in words, for sentences and for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from pvid.base.rounding import percent
+from pvid.base.wording import listed, with_unit
+from pvid.model.compiled import CompiledModel
+from pvid.model.signals import total_derivative
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.missing import VISIBLE, Explained, Missing, word_of
+from pvid.oracle.weak.solve import Fit
+from pvid.oracle.weak.terms import CONSTANT, SOFT, Act, Candidate, Law
+from pvid.oracle.weak.verdict import Name, Reason
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term that is missing.
+
+    Attributes
+    ----------
+    where : the equation, or the signal that is not what was recorded
+    law : as typed in a model file, without its factor; None: it is no law
+    size : factor of the law in the equation as written, or the number of the clause; None: equations were combined
+    se : standard error of it
+    unit : of a number of a signal; a law's is that of the equation over the law
+    text : a clause
+    instead : clauses, of terms that explain the run alike
+    """
+
+    where: str
+    law: str | None
+    size: float | None
+    se: float | None
+    unit: str | None
+    text: str
+    instead: tuple[str, ...]
+
+
+def terms_of(fit: Fit, found: Explained) -> tuple[Term, ...]:
+    """All that were named.
+
+    Parameters
+    ----------
+    fit : the estimate that lacks them
+    """
+    model = fit.rows.compiled.bare
+    scale = {row.name: scale_of(model, kind, fit.p) for kind, row in enumerate(model.rows)}
+    out = []
+    for one in found.named:
+        term = one.chosen
+        law: str | None = None
+        unit: str | None = ""
+        factor: float | None = 1.0
+        if isinstance(term.kind, Act):
+            unit = {"signal": model.signal(term.signal).unit, "time": "s", "part": "", "percent": ""}[term.kind.measure]
+        elif term.kind is not SOFT:
+            law, factor, unit = _law(term), scale[term.where], None
+        out.append(
+            Term(
+                where=term.where,
+                law=law,
+                size=_over(term.number, factor),
+                se=_over(one.error, abs(factor) if factor else factor),
+                unit=unit,
+                text=in_words(model, term, scale),
+                instead=tuple(in_words(model, other, scale) for other in one.rivals),
+            )
+        )
+    return tuple(out)
+
+
+def _over(number: float, factor: float | None) -> float | None:
+    return number / factor if factor and np.isfinite(number) else None
+
+
+def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
+    """The doubt about an estimate and its cause; "unknown" where no cause explains it."""
+    model, p, terms = fit.rows.compiled.bare, fit.p, terms_of(fit, found)
+    relative = lacking.error / np.maximum(np.abs(p), 1e-300)
+    worst = [k for k in np.argsort(-relative) if lacking.visible[k]]
+    causes = listed(one.text for one in terms)
+    if not found.complete:
+        biased = listed(f"{model.p_names[k]} by {percent(relative[k])}" for k in worst)
+        text = f"The equations lack something, or a signal is not what was recorded: it may bias {biased}. "
+        best = f"of what was tried most is explained by this, {percent(found.share)}: {causes}."
+        text += f"The cause is unknown: {best if terms else 'no term that was tried explains it.'}"
+        return [Reason("missing", text)]
+    if terms[0].text.startswith(("equation", "the ")):  # a signal's name keeps its letters
+        causes = causes[0].upper() + causes[1:]
+    now = found.fit.p
+    moved = [k for k in worst if abs(now[k] - p[k]) > VISIBLE / 2 * abs(p[k])] or worst[:1]
+    values = listed(
+        f"{model.p_names[k]} would be {with_unit(now[k], model.unknowns[k].unit, 4)} in place of {p[k]:.4g}"
+        for k in moved
+    )
+    text = f"{causes}: with that {values}."
+    if terms[0].instead:
+        text += f" The run does not distinguish it from these: {listed(terms[0].instead, 'or')}."
+    return [Reason(_name_of(found.named[0].chosen), text)]
+
+
+def _name_of(one: Candidate) -> Name:
+    if isinstance(one.kind, Act):
+        return "sensor"
+    return "friction" if one.kind is SOFT or one.kind.text.startswith("sgn({x}.d())") else "missing"
+
+
+def in_words(model: CompiledModel, one: Candidate, scale: Mapping[str, float | None]) -> str:
+    """A term, with its size.
+
+    Parameters
+    ----------
+    scale : of each row, see scale_of
+    """
+    kind = one.kind
+    if kind is SOFT:
+        return kind.text.format(x=one.signal, w=f"{one.level:.2g}")
+    if isinstance(kind, Law):
+        law, factor = _law(one), scale[one.where]
+        verb = "seem" if one.where.startswith("equations") else "seems"
+        if factor is None:
+            return f"{one.where} {verb} to lack a term in {law}"
+        size = f"{one.size / factor:.3g}"
+        return f"{one.where} {verb} to lack {f'a constant of {size}' if kind is CONSTANT else f'{size}*{law}'}"
+    signal = model.signal(one.signal)
+    amount = abs(one.number)
+    size = {
+        "signal": with_unit(amount, signal.unit, 3),
+        "time": with_unit(amount, "s", 2),
+        "part": f"{amount:.2g}",
+        "percent": percent(amount),
+    }[kind.measure]
+    text = kind.text.format(size=size, word=word_of(one), u=one.signal, top=f"{one.top:.3g}")
+    return f"{one.signal} seems to be {text[3:]}" if text.startswith("is ") else f"{one.signal} {text}"
+
+
+def _law(one: Candidate) -> str:
+    return one.kind.text.format(x=one.signal, w=f"{one.level:.2g}")
+
+
+def scale_of(model: CompiledModel, kind: int, p: Float) -> float | None:
+    """A row over the equation that the user wrote, at p; None where the row is no multiple of it."""
+    if len(model.rows) != len(model.equations):
+        return None
+    row, equation = model.rows[kind], model.equations[kind]
+    parts = [(theta, part) for theta, part in zip(row.theta, row.regressors, strict=True)] + [(-1, row.known)]
+    whole = sum(
+        sp.sympify(theta) * total_derivative(psi, order) for theta, part in parts for order, psi in part.items()
+    )
+    at_p = dict(zip(model.p, map(sp.Float, p), strict=True))
+    whole, equation = (model.with_knowns(sp.sympify(one)).xreplace(at_p) for one in (whole, equation))
+    symbols = sorted(whole.free_symbols | equation.free_symbols, key=str)
+    random = np.random.default_rng(1)
+    ratios = []
+    for _ in range(3):
+        at = {one: sp.Float(value) for one, value in zip(symbols, random.uniform(0.5, 1.5, len(symbols)), strict=True)}
+        try:
+            ratios.append(float(whole.xreplace(at)) / float(equation.xreplace(at)))
+        except (TypeError, ZeroDivisionError):
+            return None
+    return ratios[0] if np.allclose(ratios, ratios[0], rtol=1e-6) else None
