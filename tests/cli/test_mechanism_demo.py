@@ -13,7 +13,7 @@ from pvid.base.console import DONE
 from pvid.base.errors import PvidError
 from pvid.board.target import HOST_TARGET
 from pvid.cli.mechanism_demo import demo
-from pvid.run.mechanism import refined_gains_of
+from pvid.run.mechanism import refined_shifts_of
 
 
 @pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
@@ -33,12 +33,9 @@ def test_a_mechanism_is_identified_compared_and_streamed(
 
 def test_a_refined_estimate_lacks_what_the_linear_rows_lack_only_beyond_what_they_neglect() -> None:
     model = SimpleNamespace(refinement=SimpleNamespace(equations=("full",)), knowns={}, signals=())
-    found = SimpleNamespace(
-        by_gain={}, by_known={}, by_model=np.array([0.1, -0.3, 0.3]), by_neglect=np.array([0.2, 0.2, 0.2])
-    )
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("pvid.run.mechanism.given", lambda *_: [])
-        np.testing.assert_array_equal(refined_gains_of(model, found), [[0.0, -0.3, 0.3]])  # type: ignore[arg-type]
+    lacking = SimpleNamespace(shifts=np.array([[0.1, -0.3, 0.3]]))
+    found = SimpleNamespace(lacking=lacking, by_neglect=np.array([0.2, 0.2, 0.2]))
+    np.testing.assert_array_equal(refined_shifts_of(model, found), [[0.0, -0.3, 0.3]])  # type: ignore[arg-type]
 
 
 def test_what_is_not_shipped_is_refused() -> None:

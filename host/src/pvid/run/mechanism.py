@@ -225,13 +225,15 @@ def gains_of(model: CompiledModel, found: Identified) -> Float:
 
 
 def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
-    """The same of a refined estimate. Where the refinement has its own equations, it neglects nothing: what the linear
-    rows lack counts only where it is more than they neglect."""
-    gains = gains_of(model, found)
-    if not model.refinement.equations:
-        return gains
-    *others, lacking, neglected = gains
-    return np.array([*others, np.where(np.abs(lacking) > neglected, lacking, 0.0)])
+    """The same of a refined estimate, whose equations neglect nothing where the refinement has its own."""
+    return gains_of(model, found)[:-1] if model.refinement.equations else gains_of(model, found)
+
+
+def refined_shifts_of(model: CompiledModel, found: Identified) -> Float:
+    """The same of a refined estimate: where the refinement has its own equations, what the linear rows lack counts only
+    where it is more than they neglect."""
+    shifts = shifts_of(found)
+    return np.where(np.abs(shifts) > found.by_neglect, shifts, 0.0) if model.refinement.equations else shifts
 
 
 def values_of(

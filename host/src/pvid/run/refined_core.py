@@ -20,7 +20,7 @@ from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, Difference
 from pvid.run.engine_design import config_to_identify, samples_of
-from pvid.run.mechanism import MechanismAnswer, Value, own_keys, refined_gains_of, shifts_of, values_of
+from pvid.run.mechanism import MechanismAnswer, Value, own_keys, refined_gains_of, refined_shifts_of, values_of
 from pvid.run.mechanism_compare import compare_samples
 from pvid.run.mechanism_core import CoreAnswer
 from pvid.run.refine_design import refine_design
@@ -192,10 +192,9 @@ def _values(answer: MechanismAnswer, made: RefineFunctions, estimate: npt.NDArra
     unit = np.where([one.log for one in parameters], r, 1.0)
     covariance = np.asarray(estimate["covariance"], np.float64) * np.outer(unit, unit)
     places = made.places_of_p
-    gains = refined_gains_of(answer.model, answer.found)
-    values = values_of(
-        answer.model, r[places], covariance[np.ix_(places, places)], gains, answer.found.judged, shifts_of(answer.found)
-    )
+    model, found, own = answer.model, answer.found, covariance[np.ix_(places, places)]
+    gains, shifts = refined_gains_of(model, found), refined_shifts_of(model, found)
+    values = values_of(model, r[places], own, gains, found.judged, shifts)
     for k, one in enumerate(parameters):
         if one.place < 0 and answer.identified:
             se = float(np.sqrt(covariance[k, k]))

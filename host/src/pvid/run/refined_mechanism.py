@@ -15,7 +15,7 @@ from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import Nominal, RigFile, Sensor
 from pvid.rig.run import Run
-from pvid.run.mechanism import MechanismAnswer, refined_gains_of, shifts_of, values_of
+from pvid.run.mechanism import MechanismAnswer, refined_gains_of, refined_shifts_of, values_of
 from pvid.run.refined import GOOD, NOISE, Measured, Prior, Problem, Refined, refined, softened, without_outliers
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
@@ -221,7 +221,7 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
         return answer, refined, text
     made = refined.problem.kernel.made
     p, covariance = refined.problem.values(found, made.places_of_p)
-    values = values_of(model, p, covariance, refined_gains_of(model, weak), weak.judged, shifts_of(weak))
+    values = values_of(model, p, covariance, refined_gains_of(model, weak), weak.judged, refined_shifts_of(model, weak))
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
     if len(answer.recording.segments) > 1:
         text += f"; of the longest segment alone, {recording.t[0]:.6g} s to {recording.t[-1]:.6g} s"

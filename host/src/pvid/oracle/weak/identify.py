@@ -24,7 +24,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.missing import Explained, Missing, explained
-from pvid.oracle.weak.naming import of_missing
+from pvid.oracle.weak.naming import of_missing, of_unexplained
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.weak.samples import explains, of_samples
 from pvid.oracle.weak.scale import of_scale
@@ -191,22 +191,26 @@ def identify(
     reasons = verdict.of_parameters(compiled, fit, se, judged, found.r2)
     named: Explained | None = None
     lacking = None if fit.diverged else attempt("what is missing", lambda: Missing.of(library, se))
-    by_model = np.zeros(len(se)) if lacking is None else lacking.error
-    se = np.hypot(se, by_model)
     if not fit.diverged:
         reasons += attempt.reasons(_checks(rows, run, fit, found, halves, judged, with_error))
         if lacking is not None and lacking.visible.any() and not explains(reasons, lacking.there[0], sample_rate):
-            named = attempt("what is missing", lambda: explained(library, lacking))
-            reasons += [] if named is None else of_missing(fit, lacking, named)
+            named = attempt("what is missing", partial(explained, library, lacking))
+            if named is not None:
+                lacking = lacking.also(named.fit.p - fit.p) if named.complete else lacking
+                reasons += of_missing(fit, lacking, named)
+        if lacking is not None and (unknown := of_unexplained(compiled, found, lacking)):
+            lacking = lacking.also(library.scores.by_parts())
+            reasons += unknown
         reasons += of_scale(compiled, by_gain, fit.p, found.se)
         reasons += attempt.failed
         if with_error and not weighted_anew:
             reasons.append(Reason("not_settled", _NOT_REWEIGHTED))
+    by_model = np.zeros(len(se)) if lacking is None else lacking.error
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
         p=fit.p,
-        se=se,
+        se=np.hypot(se, by_model),
         predicted=found.predicted,
         clustered=found.clustered,
         covariance=found.covariance,
@@ -297,7 +301,7 @@ def _checks(
         "the halves of the run": lambda: verdict.of_halves(bare, fit, halves),
         "attenuation": lambda: verdict.of_attenuation(bare, fit, found, other_line(fit)),
         "feedback": lambda: of_feedback(bare, run, fit, _determined(bare, fit, found)),
-        "the residuals": lambda: verdict.of_residuals(found, equation_error),
+        "the residuals": lambda: verdict.of_residuals(found),
         "the range": lambda: verdict.of_range(bare, fit.p, judged),
         "spoiled windows": lambda: verdict.of_spoiled(rows, fit),
         "the weights of the sensors": lambda: compared(verdict.of_weights, by_sensors(fit)),

@@ -74,10 +74,16 @@ class Missing:
             if one.certainty > _CERTAIN and one.share > _SHARE and one.folds >= FOLDS - 1
             if fit is None or one.own > _DISTINCT
         )
-        plausible = [one.shift for one in there if one.share >= _PLAUSIBLE * there[0].share]
-        shifts = np.array(plausible).reshape(-1, len(p))
+        plausible = [one for one in there if one.share >= _PLAUSIBLE * there[0].share]
+        shifts = np.array([one.shift for one in plausible if one.own > _DISTINCT or one is there[0]]).reshape(
+            -1, len(p)
+        )
         error = np.max(np.abs(shifts), axis=0, initial=0.0)
         return cls(there, shifts, (error > _MOVES * se) & (error > VISIBLE * np.abs(p)))
+
+    def also(self, shift: Float) -> Missing:
+        """With one more plausible shift of p [n_p]."""
+        return replace(self, shifts=np.append(self.shifts, shift[np.newaxis], axis=0))
 
     @property
     def error(self) -> Float:
@@ -198,7 +204,13 @@ def _refitted(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fi
         with_it = _leveled(library, fit, one) if one.leveled else _sized(fit, one)
     except (np.linalg.LinAlgError, ArithmeticError, PvidError):
         return None
-    return with_it if with_it is None or np.isfinite(unlikelihood(with_it[1])) else None
+    return with_it if with_it is None or _is_nearer(with_it[1], fit) else None
+
+
+def _is_nearer(one: Fit, other: Fit) -> bool:
+    """Whether it leaves less beyond the sensors' noise: the likelihood alone prefers what takes an input away, with
+    parameters and residuals near 0."""
+    return bool(np.isfinite(unlikelihood(one))) and chi2_of_sensors(one) < chi2_of_sensors(other)
 
 
 def _sized(fit: Fit, one: Candidate) -> tuple[Candidate, Fit] | None:
@@ -221,7 +233,7 @@ def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit
     def at(level: float) -> tuple[float, Candidate, Fit]:
         own = replace(one, level=level, size=1.0, change=library.act(recorded, act, level).change)
         with_it = corrected(fit, own)
-        return unlikelihood(with_it), own, with_it
+        return unlikelihood(with_it) if _is_nearer(with_it, fit) else np.inf, own, with_it
 
     best = at(one.level)
     for factor in _FACTORS:

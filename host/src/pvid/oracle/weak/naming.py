@@ -12,11 +12,14 @@ from pvid.base.rounding import percent
 from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import total_derivative
+from pvid.oracle.weak.errors import Uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.missing import VISIBLE, Explained, Missing, word_of
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.terms import CONSTANT, SOFT, Act, Candidate, Law
 from pvid.oracle.weak.verdict import Name, Reason
+
+_GROSS = 100.0  # chi^2, from which motion that is left unexplained is a doubt
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
     model, p, terms = fit.rows.compiled.bare, fit.p, terms_of(fit, found)
     relative = lacking.error / np.maximum(np.abs(p), 1e-300)
     worst = [k for k in np.argsort(-relative) if lacking.visible[k]]
-    causes = listed(one.text for one in terms)
+    causes = listed([one.text for one in terms] or ["nothing"])
     if not found.complete:
         biased = listed(f"{model.p_names[k]} by {percent(relative[k])}" for k in worst)
         text = f"The equations lack something, or a signal is not what was recorded: it may bias {biased}. "
@@ -104,6 +107,17 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
     if terms[0].instead:
         text += f" The run does not distinguish it from these: {listed(terms[0].instead, 'or')}."
     return [Reason(_name_of(found.named[0].chosen), text)]
+
+
+def of_unexplained(model: CompiledModel, found: Uncertainty, lacking: Missing) -> list[Reason]:
+    """Motion that neither the equations nor a term that was tried explains."""
+    left = 1 - min(found.r2)
+    if lacking.there or found.chi2 < _GROSS or left < VISIBLE:
+        return []
+    row = model.rows[int(np.argmin(found.r2))].name
+    text = f"{row[0].upper()}{row[1:]} leaves {percent(left)} of its motion unexplained, and no term that was tried "
+    text += "explains it: the cause is unknown. The standard errors contain how far each quarter of the run moves p."
+    return [Reason("missing", text)]
 
 
 def _name_of(one: Candidate) -> Name:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.oracle.weak.errors import clustered_variance
 from pvid.oracle.weak.functions import Float
@@ -68,14 +69,28 @@ class Scores:
         q = np.linalg.qr(nuisances.transpose(0, 2, 1))[0]
         return np.asarray(rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows)))
 
+    def _folds(self) -> list[npt.NDArray[np.intp]]:
+        """Windows of each part of the run."""
+        windows = len(self.residuals)
+        fold = np.minimum(np.arange(windows) * FOLDS // windows, FOLDS - 1)
+        return [np.flatnonzero(fold == part) for part in range(FOLDS)]
+
+    def by_parts(self) -> Float:
+        """What p moves by when the run's parts are left out one by one: standard error of the jackknife [n_p]."""
+        jj = np.array([_products(self.slopes[own], self.slopes[own]) for own in self._folds()])
+        jr = np.array(
+            [_products(self.slopes[own], self.residuals[own][..., np.newaxis])[:, 0] for own in self._folds()]
+        )
+        whole, b = jj.sum(axis=0) + self.prior, jr.sum(axis=0)
+        without = np.array([self.unit * (inverse(whole - a) @ (b - c)) for a, c in zip(jj, jr, strict=True)])
+        return np.asarray(np.sqrt((FOLDS - 1) * np.mean((without - without.mean(axis=0)) ** 2, axis=0)))
+
     def of(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """With their scores, that of the largest share first."""
         r, slopes = self.residuals, self.slopes
-        windows = len(r)
         c = np.stack([self.white(one) for one in candidates], axis=-1)
         known = np.concatenate([one.known for one in self.fit.white], axis=1)
-        fold = np.minimum(np.arange(windows) * FOLDS // windows, FOLDS - 1)
-        parts = [np.flatnonzero(fold == part) for part in range(FOLDS)]
+        parts = self._folds()
         jj = np.array([_products(slopes[own], slopes[own]) for own in parts])
         jc = np.array([_products(slopes[own], c[own]) for own in parts])
         jr = np.array([_products(slopes[own], r[own][..., np.newaxis])[:, 0] for own in parts])

@@ -25,7 +25,6 @@ Name = Literal[
     "near_zero",
     "not_settled",
     "chi2",
-    "shape",
     "halves",
     "windows",
     "smoothing",
@@ -61,7 +60,6 @@ _VISIBLE = 1e-3
 
 # Residuals above this many times what the sensors explain are reported.
 _CHI2 = 2.0
-_CHI2_WEIGHTED = 3.0
 
 _FEW_WINDOWS = 8
 
@@ -331,27 +329,12 @@ def of_weights(model: CompiledModel, fit: Fit, found: Uncertainty, other: Fit, o
     return [replace(one, alarm=False) for one in reasons]
 
 
-def of_residuals(found: Uncertainty, equation_error: bool = True) -> list[Reason]:
-    """Residuals beyond what the sensors explain, and beyond what they and an error of the equations explain."""
-    out = []
-    if equation_error and found.weighted_chi2 > _CHI2_WEIGHTED:
-        out.append(
-            Reason(
-                "shape",
-                f"The residuals are {found.weighted_chi2:.3g} times what sensors and a white error of the equations "
-                "explain: they are correlated with the motion, and a term is probably missing.",
-            )
-        )
-    if found.chi2 > _CHI2:
-        out.append(
-            Reason(
-                "chi2",
-                f"The residuals are {found.chi2:.3g} times what the sensors explain; standard errors are from their "
-                "scatter.",
-                alarm=False,
-            )
-        )
-    return out
+def of_residuals(found: Uncertainty) -> list[Reason]:
+    """Residuals beyond what the sensors explain: a note, as it is not their size that biases p."""
+    if found.chi2 <= _CHI2:
+        return []
+    text = f"The residuals are {found.chi2:.3g} times what the sensors explain; standard errors are from their scatter."
+    return [Reason("chi2", text, alarm=False)]
 
 
 def of_range(model: CompiledModel, p: Float, found: Sequence[Judged] = ()) -> list[Reason]:
