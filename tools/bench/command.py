@@ -701,8 +701,9 @@ def bench_long(update: Path | None, only: tuple[str, ...]) -> int:
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the first rig.")
 @click.option("--resume", is_flag=True, help="Go on behind the rigs of an earlier run of this seed on this code.")
 def bench_random_models(update: Path | None, count: int, seed: int, resume: bool) -> int:
-    """Random rigs the whole road: check, identify in float64 and in C, refine, build, compile, equal bits."""
-    from bench import random_models
+    """Random rigs the whole road: check, identify in float64 and in C, refine, build, compile, equal bits; and
+    descriptions without sense, of which each is a report or one sentence."""
+    from bench import random_models, senseless_models
 
     kept = build_folder() / f"random-models-{seed}.jsonl"
     if not resume:
@@ -711,8 +712,10 @@ def bench_random_models(update: Path | None, count: int, seed: int, resume: bool
         found = random_models.roads(range(seed, seed + count), kept, advance)
     put_table(update, "random-models", markdown(random_models.HEADER, random_models.table_of(found)))
     put_table(update, "compile-times", markdown(random_models.COMPILE_HEADER, random_models.compile_times()))
-    failed = [one for one in found if one.failures]
-    for one in failed:
-        for failure in one.failures:
-            write_stderr(f"pvid: rig {one.seed} ({one.kind}): {failure}")
-    return DIFFERENT if failed else DONE
+    senseless = senseless_models.run(range(seed, seed + 2 * count))
+    put_table(update, "senseless-models", markdown(senseless_models.HEADER, [senseless.row()]))
+    failures = [f"rig {one.seed} ({one.kind}): {failure}" for one in found for failure in one.failures]
+    failures += [f"description {number}: {error}" for number, error in senseless.tracebacks]
+    for failure in failures:
+        write_stderr(f"pvid: {failure}")
+    return DIFFERENT if failures else DONE

@@ -1,0 +1,112 @@
+"""Expressions without sense as model files: each is a report or one sentence, never a traceback."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from pvid.base.errors import PvidError
+from pvid.model import Model, cos, sgn, sin
+from pvid.model.report import check_report
+from pvid.model.signals import Jet
+
+HEADER = ("models", "identifiable", "not identifiable", "refused", "tracebacks")
+_UNITS = ("s", "m", "rad", "kg*m^2", "1/s", "mm", "V", "furlong", "A*", "deg")
+
+
+@dataclass
+class Tally:
+    """Outcomes of many descriptions.
+
+    Attributes
+    ----------
+    count : of each kind of outcome
+    tracebacks : (seed, error) of what must not happen
+    """
+
+    count: Counter[str] = field(default_factory=Counter)
+    tracebacks: list[tuple[int, str]] = field(default_factory=list)
+
+    def row(self) -> tuple[str, ...]:
+        """Cells of the table."""
+        kinds = [self.count[one] for one in HEADER[1:4]]
+        return tuple(map(str, (sum(kinds) + len(self.tracebacks), *kinds, len(self.tracebacks))))
+
+
+def run(seeds: range, advance: Callable[[int], None] = lambda done: None) -> Tally:
+    """Describes, compiles and reports one model for each seed."""
+    tally = Tally()
+    for seed in seeds:
+        try:
+            text = check_report(described(random.Random(seed)).compiled("random"))
+            assert "sum of theta * N = Y" in text
+            tally.count["not identifiable" if "Not identifiable: " in text else "identifiable"] += 1
+        except PvidError as error:
+            cause = str(error)
+            if "\n" in cause or len(cause) < 20:
+                tally.tracebacks.append((seed, f"not a sentence: {cause!r}"))
+            else:
+                tally.count["refused"] += 1
+        except Exception as error:  # what is looked for
+            tally.tracebacks.append((seed, f"{type(error).__name__}: {error}"))
+        advance(seed - seeds.start + 1)
+    return tally
+
+
+def described(source: random.Random) -> Model:
+    """Whatever the symbols allow."""
+    model = Model("random expressions")
+    odd = 0.05 if source.random() < 0.2 else 0.0  # how often a unit is a wrong one
+    signals = [_signal(model, source, f"z{k}", _unit(source, odd)) for k in range(source.randint(1, 3))]
+    unknowns = [_unknown(model, source, f"p{k}", _unit(source, odd)) for k in range(source.randint(1, 4))]
+    second = model.known("s0", "s", 1.0)
+    leaves = [*signals, *signals, *unknowns, *(one.d(n) * second**n for one in signals for n in (1, 2, 3))]
+    for _ in range(source.randint(1, 3)):
+        whole = _expression(source, leaves, source.randint(1, 4))
+        model.equation(whole + sum(source.choice(unknowns) * source.choice(leaves) for _ in range(2)))
+    return model
+
+
+def _signal(model: Model, source: random.Random, name: str, unit: str) -> Jet:
+    kind = source.randrange(8)
+    if kind == 0:
+        return model.unmeasured(name, unit)
+    if kind == 1:
+        return model.input(name, unit, hold=source.choice(("zoh", "sampled")))
+    return model.sensor(name, unit, resolution=1e-3)
+
+
+def _unknown(model: Model, source: random.Random, name: str, unit: str) -> sp.Expr:
+    if source.random() < 0.1:
+        return model.known(name, unit, source.choice((0.5, 9.81, 2.0)))
+    if source.random() < 0.15:
+        return model.unknown(name, unit, 0.0, positive=False, sd=1.0)
+    return model.unknown(name, unit, source.choice((1e-3, 0.3, 1.0, 20.0)))
+
+
+def _unit(source: random.Random, odd: float) -> str:
+    return source.choice(_UNITS) if source.random() < odd else ""
+
+
+def _expression(source: random.Random, leaves: list[sp.Expr], depth: int) -> sp.Expr:
+    if depth == 0:
+        leaf = source.choice(leaves)
+        return leaf if source.random() < 0.9 else sp.Float(source.choice((0.5, 2.0, 3.3)))
+    one = _expression(source, leaves, depth - 1)
+    other = _expression(source, leaves, source.randrange(depth))
+    kind = source.randrange(14)
+    if kind < 5:
+        return one + other
+    if kind < 9:
+        return one * other
+    if kind == 9:
+        return one / (other if other != 0 else sp.Integer(1))
+    if kind == 10:
+        return source.choice((sin, cos, sgn, abs, sp.exp, sp.sqrt, sp.tan, sp.tanh))(one)
+    if kind == 11:
+        return one ** source.choice((2, 3, -1, 0.5))
+    return one - other
