@@ -85,6 +85,16 @@ def test_a_run_of_the_pendulum_is_identified_without_loading_sympy() -> None:
     )
 
 
+def test_a_good_run_of_a_mechanism_loads_no_package_that_it_does_not_need(motor: Path) -> None:
+    """SciPy's signals, numpy's Fortran compiler and SymPy's mechanics take a second."""
+    others = ("scipy.signal", "numpy.f2py", "sympy.physics.mechanics", "pvid.board", "matplotlib")
+    code = f"import sys; sys.argv[1:] = ['identify', {str(motor)!r}, '--json']\nfrom pvid.cli.main import main\n"
+    code += "try:\n    main()\nexcept SystemExit as end:\n"
+    code += f"    print(end.code, [one for one in {others} if one in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "0 []"
+
+
 def test_columns_and_units_are_mapped(motor: Path, tmp_path: Path) -> None:
     lines = motor.read_text().splitlines()
     head, rows = lines[0].split(","), [line.split(",") for line in lines[1:]]

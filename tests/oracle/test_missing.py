@@ -11,8 +11,9 @@ import pytest
 
 from bench.lacking import EFFECTS, PLANTS, Effect, Outcome, cells, outcome
 from bench.mechanisms import design_of, start_of
-from pvid.models.mechanisms import names
+from pvid.models.mechanisms import compiled_of, names
 from pvid.oracle.weak.identify import Identified, identify
+from pvid.oracle.weak.terms import ACTS, Recorded
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 
@@ -92,6 +93,18 @@ def imperfect(name: str, key: str = "", signal: str = "", size: float = 0.0) -> 
     imperfections = Imperfections(**({key: {signal: size}} if key else {}))  # type: ignore[arg-type]
     run, design = simulation.run(3, imperfections), design_of(simulation, imperfections)
     return identify(simulation.model, run, simulation.rig.sample_rate, start_of(simulation, 3), design)
+
+
+@pytest.mark.parametrize("samples", [0.5, 3.0, 16.0])
+def test_signal_behind_a_lag_is_that_of_the_recursion(samples: float) -> None:
+    rate = 200.0
+    x = 3 + np.random.default_rng(0).normal(size=500)
+    decay, expected = np.exp(-1 / samples), x.copy()
+    for k in range(1, len(x)):
+        expected[k] = decay * expected[k - 1] + (1 - decay) * x[k]
+    lag = next(one for one in ACTS if "lag" in one.text)
+    recorded = Recorded(compiled_of("dc_motor").signal("V"), x, rate, 1.0, 10.0)
+    np.testing.assert_allclose(recorded.under(lag, samples / rate), expected, rtol=1e-13)
 
 
 @pytest.mark.parametrize("name", names())

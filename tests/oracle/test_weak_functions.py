@@ -185,3 +185,30 @@ def test_more_directions_than_rows_whiten_as_the_sum_of_their_covariances_does()
     assert whitener.inverse_of_directions() == pytest.approx(expected, rel=1e-8, abs=1e-9)
     assert whitener.total_inverse() == pytest.approx(sum(map(np.linalg.inv, whole)), rel=1e-9)
     assert whitener.log_determinant() == pytest.approx(sum(np.linalg.slogdet(one)[1] for one in whole))
+
+
+def test_windows_are_whitened_at_the_cost_of_their_own_directions() -> None:
+    """Most windows of a run hold few reversals, and one holds many."""
+    rng = np.random.default_rng(6)
+    windows, rows = 60, 20
+    counts = np.where(np.arange(windows) == 7, 16, np.arange(windows) % 3)
+    u = rng.normal(size=(windows, 16, rows)) * (np.arange(16) < counts[:, np.newaxis])[..., np.newaxis]
+    u[:, [0, 5]] = u[:, [5, 0]]  # in any place
+    whitener = Whitener.of_covariance(np.eye(rows), u)
+    assert sum(one.v.size for one in whitener.alike) <= 2 * rows * counts.sum()
+    whole = [np.eye(rows) + one.T @ one for one in u]
+    assert whitener.total_inverse() == pytest.approx(sum(map(np.linalg.inv, whole)), rel=1e-9)
+    x = rng.normal(size=(windows, 2, rows))
+    some = whitener.only(slice(5, 40))
+    white = some.of(x[5:40])
+    for place, one in enumerate(whole[5:40]):
+        assert white[place] @ white[place].T == pytest.approx(x[5 + place] @ np.linalg.inv(one) @ x[5 + place].T)
+    assert some.inverse_of_directions() == pytest.approx(whitener.inverse_of_directions()[5:40])
+    assert some.log_determinant() == pytest.approx(sum(np.linalg.slogdet(one)[1] for one in whole[5:40]))
+
+
+@pytest.mark.parametrize("gap", [1, 2, 7])
+def test_the_zero_of_a_doubtful_stretch_is_that_of_its_least_squares_line(gap: int) -> None:
+    v = np.linspace(-1.0, 1.5, gap + 2) + 0.1 * np.random.default_rng(gap).normal(size=gap + 2)
+    slope, level = np.polyfit(np.arange(gap + 2), v, 1)
+    assert reversals.zero_between(v, 1, gap + 1) == pytest.approx(-level / slope)

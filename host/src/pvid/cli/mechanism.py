@@ -15,7 +15,6 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
-from pvid.board.compare_on import Outcome
 from pvid.cli.input import print_notes, read_input
 from pvid.log.rig import LOG_SUFFIX, recording_of_log
 from pvid.oracle.weak.weights import Weights
@@ -25,8 +24,6 @@ from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
-from pvid.run.compare import Comparison
-from pvid.run.engine_identify import ALL_ALIKE
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.run.mechanism_advice import advised
 from pvid.run.wild_samples import without_wild_samples
@@ -35,7 +32,9 @@ from pvid.settings.enums import Core, Law
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 if TYPE_CHECKING:
+    from pvid.board.compare_on import Outcome
     from pvid.model.compiled import CompiledModel
+    from pvid.run.compare import Comparison
     from pvid.run.mechanism_core import CoreAnswer
     from pvid.run.refined_mechanism import RefinedMechanism
     from pvid.run.refined_pendulum import RefinedPendulum
@@ -154,6 +153,8 @@ def identify_run(
     else:
         _print(answer)
     if core is None and not model.following.is_usual:
+        from pvid.run.engine_identify import ALL_ALIKE  # the core and its design, which this road does not need
+
         write_stderr(f"pvid: note: {ALL_ALIKE}")
     if figure is not None:
         _draw(shown, None, figure)
@@ -336,7 +337,9 @@ def compare_recording(
     targets : the recording is streamed to them; of the strong form emulated boards, which replay it
     given : options, by name; a value that the form does not have is refused
     """
+    from pvid.board.compare_on import Outcome
     from pvid.board.engine_board import verify_recording
+    from pvid.run.compare import Comparison
     from pvid.run.mechanism_compare import compare_recording as compared
     from pvid.run.refined_core import compare_both
 
@@ -373,6 +376,8 @@ def compare_recording(
 
 
 def _compared(form: str, core: Core, found: Comparison) -> Outcome:
+    from pvid.board.compare_on import Outcome
+
     verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
     return Outcome("host", core, form, "stationary", found.ticks, found.core_hash, found.equal, verdict)
 
@@ -385,6 +390,7 @@ def _compared_strong(
     given: Mapping[str, str | None],
 ) -> list[Outcome]:
     """The same by the strong form, on this computer and on emulated boards."""
+    from pvid.board.compare_on import Outcome
     from pvid.board.strong_image import compare_on_board
     from pvid.run.strong_compare import StrongComparison
 

@@ -13,7 +13,6 @@ import sympy as sp
 from pvid.model.compiled import CompiledModel, Extra, Known, Output, Refinement, Signal, Unknown
 from pvid.model.compiler import rows_of
 from pvid.model.eliminate import Equation
-from pvid.model.mechanics import equations_of
 from pvid.model.normal_form import rational
 from pvid.model.refusal import ModelError, place_of_caller
 from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
@@ -237,6 +236,8 @@ class Model:
         ----------
         signals : dynamicsymbol or constant -> the signal, unknown or known constant of this model
         """
+        from pvid.model.mechanics import equations_of  # a fifth of a second, for models in SymPy's own words alone
+
         try:
             found = equations_of(method, signals)
         except ModelError as error:

@@ -18,6 +18,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
+from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Integral, Jet, jets, sgn
 from pvid.model.strong import strong_form
 from pvid.oracle.weak.channels import broadcast, running_integrals
@@ -158,7 +159,7 @@ class StrongModel:
             integrand, fold = one.args
             mark = sp.Dummy()
             symbols = sorted(jets(integrand), key=str)
-            inner = sp.lambdify(symbols, integrand, "numpy")(
+            inner = numpy_function(symbols, integrand)(
                 *[raw[jet.of] if jet.order == 0 else values[jet] for jet in symbols]
             )
             known[mark] = running_integrals(broadcast(inner, size), size - 1, int(fold), dt)[int(fold)][0]

@@ -9,8 +9,10 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from itertools import islice
 
 from pvid.rig.cells import is_missing, is_number
 from pvid.rig.times import is_time
@@ -136,8 +138,9 @@ def find(lines: Sequence[str], wanted: Sequence[str], positions: Sequence[int] =
     bare = [without_stamp(line)[0] for line in lines] if stamped else lines
     sought = [one for one in wanted if not (stamped and one in ("t", STAMP))]
     found: list[tuple[tuple[bool, float], Layout]] = []
+    named = cache(lambda: _named(bare, sought))
     for separator in _SEPARATORS:
-        table = _table(bare, separator, sought, [one - int(stamped) for one in positions])
+        table = _table(bare, separator, sought, [one - int(stamped) for one in positions], named)
         if table is not None:
             found.append(table)
     if not found:
@@ -158,14 +161,20 @@ def _is_stamped(lines: Sequence[str]) -> bool:
 
 
 def _table(
-    lines: Sequence[str], separator: str, wanted: Sequence[str], positions: Sequence[int]
+    lines: Sequence[str],
+    separator: str,
+    wanted: Sequence[str],
+    positions: Sequence[int],
+    named: Callable[[], Sequence[int]],
 ) -> tuple[tuple[bool, float], Layout] | None:
-    """The layout if this is the separator, and how well it fits; None where it divides nothing."""
+    """The layout if this is the separator, and how well it fits; None where it divides nothing.
+
+    named : as `_named`, for a header behind the first lines
+    """
     sampled = [*_read(lines, separator, range(min(len(lines), _SAMPLED)))]
     head = _head(sampled, wanted)
     if head is None and wanted and len(lines) > _SAMPLED:
-        at = [k for k in range(_SAMPLED, len(lines)) if all(name in lines[k] for name in wanted)][:3]
-        further = _head([*_read(lines, separator, at)], wanted)
+        further = _head([*_read(lines, separator, named())], wanted)
         if further is not None:
             sampled += _read(lines, separator, range(further[0].number, min(len(lines), further[0].number + _SAMPLED)))
             head = further
@@ -185,6 +194,13 @@ def _table(
     numeric = sum(sum(kind in "nt" for kind in one.kinds) for one in usual) / len(rows)
     layout = _with_head(separator, sampled, usual, head, (wanted, positions))
     return (head is not None, numeric**2 / width), layout
+
+
+def _named(lines: Sequence[str], wanted: Sequence[str]) -> list[int]:
+    """The first few lines behind the sampled ones that contain all names."""
+    longest = max(wanted, key=len)
+    there = (k for k in range(_SAMPLED, len(lines)) if longest in lines[k] and all(one in lines[k] for one in wanted))
+    return [*islice(there, 3)]
 
 
 def _read(lines: Sequence[str], separator: str, at: Iterable[int]) -> Iterator[_Line]:

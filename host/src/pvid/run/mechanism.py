@@ -14,6 +14,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
+from pvid.model.evaluation import numpy_function
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
 from pvid.oracle.weak.choice import Scored
@@ -287,7 +288,7 @@ def outputs_at(model: CompiledModel, p: Float) -> dict[str, float]:
 @lru_cache(maxsize=256)
 def _gradient(value: sp.Expr, p: tuple[sp.Symbol, ...]) -> Any:
     """A function of p: the value, then its slopes."""
-    return sp.lambdify(p, [value, *(value.diff(symbol) for symbol in p)], "numpy")
+    return numpy_function(p, [value, *(value.diff(symbol) for symbol in p)])
 
 
 def _output(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:

@@ -18,6 +18,7 @@ from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.design.refine import refine_config
 from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Integral, Jet, jets
 from pvid.models.kapitza.refinement import PARAMETERS
 from pvid.models.registry import DEFAULT
@@ -344,7 +345,7 @@ def _reversal(made: RefineFunctions, argument: sp.Expr, q: Float32) -> tuple[Flo
     own = {one: sp.Symbol(str(one), real=True) for one in argument.free_symbols}
     whole = argument.xreplace(own)
     whole = whole.xreplace(dict.fromkeys(whole.free_symbols - set(symbols), sp.Integer(0)))
-    value = sp.lambdify(symbols, [whole, *(sp.diff(whole, one) for one in symbols)], "numpy")
+    value = numpy_function(symbols, [whole, *(sp.diff(whole, one) for one in symbols)])
     for _ in range(_NEWTON):
         at, *slope = map(float, value(*still))
         if at != 0 and any(slope):

@@ -87,13 +87,15 @@ def sizes_of(settings: Iterable[str]) -> dict[str, Any]:
 
 def with_play(values: Float, width: float) -> Float:
     """What a sensor behind a play shows [n]: it stays until one of the flanks, `width` apart, moves it."""
-    out = np.empty_like(values)
-    at = float(values[0])
     half = width / 2.0
-    for place, value in enumerate(values.tolist()):
-        at = min(max(at, value - half), value + half)
-        out[place] = at
-    return out
+    at, out = float(values[0]), []
+    for low, high in zip((values - half).tolist(), (values + half).tolist(), strict=True):
+        if at < low:
+            at = low
+        elif at > high:
+            at = high
+        out.append(at)
+    return np.array(out)
 
 
 def eccentric(values: Float, amplitude: float, phase: float) -> Float:

@@ -6,6 +6,7 @@ sum_terms factor (-1)^order sum chi^(order) channel.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Part
+from pvid.model.evaluation import numpy_function
 from pvid.model.signals import TIME, Integral, Jet, jets, sgn
 from pvid.oracle.weak import reversals
 from pvid.oracle.weak.front import Grid, filtered, weights_of
@@ -26,6 +28,7 @@ _ONE = sp.Integer(1)
 
 # A sign in doubt is one direction in the rows while the fastest test function turns by less than this [rad].
 _PIECE = 0.5
+_KEPT = 8  # located signs
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,7 @@ class Channels:
 
     def __init__(self, model: CompiledModel) -> None:
         self.model = model
+        self._located: dict[tuple[object, ...], reversals.Signs] = {}
         found: dict[Channel, int] = {}
         plans = []
         for row in model.rows:
@@ -171,7 +175,7 @@ class Channels:
 
     def function(self, expressions: Sequence[sp.Expr]) -> Any:
         """A numpy function of `plain`."""
-        return sp.lambdify(self.plain, [one.xreplace(self.sign_marks) for one in expressions], "numpy", cse=True)
+        return numpy_function(self.plain, [one.xreplace(self.sign_marks) for one in expressions])
 
     @cached_property
     def _values(self) -> Any:
@@ -202,7 +206,7 @@ class Channels:
 
     @cached_property
     def _sign_arguments(self) -> Any:
-        return sp.lambdify(sorted(self.needed, key=str), list(self.signs), "numpy")
+        return numpy_function(sorted(self.needed, key=str), list(self.signs))
 
     def record(self, grid: Grid) -> Record:
         """Values of all channels at the steps of a grid."""
@@ -219,13 +223,18 @@ class Channels:
         count = len(self.channels)
         return Record(self, grid, np.array(whole[:count]), whole[count:], tuple(signs), arguments)
 
+    @cached_property
+    def _sign_slopes(self) -> dict[sp.Expr, dict[Jet, sp.Expr]]:
+        """Derivatives of each argument by its jets."""
+        return {one: {jet: sp.diff(one, jet) for jet in jets(one)} for one in self.signs}
+
     def _signs(self, grid: Grid, argument: sp.Expr, v: Float) -> reversals.Signs:
         design = grid.design
         if design.reversals == "soft":
             return reversals.soft(v, design.soft)
         if design.reversals == "averaged":
             return reversals.averaged(v)
-        weights = {jet: sp.diff(argument, jet) for jet in jets(argument)}
+        weights = self._sign_slopes[argument]
         straight = all(one.is_number for one in weights.values()) and all(jet.order == 1 for jet in weights)
         gain = weights_of(design, 1)
         per_sensor = float(np.sum(gain**2)) ** 0.5
@@ -233,11 +242,17 @@ class Channels:
         if straight:
             position = sum((float(one) * grid.raw[jet.of] for jet, one in weights.items()), np.zeros(1))
             sd = sum(float(one) ** 2 * self.model.signal(jet.of).sd ** 2 for jet, one in weights.items()) ** 0.5
-            blur = blur_of(position, grid, v)
-            half = max(len(gain) // 2, 6)
-            return reversals.located(
-                v, sd * per_sensor, blur, piece, reversals.Position(position, grid.places, half, sd)
-            )
+            same = hashlib.blake2b(b"".join(np.ascontiguousarray(one).data for one in (v, position, gain)))
+            degrees = (design.rate_taps, design.rate_degree, design.degree)
+            # Many changes of another signal, and of the design, leave the motion as it is.
+            key = (sd, piece, degrees, design.decimation, int(grid.places[0]), same.digest())
+            if key not in self._located:
+                half = max(len(gain) // 2, 6)
+                raw = reversals.Position(position, grid.places, half, sd)
+                self._located[key] = reversals.located(v, sd * per_sensor, blur_of(position, grid, v), piece, raw)
+                while len(self._located) > _KEPT:
+                    del self._located[next(iter(self._located))]
+            return self._located[key]
         variance = 0.0
         for jet, one in weights.items():
             if jet.order == 1:
@@ -264,7 +279,7 @@ def blur_of(position: Float, grid: Grid, v: Float) -> Float:
 def evaluated(expression: sp.Expr, values: dict[sp.Symbol, Float]) -> Any:
     """An expression at values of its symbols."""
     symbols = sorted(expression.free_symbols, key=str)
-    return sp.lambdify(symbols, expression, "numpy")(*[values[one] for one in symbols])
+    return numpy_function(symbols, expression)(*[values[one] for one in symbols])
 
 
 def broadcast(x: Any, size: int) -> Float:

@@ -45,8 +45,9 @@ _FLAT_RATES = (
     (141, 8),
 )  # for a drive that is measured: see pvid.oracle.weak.blur
 
-# Enough to compare designs, each from the best p so far.
+# Enough to compare designs, each from the best p so far: a step is far below what scores differ by.
 _PASSES = 10
+_SETTLED = 1e-5
 
 # Above this the equations' own errors are estimated when designs are compared.
 MODEL_ERROR = 5.0
@@ -109,7 +110,7 @@ def _scored(
         rows = WeakRows.of(model, run, design)
         if rows.windows < fewest:
             return None
-        fit = gated(rows, start, equation_error=errors, passes=_PASSES)
+        fit = gated(rows, start, equation_error=errors, passes=_PASSES, settled=_SETTLED)
         found = uncertainty(fit)
         other = other_line(fit)
     except FAILURES:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import WeakRows
-from pvid.oracle.weak.solve import PASSES, Fit, batch
+from pvid.oracle.weak.solve import PASSES, SETTLED, Fit, batch
 
 # A window is spoiled if its residuals have this many times the energy of the median window's. Windows of one sample's
 # spike are at 1e3 and more; without spoiled ones the largest of a hundred windows of 24 rows is below 3.
@@ -40,12 +40,14 @@ def gated(
     equation_error: bool = True,
     compensate: bool = True,
     passes: int = PASSES,
+    settled: float = SETTLED,
 ) -> Fit:
     """The estimate from the windows that are not spoiled."""
-    fit = batch(rows, start, equation_error, compensate, passes)
+    fit = batch(rows, start, equation_error, compensate, passes, settled)
     for _ in range(_ROUNDS):
         bad = spoiled(fit)
         if not bad.any():
             break
-        fit = replace(batch(fit.rows.only(~bad), fit.p, equation_error, compensate, passes), start=fit.start)
+        again = batch(fit.rows.only(~bad), fit.p, equation_error, compensate, passes, settled)
+        fit = replace(again, start=fit.start)
     return fit

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-import sympy as sp
 
 from pvid.model.compiled import CompiledModel
+from pvid.model.evaluation import numpy_function
 from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.front import filtered
@@ -98,7 +98,7 @@ class Library:
             return
         argument = channels.signs[0]
         symbols = sorted(argument.free_symbols, key=str)
-        speed = sp.lambdify(symbols, argument, "numpy")(*[grid.jets[one] for one in symbols])
+        speed = numpy_function(symbols, argument)(*[grid.jets[one] for one in symbols])
         rms = float(np.sqrt(np.mean(np.square(speed))))
         for part in SOFT_WIDTHS:
             soft = replace(self.design, reversals="soft", soft=part * rms)

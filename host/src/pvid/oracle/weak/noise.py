@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
+from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Integral, jets
 from pvid.oracle.weak.channels import Channels, Record, broadcast
 from pvid.oracle.weak.front import density
@@ -55,7 +56,7 @@ class NoiseFilters:
                         self.entries.append((place, jet.of, jet.order))
                         expressions.append(slope)
         given = (*channels.plain, *self._sign_slopes.values())
-        self._function = sp.lambdify(given, expressions, "numpy", cse=True)
+        self._function = numpy_function(given, expressions)
 
     def gains(self, record: Record) -> list[dict[str, list[Gain]]]:
         """Of each row kind: sensor -> gains. (Nuisances are left out: their noise is second order.)"""
@@ -250,7 +251,7 @@ class ReversalNoise:
             holders = {k: sp.diff(one, mark) for k, one in enumerate(full) if one.has(mark)}
             if not len(signs.times) or not holders:
                 continue
-            slopes = sp.lambdify(channels.plain, list(holders.values()), "numpy", cse=True)(*record.arguments)
+            slopes = numpy_function(channels.plain, list(holders.values()))(*record.arguments)
             at = np.clip(np.round(signs.times).astype(np.int64), 0, record.grid.size - 1)
             weight = {k: broadcast(one, record.grid.size)[at] for k, one in zip(holders, slopes, strict=True)}
             half = np.floor(signs.times / functions.hop).astype(np.int64)

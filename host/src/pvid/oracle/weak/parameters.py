@@ -12,6 +12,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
+from pvid.model.evaluation import numpy_function
 from pvid.oracle.weak.functions import Float
 
 # A standard error of a positive parameter beyond this part of it means that it may be 0, or that the run does not
@@ -46,7 +47,7 @@ class Parameters:
         for row in self.model.rows:
             theta = [self.model.with_knowns(sp.sympify(one)) for one in row.theta]
             slopes = [[sp.diff(one, symbol) for symbol in p] for one in theta]
-            out.append((sp.lambdify(p, theta, "numpy", cse=True), sp.lambdify(p, slopes, "numpy", cse=True)))
+            out.append((numpy_function(p, theta), numpy_function(p, slopes)))
         return out
 
     def theta(self, p: Float) -> list[Float]:

@@ -105,9 +105,9 @@ def zero_between(v: Float, first: int, behind: int) -> float:
     i, j = first - 1, behind
     if j - i == 1:
         return float(i + v[i] / (v[i] - v[j]))
-    t = np.arange(j - i + 1)
-    slope, level = np.polyfit(t, v[i : j + 1], 1)
-    zero = -level / slope if slope * (v[j] - v[i]) > 0 else (j - i) / 2
+    middle, mean = (j - i) / 2, float(np.mean(v[i : j + 1]))
+    slope = float((np.arange(j - i + 1) - middle) @ v[i : j + 1]) / ((j - i) * (j - i + 1) * (j - i + 2) / 12)
+    zero = middle - mean / slope if slope * (v[j] - v[i]) > 0 else middle
     return float(i + min(max(zero, 0.0), j - i))
 
 
@@ -225,7 +225,7 @@ def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position |
             t[turns] = np.where(better, (raw - position.places[0]) / stride, t[turns])
             variances[turns] = np.where(better, spread / stride**2, variances[turns] + span[turns] ** 2 / 12)
         variances[turns] += _FLOOR**2 + (_DOUBT * span[turns]) ** 2
-    for k in turns:
+    for k, corrected in zip(turns, up[turns, np.newaxis] * correction(t[turns] % 1.0), strict=True):
         at = int(np.floor(t[k]))
         low, high = max(int(t[k] - span[k]) - 2, 0), min(int(t[k] + span[k]) + 3, n)
         own = np.arange(low, high)
@@ -233,5 +233,5 @@ def located(v: Float, sd_v: float, blur: Float, piece: int, position: Position |
         own = own[~stuck[own]]
         values[own] = np.where(own <= t[k], -up[k], up[k])
         if 1 <= at < n - 2:
-            values[at - 1 : at + 3] += up[k] * correction(np.array(t[k] - at))
+            values[at - 1 : at + 3] += corrected
     return Signs(values, t, variances, len(turns), stuck, np.zeros(n))

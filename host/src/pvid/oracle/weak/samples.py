@@ -12,6 +12,7 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Jet, order_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.solve import Fit
@@ -168,8 +169,8 @@ class _Modes:
         self._highest = [motion.highest.index(one) if one in motion.highest else -1 for one in motion.rates]
         self._states = [motion.states.index(one) if one in motion.states else -1 for one in motion.rates]
         p = list(model.p)
-        self._matrix = sp.lambdify(p, matrix.xreplace(place), "numpy")
-        self._slopes = sp.lambdify(p, slopes.xreplace(place), "numpy")
+        self._matrix = numpy_function(p, matrix.xreplace(place))
+        self._slopes = numpy_function(p, slopes.xreplace(place))
 
     def fastest(self, p: Float) -> float:
         """Largest rate of a mode [1/s] at p [n_p]; 0 where there is no state, NaN where the equations are singular."""

@@ -19,7 +19,7 @@ RIDGE = 1e-13  # added to the unit diagonal of what is inverted
 _STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
 PASSES = 25  # of whitening at the present p
 _STEPS = 30  # of Gauss-Newton between two whitenings
-_SETTLED = 1e-8  # a step below this ends the search
+SETTLED = 1e-8  # a step below this ends the search
 
 # An error of the equation is taken for real if it raises twice the logarithm of the likelihood by this much.
 _EVIDENCE = 10.0
@@ -117,7 +117,7 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
                 break
             step = step / 2
         p = moved
-        if size < _SETTLED:
+        if size < SETTLED:
             break
     return p, first
 
@@ -203,6 +203,7 @@ def batch(
     equation_error: bool = True,
     compensate: bool = True,
     passes: int = PASSES,
+    settled: float = SETTLED,
 ) -> Fit:
     """All windows at once: whiten at p, step, and again until p stays.
 
@@ -213,6 +214,7 @@ def batch(
     equation_error : estimate the error of each equation from its residuals and weight with it
     compensate : take the bias of noise in the regressors off, E[N R^-1 e] = -1/2 d log det R / d theta
     passes : of whitening at the present p, at most
+    settled : a first step of a pass below this ends them, in units of a parameter's reach
 
     Raises
     ------
@@ -223,7 +225,7 @@ def batch(
     """
     last: Fit | None = None
     try:
-        for fit in _passes(rows, start, equation_error, compensate, passes):
+        for fit in _passes(rows, start, equation_error, compensate, passes, settled):
             last = fit
     except FAILURES as error:
         if last is None:
@@ -233,7 +235,9 @@ def batch(
     return last
 
 
-def _passes(rows: WeakRows, start: Float | None, equation_error: bool, compensate: bool, passes: int) -> Iterator[Fit]:
+def _passes(
+    rows: WeakRows, start: Float | None, equation_error: bool, compensate: bool, passes: int, enough: float
+) -> Iterator[Fit]:
     """The estimate before each pass of `batch`, and after the last."""
     parameters = rows.compiled.parameters
     p = begun = parameters.checked(start)
@@ -252,7 +256,7 @@ def _passes(rows: WeakRows, start: Float | None, equation_error: bool, compensat
             found = [improved(rows, kind, now, errors[kind], turn) for kind in range(rows.kinds)]
             changed = any(differs(a, b) for a, b in zip(errors, found, strict=True))
             errors = found
-        if size < _SETTLED and turn >= 3 and not changed:
+        if size < enough and turn >= (3 if equation_error else 1) and not changed:
             settled = True
             break
         settled = size < 1e-4

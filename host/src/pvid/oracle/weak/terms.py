@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from scipy.signal import lfilter
 
 from pvid.model.compiled import Signal
 from pvid.oracle.weak.front import filtered, in_segments
@@ -20,6 +19,7 @@ from pvid.oracle.weak.polynomials import polynomial_weights
 from pvid.sim.imperfections import with_play
 
 _SMOOTHED = (21, 2)  # samples and degree, for the direction of a motion that has a play
+_FORGOTTEN = 1e-18  # part of a sample behind a lag
 _TURNS = 2.0  # an angle that turns by less shows nothing that repeats with the turn [rad]
 
 
@@ -141,7 +141,13 @@ class Act:
 def _lagged(of: Recorded, tau: float) -> Float:
     """Behind a first-order lag with this time constant [s]."""
     decay = float(np.exp(-1 / (tau * of.rate)))
-    return np.asarray(lfilter([1 - decay], [1, -decay], of.values, zi=[decay * of.values[0]])[0])
+    y = (1 - decay) * of.values
+    y[:1] = of.values[:1]
+    shift = 1
+    while shift < len(y) and decay > _FORGOTTEN:  # y holds the last `shift` samples of the sum: each turn doubles them
+        y[shift:] = y[shift:] + decay * y[:-shift]
+        shift, decay = 2 * shift, decay**2
+    return y
 
 
 def _shifted(of: Recorded, delay: float) -> Float:

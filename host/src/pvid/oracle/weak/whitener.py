@@ -6,90 +6,143 @@ V = L^-1 U the rows y = L^-1 x have the covariance I + V V^T. With I + V^T V = K
     x -> (I - V B^T V^T) L^-1 x,   B = K^-T (I + K)^-1
 
 whitens them (Andrews' square root): one factorisation of the run, and matrices of the size of the number of reversals
-for each window. Of a window with more directions than rows, as where a friction sticks, V is replaced by a square
-factor of V V^T.
+for each window. Windows with about as many directions are computed together: most windows of a run have few or none.
+Of a window with more directions than rows, as where a friction sticks, V is replaced by a square factor of V V^T.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.oracle.weak.functions import Float
 
 
 @dataclass(frozen=True)
-class Whitener:
-    """L_w^-1 of every window; R is the number of rows, r of directions.
+class _Alike:
+    """Windows with about as many directions; r is the largest number of theirs.
 
     Attributes
     ----------
-    base : L^-1 [R, R]
-    whole : L^-1 U_w [windows, R, r]
-    v : the same, or a factor of as many directions as there are rows where r is larger [windows, R, min(r, R)]
-    small : B [windows, r', r'], r' = min(r, R)
-    shrink : (I + V^T V)^-1 [windows, r', r']
+    windows : their places [w]
+    entries : places of each one's directions among those of its window [w, r]
+    whole : L^-1 U_w [w, R, r]
+    v : the same, or a factor of as many directions as there are rows where r is larger [w, R, min(r, R)]
+    small : B [w, r', r'], r' = min(r, R)
+    inner : K^-1 [w, r', r']
     """
 
-    base: Float
+    windows: npt.NDArray[np.int64]
+    entries: npt.NDArray[np.int64]
     whole: Float
     v: Float
     small: Float
-    shrink: Float
+    inner: Float
 
     @classmethod
-    def of_covariance(cls, covariance: Float, directions: Float) -> Whitener:
-        """From R [R, R] and the directions of each window [windows, r, R], zeros where there are fewer."""
-        base = np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.float64)
-        v = whole = base @ directions.transpose(0, 2, 1)
-        if not v.shape[2]:
-            nothing = np.zeros((len(v), 0, 0))
-            return cls(base, v, v, nothing, nothing)
+    def of(cls, windows: npt.NDArray[np.int64], entries: npt.NDArray[np.int64], whole: Float) -> _Alike:
+        """From their directions."""
+        v = whole
         if v.shape[2] > v.shape[1]:
             v = np.asarray(np.linalg.qr(v.transpose(0, 2, 1), mode="r")).transpose(0, 2, 1)
         one = np.eye(v.shape[2])
         k = np.linalg.cholesky(one + v.transpose(0, 2, 1) @ v)
-        back = np.linalg.inv(k)
-        small = back.transpose(0, 2, 1) @ np.linalg.inv(one + k)
-        return cls(base, whole, v, small, back.transpose(0, 2, 1) @ back)
+        inner = np.linalg.inv(k)
+        return cls(windows, entries, whole, v, inner.transpose(0, 2, 1) @ np.linalg.inv(one + k), inner)
+
+    def only(self, kept: npt.NDArray[np.int64]) -> _Alike:
+        """Of some of all windows, at their new places."""
+        there = np.isin(self.windows, kept)
+        whole, v, small, inner = (one[there] for one in (self.whole, self.v, self.small, self.inner))
+        return _Alike(np.searchsorted(kept, self.windows[there]), self.entries[there], whole, v, small, inner)
+
+    def turn(self, y: Float, transposed: bool = False) -> None:
+        """(I - V B^T V^T) y of these windows' part of y [windows, columns, R], or its transpose; in place."""
+        small = self.small.transpose(0, 2, 1) if transposed else self.small
+        y[self.windows] -= ((y[self.windows] @ self.v) @ small) @ self.v.transpose(0, 2, 1)
+
+    def shrunk(self) -> Float:
+        """V K^-T [w, R, r'], whose square is V (I + V^T V)^-1 V^T."""
+        return np.asarray(self.v @ self.inner.transpose(0, 2, 1))
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """L_w^-1 of every window; R is the number of rows.
+
+    Attributes
+    ----------
+    base : L^-1 [R, R]
+    shape : of the directions [windows, most directions of one, R]
+    alike : windows with directions
+    """
+
+    base: Float
+    shape: tuple[int, int, int]
+    alike: tuple[_Alike, ...]
+
+    @classmethod
+    def of_covariance(cls, covariance: Float, directions: Float) -> Whitener:
+        """From R [R, R] and the directions of each window [windows, most, R], zeros where there are fewer."""
+        base = np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.float64)
+        there = directions.any(axis=2)
+        count = there.sum(axis=1)
+        first = np.argsort(~there, axis=1, kind="stable")
+        octave = np.frexp(count - 0.5)[1]
+        alike = []
+        for one in np.unique(octave[count > 0]):
+            windows = np.flatnonzero((octave == one) & (count > 0))
+            entries = first[windows, : count[windows].max()]
+            own = directions[windows[:, np.newaxis], entries]
+            alike.append(_Alike.of(windows, entries, base @ own.transpose(0, 2, 1)))
+        return cls(base, directions.shape, tuple(alike))
 
     def only(self, windows: slice) -> Whitener:
         """Of some of the windows."""
-        return Whitener(self.base, self.whole[windows], self.v[windows], self.small[windows], self.shrink[windows])
+        kept = np.arange(self.shape[0])[windows]
+        return replace(self, shape=(len(kept), *self.shape[1:]), alike=tuple(one.only(kept) for one in self.alike))
 
     def of(self, x: Float, rows: slice = slice(None)) -> Float:
         """L_w^-1 x_w for each of several columns x [windows, columns, R]; those that fill some rows only are short."""
-        return self._turned(x @ self.base[:, rows].T, self.small)
+        y = np.asarray(x @ self.base[:, rows].T)
+        for one in self.alike:
+            one.turn(y)
+        return y
 
     def back(self, y: Float) -> Float:
         """L_w^-T y_w of [windows, columns, R]."""
-        return np.asarray(self._turned(y, self.small.transpose(0, 2, 1)) @ self.base)
-
-    def _turned(self, y: Float, small: Float) -> Float:
-        if not self.v.shape[2]:
-            return np.asarray(y)
-        return np.asarray(y - ((y @ self.v) @ small) @ self.v.transpose(0, 2, 1))
+        y = y.copy()
+        for one in self.alike:
+            one.turn(y, transposed=True)
+        return np.asarray(y @ self.base)
 
     def total_inverse(self) -> Float:
         """Sum over the windows of R_w^-1 [R, R]."""
         rows = len(self.base)
-        flat = self.v.transpose(1, 0, 2).reshape(rows, -1)
-        shrunk = (self.shrink @ self.v.transpose(0, 2, 1)).reshape(-1, rows)
-        return np.asarray(self.base.T @ (len(self.v) * np.eye(rows) - flat @ shrunk) @ self.base)
+        total = self.shape[0] * np.eye(rows)
+        for one in self.alike:
+            flat = one.shrunk().transpose(1, 0, 2).reshape(rows, -1)
+            total -= flat @ flat.T
+        return np.asarray(self.base.T @ total @ self.base)
 
     def inverse_of_directions(self) -> Float:
-        """R_w^-1 U_w as rows [windows, r, R]."""
-        back = self.v.transpose(0, 2, 1)
-        if self.whole.shape == self.v.shape:
-            return np.asarray(self.shrink @ back @ self.base)
-        inside = self.whole - self.v @ (self.shrink @ (back @ self.whole))
-        return np.asarray(inside.transpose(0, 2, 1) @ self.base)
+        """R_w^-1 U_w as rows, as in `shape`."""
+        out = np.zeros(self.shape)
+        for one in self.alike:
+            inside = one.shrunk()
+            if one.whole.shape == one.v.shape:
+                rows = inside @ one.inner
+            else:
+                rows = one.whole - inside @ (inside.transpose(0, 2, 1) @ one.whole)
+            out[one.windows[:, np.newaxis], one.entries] = rows.transpose(0, 2, 1) @ self.base
+        return out
 
     def log_determinant(self) -> float:
         """Sum over the windows of log det R_w."""
-        of_base = -2 * float(np.sum(np.log(np.abs(np.diag(self.base)))))
-        return len(self.v) * of_base - float(np.sum(np.linalg.slogdet(self.shrink)[1]))
+        inner = [np.diagonal(one.inner, axis1=1, axis2=2) for one in self.alike]
+        return -2 * (self.shape[0] * _logarithms(np.diag(self.base)) + sum(map(_logarithms, inner)))
 
     def trace(self, q: Float) -> float:
         """Sum over the windows of tr(R_w^-1 Q)."""
@@ -99,3 +152,7 @@ class Whitener:
         """Sum over the windows of e^T L_w^-1 Q L_w^-T e, e whitened [windows, R]."""
         f = self.back(e[:, np.newaxis, :])[:, 0]
         return float(np.sum((f @ q) * f))
+
+
+def _logarithms(x: Float) -> float:
+    return float(np.sum(np.log(np.abs(x))))

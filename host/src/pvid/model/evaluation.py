@@ -1,0 +1,22 @@
+"""Numpy functions of expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from sympy.printing.numpy import NumPyPrinter
+
+
+def numpy_function(symbols: Sequence[sp.Symbol], expressions: Any) -> Callable[..., Any]:
+    """A function of the symbols' values, as scalars or arrays, that gives an expression, a list or a matrix of them.
+
+    `lambdify` with "numpy" does the same, and imports all of numpy's packages, the Fortran one too, for a quarter of a
+    second.
+    """
+    function: Callable[..., Any] = sp.lambdify(
+        symbols, expressions, modules=[{"numpy": np}], printer=NumPyPrinter, cse=True
+    )
+    return function
