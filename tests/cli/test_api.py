@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import importlib
+import os
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import pvid
 from pvid.cli.main import commands
 from pvid.models.kapitza.physical import linear
+
+api = importlib.import_module("pvid.api.identify")
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +46,38 @@ def test_a_file_a_frame_and_arrays_have_the_same_answer(run: Path, tmp_path: Pat
     assert of_file.plot(tmp_path / "a.png").stat().st_size > 10_000
     assert "<table>" in of_file._repr_html_() and "g = 9." in repr(of_file)
     assert of_file.details["core"] == "f32"
+
+
+def blas_threads() -> set[int]:
+    return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+
+def test_an_identification_has_one_thread_and_leaves_those_of_the_program(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two threads on two busy processors took 12 s of CPU in place of 5."""
+    within: list[set[int]] = []
+    inner = api.identified
+
+    def seen(*given: Any) -> Any:
+        within.append(blas_threads())
+        return inner(*given)
+
+    monkeypatch.setattr(api, "identified", seen)
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = blas_threads()
+        pvid.identify(run)
+        assert blas_threads() == before
+    assert within == [{1}]
+
+
+def test_a_command_has_one_thread() -> None:
+    code = "import sys; sys.argv[1:] = ['models', '--help']\nfrom pvid.cli.main import main\ntry:\n    main()\n"
+    code += "except SystemExit:\n    import numpy, threadpoolctl\n"
+    code += "    print({one['num_threads'] for one in threadpoolctl.threadpool_info()})"
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout.splitlines()[-1] == "{1}"
 
 
 def test_data_that_say_nothing_have_an_answer_without_parameters() -> None:

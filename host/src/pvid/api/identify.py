@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 from pvid.api.result import Result, of_core, of_mechanism, of_pendulum
 from pvid.base.errors import PvidError
@@ -74,8 +75,21 @@ def identify(
     --------
     >>> pvid.identify("run.csv", l1=0.25)["g"].value  # doctest: +SKIP
     """
+    # Matrices are small: threads would wait for each other, on all cores.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _identify(data, model, rig, columns, core, {**(settings or {}), **keys})
+
+
+def _identify(
+    data: Data,
+    model: str | os.PathLike[str] | None,
+    rig: str | os.PathLike[str] | None,
+    columns: str | None,
+    core: Literal["f32", "q31", "f64"] | None,
+    settings: Mapping[str, Any],
+) -> Result:
     path = Path(data) if isinstance(data, str | os.PathLike) else None
-    texts = tuple(f"{key}={_toml(value)}" for key, value in {**(settings or {}), **keys}.items())
+    texts = tuple(f"{key}={_toml(value)}" for key, value in settings.items())
     rig_path = None if rig is None else Path(rig)
     described = mechanism_rig(path, rig_path, texts, None if model is None else os.fspath(model))
     if described is not None:

@@ -68,6 +68,7 @@ _IN_A_CLONE = ("bench", "campaign")
 def main() -> None:
     """Runs a command and turns every refusal into one sentence and its exit code."""
     watch()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads wait for each other, on all cores
     os.environ.pop("MPLBACKEND", None)  # figures are files here; a backend that is not installed would fail
     try:
         code = commands.main(prog_name="pvid", standalone_mode=False)
