@@ -270,6 +270,23 @@ def bench_cost(update: Path | None) -> int:
     return DONE
 
 
+@bench.command(name="missing")
+@click.option("--clean", default=20, show_default=True, type=click.IntRange(min=1), help="Runs of each plant as it is.")
+@UPDATE
+def bench_missing(clean: int, update: Path | None) -> int:
+    """Models that lack something: what is warned of, what is named, and what the standard errors contain."""
+    from bench import lacking
+
+    rows = []
+    with progress_bar("missing", len(lacking.PLANTS) + len(lacking.EFFECTS)) as advance:
+        for done, row in enumerate(lacking.outcomes(clean), 1):
+            rows.append(row)
+            advance(done)
+    put_table(update, "missing", markdown(lacking.HEADER, [row.cells() for row in rows]))
+    put_table(update, "missing-sum", lacking.summary(rows))
+    return DONE
+
+
 @bench.command(name="cell")
 @click.option("--write", "folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @UPDATE

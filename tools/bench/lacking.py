@@ -6,7 +6,7 @@ strengths; the model is that of the plant without it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pvid.model import Model, sin
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.identify import Identified, identify
-from pvid.oracle.weak.naming import terms_of
+from pvid.oracle.weak.naming import Term, terms_of
 
 Float = npt.NDArray[np.float64]
 Law = Callable[[Float], float]  # of the states
@@ -36,7 +36,6 @@ HEADER = (
 
 SAMPLES, SUBSTEPS = 4000, 6
 WRONG_SE, WRONG = 4.0, 0.02  # an answer is wrong beyond so many standard errors and this part of the value
-CLEAN = 10  # runs of each plant without an effect
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ class Effect:
 
     Attributes
     ----------
-    named : parts of the clauses that name it rightly
+    named : laws, or parts of the clauses on a signal, that name it rightly
     sizes : three strengths
     law : of the states, what the left side of equation `row` has more for size 1
     acts : true input from the recorded one and the strength
@@ -238,14 +237,14 @@ EFFECTS = (
     Effect("motor", "brush drop [V]", ("sgn(i)",), (0.1, 0.3, 0.9), lambda s: float(np.tanh(s[0] / 2e-3))),
     Effect("motor", "fan torque", ("abs(w)*w",), (5e-7, 2e-6, 8e-6), lambda s: abs(s[1]) * s[1], row=1),
     Effect("motor", "dry friction", ("sgn(w)",), (0.003, 0.01, 0.03), lambda s: float(np.tanh(s[1] / 0.05)), row=1),
-    Effect("motor", "load torque", ("constant",), (0.005, 0.02, 0.05), lambda s: 1.0, row=1),
+    Effect("motor", "load torque", ("1",), (0.005, 0.02, 0.05), lambda s: 1.0, row=1),
     Effect("motor", "saturation [V]", ("saturates",), (8.0, 6.0, 4.5), acts=_clip),
     Effect("motor", "dead band [V]", ("dead band", "sgn(V)"), (0.15, 0.5, 1.5), acts=_dead),
     Effect("motor", "sag with load", ("abs(V)/", "(V/"), (0.003, 0.01, 0.02), acts=_sag),
     Effect("motor", "delay of the sensors [s]", ("delayed", "late"), (0.0008, 0.002, 0.004), shows=_late),
     Effect("pendulum", "drag", ("abs(q.d())*q.d()",), (0.002, 0.01, 0.04), lambda s: abs(s[1]) * s[1]),
     Effect("pendulum", "dry friction", ("sgn(q.d())",), (0.01, 0.04, 0.12), lambda s: float(np.tanh(s[1] / 5e-3))),
-    Effect("pendulum", "spring", ("lack",), (0.05, 0.2, 0.8), lambda s: s[0]),
+    Effect("pendulum", "spring", ("q",), (0.05, 0.2, 0.8), lambda s: s[0]),
     Effect("pendulum", "saturation [N m]", ("saturates",), (1.1, 0.85, 0.6), acts=_clip),
     Effect("pendulum", "dead band [N m]", ("dead band", "sgn(M)"), (0.02, 0.08, 0.2), acts=_dead),
     Effect("pendulum", "delay of the sensor [s]", ("delayed", "late", "lag"), (0.004, 0.012, 0.03), shows=_late),
@@ -255,8 +254,8 @@ EFFECTS = (
     Effect("lag", "saturation [V]", ("saturates",), (2.0, 1.6, 1.1), acts=_clip),
     Effect("lag", "dead band [V]", ("dead band", "sgn(u)"), (0.04, 0.12, 0.4), acts=_dead),
     Effect("lag", "sag with load", ("abs(u)/", "(u/"), (0.01, 0.03, 0.1), acts=_sag),
-    Effect("lag", "lag of the input [samples]", ("lag", "late", "delayed", "d(2)"), (2, 6, 15), acts=_behind),
-    Effect("lag", "delay of the sensor [s]", ("delayed", "late", "d(2)"), (0.005, 0.015, 0.04), shows=_late),
+    Effect("lag", "lag of the input [samples]", ("lag", "late", "delayed", "y.d(2)"), (2, 6, 15), acts=_behind),
+    Effect("lag", "delay of the sensor [s]", ("delayed", "late", "y.d(2)"), (0.005, 0.015, 0.04), shows=_late),
 )
 
 
@@ -301,13 +300,13 @@ class Outcome:
     ----------
     off : errors [n_p]
     with_terms : errors with the terms that were named; None: there are none, or the cause is unknown
-    named : clauses
+    named : the terms
     """
 
     found: Identified
     off: Float
     with_terms: Float | None
-    named: tuple[str, ...]
+    named: tuple[Term, ...]
 
     @property
     def wrong(self) -> bool:
@@ -324,50 +323,100 @@ def outcome(plant: Plant, seed: int, effect: Effect | None = None, size: float =
         found,
         np.abs(found.p - truth),
         None if named is None else np.abs(named.fit.p - truth),
-        () if named is None else tuple(one.text for one in terms_of(found.fit, named)),
+        () if named is None else terms_of(found.fit, named),
     )
 
 
-def outcomes(
-    names: tuple[str, ...] = (), clean: int = CLEAN
-) -> Iterator[tuple[str, str, list[Outcome], Effect | None]]:
-    """By plant and effect; every recording has a seed of its own."""
-    for name in names or tuple(PLANTS):
-        plant = PLANTS[name]
-        yield name, "none", [outcome(plant, 1000 + seed) for seed in range(clean)], None
+def _is_named(term: Term, parts: Sequence[str]) -> bool:
+    return any(part in term.text for part in parts) if term.law is None else term.law in parts
+
+
+@dataclass(frozen=True)
+class Row:
+    """What the recordings of a plant with an effect gave; None: as it is."""
+
+    plant: str
+    effect: Effect | None
+    done: tuple[Outcome, ...]
+
+    @property
+    def wrong(self) -> int:
+        """Wrong answers without a warning."""
+        return sum(one.wrong and one.found.verdict.status == "good" for one in self.done)
+
+    @property
+    def warnings(self) -> int:
+        """Answers with one."""
+        return sum(one.found.verdict.status != "good" for one in self.done)
+
+    @property
+    def right(self) -> list[bool]:
+        """Whether the first named term is the effect."""
+        parts = () if self.effect is None else self.effect.named
+        return [bool(one.named) and _is_named(one.named[0], parts) for one in self.done]
+
+    @property
+    def named_wrongly(self) -> int:
+        """Recordings whose first named term is another."""
+        return sum(bool(one.named) and not ok for one, ok in zip(self.done, self.right, strict=True))
+
+    def cells(self) -> tuple[str, ...]:
+        """Of the table."""
+        of_worst = [self._worst(one.off) for one in self.done]
+        in_se = [float(np.max(one.off / np.maximum(one.found.se, 1e-300))) for one in self.done]
+        alone = [np.sqrt(np.maximum(one.found.se**2 - one.found.by_model**2, 1e-300)) for one in self.done]
+        before = [float(np.max(one.off / se)) for one, se in zip(self.done, alone, strict=True)]
+        after = [self._worst(one.with_terms) for one in self.done if one.with_terms is not None]
+        return (
+            self.plant,
+            "none" if self.effect is None else self.effect.name,
+            str(len(self.done)),
+            *(self._shown(values) for values in (of_worst, before, in_se)),
+            *(str(count) for count in (self.wrong, self.warnings, sum(self.right), self.named_wrongly)),
+            ", ".join(f"{one:.2g}" for one in after) or "-",
+        )
+
+    def _worst(self, off: Float) -> float:
+        return 100 * float(np.max(off / np.abs(list(PLANTS[self.plant].truth.values()))))
+
+    def _shown(self, values: list[float]) -> str:
+        return f"{max(values):.2g}" if self.effect is None else ", ".join(f"{one:.2g}" for one in values)
+
+
+def outcomes(clean: int) -> Iterator[Row]:
+    """By plant and effect; every recording has a seed of its own.
+
+    Parameters
+    ----------
+    clean : runs of each plant as it is
+    """
+    for name, plant in PLANTS.items():
+        yield Row(name, None, tuple(outcome(plant, 1000 + seed) for seed in range(clean)))
         for number, effect in enumerate(one for one in EFFECTS if one.plant == name):
-            seeds = range(10 * number, 10 * number + 10)
-            done = [outcome(plant, seed, effect, size) for seed, size in zip(seeds, effect.sizes, strict=False)]
-            yield name, effect.name, done, effect
+            sizes = enumerate(effect.sizes, 10 * number)
+            yield Row(name, effect, tuple(outcome(plant, seed, effect, size) for seed, size in sizes))
 
 
-def cells(plant: str, effect: str, done: list[Outcome], of: Effect | None) -> tuple[str, ...]:
-    """Of a row."""
-
-    def worst(one: Outcome, off: Float) -> float:
-        return 100 * float(np.max(off / np.abs(list(PLANTS[plant].truth.values()))))
-
-    def in_se(one: Outcome, part: float) -> float:
-        se = np.sqrt(np.maximum(one.found.se**2 - part * one.found.by_model**2, 1e-300))
-        return float(np.max(one.off / se))
-
-    right = [bool(one.named) and of is not None and any(part in one.named[0] for part in of.named) for one in done]
-    wrongly = [bool(one.named) and not ok for one, ok in zip(done, right, strict=True)]
-    after = [worst(one, one.with_terms) for one in done if one.with_terms is not None]
-
-    def shown(values: list[float]) -> str:
-        return f"{max(values):.2g}" if of is None else ", ".join(f"{one:.2g}" for one in values)
-
+def summary(rows: Sequence[Row]) -> str:
+    """In sentences."""
+    clean = [row for row in rows if row.effect is None]
+    spoilt = [row for row in rows if row.effect is not None]
+    every = [one for row in spoilt for one in row.done]
+    visible = [np.max(one.off / np.abs(one.found.p)) > WRONG for one in every]
+    right = [ok for row in spoilt for ok in row.right]
+    covered = np.concatenate([one.off <= 2 * one.found.se for row in rows for one in row.done])
+    without = sum(
+        bool(np.any((one.off > WRONG_SE * se) & (one.off > WRONG * np.abs(one.found.p))))
+        for one in every
+        for se in [np.sqrt(np.maximum(one.found.se**2 - one.found.by_model**2, 0.0))]
+    )
+    silent, seen, named = sum(row.wrong for row in spoilt), sum(visible), list(zip(right, visible, strict=True))
     return (
-        plant,
-        effect,
-        str(len(done)),
-        shown([worst(one, one.off) for one in done]),
-        shown([in_se(one, 1.0) for one in done]),
-        shown([in_se(one, 0.0) for one in done]),
-        str(sum(one.wrong and one.found.verdict.status == "good" for one in done)),
-        str(sum(one.found.verdict.status != "good" for one in done)),
-        str(sum(right)),
-        str(sum(wrongly)),
-        ", ".join(f"{one:.2g}" for one in after) or "-",
+        f"Of {len(every)} recordings with an effect {silent} are wrong without a warning: some parameter off by more "
+        f"than 4 of its standard errors and 2 %. Without the model's part of the errors {without} would be that far "
+        f"off. Of {seen} with a parameter more than 2 % off the first named term is right in "
+        f"{sum(ok and large for ok, large in named)}; wrongly named are {sum(row.named_wrongly for row in spoilt)} of "
+        f"all. Of {sum(len(row.done) for row in clean)} recordings without an effect "
+        f"{sum(row.warnings for row in clean)} have a warning. Two standard errors cover "
+        f"{100 * float(np.mean(covered)):.0f} % of all parameters."
     )

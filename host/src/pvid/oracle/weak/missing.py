@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import stdtrit
 
 from pvid.base.errors import PvidError
 from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
@@ -22,8 +23,8 @@ from pvid.oracle.weak.solve import Fit, resumed, unlikely
 from pvid.oracle.weak.terms import UNUSUAL, Act, Candidate
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
-# 0.05, and with 0.3 to 0.8 of the best.
-_CERTAIN = 6.0  # |size| over its standard error
+# 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
+_CHANCE = 1e-8  # that |size| over its standard error is beyond the limit: 5.6 of them for many windows
 _SHARE = 0.01  # of the residuals' energy on unseen windows
 _PLAUSIBLE = 0.5  # of the best candidate's share: what may be meant as well
 
@@ -68,10 +69,13 @@ class Missing:
         """
         scores = library.scores if fit is None else Scores(fit)
         scored, p = scores.of(library.candidates), scores.fit.p
+        # Standard errors from the scatter of few windows, which overlap, are themselves uncertain.
+        least = -float(stdtrit(len(scores.residuals) / 2, _CHANCE))
         there = tuple(
             one
             for one in scored
-            if one.certainty > _CERTAIN and one.share > _SHARE and one.folds >= FOLDS - 1
+            if one.certainty > least * max(1.0, _DISTINCT / max(one.own, 1e-300)) ** 0.5
+            if one.share > _SHARE and one.folds >= FOLDS - 1
             if fit is None or one.own > _DISTINCT
         )
         plausible = [one for one in there if one.share >= _PLAUSIBLE * there[0].share]
