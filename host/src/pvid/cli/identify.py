@@ -44,6 +44,13 @@ from pvid.settings.engine_cores import FLOAT
 @click.option(
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
 )
+@click.option(
+    "--validate",
+    "other",
+    metavar="RUN",
+    type=click.Path(path_type=Path),
+    help="Another recording of the same described mechanism: how well the answer predicts it.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 @force_option
@@ -59,6 +66,7 @@ def command(
     weights: Literal["residuals", "sensors"] | None,
     refine: bool | None,
     target: str | None,
+    other: Path | None,
     as_json: bool,
     figure: Path | None,
 ) -> int:
@@ -74,6 +82,9 @@ def command(
     its residuals are those of the sensors' noise; the last line says which it is and why. With --core f32 --refine it
     is the second stage of the C core, as on a board, and the answer is its last estimate. --figure shows the measured
     signals against the simulated.
+
+    With --validate the answer, of float64, is also simulated freely on another recording with the same columns, in
+    blocks of four windows whose initial states alone are fitted: what is left of each sensor's motion, over its noise.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
     reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both
@@ -97,8 +108,11 @@ def command(
             figure=figure,
             weights=weights or "residuals",
             refine=bool(refine),
+            validate=other,
             **options,
         )
+    if other is not None:
+        raise PvidError("--validate is for a described mechanism: --model")
     if weights is not None:
         raise PvidError(f"--weights {weights} is for a described mechanism, --model; the pendulum has its own weights")
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from pvid.run.mechanism_core import CoreAnswer
     from pvid.run.refined_mechanism import RefinedMechanism
     from pvid.run.refined_pendulum import RefinedPendulum
+    from pvid.run.validation import Validation
 
 _FORM = ("form", "weak")
 _IN_C = tuple(("core", name) for name in ENGINE_CORES)
@@ -95,6 +97,7 @@ def identify_run(
     weights: Weights = "residuals",
     refine: bool = False,
     on: str | None = None,
+    validate: Path | None = None,
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
@@ -103,6 +106,7 @@ def identify_run(
     ----------
     weights : of the rows, as in pvid.oracle.weak.identify
     refine : the equations are fitted to the whole run, from the answer on
+    validate : another recording, which the answer predicts
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
@@ -118,6 +122,8 @@ def identify_run(
                 f"omit --{option}"
             )
     in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
+    if validate is not None and (in_c or refine):
+        raise PvidError(f"--validate is of the answer in float64; omit {'--refine' if refine else '--core'}")
     if weights != "residuals" and in_c:
         raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
     if refine and in_c and in_c is not FLOAT:
@@ -146,12 +152,17 @@ def identify_run(
             no_second = {"refinement": {"adopted": False, "text": f"not refined: {error}"}}
             write_stderr(f"pvid: note: not refined: {error}")
     shown = core or answer
+    validation = None if validate is None else _validated(answer, validate, rig, columns)
     if as_json:
-        click.echo(json.dumps(shown.as_json() | no_second | ({} if on is None else {"on": on})))
+        more = no_second | ({} if on is None else {"on": on})
+        more |= {} if validation is None else {"validation": {"run": str(validate), **asdict(validation)}}
+        click.echo(json.dumps(shown.as_json() | more))
     elif core is not None:
         _print_core(core)
     else:
         _print(answer)
+        if validation is not None:
+            click.echo(f"{validate}: {validation.text}")
     if core is None and not model.following.is_usual:
         from pvid.run.engine_identify import ALL_ALIKE  # the core and its design, which this road does not need
 
@@ -166,6 +177,12 @@ def identify_run(
         write_stderr(f"pvid: nothing identified{reason}")
         return NOTHING_IDENTIFIED
     return DONE
+
+
+def _validated(answer: MechanismAnswer, path: Path, rig: MechanismRig | RigFile, columns: str | None) -> Validation:
+    from pvid.run.validation import validated
+
+    return validated(answer, recording_of(path, rig, columns)[0])
 
 
 def _identified_by_strong_form(
