@@ -24,7 +24,8 @@ from pvid.oracle.weak.terms import UNUSUAL, Act, Candidate
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
-_CHANCE = 1e-8  # that |size| over its standard error is beyond the limit: 5.6 of them for many windows
+_CERTAIN = 6.0  # |size| over its standard error
+_CHANCE = 1e-8  # of a size beyond the limit, where the residuals are within the sensors' noise
 _SHARE = 0.01  # of the residuals' energy on unseen windows
 _PLAUSIBLE = 0.5  # of the best candidate's share: what may be meant as well
 
@@ -69,12 +70,13 @@ class Missing:
         """
         scores = library.scores if fit is None else Scores(fit)
         scored, p = scores.of(library.candidates), scores.fit.p
+        doubtful = chi2_of_sensors(scores.fit) < _NOISE  # the residuals are no sign that anything is missing
         # Standard errors from the scatter of few windows, which overlap, are themselves uncertain.
-        least = -float(stdtrit(len(scores.residuals) / 2, _CHANCE))
+        least = -float(stdtrit(len(scores.residuals) / 2, _CHANCE)) if doubtful else _CERTAIN
         there = tuple(
             one
             for one in scored
-            if one.certainty > least * max(1.0, _DISTINCT / max(one.own, 1e-300)) ** 0.5
+            if one.certainty > least * (max(1.0, _DISTINCT / max(one.own, 1e-300)) ** 0.5 if doubtful else 1.0)
             if one.share > _SHARE and one.folds >= FOLDS - 1
             if fit is None or one.own > _DISTINCT
         )
