@@ -125,6 +125,20 @@ def test_core_and_analysis_are_compared_by_their_noise(recorded: dict[str, Path]
     assert replace(core, values={**core.values, "Iyz": near}).verdict.status == "good"
 
 
+@pytest.mark.parametrize(("steps", "status"), [(2, "good"), (40, "warning")])
+def test_values_that_float32_does_not_resolve_are_alike(recorded: dict[str, Path], steps: int, status: str) -> None:
+    """Of sensors without noise the standard errors are far below the last bit of a float."""
+    rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
+    core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
+    one = core.values["Iyz"]
+    assert one.value is not None
+    exact = replace(one, value=float(np.float32(one.value)), se_noise=1e-12 * abs(one.value))
+    assert exact.value is not None
+    apart = replace(exact, value=exact.value + steps * float(np.spacing(np.float32(abs(one.value)))))
+    oracle = replace(core.oracle, values={**core.oracle.values, "Iyz": exact})
+    assert replace(core, oracle=oracle, values={**core.values, "Iyz": apart}).verdict.status == status
+
+
 def test_without_a_second_stage_the_answer_is_that_of_the_first(tmp_path: Path) -> None:
     """A motor without inductance, whose current is a reading that contains parameters of the motion."""
     model, run = tmp_path / "motor.py", tmp_path / "motor.csv"

@@ -127,8 +127,9 @@ class CoreAnswer:
         one, other = self.values[name], self.oracle.values[name]
         if one.value is None or one.se_noise is None or other.value is None or other.se_noise is None:
             return False
-        # What gains and constants are off by is the same in both.
-        return abs(one.value - other.value) > _CLASH * math.hypot(one.se_noise, other.se_noise)
+        # What gains and constants are off by is the same in both. No core resolves more than float32 does.
+        resolved = float(np.spacing(np.float32(abs(other.value))))
+        return abs(one.value - other.value) > _CLASH * math.hypot(one.se_noise, other.se_noise, resolved)
 
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
