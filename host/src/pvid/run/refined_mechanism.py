@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,7 @@ _SIGN_SUB = (16, 64)  # steps a sample where there are signs, whose width follow
 _STEPS = 1e6  # of the run: inputs at each are kept
 _WIDER = (8.0, 64.0, 512.0, 4096.0)  # times the sharp width
 _WIDENING_PASSES = 10
+_WORSE = 3.0  # times the least sum of squares: signs that are wider still explain less
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,10 +119,17 @@ def refine_mechanism(
     problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
     prior = _prior(problem, r)
     samples = max(8, round(block_s * rate))
-    found = refined(problem, prior, (max(8, samples // 3), samples))
+    shorter = refined(problem, prior, (max(8, samples // 3),))
+    found = longest_that_fits((shorter, refined(problem, prior, (samples,), before=shorter)))
     if problem.kernel.widths and found.slow_chi2 > NOISE:
         found, prior = _softer(problem, prior, found)
     return RefinedMechanism(problem, without_outliers(problem, prior, found))
+
+
+def longest_that_fits(tried: Sequence[Refined]) -> Refined:
+    """Of blocks of rising length the longest whose residuals are noise, else the longest: along a block the errors of
+    the steps at reversals grow, and a search in it may not converge."""
+    return next((one for one in reversed(tried) if one.converged and one.slow_chi2 <= NOISE), tried[-1])
 
 
 def _prior(problem: Problem, r: Float) -> Prior:
@@ -164,8 +172,8 @@ def _softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Pr
         r[problem.kernel.widths] = wider * sharp
         again = problem.searched(r, prior, found.cut, again.starts, use, most=_WIDENING_PASSES)
         found = min(found, again, key=lambda one: one.sum_of_squares)
-        if not np.isfinite(again.sum_of_squares):
-            again = found
+        if not again.sum_of_squares < _WORSE * found.sum_of_squares:
+            break
     return softened(problem, prior, found, use)
 
 
@@ -218,6 +226,11 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
         return answer, refined, "the refinement did not converge: the weak form's answer stands"
     if isinstance(refined, RefinedPendulum) and (rivalry := refined.rivalry) is not None:
         return answer, refined, f"{rivalry}: the weak form's answer stands"
+    asked = 2 * weak.design.window_s
+    length = found.cut.samples / recording.sample_rate
+    if isinstance(refined, RefinedMechanism) and length < asked / 2 and _spread(refined, weak.se) > 1:
+        text = f"blocks above {length:.2g} s do not fit, and shorter ones have larger standard errors"
+        return answer, refined, f"{text}: the weak form's answer stands"
     better = isinstance(refined, RefinedMechanism) and _better(refined, weak.p, weak.se)
     if found.slow_chi2 > GOOD and not better:
         text = (
@@ -236,6 +249,13 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
                 f"; sgn({made.parameters[place].sign}) changes over {found.r[place]:.2g} {made.parameters[place].unit}"
             )
     return replace(answer, values=values), refined, text
+
+
+def _spread(refined: RefinedMechanism, se: Float) -> float:
+    """Geometric mean of the refined standard errors over those of the weak form, of parameters that both have."""
+    ratio = np.array([refined.errors[name] for name in refined.problem.kernel.made.model.p_names]) / se
+    there = np.isfinite(ratio) & (ratio > 0)
+    return float(np.exp(np.mean(np.log(ratio[there])))) if there.any() else np.inf
 
 
 def _better(refined: RefinedMechanism, p: Float, se: Float) -> bool:
