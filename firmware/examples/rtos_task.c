@@ -5,8 +5,10 @@
 #include "dc_motor_example.h"
 #include "task.h"
 
-/* Of a rig faster than the tick of the system one tick, which is too long: raise configTICK_RATE_HZ. */
-#define PERIOD (pdMS_TO_TICKS(DC_MOTOR_PERIOD_US / 1000) > 0 ? pdMS_TO_TICKS(DC_MOTOR_PERIOD_US / 1000) : 1)
+/* In ticks of the system: a whole number. Another one would scale every time of the model, and no residual shows it. */
+#define TIMES_1E6 ((uint64_t)DC_MOTOR_PERIOD_US * (uint64_t)configTICK_RATE_HZ)
+#define PERIOD ((TickType_t)(TIMES_1E6 / 1000000u))
+typedef char raise_configTICK_RATE_HZ[(TIMES_1E6 > 0 && TIMES_1E6 % 1000000u == 0) ? 1 : -1];
 
 static void identify(void *unused)
 {

@@ -160,27 +160,32 @@ def test_the_weak_form_and_its_refinement_are_options_of_the_folder(tmp_path: Pa
     assert np.allclose(printed[-6:-3], p_of_rig[:3], rtol=2e-4) and np.allclose(printed[-6:], p_of_rig, atol=2e-6)
 
 
-def test_both_arithmetics_of_a_mechanism_are_in_one_c_file(tmp_path: Path) -> None:
-    """As in a firmware that carries both for a comparison."""
-    compiled = compiled_of("dc_motor")
-    engine = engine_for_rig_like_the_shipped(compiled)
-    config = config_for_simulated_rig(compiled)
-    build(compiled, tmp_path, options=Options(design=config, fixed_weak=fixed_files_of(engine, "test")))
-    (tmp_path / "both.c").write_text(
-        '#include "dc_motor_design_f32.h"\n#include "dc_motor_design_q31.h"\n'
-        "static pvid_weak_f32 one;\nstatic pvid_weak_q31 other;\n"
-        "int main(void)\n{\n    return (pvid_weak_init_f32(&one, &dc_motor_config_f32) != PVID_OK) ||\n"
-        "           (pvid_weak_init_q31(&other, &dc_motor_config_q31) != PVID_OK);\n}\n",
-        encoding="utf-8",
-    )
-    needed, fixed = sizes_of_design(config.design), fitted_of(engine)
-    largest = {
-        macro: max(needed.get(macro, 0), fixed.get(macro, 0)) for macro in {*needed, *fixed} & set(default_sizes())
-    }
-    usual = [f"-D{macro}={size}" for macro, size in raised(largest).items()]
+@pytest.mark.parametrize("names", [("dc_motor",), ("dc_motor", "cart_pendulum")])
+def test_both_arithmetics_of_mechanisms_are_in_one_c_file(names: tuple[str, ...], tmp_path: Path) -> None:
+    """As in a firmware that carries both for a comparison, or that identifies two axes."""
+    sizes: dict[str, int] = {}
+    lines, begun = ["static pvid_weak_f32 one;", "static pvid_weak_q31 other;"], []
+    for name in names:
+        compiled = compiled_of(name)
+        engine, config = engine_for_rig_like_the_shipped(compiled), config_for_simulated_rig(compiled)
+        build(compiled, tmp_path / name, options=Options(design=config, fixed_weak=fixed_files_of(engine, "test")))
+        for needed in (sizes_of_design(config.design), fitted_of(engine)):
+            sizes |= {macro: max(size, sizes.get(macro, 0)) for macro, size in needed.items()}
+        headers = sorted(one.name for one in (tmp_path / name).glob(f"{name}*.h"))
+        assert {f"{name}_design_f32.h", f"{name}_design_q31.h"} < set(headers)
+        lines = [*(f'#include "{header}"' for header in headers), *lines]
+        begun += [
+            f"pvid_weak_init_{core}(&{it}, &{name}_config_{core})" for core, it in (("f32", "one"), ("q31", "other"))
+        ]
+    lines += ["int main(void)", "{", f"    return {' || '.join(f'({one} != PVID_OK)' for one in begun)};", "}", ""]
+    (tmp_path / "all.c").write_text("\n".join(lines), encoding="utf-8")
+    usual = [
+        f"-D{macro}={size}" for macro, size in raised({m: sizes[m] for m in {*sizes} & {*default_sizes()}}).items()
+    ]
+    folders = [f"-I{tmp_path / name}" for name in names]
     run(
-        host_compiler("a test"), "-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", *usual, f"-I{tmp_path}",
-        *INCLUDES, tmp_path / "both.c",
+        host_compiler("a test"), "-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *usual,
+        *folders, *INCLUDES, tmp_path / "all.c",
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,14 @@ def test_example(name: str, language: tuple[str, ...], package: Path, tmp_path: 
     run(language[0], *flags, "-c", EXAMPLES / f"{name}.c", "-o", tmp_path / "main.o", cwd=package)
     run(language[0], tmp_path / "main.o", *objects, "-lm", "-pthread", "-o", tmp_path / "it", cwd=package)
     assert re.fullmatch(PRINTED[name], run(tmp_path / "it"))
+
+
+@pytest.mark.parametrize(("rate", "compiles"), [(1000, True), (2000, True), (1500, False), (100, False)])
+def test_a_task_whose_period_is_no_whole_number_of_ticks_is_refused(rate: int, compiles: bool, package: Path) -> None:
+    """At 100 Hz, a usual rate, a period of 1 ms was 0 ticks; at 1.5 kHz it would be a third too short."""
+    paths = (f"-I{package}/p/src", f"-I{package}/p/example", f"-I{STUBS / 'freertos'}")
+    tick = f"-DconfigTICK_RATE_HZ=((TickType_t){rate})"
+    command = ["gcc", "-std=c99", "-fsyntax-only", *WARNINGS, *paths, tick, str(EXAMPLES / "rtos_task.c")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode == 0) == compiles
+    assert compiles or "raise_configTICK_RATE_HZ" in done.stderr

@@ -11,7 +11,7 @@ import pytest
 from pvid.rig.run import Recording
 from pvid.run import refined_mechanism as refinement
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
-from pvid.run.refined import Cut, Problem, Refined
+from pvid.run.refined import Cut, Prior, Problem, Refined, refined
 from pvid.run.refined_kernel import kernel_of
 from pvid.run.refined_mechanism import longest_that_fits, problem_of, refined_answer, start_of
 from pvid.sim.simulated_run import simulation_of
@@ -44,10 +44,8 @@ def answer_of(name: str) -> MechanismAnswer:
 def test_short_blocks_that_alone_fit_are_the_answer_where_their_errors_are_smaller(
     name: str, adopted: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    search = refinement.refined
-
-    def without_long_blocks(*given: Any, before: Refined | None = None) -> Refined:
-        found = search(*given, before=before)
+    def without_long_blocks(problem: Problem, prior: Prior, lengths: Any, before: Refined | None = None) -> Refined:
+        found = refined(problem, prior, lengths, before=before)
         return found if before is None else replace(found, converged=False)
 
     monkeypatch.setattr(refinement, "refined", without_long_blocks)

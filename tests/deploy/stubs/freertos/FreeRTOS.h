@@ -6,6 +6,9 @@
 #include <stdint.h>
 
 typedef uint32_t TickType_t;
-#define pdMS_TO_TICKS(ms) ((TickType_t)(ms))
+#ifndef configTICK_RATE_HZ
+#define configTICK_RATE_HZ ((TickType_t)1000)
+#endif
+#define pdMS_TO_TICKS(ms) ((TickType_t)(((uint64_t)(ms) * configTICK_RATE_HZ) / 1000u))
 
 #endif
