@@ -29,9 +29,11 @@ from pvid.run.refined_identify import (
     _remarks,
     refined_identification,
 )
+from pvid.run.refined_inputs import HIGHEST, drive_edge_hz
 from pvid.run.refined_kernel import PlayedKernel, kernel_of
 from pvid.run.refined_mechanism import RefinedMechanism, refine_mechanism
-from pvid.run.refined_pendulum import HIGHEST, RefinedPendulum, _without_push, drive_edge_hz, refine_pendulum
+from pvid.run.refined_pendulum import RefinedPendulum, _without_push, refine_pendulum
+from pvid.setup.f32 import NOISE_LSB
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.pendulum import SLIP, STANDARD_DRIVE, STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.sim.simulated_run import PERFECT, SOFT, RigSimulation, simulation_of
@@ -146,12 +148,12 @@ def test_the_drives_band_ends_where_its_noise_begins() -> None:
     rate, sensors = 1000.0, standard_sensors(14)
     fastest = max(tone.frequency_hz for tone in STANDARD_DRIVE)
     run = simulate(DAMPED, STANDARD_DRIVE, sensors, rate, 20.0, truth="full").run
-    clean = drive_edge_hz(run.y, rate, RigFile.standard())
+    clean = drive_edge_hz(run.y, rate, NOISE_LSB * RigFile.standard().sensor.y_lsb)
     late = np.random.default_rng(0).normal(0.0, 3e-4, len(run.y))
     jittered = run.y + late * np.gradient(run.y) * rate
     assert np.std(jittered - run.y) > 3 * RigFile.standard().sensor.y_lsb
     assert fastest <= clean <= fastest + 0.2
-    assert fastest <= drive_edge_hz(jittered, rate, RigFile.standard()) <= fastest + 0.2
+    assert fastest <= drive_edge_hz(jittered, rate, NOISE_LSB * RigFile.standard().sensor.y_lsb) <= fastest + 0.2
 
 
 def test_a_skew_is_found_and_costs_no_accuracy() -> None:

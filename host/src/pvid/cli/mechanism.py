@@ -134,6 +134,10 @@ def identify_run(
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     answer = advised(identify_mechanism(recording, model, weights))
+    if not refine and in_c is None and weights == "residuals":
+        from pvid.run.judge import judged  # compiles the simulation where it is needed
+
+        answer = judged(answer)
     print_notes(answer.recording.notes[len(recording.notes) :])
     if refine and not in_c:
         return _refined(answer, as_json=as_json, figure=figure)

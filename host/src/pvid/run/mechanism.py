@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,9 @@ from pvid.oracle.weak.verdict import Judged, ParameterStatus
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
+
+if TYPE_CHECKING:
+    from pvid.run.validation import SensorPrediction
 
 Float = npt.NDArray[np.float64]
 
@@ -71,6 +74,7 @@ class MechanismAnswer:
     recording : the samples
     weights : of the rows
     advice : sentences with what to type, where a column seems to be wrong
+    prediction : how well each sensor's motion is predicted that was not fitted; none: it was not looked at
     """
 
     model: CompiledModel
@@ -79,6 +83,7 @@ class MechanismAnswer:
     recording: Recording
     weights: Weights = "residuals"
     advice: tuple[str, ...] = ()
+    prediction: tuple[SensorPrediction, ...] = ()
 
     @property
     def identified(self) -> bool:
@@ -105,6 +110,7 @@ class MechanismAnswer:
             "missing": missing_of(found),
             "chi2": found.chi2,
             "r2": found.r2,
+            "prediction": {one.name: one.as_json() for one in self.prediction},
             "window_s": found.design.window_s,
             "windows": len(found.times),
             "weights": self.weights,
@@ -155,7 +161,7 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
     model = as_sampled(model, recording.ticks_between)
     found = identified_by(model, recording.signals, recording.sample_rate, weights=weights)
     noted = replace(recording, notes=(*recording.notes, *_of_segments(recording, found)))
-    return MechanismAnswer(model, found, _values(model, found), noted, weights)
+    return MechanismAnswer(model, found, values_of_found(model, found), noted, weights)
 
 
 def _of_segments(recording: Recording, found: Identified) -> tuple[str, ...]:
@@ -201,7 +207,8 @@ def refuse_constant(recording: Recording, model: CompiledModel) -> None:
             raise PvidError(f"{one.name} has the same value in all {len(recording)} samples: is the sensor connected?")
 
 
-def _values(model: CompiledModel, found: Identified) -> dict[str, Value]:
+def values_of_found(model: CompiledModel, found: Identified) -> dict[str, Value]:
+    """Outputs of the model, then p, by name."""
     # The correlations of the rows, with the published standard errors but for gains and constants.
     widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)

@@ -14,9 +14,21 @@ from pvid.model.compiled import CompiledModel
 from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import Nominal, RigFile, Sensor
-from pvid.rig.run import Recording, Run
+from pvid.rig.gaps import stretches
+from pvid.rig.run import Run
 from pvid.run.mechanism import MechanismAnswer, refined_gains_of, refined_shifts_of, values_of
-from pvid.run.refined import GOOD, NOISE, Measured, Prior, Problem, Refined, refined, softened, without_outliers
+from pvid.run.refined import (
+    GOOD,
+    NOISE,
+    Measured,
+    Prior,
+    Problem,
+    Refined,
+    Stretch,
+    refined,
+    softened,
+    without_outliers,
+)
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
 from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
@@ -88,8 +100,17 @@ def problem_of(
         rate,
         sub,
         coarse=coarse,
+        stretches=_known_stretches(inputs[0], sub),
     )
     return Problem(kernel, measured), r
+
+
+def _known_stretches(u: Float, sub: int) -> list[Stretch]:
+    """In which the inputs [steps, 3, inputs] are known; none: everywhere."""
+    there = np.asarray(np.isfinite(u).all((1, 2)).reshape(-1, sub).all(1))
+    if there.all():
+        return []
+    return [(int(first), int(end)) for first, end in zip(*stretches(there), strict=True)]
 
 
 def _width(kernel: RefinedKernel, r: Float, place: int, sub: int, rate: float) -> float:
@@ -139,25 +160,18 @@ def _prior(problem: Problem, r: Float) -> Prior:
 
 
 def simulated_at(answer: MechanismAnswer, p: Float) -> RefinedMechanism:
-    """The motion of a recording's longest segment at p [n_p], in blocks of two windows; see simulated_on."""
-    recording = answer.recording.whole()
-    return simulated_on(
-        answer.model, recording, p, max(8, round(2 * answer.found.design.window_s * recording.sample_rate))
-    )
-
-
-def simulated_on(model: CompiledModel, recording: Recording, p: Float, samples: int) -> RefinedMechanism:
-    """The motion of a recording without gaps at p [n_p], in blocks of about so many samples, whose starts are fitted.
+    """The motion of a recording's longest segment at p [n_p]: the starts of its blocks, of two windows each, are fitted
+    to it.
 
     Raises
     ------
     PvidError
-        Where the equations are not simulated: an input is the derivative of a sample.
+        Where the equations cannot be simulated on it.
     """
-    if has_skew(model):
-        raise PvidError(f"an input of {model.name} is the derivative of a sample")
-    problem, r = problem_of(model, recording.signals, recording.sample_rate, start_of(kernel_of(model), p))
-    cut = problem.cut(samples)
+    model, recording = answer.model, answer.recording.whole()
+    rate = recording.sample_rate
+    problem, r = problem_of(model, recording.signals, rate, start_of(kernel_of(model), p))
+    cut = problem.cut(max(8, round(2 * answer.found.design.window_s * rate)))
     starts = problem.first_starts(cut, r)
     found = problem.searched(r, _prior(problem, r), cut, starts, problem.used(cut), move=False)
     return RefinedMechanism(problem, found)

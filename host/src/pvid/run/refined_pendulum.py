@@ -15,7 +15,7 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.breaks import breaks
 from pvid.rig.file import RigFile
-from pvid.rig.gaps import bridge, longest_stretch, stretches
+from pvid.rig.gaps import bridge, stretches
 from pvid.rig.run import Run
 from pvid.run.refined import (
     GOOD,
@@ -34,6 +34,7 @@ from pvid.run.refined import (
     softened,
     without_outliers,
 )
+from pvid.run.refined_inputs import EDGE, HIGHEST, drive_edge_hz
 from pvid.run.refined_kernel import PLAY, PlayedKernel, kernel_of
 from pvid.setup.f32 import NOISE_LSB, row_sd_of
 
@@ -45,8 +46,6 @@ _SEARCH_PASSES = 12
 _VAGUE = 0.1  # largest standard error of a logarithm from which a search goes on with longer blocks
 _BOUND = 1.5  # slow chi^2 of a search that needs no other start
 _KNOTS = 4  # of the spline through the drive: over as many it follows a wrong one
-_EDGE = 1.25  # times the drive's: the pass band
-HIGHEST = 0.25  # of the sample rate: a pass band that its filter is exact in to 1e-5
 _STEP = 0.1  # of a step times the fast mode's angular frequency
 _A_PERIOD = 60  # decimated samples in a period of the fast mode
 # what is known of the extras before: little
@@ -161,7 +160,7 @@ class _Search:
             raise PvidError(f"{rate:g} samples a second are too few for a mode of {self.fast:.3g} Hz")
         y, self.breaks = self._whole(run.y)
         there = np.isfinite(y)
-        edge = max(_EDGE * drive_edge_hz(y, rate, rig), self.slow)
+        edge = max(EDGE * drive_edge_hz(y, rate, NOISE_LSB * rig.sensor.y_lsb), self.slow)
         front = second_derivative(rate, min(edge, HIGHEST * rate))
         y = np.interp(np.arange(len(y)), np.flatnonzero(there), y[there])
         times, acceleration = front.apply(y, rate)
@@ -602,19 +601,3 @@ def _inputs(t: Float, u: Float, rate: float, sub: int, samples: int) -> Inputs:
         return kept[skew]
 
     return of
-
-
-def drive_edge_hz(y: Float, rate: float, rig: RigFile) -> float:
-    """Up to where the spectrum of the drive's longest stretch stands above its noise [Hz]: of the sensor, or of the
-    spectrum's upper half, where instants of sampling that jitter make more."""
-    y = y[longest_stretch(np.isfinite(y))]
-    n = len(y)
-    window = np.hanning(n)
-    spectrum = np.abs(np.fft.rfft((y - y.mean()) * window)) ** 2
-    floor = (NOISE_LSB * rig.sensor.y_lsb) ** 2 * float(np.sum(window**2))
-    hz = np.fft.rfftfreq(n, 1 / rate)
-    floor = max(floor, float(np.median(spectrum[hz >= rate / 4])) / np.log(2))  # the mean, of white noise
-    weighted = spectrum * hz**4
-    shown = spectrum > 30 * floor
-    above = np.flatnonzero(shown & (weighted > 1e-5 * weighted[shown].sum()))
-    return float(hz[above[-1]]) if len(above) else 0.0

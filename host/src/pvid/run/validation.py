@@ -1,101 +1,209 @@
-"""How well an answer predicts a recording that it was not fitted to."""
+"""How well parameters predict a recording: its blocks are simulated by the full equations, from starts that are fitted.
+
+A block has four windows of the weak form. What is simulated in it follows from the recorded inputs, the parameters and
+the start alone: an error of the parameters or of the equations grows in it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.rounding import percent
-from pvid.base.wording import with_unit
+from pvid.base.wording import listed
+from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
-from pvid.run.mechanism import MechanismAnswer
-from pvid.run.refined_mechanism import simulated_on
+from pvid.run.refined import Cut, Prior, Problem, Stretch
+from pvid.run.refined_kernel import kernel_of
+from pvid.run.refined_mechanism import problem_of, start_of
 
-_WINDOWS = 4  # of a block: two of a short design predict alike whatever the parameters are
-_LEAST = 30  # samples of a block
-_BLOCKS = 6  # at least
+Float = npt.NDArray[np.float64]
+
+WINDOWS = 4  # in a block
+SHORTEST = 30  # samples of a block
+_PASSES = 6  # of the search for the starts
 
 
 @dataclass(frozen=True)
-class Predicted:
-    """A sensor's signal, simulated with an answer.
+class SensorPrediction:
+    """What is left of a sensor's samples behind their prediction.
 
     Attributes
     ----------
-    sensor, unit : as described
-    rms : of measured less simulated samples [unit]
-    noise : standard deviation of the sensor [unit]
-    r2 : part of the signal's variance that the simulation explains
+    rms : of measured less simulated [unit]
+    of_motion : over the rms of the motion within a block
+    of_noise : over the standard deviation of a sample; None where the model gives none
+    r2 : 1 - of_motion^2
     """
 
-    sensor: str
+    name: str
     unit: str
     rms: float
-    noise: float
-    r2: float
+    of_motion: float
+    of_noise: float | None
 
     @property
-    def text(self) -> str:
-        """A clause."""
-        times = f", {self.rms / self.noise:.2g} times the sensor's noise" if self.noise else ""
-        return (
-            f"{self.sensor} is predicted to {percent(np.sqrt(max(1 - self.r2, 0.0)))} of its motion "
-            f"(rms {with_unit(self.rms, self.unit, 2)}{times})"
-        )
+    def r2(self) -> float:
+        """Part of the motion that is predicted."""
+        return 1.0 - self.of_motion**2
+
+    def __str__(self) -> str:
+        noise = "" if self.of_noise is None else f", {self.of_noise:.2g} times the noise of a sample"
+        return f"{self.name} to {100 * self.of_motion:.2g} % (rms {self.rms:.2g} {self.unit}{noise}; R^2 {self.r2:.5f})"
+
+    def as_json(self) -> dict[str, Any]:
+        """Its entry in a JSON object."""
+        return {
+            "rms": self.rms,
+            "unit": self.unit,
+            "of_motion": self.of_motion,
+            "of_noise": self.of_noise,
+            "r2": self.r2,
+        }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Validation:
-    """Of an answer.
+    """A recording under given parameters.
 
     Attributes
     ----------
-    block_s : length of the blocks that are simulated freely, from states that are fitted to each [s]
-    blocks : how many
-    sensors : by signal
+    sensors : how well each is predicted
+    block_s, blocks : length [s] and number of the blocks
+    t, measured, simulated : of the samples in them [n]; by sensor [n] each
     """
 
+    sensors: tuple[SensorPrediction, ...]
     block_s: float
     blocks: int
-    sensors: tuple[Predicted, ...]
+    t: Float
+    measured: Mapping[str, Float]
+    simulated: Mapping[str, Float]
 
     @property
     def text(self) -> str:
-        """In words."""
-        clauses = "; ".join(one.text for one in self.sensors)
-        return f"{self.blocks} blocks of {self.block_s:.3g} s, simulated freely: {clauses}"
+        """A sentence."""
+        return f"predicts {listed(self.sensors)}, in {self.blocks} blocks of {self.block_s:.3g} s"
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `validate --json`."""
+        sensors = {one.name: one.as_json() for one in self.sensors}
+        return {"sensors": sensors, "block_s": self.block_s, "blocks": self.blocks}
 
 
-def validated(answer: MechanismAnswer, recording: Recording) -> Validation:
-    """The longest segment of another recording of the same mechanism, simulated in blocks of four windows with the
-    values of an answer. No parameter is fitted to it; the state at the start of each block is.
+class Motion:
+    """The full equations on a recording, for any parameters.
+
+    Parameters
+    ----------
+    signals : by name [n]; NaN where a sample is missing
+    rate : of the samples [Hz]
+    p : parameters near those that will be simulated [n_p]: the integration's step and the width of the signs are theirs
 
     Raises
     ------
     PvidError
-        Where a parameter has no value, the recording is too short, or the equations are not simulated.
+        Where the equations cannot be simulated: an input is a derivative that no recorded signal gives, or the
+        recording is too short.
     """
-    model, whole = answer.model, recording.whole()
-    p = [answer.values[name].value for name in model.p_names]
-    if None in p:
-        raise PvidError(f"not validated: {model.p_names[p.index(None)]} is not identified")
-    samples = max(round(_WINDOWS * answer.found.design.window_s * whole.sample_rate), _LEAST)
-    samples = min(samples, len(whole) // _BLOCKS)
-    if samples < _LEAST:
-        raise PvidError(f"not validated: {len(whole)} samples are too few for {_BLOCKS} blocks of {_LEAST}")
-    simulated = simulated_on(model, whole, np.array(p, np.float64), samples)
-    problem, found = simulated.problem, simulated.found
-    if not np.isfinite(found.sum_of_squares):
-        raise PvidError("not validated: the simulated motion runs away")
+
+    def __init__(self, model: CompiledModel, signals: Mapping[str, Float], rate: float, p: Float) -> None:
+        self.model = model
+        self.problem, self._r = problem_of(model, signals, rate, start_of(kernel_of(model), p))
+
+    @property
+    def sd(self) -> Float:
+        """Standard deviation of a sample of each sensor [sensors]; 0: not known."""
+        return self.problem.measured.sd
+
+    def r_of(self, p: Float) -> Float:
+        """Parameters and settings of the simulation."""
+        r = start_of(self.problem.kernel, p)
+        widths = self.problem.kernel.widths
+        r[widths] = self._r[widths]
+        return r
+
+    def within(self, parts: Sequence[Stretch], sd: Float | None = None) -> Problem:
+        """The problem on parts of the recording alone."""
+        measured = self.problem.measured
+        known = self.problem.stretches
+        both = [(max(a, c), min(b, d)) for a, b in known for c, d in parts]
+        chosen = [(a, b) for a, b in both if b - a > 1]
+        scaled = np.where(measured.sd > 0, measured.sd, 1.0) if sd is None else sd
+        kernel = self.problem.kernel
+        return Problem(kernel, replace(measured, stretches=chosen, sd=scaled), self.problem.budget)
+
+    def block(self, window_s: float, parts: int = 1) -> int:
+        """Samples of a block, of this window of the weak form; at most those of each of so many parts of the run."""
+        rate, longest = self.problem.measured.rate, self.problem.longest
+        return int(np.clip(round(WINDOWS * window_s * rate), SHORTEST, max(SHORTEST + 1, longest // parts)))
+
+    def simulated(self, r: Float, problem: Problem, samples: int, most: int | None = None) -> tuple[Cut, Float]:
+        """Blocks and readings in them [blocks, samples, sensors], from starts that fit the measured ones.
+
+        Parameters
+        ----------
+        samples : of a block
+        most : samples that are simulated in all; None: all
+        """
+        cut = problem.cut(samples)
+        if most is not None and len(cut.first) * cut.samples > most:
+            every = -(-len(cut.first) * cut.samples // most)
+            cut = Cut(cut.first[::every].copy(), cut.samples)
+        nothing = Prior(r, np.ones(problem.n), np.zeros(problem.n, np.bool_))
+        starts = problem.first_starts(cut, r)
+        found = problem.searched(r, nothing, cut, starts, problem.used(cut), move=False, most=_PASSES)
+        return cut, problem.simulated(r, cut, found.starts)
+
+
+def validated(model: CompiledModel, recording: Recording, p: Float, window_s: float) -> Validation:
+    """How well p predicts a recording, all of it that can be simulated.
+
+    Parameters
+    ----------
+    p : all parameters of the model [n_p]
+    window_s : of the weak form that gave p [s]
+
+    Raises
+    ------
+    PvidError
+        Where the equations cannot be simulated on it, or the motion runs away.
+    """
+    rate = recording.sample_rate
+    with np.errstate(all="ignore"):
+        motion = Motion(model, recording.signals, rate, p)
+        problem = motion.within([(0, len(recording))])
+        if not problem.measured.stretches or problem.longest < SHORTEST:
+            raise PvidError(f"the recording has no {SHORTEST} samples in a row to predict: record longer")
+        cut, simulated = motion.simulated(motion.r_of(p), problem, motion.block(window_s))
+    measured = cut.rows(problem.measured.z)
+    if not np.isfinite(simulated).all():
+        raise PvidError(
+            f"the motion of {model.name} runs away with these parameters: they are not those of this recording"
+        )
     names = problem.kernel.made.outputs
-    motion = problem.simulated(found.r, found.cut, found.starts).reshape(-1, len(names))
-    measured = found.cut.rows(problem.measured.z).reshape(-1, len(names))
-    sensors = []
-    for k, name in enumerate(names):
-        rms = float(np.sqrt(np.nanmean((measured[:, k] - motion[:, k]) ** 2)))
-        spread = float(np.nanvar(measured[:, k]))
-        signal = model.signal(name)
-        sensors.append(Predicted(name, signal.unit, rms, signal.sd, 1 - rms**2 / max(spread, 1e-300)))
-    return Validation(found.cut.samples / whole.sample_rate, len(found.cut.first), tuple(sensors))
+    sensors = tuple(
+        of_sensor(model, name, measured[..., k], simulated[..., k], motion.sd[k]) for k, name in enumerate(names)
+    )
+    places = cut.first[:, None] + np.arange(cut.samples)
+    return Validation(
+        sensors,
+        cut.samples / rate,
+        len(cut.first),
+        recording.t[places.ravel()],
+        {name: measured[..., k].ravel() for k, name in enumerate(names)},
+        {name: simulated[..., k].ravel() for k, name in enumerate(names)},
+    )
+
+
+def of_sensor(model: CompiledModel, name: str, measured: Float, simulated: Float, sd: float) -> SensorPrediction:
+    """From samples and their simulation, both [blocks, samples]."""
+    error = measured - simulated
+    rms = float(np.sqrt(np.nanmean(np.square(error))))
+    motion = float(np.sqrt(np.nanmean(np.square(measured - np.nanmean(measured, axis=1, keepdims=True)))))
+    of_motion = rms / motion if motion > 0 else np.inf
+    return SensorPrediction(name, model.signal(name).unit, rms, of_motion, rms / sd if sd > 0 else None)

@@ -45,6 +45,8 @@ Name = Literal[
     "misfit",
     "core",
     "held",
+    "prediction",
+    "unpredicted",
     "unchecked",
 ]
 Status = Literal["good", "warning", "not_identified"]
