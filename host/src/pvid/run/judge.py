@@ -27,7 +27,7 @@ from pvid.oracle.weak.identify import Identified, ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
-from pvid.run.mechanism import MechanismAnswer, gains_of, values_of_found
+from pvid.run.mechanism import MechanismAnswer, gains_of, noise_of, values_of_found
 from pvid.run.refined import Prior, Problem, Refined, Stretch, refined
 from pvid.run.validation import Motion, SensorPrediction, of_sensor
 
@@ -268,8 +268,10 @@ def _published(
     found, model = answer.found, answer.model
     apart = np.max([np.abs(one.p - chosen.p) for one in alike], axis=0)
     fit = chosen.fit.at(chosen.p)
-    own = found.se if chosen is usual else np.sqrt(chosen.se**2 + np.sum(gains_of(model, found) ** 2, axis=0))
-    se = np.hypot(own, apart)
+    by_model = np.hypot(found.by_model, apart) if chosen is usual else apart
+    gains = gains_of(model, replace(found, by_model=by_model))
+    noise = noise_of(model, found) if chosen is usual else chosen.se
+    se = np.sqrt(noise**2 + np.sum(gains**2, axis=0))
     status = tuple(verdict.judged(model, fit, se))
     r2 = list(found.r2.values()) if chosen is usual else uncertainty(fit).r2
     reasons = [one for one in found.verdict.reasons if chosen is usual or one.name not in _OF_USUAL]
@@ -288,7 +290,7 @@ def _published(
         found,
         p=chosen.p,
         se=se,
-        by_model=np.hypot(found.by_model, apart),
+        by_model=by_model,
         fit=fit,
         judged=status,
         verdict=Verdict(verdict.sorted_by_gravity(reasons)),
