@@ -272,18 +272,18 @@ def _published(
     gains = gains_of(model, replace(found, by_model=by_model))
     noise = noise_of(model, found) if chosen is usual else chosen.se
     se = np.sqrt(noise**2 + np.sum(gains**2, axis=0))
-    status = tuple(verdict.judged(model, fit, se))
+    status = tuple(verdict.judged(model, fit, noise))
     r2 = list(found.r2.values()) if chosen is usual else uncertainty(fit).r2
     reasons = [one for one in found.verdict.reasons if chosen is usual or one.name not in _OF_USUAL]
     if chosen is not usual:
         reasons += [
-            *verdict.of_parameters(model, fit, se, status, r2),
+            *verdict.of_parameters(model, fit, noise, status, r2),
             *verdict.of_range(model, chosen.p, status),
             _of_choice(chosen, usual),
         ]
     poor = [one for one in chosen.sensors if one.r2 < _PREDICTED]
     if poor:
-        shares = listed(f"{100 * one.r2:.0f} % of {one.name}" for one in poor)
+        shares = listed(f"{100 * max(one.r2, 0.0):.0f} % of {one.name}" for one in poor)
         text = f"Of motion that was not fitted the answer predicts {shares}: the equations lack something that matters."
         reasons.append(Reason("unpredicted", text))
     judged_found: Identified = replace(

@@ -58,7 +58,8 @@ class Scored:
     """A design with its score, and p there.
 
     error : predicted, of each parameter [n_p]
-    known : every parameter has a value that means something, within the range of the model
+    known : every parameter has a value that means something, within the range of the model, or may be 0
+    near_0 : one of them may be 0
     """
 
     design: WeakDesign
@@ -67,6 +68,7 @@ class Scored:
     chi2: float
     error: Float
     known: bool
+    near_0: bool = False
 
 
 _KEPT = 4096
@@ -124,7 +126,8 @@ def _scored(
         return None
     known = attempted(lambda: verdict.is_known(model.bare, fit, small, of_small)) or False
     p = np.where(small, np.maximum(fit.p, ALMOST_0 * of_small), fit.p)
-    return Scored(design, float(np.exp(np.mean(np.log(relative)))), p, found.chi2, relative * size, known)
+    score = float(np.exp(np.mean(np.log(relative))))
+    return Scored(design, score, p, found.chi2, relative * size, known, bool(small.any()))
 
 
 def power_of(model: Compiled) -> int:
@@ -204,9 +207,9 @@ def ranked(
         longer = lengths(_unbroken(parts, fewest), sample_rate, fewest)
         windows = sorted({*windows, *longer}, reverse=True)
         attempt(made(basis, window_s=one) for one in longer)
-        if not any(one.known for one in tried):
+        if not any(one.known and not one.near_0 for one in tried):  # a logarithm that ran down may have lost its way
             tried += _searched(model, run, [made(basis, window_s=one) for one in longer[:_SEARCHED]], start, fewest - 2)
-        if any(one.known for one in tried):
+        if any(one.known and not one.near_0 for one in tried):
             break
     if not tried:
         longest = max(parts, default=0)

@@ -187,7 +187,7 @@ def identify(
         *([] if white is None else [white - fit.p]),
     ]
     se = np.sqrt(np.sum(np.square(parts), axis=0))
-    judged = tuple(verdict.judged(compiled, fit, se))
+    judged = tuple(verdict.with_unsettled(fit, verdict.judged(compiled, fit, se)))
     reasons = verdict.of_parameters(compiled, fit, se, judged, found.r2)
     named: Explained | None = None
     lacking = None if fit.diverged else attempt("what is missing", lambda: Missing.of(library, se))

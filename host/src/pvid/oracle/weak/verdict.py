@@ -176,9 +176,14 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
     known = [one.status == "identified" for one in out]
     if not any(known):  # all at 0: the equations do not describe the run
         return [replace(one, status="not_identified") for one in out]
-    if not fit.settled and any(one.status == "not_identified" for one in out):  # what wanders moves the others
-        return [replace(one, status="not_identified", reason=one.reason or _UNSETTLED) for one in out]
     return out
+
+
+def with_unsettled(fit: Fit, found: Sequence[Judged]) -> list[Judged]:
+    """The same of an answer: where the search did not come to rest, what is not determined moves the others."""
+    if fit.settled or all(one.status != "not_identified" for one in found):
+        return list(found)
+    return [replace(one, status="not_identified", reason=one.reason or _UNSETTLED) for one in found]
 
 
 def is_known(model: CompiledModel, fit: Fit, small: npt.NDArray[np.bool_], se: Float) -> bool:
