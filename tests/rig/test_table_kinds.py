@@ -28,7 +28,7 @@ from mcap.writer import Writer
 from mcap_protobuf.writer import Writer as ProtobufWriter
 from mcap_ros2.writer import Writer as Ros2Writer
 
-from pvid.api.identify import _named
+from pvid.api.data import named
 from pvid.base.errors import PvidError
 from pvid.models.model import Channel
 from pvid.rig.columns import Columns
@@ -84,7 +84,7 @@ DATA: dict[str, Any] = {
 
 @pytest.mark.parametrize("case", DATA)
 def test_arrays_of_every_kind(case: str) -> None:
-    assert_same(recording_of_arrays(_named(DATA[case]), columns=columns()))
+    assert_same(recording_of_arrays(named(DATA[case]), columns=columns()))
 
 
 def test_switches_are_0_and_1() -> None:

@@ -13,7 +13,7 @@ from bench.lacking import EFFECTS, PLANTS, recording
 from pvid.base.errors import PvidError
 from pvid.rig.run import Recording
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
-from pvid.run.validation import validated
+from pvid.run.validation import Validation, validated
 
 Float = npt.NDArray[np.float64]
 
@@ -31,23 +31,27 @@ def answer() -> MechanismAnswer:
     return identify_mechanism(recorded(1), CART.model())
 
 
+def validation(run: Recording) -> Validation:
+    return validated(answer().model, run, answer().found.p, answer().found.design.window_s)
+
+
 def test_another_run_of_the_same_mechanism_is_predicted_to_the_noise() -> None:
     """White noise of half a step and rounding are twice the rounding alone, which the model has."""
-    found = validated(answer(), recorded(2))
+    found = validation(recorded(2))
     (x,) = found.sensors
-    assert (x.sensor, x.unit) == ("x", "m") and found.blocks >= 6
-    assert x.rms < 2.5 * x.noise and x.r2 > 0.999999
-    assert "x is predicted to 0.0" in found.text and "times the sensor's noise" in found.text
+    assert (x.name, x.unit) == ("x", "m") and found.blocks >= 6
+    assert x.of_noise is not None and x.of_noise < 2.5 and x.r2 > 0.999999
+    assert "predicts x to 0.0" in found.text and "times the sensor's noise" in found.text
 
 
 def test_run_of_another_mechanism_is_predicted_worse() -> None:
-    (x,) = validated(answer(), recorded(2, drag=0.8)).sensors
-    assert x.rms > 100 * x.noise and x.r2 < 0.999
+    (x,) = validation(recorded(2, drag=0.8)).sensors
+    assert x.of_noise is not None and x.of_noise > 100 and x.r2 < 0.999
 
 
 def test_recording_that_is_too_short_for_blocks_is_refused() -> None:
-    with pytest.raises(PvidError, match="not validated: 120 samples are too few for 6 blocks of 30"):
-        validated(answer(), recorded(2, samples=120))
+    with pytest.raises(PvidError, match="too short to predict it in 6 blocks of 30 samples"):
+        validation(recorded(2, samples=120))
 
 
 MODEL = '''"""A cart on a spring."""
@@ -69,5 +73,5 @@ def test_command_prints_what_it_predicts_and_has_it_in_the_json(tmp_path: Path) 
     command = ("identify", tmp_path / "a.csv", "--model", tmp_path / "cart.py", "--validate", tmp_path / "b.csv")
     assert "b.csv: " in pvid(tmp_path, *command).stdout
     found = json.loads(pvid(tmp_path, *command, "--json").stdout)["validation"]
-    assert found["run"].endswith("b.csv") and found["sensors"][0]["r2"] > 0.999999
-    assert "--validate is of the answer in float64; omit --core" in pvid(tmp_path, *command, "--core", "f32").stderr
+    assert found["sensors"]["x"]["r2"] > 0.999999
+    assert "b.csv: the answer predicts x to" in pvid(tmp_path, *command, "--core", "f32").stdout

@@ -8,29 +8,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from pvid.api.data import Data, recording_of
 from pvid.api.result import Result, of_core, of_mechanism, of_pendulum
-from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig import LOG_SUFFIX, recording_of_log, run_of_log
 from pvid.log.rig_settings import rig_for
-from pvid.rig.columns import Columns, parsed
+from pvid.rig.columns import parsed
+from pvid.rig.described import described as described_by
 from pvid.rig.mechanism_file import channels_of
-from pvid.rig.run import Recording, Run, read_recording, recording_of_arrays
+from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advised import identified
+from pvid.run.judge import judged
 from pvid.run.mechanism import identify_mechanism, model_of
 from pvid.run.mechanism_advice import advised
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.skew import aligned
 from pvid.run.wild_samples import without_wild_samples
 from pvid.settings.engine_cores import ENGINE_CORES
-
-Data = str | os.PathLike[str] | Mapping[str, npt.ArrayLike] | Any
 
 
 def identify(
@@ -97,47 +95,23 @@ def _identify(
         if path is not None and path.suffix == LOG_SUFFIX:
             recording = recording_of_log(path, [one.name for one in compiled.signals])
         else:
-            recording = _recording(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
+            recording = recording_of(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
         answer = advised(identify_mechanism(without_wild_samples(recording, compiled), compiled))
         engine = ENGINE_CORES.get(core or "")
-        return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
+        return of_mechanism(judged(answer)) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)
     if core is not None:
         file = replace(file, identifier=replace(file.identifier, core=core))
     if path is not None and path.suffix == LOG_SUFFIX:
         run = run_of_log(path)
     else:
-        run = Run.of(_recording(data, path, file.sample_rate, parsed(columns)))
+        run = Run.of(recording_of(data, path, file.sample_rate, parsed(columns)))
     run = aligned(run, file.sensor.y_delay)
     if not file.identifier.core_traits.takes_gaps:
         run = run.whole()
     given, file = file, resolved(file, run)
     run = replace(run, notes=(*run.notes, *resolution_note(given, file)))
-    return of_pendulum(identified(run, file, Native()))
-
-
-def _recording(data: Data, path: Path | None, rate: float | None, columns: Columns) -> Recording:
-    if path is not None:
-        recording = read_recording(path, rate, columns)
-    else:
-        recording = recording_of_arrays(_named(data), rate, columns)
-    recording.refuse_damaged()
-    return recording
-
-
-def _named(data: Any) -> dict[str, Any]:
-    """Arrays by name, of a mapping, a data frame, an Arrow table or a structured array."""
-    if isinstance(data, np.ndarray) and data.dtype.names:
-        return {one: data[one] for one in data.dtype.names}
-    names = data.keys() if isinstance(data, Mapping) else getattr(data, "column_names", getattr(data, "columns", None))
-    if names is None:
-        kind = type(data).__name__
-        raise PvidError(f"data: a path, a data frame, a structured array or a mapping of arrays is wanted, not {kind}")
-    named = {str(one): data[one] for one in names}
-    index = getattr(data, "index", None)
-    if index is not None and isinstance(getattr(index, "name", None), str):
-        named.setdefault(index.name, index)
-    return named
+    return of_pendulum(identified(run, file, Native()), model_of(described_by(file)))
 
 
 def _toml(value: Any) -> str:

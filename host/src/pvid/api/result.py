@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from pvid.api.data import Data, recording_of
 from pvid.base.replacing import replacing
 from pvid.base.rounding import with_error
+from pvid.model.compiled import CompiledModel
+from pvid.rig.columns import parsed
+from pvid.rig.mechanism_file import channels_of
 from pvid.run import answer
 from pvid.run.identify import Identification
 from pvid.run.mechanism import MechanismAnswer
 from pvid.run.mechanism_core import CoreAnswer
+
+if TYPE_CHECKING:
+    from pvid.run.validation import Validation
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,7 @@ class Result:
     notes: tuple[str, ...]
     details: Mapping[str, Any]
     _answer: Identification | MechanismAnswer | CoreAnswer
+    _model: CompiledModel
 
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -116,17 +126,54 @@ class Result:
                 write_figure(self._answer, out)
         return out
 
+    def validate(self, data: Data, *, columns: str | None = None) -> Validation:
+        """How well these parameters predict another recording of the mechanism: blocks of it are simulated by the full
+        equations, from starts that are fitted.
 
-def of_pendulum(found: Identification) -> Result:
-    """Of the pendulum's identifier."""
-    return _result(found, answer.as_json(found), found.identified, found.status, found.warning, found.notes)
+        Parameters
+        ----------
+        data, columns : as of `pvid.identify`
+
+        Returns
+        -------
+        `sensors` (rms [unit], share of the motion, R^2), and `t` [s], `measured` and `simulated` by name, each [n].
+
+        Raises
+        ------
+        PvidError
+            Where the data cannot be read, or a parameter has no value.
+        """
+        from pvid.run.validation import predicted
+
+        path = Path(data) if isinstance(data, str | os.PathLike) else None
+        channels = channels_of(self._model)
+        recording = recording_of(data, path, None, parsed(columns, channels))
+        values = {name: one.value for name, one in self.parameters.items()}
+        return predicted(self._model, recording, values, self.details.get("window_s"))
+
+    def compare(self, other: Result) -> dict[str, float]:
+        """By parameter: this value less the other's, in standard errors of the difference.
+
+        What both share, the scale of one rig's sensors, is in those errors too: they are rather too large.
+        """
+        both = [name for name in self.parameters if name in other.parameters]
+        return {
+            name: (one.value - two.value) / math.hypot(one.se, two.se)
+            for name in both
+            for one, two in [(self.parameters[name], other.parameters[name])]
+        }
+
+
+def of_pendulum(found: Identification, model: CompiledModel) -> Result:
+    """Of the pendulum's identifier; model: its description, with the values of the rig."""
+    return _result(found, answer.as_json(found), found.identified, found.status, found.warning, found.notes, model)
 
 
 def of_mechanism(found: MechanismAnswer) -> Result:
     """Of a described mechanism."""
     verdict = found.found.verdict
     notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
-    return _result(found, found.as_json(), found.identified, verdict.status, verdict.warning, notes)
+    return _result(found, found.as_json(), found.identified, verdict.status, verdict.warning, notes, found.model)
 
 
 def of_core(found: CoreAnswer) -> Result:
@@ -134,7 +181,7 @@ def of_core(found: CoreAnswer) -> Result:
     verdict = found.verdict
     notes = (*found.oracle.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
     status = verdict.status if found.published else found.reason.text
-    return _result(found, found.as_json(), found.identified, status, verdict.warning, notes)
+    return _result(found, found.as_json(), found.identified, status, verdict.warning, notes, found.oracle.model)
 
 
 def _result(
@@ -144,10 +191,11 @@ def _result(
     status: str,
     warning: str | None,
     notes: tuple[str, ...],
+    model: CompiledModel,
 ) -> Result:
     known = {
         name: Parameter(one["value"], one["se"], one["unit"])
         for name, one in details["parameters"].items()
         if identified and one["value"] is not None
     }
-    return Result(identified, known, status, warning, tuple(details["advice"]), tuple(notes), details, found)
+    return Result(identified, known, status, warning, tuple(details["advice"]), tuple(notes), details, found, model)

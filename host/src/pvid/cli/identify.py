@@ -47,9 +47,9 @@ from pvid.settings.engine_cores import FLOAT
 @click.option(
     "--validate",
     "other",
-    metavar="RUN",
+    metavar="RUN2",
     type=click.Path(path_type=Path),
-    help="Another recording of the same described mechanism: how well the answer predicts it.",
+    help="Of a described mechanism: also say how well the answer predicts RUN2, another run of it.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
@@ -83,8 +83,8 @@ def command(
     is the second stage of the C core, as on a board, and the answer is its last estimate. --figure shows the measured
     signals against the simulated.
 
-    With --validate the answer, of float64, is also simulated freely on another recording with the same columns, in
-    blocks of four windows whose initial states alone are fitted: what is left of each sensor's motion, over its noise.
+    With --validate the answer is also simulated on another recording with the same columns, in blocks of four windows
+    whose initial states alone are fitted: what is left of each sensor's motion, over its motion and its noise.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
     reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both
@@ -108,11 +108,11 @@ def command(
             figure=figure,
             weights=weights or "residuals",
             refine=bool(refine),
-            validate=other,
+            other=other,
             **options,
         )
     if other is not None:
-        raise PvidError("--validate is for a described mechanism: --model")
+        raise PvidError("--validate is for a described mechanism, --model; here: pvid validate RUN2 --from ANSWER")
     if weights is not None:
         raise PvidError(f"--weights {weights} is for a described mechanism, --model; the pendulum has its own weights")
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)

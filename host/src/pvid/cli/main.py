@@ -27,6 +27,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "demo": "Identify a simulated rig in the firmware on an emulated board.",
         "simulate": "Simulate a rig and write its run and rig file.",
         "identify": "Identify the parameters from a recorded or simulated run.",
+        "validate": "Say how well an answer predicts another run.",
         "tune": "Show the designs of the weak form for a recorded run.",
         "plot": "Draw a report of a log or a run.",
         "batch": "Identify many runs and logs in parallel; one row each, and a page of drifts.",

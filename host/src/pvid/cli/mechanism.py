@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +97,7 @@ def identify_run(
     weights: Weights = "residuals",
     refine: bool = False,
     on: str | None = None,
-    validate: Path | None = None,
+    other: Path | None = None,
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism and prints the answer.
@@ -106,7 +106,7 @@ def identify_run(
     ----------
     weights : of the rows, as in pvid.oracle.weak.identify
     refine : the equations are fitted to the whole run, from the answer on
-    validate : another recording, which the answer predicts
+    other : another recording, of which is said how well the answer predicts it
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
@@ -122,8 +122,8 @@ def identify_run(
                 f"omit --{option}"
             )
     in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
-    if validate is not None and (in_c or refine):
-        raise PvidError(f"--validate is of the answer in float64; omit {'--refine' if refine else '--core'}")
+    if other is not None and refine and in_c:
+        raise PvidError("--validate is not for --core f32 --refine: use pvid validate RUN2 --from ANSWER")
     if weights != "residuals" and in_c:
         raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
     if refine and in_c and in_c is not FLOAT:
@@ -140,7 +140,7 @@ def identify_run(
         answer = judged(answer)
     print_notes(answer.recording.notes[len(recording.notes) :])
     if refine and not in_c:
-        return _refined(answer, as_json=as_json, figure=figure)
+        return _refined(answer, partial(_predicted, other, rig, columns), as_json=as_json, figure=figure)
     core: CoreAnswer | None = None
     no_second: dict[str, Any] = {}
     if in_c:
@@ -156,17 +156,16 @@ def identify_run(
             no_second = {"refinement": {"adopted": False, "text": f"not refined: {error}"}}
             write_stderr(f"pvid: note: not refined: {error}")
     shown = core or answer
-    validation = None if validate is None else _validated(answer, validate, rig, columns)
+    validation = _predicted(other, rig, columns, shown)
     if as_json:
-        more = no_second | ({} if on is None else {"on": on})
-        more |= {} if validation is None else {"validation": {"run": str(validate), **asdict(validation)}}
-        click.echo(json.dumps(shown.as_json() | more))
+        more = no_second | _validation_json(validation)
+        click.echo(json.dumps(shown.as_json() | more | ({} if on is None else {"on": on})))
     elif core is not None:
         _print_core(core)
     else:
         _print(answer)
-        if validation is not None:
-            click.echo(f"{validate}: {validation.text}")
+    if validation is not None and not as_json:
+        click.echo(f"{other}: the answer {validation.text}")
     if core is None and not model.following.is_usual:
         from pvid.run.engine_identify import ALL_ALIKE  # the core and its design, which this road does not need
 
@@ -181,12 +180,6 @@ def identify_run(
         write_stderr(f"pvid: nothing identified{reason}")
         return NOTHING_IDENTIFIED
     return DONE
-
-
-def _validated(answer: MechanismAnswer, path: Path, rig: MechanismRig | RigFile, columns: str | None) -> Validation:
-    from pvid.run.validation import validated
-
-    return validated(answer, recording_of(path, rig, columns)[0])
 
 
 def _identified_by_strong_form(
@@ -275,19 +268,47 @@ def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, co
     return verdict.equal
 
 
-def _refined(answer: MechanismAnswer, *, as_json: bool, figure: Path | None) -> int:
-    """Refines an answer and prints it."""
+def _predicted(
+    other: Path | None, rig: MechanismRig | RigFile, columns: str | None, answer: MechanismAnswer | CoreAnswer
+) -> Validation | None:
+    """How well an answer predicts another recording of the rig; None: none was given."""
+    from pvid.run.validation import predicted
+
+    if other is None:
+        return None
+    recording, model = recording_of(other, rig, columns, whole=False)
+    oracle = answer if isinstance(answer, MechanismAnswer) else answer.oracle
+    values = {name: one.value for name, one in answer.values.items()}
+    return predicted(model, recording, values, oracle.found.design.window_s)
+
+
+def _validation_json(validation: Validation | None) -> dict[str, Any]:
+    return {} if validation is None else {"validation": validation.as_json()}
+
+
+def _refined(
+    answer: MechanismAnswer,
+    predicted: Callable[[MechanismAnswer], Validation | None],
+    *,
+    as_json: bool,
+    figure: Path | None,
+) -> int:
+    """Refines an answer and prints it, and how well it predicts another recording."""
     from pvid.run.refined_mechanism import refined_answer
 
     weak = answer
     answer, refined, text = refined_answer(weak)
+    validation = predicted(answer)
     if as_json:
         found = None if refined is None else refined.found
         shown = None if found is None else {"chi2": found.chi2, "slow_chi2": found.slow_chi2}
-        click.echo(json.dumps({**answer.as_json(), "refinement": {"text": text, **(shown or {})}}))
+        more = {"refinement": {"text": text, **(shown or {})}, **_validation_json(validation)}
+        click.echo(json.dumps(answer.as_json() | more))
     else:
         _print(answer, "weak form" if answer is weak else "refined")
         click.echo(text)
+        if validation is not None:
+            click.echo(f"another run: the answer {validation.text}")
     if figure is not None:
         _draw(answer, None if answer is weak else refined, figure)
     _print_advice(answer)

@@ -4,7 +4,7 @@ Estimates of the same equations differ: by the weights of the rows, by the compe
 length of a window, by the stage. Each is formed on parts of the run and simulated on the others. That on all data of
 the best one is published; the usual one stands unless another predicts better by a tenth.
 
-Where the residuals are those of the sensors' noise alone, the estimates are alike, and nothing is simulated.
+Where the residuals are those of the sensors' noise alone, or a missing term explains the rest, nothing is judged.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pvid.oracle.weak.identify import Identified, ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
-from pvid.run.mechanism import MechanismAnswer, gains_of, noise_of, values_of_found
+from pvid.run.mechanism import MechanismAnswer, gains_of, noise_of, shifts_of, values_of_found
 from pvid.run.refined import Prior, Problem, Refined, Stretch, refined
 from pvid.run.validation import Motion, SensorPrediction, of_sensor
 
@@ -88,7 +88,8 @@ def judged(answer: MechanismAnswer) -> MechanismAnswer:
 
     Cost: a second or some for 10 000 samples, where the residuals exceed the sensors' noise alone.
     """
-    if answer.found.chi2 <= _NOISE and answer.identified:
+    named = answer.found.named
+    if (answer.found.chi2 <= _NOISE and answer.identified) or (named is not None and named.complete):
         return answer
     try:
         with np.errstate(all="ignore"):
@@ -266,12 +267,12 @@ def _published(
 ) -> MechanismAnswer:
     """The answer with the chosen estimate; its standard errors contain how far the estimates that predict alike are."""
     found, model = answer.found, answer.model
-    apart = np.max([np.abs(one.p - chosen.p) for one in alike], axis=0)
     fit = chosen.fit.at(chosen.p)
-    by_model = np.hypot(found.by_model, apart) if chosen is usual else apart
-    gains = gains_of(model, replace(found, by_model=by_model))
+    of_terms = shifts_of(found)[: len(shifts_of(found)) if chosen is usual else 0]
+    shifts = np.concatenate([of_terms, [one.p - chosen.p for one in alike]])
+    by_model = np.max(np.abs(shifts), axis=0)
     noise = noise_of(model, found) if chosen is usual else chosen.se
-    se = np.sqrt(noise**2 + np.sum(gains**2, axis=0))
+    se = np.sqrt(noise**2 + np.sum(gains_of(model, found) ** 2, axis=0) + by_model**2)
     status = tuple(verdict.judged(model, fit, noise))
     r2 = list(found.r2.values()) if chosen is usual else uncertainty(fit).r2
     reasons = [one for one in found.verdict.reasons if chosen is usual or one.name not in _OF_USUAL]
@@ -291,6 +292,7 @@ def _published(
         p=chosen.p,
         se=se,
         by_model=by_model,
+        shifts=shifts,
         fit=fit,
         judged=status,
         verdict=Verdict(verdict.sorted_by_gravity(reasons)),

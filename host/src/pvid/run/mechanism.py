@@ -222,7 +222,9 @@ def noise_of(model: CompiledModel, found: Identified) -> Float:
 
 
 def shifts_of(found: Identified) -> Float:
-    """What p moves by with each term that the equations may lack [terms, n_p]."""
+    """What p moves by with each term that the equations may lack, and to other estimates [terms, n_p]."""
+    if found.shifts is not None:
+        return found.shifts
     return np.zeros((0, len(found.p))) if found.lacking is None else found.lacking.shifts
 
 

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.wording import listed
+from pvid.base.rounding import percent
+from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.run.refined import Cut, Prior, Problem, Stretch
@@ -25,6 +26,7 @@ Float = npt.NDArray[np.float64]
 
 WINDOWS = 4  # in a block
 SHORTEST = 30  # samples of a block
+_BLOCKS = 6  # at least
 _PASSES = 6  # of the search for the starts
 
 
@@ -52,8 +54,9 @@ class SensorPrediction:
         return 1.0 - self.of_motion**2
 
     def __str__(self) -> str:
-        noise = "" if self.of_noise is None else f", {self.of_noise:.2g} times the noise of a sample"
-        return f"{self.name} to {100 * self.of_motion:.2g} % (rms {self.rms:.2g} {self.unit}{noise}; R^2 {self.r2:.5f})"
+        noise = "" if self.of_noise is None else f", {self.of_noise:.2g} times the sensor's noise"
+        rms = with_unit(self.rms, self.unit, 2)
+        return f"{self.name} to {percent(self.of_motion)} of its motion (rms {rms}{noise}; R^2 {self.r2:.5f})"
 
     def as_json(self) -> dict[str, Any]:
         """Its entry in a JSON object."""
@@ -177,9 +180,9 @@ def validated(model: CompiledModel, recording: Recording, p: Float, window_s: fl
     with np.errstate(all="ignore"):
         motion = Motion(model, recording.signals, rate, p)
         problem = motion.within([(0, len(recording))])
-        if not problem.measured.stretches or problem.longest < SHORTEST:
-            raise PvidError(f"the recording has no {SHORTEST} samples in a row to predict: record longer")
-        cut, simulated = motion.simulated(motion.r_of(p), problem, motion.block(window_s))
+        if not problem.measured.stretches or problem.longest < _BLOCKS * SHORTEST:
+            raise PvidError(f"the recording is too short to predict it in {_BLOCKS} blocks of {SHORTEST} samples")
+        cut, simulated = motion.simulated(motion.r_of(p), problem, motion.block(window_s, _BLOCKS))
     measured = cut.rows(problem.measured.z)
     if not np.isfinite(simulated).all():
         raise PvidError(
@@ -198,6 +201,27 @@ def validated(model: CompiledModel, recording: Recording, p: Float, window_s: fl
         {name: measured[..., k].ravel() for k, name in enumerate(names)},
         {name: simulated[..., k].ravel() for k, name in enumerate(names)},
     )
+
+
+def predicted(
+    model: CompiledModel, recording: Recording, values: Mapping[str, float | None], window_s: float | None
+) -> Validation:
+    """The same with values by name, as an answer has them.
+
+    Parameters
+    ----------
+    window_s : None: a twentieth of the recording
+
+    Raises
+    ------
+    PvidError
+        Also where a parameter has no value.
+    """
+    missing = [name for name in model.p_names if values.get(name) is None]
+    if missing:
+        raise PvidError(f"{listed(missing)} of {model.name} has no value there: without it no motion can be predicted")
+    p = np.array([values[name] for name in model.p_names], np.float64)
+    return validated(model, recording, p, window_s or len(recording) / recording.sample_rate / 20)
 
 
 def of_sensor(model: CompiledModel, name: str, measured: Float, simulated: Float, sd: float) -> SensorPrediction:

@@ -185,6 +185,22 @@ def ranked(
     equation_error : as in `chosen`
     reversals : how signs are summed; "averaged": of the weak engine in C, which whitens the kinds of rows one by one
     """
+    found = _ranked(model, run, sample_rate, start, equation_error, reversals, (_FEWEST_WINDOWS, _SHORT_RUN))
+    if found[0].near_0:  # a logarithm that ran down may have lost its way in windows that are too short
+        found += _ranked(model, run, sample_rate, start, equation_error, reversals, (_SHORT_RUN,))
+    return sorted(found, key=_order)
+
+
+def _ranked(
+    model: Compiled,
+    run: Mapping[str, npt.ArrayLike],
+    sample_rate: float,
+    start: Float | None,
+    equation_error: bool,
+    reversals: Literal["located", "averaged"],
+    at_least: Sequence[int],
+) -> list[Scored]:
+    """The same with windows of which the run has at least so many; fewer only where those lead nowhere."""
     plain = {name: x for name, x in run.items()}
     parts = [part.stop - part.start for part in segments_of(samples_of(model.bare, plain))]
     rates = any(jet.order for jet in model.channels.needed)
@@ -193,7 +209,7 @@ def ranked(
     )
     tried: list[Scored] = []
     errors = False
-    fewest = _FEWEST_WINDOWS
+    fewest = at_least[0]
 
     def attempt(designs: Iterable[WeakDesign]) -> None:
         for design in designs:
@@ -203,13 +219,13 @@ def ranked(
                 tried.append(found)
 
     windows: list[float] = []
-    for fewest in (_FEWEST_WINDOWS, _SHORT_RUN):
+    for fewest in at_least:
         longer = lengths(_unbroken(parts, fewest), sample_rate, fewest)
         windows = sorted({*windows, *longer}, reverse=True)
         attempt(made(basis, window_s=one) for one in longer)
         if not any(one.known and not one.near_0 for one in tried):  # a logarithm that ran down may have lost its way
             tried += _searched(model, run, [made(basis, window_s=one) for one in longer[:_SEARCHED]], start, fewest - 2)
-        if any(one.known and not one.near_0 for one in tried):
+        if any(one.known for one in tried):
             break
     if not tried:
         longest = max(parts, default=0)

@@ -49,6 +49,7 @@ class Identified:
     by_model : what p may be off by because the equations lack something, or a signal is not what was recorded [n_p]
     lacking : what the equations seem to lack; None: the numbers of the test ran away
     named : the terms that explain it; None: nothing is lacking that moves a parameter visibly
+    shifts : what p may be off by that way, and how far other estimates are [terms, n_p]; None: those of `lacking`
     predicted, clustered : those from the sensors and the equations' errors; from the scatter of the windows [n_p]
     covariance : of p, that of `predicted` [n_p, n_p]
     chi2 : mean square of the residuals over what the sensors alone explain
@@ -88,6 +89,7 @@ class Identified:
     by_model: Float
     lacking: Missing | None
     named: Explained | None
+    shifts: Float | None = None
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
