@@ -22,7 +22,6 @@ from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advised import identified
-from pvid.run.judge import judged
 from pvid.run.mechanism import identify_mechanism, model_of
 from pvid.run.mechanism_advice import advised
 from pvid.run.mechanism_core import identify_in_c
@@ -98,7 +97,11 @@ def _identify(
             recording = recording_of(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
         answer = advised(identify_mechanism(without_wild_samples(recording, compiled), compiled))
         engine = ENGINE_CORES.get(core or "")
-        return of_mechanism(judged(answer)) if engine is None else of_core(identify_in_c(answer, engine.name))
+        if engine is None and not answer.is_explained:
+            from pvid.run.judge import judged  # with the simulation, which a good run does not need
+
+            answer = judged(answer)
+        return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)
     if core is not None:
         file = replace(file, identifier=replace(file.identifier, core=core))

@@ -134,8 +134,8 @@ def identify_run(
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     answer = advised(identify_mechanism(recording, model, weights))
-    if not refine and in_c is None and weights == "residuals":
-        from pvid.run.judge import judged  # compiles the simulation where it is needed
+    if not (refine or in_c or answer.is_explained) and weights == "residuals":
+        from pvid.run.judge import judged  # with the simulation, which a good run does not need
 
         answer = judged(answer)
     print_notes(answer.recording.notes[len(recording.notes) :])

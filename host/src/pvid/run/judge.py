@@ -33,7 +33,6 @@ from pvid.run.validation import Motion, SensorPrediction, of_sensor
 
 Float = npt.NDArray[np.float64]
 
-_NOISE = 2.0  # chi^2 over the sensors' noise up to which nothing is judged
 _PARTS = 6  # of a run, of which every other one is fitted, and the rest predicted
 _FEWEST = 4  # windows of a half of the parts, to which a model is fitted
 _SAMPLES = 3000  # that are simulated of each half
@@ -88,8 +87,7 @@ def judged(answer: MechanismAnswer) -> MechanismAnswer:
 
     Cost: a second or some for 10 000 samples, where the residuals exceed the sensors' noise alone.
     """
-    named = answer.found.named
-    if (answer.found.chi2 <= _NOISE and answer.identified) or (named is not None and named.complete):
+    if answer.is_explained:
         return answer
     try:
         with np.errstate(all="ignore"):

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 Float = npt.NDArray[np.float64]
 
 
+_NOISE = 2.0  # chi^2 over the sensors' noise up to which it explains the residuals
+
+
 @dataclass(frozen=True)
 class Value:
     """A parameter, or what follows from p.
@@ -89,6 +92,13 @@ class MechanismAnswer:
     def identified(self) -> bool:
         """Whether at least one parameter is."""
         return self.found.verdict.identified
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the residuals are those of the sensors' noise, or a named term explains the rest of them: estimates
+        of the same equations are then alike, or all lack the same."""
+        named = self.found.named
+        return (self.found.chi2 <= _NOISE and self.identified) or (named is not None and named.complete)
 
     @property
     def ranking(self) -> tuple[Scored, ...]:
