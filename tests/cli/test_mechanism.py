@@ -6,11 +6,14 @@ import json
 import re
 import subprocess
 import sys
+from io import StringIO
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from rich.console import Console
 
+from pvid.base import console
 from pvid.base.console import BAD_INPUT, DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
@@ -93,6 +96,18 @@ def test_a_good_run_of_a_mechanism_loads_no_package_that_it_does_not_need(motor:
     code += f"    print(end.code, [one for one in {others} if one in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "0 []"
+
+
+def test_long_work_is_shown_on_a_terminal(motor: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = StringIO()
+    monkeypatch.setattr(console, "messages", Console(file=shown, force_terminal=True))
+    pvid("identify", motor, "--refine")
+    pvid("identify", motor, "--core", "q31")
+    for stage in ("identifying", "refining", "identifying in fixed point"):
+        assert f"{stage} " in shown.getvalue(), shown.getvalue()
+    monkeypatch.setattr(console, "messages", Console(file=(elsewhere := StringIO())))
+    pvid("identify", motor)
+    assert not elsewhere.getvalue()
 
 
 def test_columns_and_units_are_mapped(motor: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
+from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, working, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.cli.input import print_notes, read_input
@@ -133,11 +133,12 @@ def identify_run(
         refuse_too_many_unknowns(model)
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
-    answer = advised(identify_mechanism(recording, model, weights))
-    if not (refine or in_c or answer.is_explained) and weights == "residuals":
-        from pvid.run.judge import judged  # with the simulation, which a good run does not need
+    with working("identifying"):
+        answer = advised(identify_mechanism(recording, model, weights))
+        if not (refine or in_c or answer.is_explained) and weights == "residuals":
+            from pvid.run.judge import judged  # with the simulation, which a good run does not need
 
-        answer = judged(answer)
+            answer = judged(answer)
     print_notes(answer.recording.notes[len(recording.notes) :])
     if refine and not in_c:
         return _refined(answer, partial(_predicted, other, rig, columns), as_json=as_json, figure=figure)
@@ -146,7 +147,8 @@ def identify_run(
     if in_c:
         from pvid.run.mechanism_core import identify_in_c
 
-        core = identify_in_c(answer, in_c.name)
+        with working(f"identifying in {in_c.words}"):
+            core = identify_in_c(answer, in_c.name)
     if core is not None and refine:
         if figure is not None:
             raise PvidError("--figure is of a refinement in float64; omit --core f32")
@@ -297,7 +299,8 @@ def _refined(
     from pvid.run.refined_mechanism import refined_answer
 
     weak = answer
-    answer, refined, text = refined_answer(weak)
+    with working("refining"):
+        answer, refined, text = refined_answer(weak)
     validation = predicted(answer)
     if as_json:
         found = None if refined is None else refined.found
@@ -347,7 +350,8 @@ def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
     """
     from pvid.run.refined_core import refined_in_c
 
-    answer, found = core.oracle, refined_in_c(core)
+    with working(f"refining in {FLOAT.words}"):
+        answer, found = core.oracle, refined_in_c(core)
     if as_json:
         click.echo(json.dumps(found.as_json() | ({} if on is None else {"on": on})))
     else:
