@@ -1,6 +1,7 @@
 """Runs of a simulated rig: sensors, imperfections, drives by name, seeds, files."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -207,8 +208,10 @@ def test_steps_and_random_steps_change_at_their_edges_alone() -> None:
     assert np.all(np.flatnonzero(np.diff(prbs)) % 10 == 9)
     np.testing.assert_array_equal(RandomSteps(1.5, 0.01, seed=1).values(t[500:]), prbs[500:])
     np.testing.assert_array_equal(Steps((1.0, 0.0), 0.1).values(t)[[0, 99, 100, 199, 200]], [1, 1, 0, 0, 1])
-    with pytest.raises(PvidError, match="a sequence of steps has none"):
+    with pytest.raises(PvidError, match="a sequence of steps has none") as refused:
         RandomSteps(1.0, 0.1, seed=1).values(t, 1)
+    named = re.findall(r'take the drive "(.*)"', str(refused.value))
+    assert named and {*named} <= {*DRIVES}
 
 
 def test_chirp_goes_up_and_down_without_a_jump() -> None:

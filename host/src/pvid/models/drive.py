@@ -136,4 +136,5 @@ class Sum:
 
 def _refuse_derivative(what: str, order: int) -> None:
     if order:
-        raise PvidError(f"the equations need derivative {order} of a driven signal, and {what} has none: drive sines")
+        has_none = f"the equations need derivative {order} of a driven signal, and {what} has none"
+        raise PvidError(f'{has_none}: take the drive "two sines"')
