@@ -12,6 +12,8 @@ from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.identify import identify
 from pvid.rig.columns import Columns
 from pvid.rig.run import read_recording
+from pvid.run.judge import judged
+from pvid.run.mechanism import identify_mechanism
 
 DATA = ROOT / "tests" / "data" / "cell"
 
@@ -46,15 +48,16 @@ def test_two_rc_pairs_predict_another_load_at_a_fifth_of_the_capacity_an_hour() 
     assert found.own_rms < BAR
 
 
-def test_identify_predicts_another_load_with_the_weights_of_the_sensors_and_says_when_they_matter() -> None:
+def test_identify_predicts_another_load_with_the_weights_of_the_sensors_and_by_the_estimate_that_predicts() -> None:
     """Without a design: the command line has none."""
     run, other = cell.recorded("steps-mild"), cell.recorded("drive-mild")
     model = compiled_of("battery_2rc")
     found = identify(model, run.signals, run.sample_rate, weights="sensors")
     assert found.verdict.identified
     assert all(Replay(model, one).matches(found.p)["v"].rms < BAR for one in (run, other))
-    default = identify(model, run.signals, run.sample_rate)
-    assert "weights" in [one.name for one in default.verdict.reasons]
+    default = judged(identify_mechanism(run, model)).found
+    assert "prediction" in [one.name for one in default.verdict.reasons] and default.verdict.identified
+    assert all(Replay(model, one).matches(default.p)["v"].rms < BAR for one in (run, other))
 
 
 def test_stronger_load_needs_a_resistance_that_falls_with_the_current() -> None:

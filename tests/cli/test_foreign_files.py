@@ -39,6 +39,7 @@ OF_A_RUN = {
     "batch": ["batch", "FILE", "-o", "rows.parquet", "--workers", "1"],
     "design": ["design", "--run", "FILE"],
     "plot": ["plot", "FILE", "-o", "figure.png"],
+    "validate": ["validate", "FILE", "--from", "answer.json"],
 }
 OF_A_LOG = {
     "verify": ["verify", "FILE"],

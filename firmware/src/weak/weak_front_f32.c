@@ -72,7 +72,8 @@ PVID_COLD bool pvid_weak_front_early_f32(const pvid_weak_front_f32 *self, const 
     const uint32_t length = (2u * (uint32_t)self->half) + 1u;
     const uint32_t number = ((uint32_t)lost(self) + length) - ((uint32_t)self->missing + 1u);
     const uint32_t newest = ((self->head == 0u) ? length : self->head) - 1u;
-    const float *output = &self->line[(size_t)(3u + newest) * self->signals];
+    const size_t row = (size_t)newest + 3u;
+    const float *output = &self->line[row * self->signals];
     *first = number == 0u;
     /* The first block's output lacks what was before it: its weights D .. 1 are to have the sum 1. */
     const float scale = (number == 0u) ? ((2.0f * self->ticks) / (self->ticks + 1.0f)) : 1.0f;

@@ -150,7 +150,8 @@ bool pvid_weak_front_early_q31(const pvid_weak_front_q31 *self, const pvid_weak_
     const uint32_t length = (2u * (uint32_t)self->half) + 1u;
     const uint32_t number = ((uint32_t)lost(self) + length) - ((uint32_t)self->missing + 1u);
     const uint32_t newest = ((self->head == 0u) ? length : self->head) - 1u;
-    const int32_t *output = &self->line[(size_t)(3u + newest) * self->signals];
+    const size_t row = (size_t)newest + 3u;
+    const int32_t *output = &self->line[row * self->signals];
     const int64_t ticks = self->decimation;
     *first = number == 0u;
     for (size_t i = 0; i < design->model->jets; i++) {

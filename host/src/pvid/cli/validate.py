@@ -47,8 +47,8 @@ def command(
     from pvid.cli.mechanism import recording_of  # loads SymPy
     from pvid.run.validation import predicted
 
-    answer = _answer(answer_path)
     rig = mechanism_rig(run_path, rig_path, settings, model) or rig_for(run_path, rig_path, settings)
+    answer = _answer(answer_path)
     recording, compiled = recording_of(run_path, rig, columns, whole=False)
     named = answer.get("model", compiled.name)
     if named != compiled.name:

@@ -29,7 +29,8 @@ from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.mechanism import MechanismAnswer, gains_of, noise_of, shifts_of, values_of_found
 from pvid.run.refined import Prior, Problem, Refined, Stretch, refined
-from pvid.run.validation import Motion, SensorPrediction, of_sensor
+from pvid.run.sensor_prediction import SensorPrediction
+from pvid.run.validation import Motion, of_sensor
 
 Float = npt.NDArray[np.float64]
 

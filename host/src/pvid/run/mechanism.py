@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +26,7 @@ from pvid.oracle.weak.verdict import Judged, ParameterStatus
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-
-if TYPE_CHECKING:
-    from pvid.run.validation import SensorPrediction
+from pvid.run.sensor_prediction import SensorPrediction
 
 Float = npt.NDArray[np.float64]
 

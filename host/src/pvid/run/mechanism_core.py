@@ -18,6 +18,7 @@ from pvid.base.wording import listed, with_unit
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.core.native import Publisher
+from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
@@ -182,7 +183,7 @@ def identify_in_c(answer: MechanismAnswer, core: Core = "f32") -> CoreAnswer:
     """
     try:
         run = _RUNS[core](answer)
-    except PvidError as error:
+    except FAILURES as error:  # a search that runs away among them
         raise PvidError(f"--core {core}: {error}") from error
     return _answer(answer, run)
 

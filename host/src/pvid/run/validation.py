@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.base.rounding import percent
-from pvid.base.wording import listed, with_unit
+from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.run.refined import Cut, Prior, Problem, Stretch
 from pvid.run.refined_kernel import kernel_of
 from pvid.run.refined_mechanism import problem_of, start_of
+from pvid.run.sensor_prediction import SensorPrediction
 
 Float = npt.NDArray[np.float64]
 
@@ -28,45 +28,6 @@ WINDOWS = 4  # in a block
 SHORTEST = 30  # samples of a block
 _BLOCKS = 6  # at least
 _PASSES = 6  # of the search for the starts
-
-
-@dataclass(frozen=True)
-class SensorPrediction:
-    """What is left of a sensor's samples behind their prediction.
-
-    Attributes
-    ----------
-    rms : of measured less simulated [unit]
-    of_motion : over the rms of the motion within a block
-    of_noise : over the standard deviation of a sample; None where the model gives none
-    r2 : 1 - of_motion^2
-    """
-
-    name: str
-    unit: str
-    rms: float
-    of_motion: float
-    of_noise: float | None
-
-    @property
-    def r2(self) -> float:
-        """Part of the motion that is predicted."""
-        return 1.0 - self.of_motion**2
-
-    def __str__(self) -> str:
-        noise = "" if self.of_noise is None else f", {self.of_noise:.2g} times the sensor's noise"
-        rms = with_unit(self.rms, self.unit, 2)
-        return f"{self.name} to {percent(self.of_motion)} of its motion (rms {rms}{noise}; R^2 {self.r2:.5f})"
-
-    def as_json(self) -> dict[str, Any]:
-        """Its entry in a JSON object."""
-        return {
-            "rms": self.rms,
-            "unit": self.unit,
-            "of_motion": self.of_motion,
-            "of_noise": self.of_noise,
-            "r2": self.r2,
-        }
 
 
 @dataclass(frozen=True, eq=False)
