@@ -1,8 +1,8 @@
 """Which estimate to publish: that which predicts motion that it has not seen.
 
 Estimates of the same equations differ: by the weights of the rows, by the compensation of the regressors' noise, by the
-length of a window, by the stage. Each is formed on parts of the run and simulated on the others. That on all data of
-the best one is published; the usual one stands unless another predicts better by a tenth.
+length of a window, by the stage. Each is computed from one half of the run, in several parts, and simulates the other
+half. The usual estimate is published unless another one has a prediction error (rms) at least 10 % smaller.
 
 Where the residuals are those of the sensors' noise alone, or a missing term explains the rest, nothing is judged.
 """
@@ -69,7 +69,7 @@ class Candidate:
     name : what it is, in words
     p, se : from all data [n_p]
     halves : r from each half of the parts [2][parameters and settings of the simulation]
-    fit : of the weak form; of the refinement that which it began at
+    fit : of the weak form; of the refinement the estimate at which it began
     sensors : how well the halves predict each other
     """
 
@@ -83,8 +83,8 @@ class Candidate:
 
 
 def judged(answer: MechanismAnswer) -> MechanismAnswer:
-    """The answer, or that of the estimate that predicts best, with what the estimates that predict alike say in its
-    standard errors.
+    """The answer, or that of the estimate that predicts best. Its standard errors include the spread of the estimates
+    that predict about equally well.
 
     Cost: a second or some for 10 000 samples, where the residuals exceed the sensors' noise alone.
     """

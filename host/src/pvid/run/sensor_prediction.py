@@ -11,7 +11,7 @@ from pvid.base.wording import with_unit
 
 @dataclass(frozen=True)
 class SensorPrediction:
-    """What is left of a sensor's samples behind their prediction.
+    """Residual of a sensor: measured less simulated samples.
 
     Attributes
     ----------
