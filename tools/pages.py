@@ -170,14 +170,17 @@ class Printed:
 
 
 def pvid(words: list[str]) -> Printed:
-    """`./tools/pvid WORDS` in this process and folder."""
+    """`./tools/pvid WORDS` in this process and folder; `> FILE` at the end takes what is printed."""
     from pvid.base.console import BAD_INPUT
     from pvid.base.errors import PvidError
     from pvid.base.replacing import replacing
     from pvid.cli.main import commands
 
+    words, target = _redirected(words)
     with replacing():  # the files at hand are those of the page's reader
         done = CliRunner().invoke(commands, words, standalone_mode=False)
+    if target is not None:
+        target.write_text(done.stdout, encoding="utf-8")
     if isinstance(done.exception, PvidError | click.ClickException):
         return Printed(BAD_INPUT, f"{done.output}pvid: {done.exception}")
     if done.exception is not None and not isinstance(done.exception, SystemExit):
@@ -185,11 +188,16 @@ def pvid(words: list[str]) -> Printed:
     return Printed(done.return_value if isinstance(done.return_value, int) else 0, done.output)
 
 
+def _redirected(words: list[str]) -> tuple[list[str], Path | None]:
+    """The words of a command, and the file that takes its output."""
+    return (words[:-2], Path(words[-1])) if words[-2:-1] == [">"] else (words, None)
+
+
 def parse(line: str) -> None:
     """Raises click.ClickException where the arguments of `./tools/pvid ...` are not accepted."""
     from pvid.cli.main import commands
 
-    words = shlex.split(line)[1:]
+    words, _ = _redirected(shlex.split(line)[1:])
     command: click.Command = commands
     context = click.Context(command)
     while isinstance(command, click.Group):
