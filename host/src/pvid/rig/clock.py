@@ -495,6 +495,8 @@ def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray,
             within = (times[right] - times[right - 1] > _EMPTY_PERIODS * max(period, usual)) & (nearest > period / 2)
             piece[within] = np.nan
     there = np.flatnonzero(np.isfinite(out).any(axis=0))
+    if not there.size:
+        raise table.error(1, "t", f"the times fit no uniform clock: none of its ticks at {rate:g} Hz is near a sample")
     end = int(there[-1]) + 1
     return t[:end], dict(zip(table.signals, out[:, :end], strict=True))
 
