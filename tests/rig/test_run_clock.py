@@ -346,7 +346,8 @@ def test_unexplainable_clock_is_refused(times: Float, part: str, tmp_path: Path)
     digits=st.sampled_from(["", ".3f", ".6g"]),
     rate=st.sampled_from([None, 1000.0]),
 )
-@example(steps=[0.0, 1.0, 1.0, 3.0, 0.25, 0.25], scale=1.0, digits="", rate=None)  # no tick of a uniform clock is near a sample
+# No tick of a uniform clock is near a sample.
+@example(steps=[0.0, 1.0, 1.0, 3.0, 0.25, 0.25], scale=1.0, digits="", rate=None)
 @relaxed
 def test_any_times_that_do_not_run_back_give_a_run_or_a_sentence(
     steps: list[float], scale: float, digits: str, rate: float | None, tmp_path: Path
