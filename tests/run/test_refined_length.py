@@ -74,5 +74,5 @@ def test_signs_are_widened_no_further_than_they_explain_the_run(
     monkeypatch.setattr(Problem, "searched", worse)
     monkeypatch.setattr(refinement, "softened", lambda problem, prior, found, use: (found, prior))
     found = replace(outcome(300, 30.0), r=r)
-    refinement._softer(problem, refinement._prior(problem, r), found)
+    refinement._softer(problem, refinement.prior_about(problem, r), found)
     assert len(widths) == count

@@ -22,8 +22,8 @@ from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.advised import identified
-from pvid.run.mechanism import identify_mechanism, model_of
-from pvid.run.mechanism_advice import advised
+from pvid.run.mechanism import model_of
+from pvid.run.mechanism_advice import analysed
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.skew import aligned
 from pvid.run.wild_samples import without_wild_samples
@@ -95,12 +95,8 @@ def _identify(
             recording = recording_of_log(path, [one.name for one in compiled.signals])
         else:
             recording = recording_of(data, path, described.sample_rate, parsed(columns, channels_of(compiled)))
-        answer = advised(identify_mechanism(without_wild_samples(recording, compiled), compiled))
         engine = ENGINE_CORES.get(core or "")
-        if engine is None and not answer.is_explained:
-            from pvid.run.judge import judged  # with the simulation, which a good run does not need
-
-            answer = judged(answer)
+        answer = analysed(without_wild_samples(recording, compiled), compiled, predict=engine is None)
         return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     file = rig_for(path, rig_path, texts)
     if core is not None:

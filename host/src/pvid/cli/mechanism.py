@@ -26,7 +26,7 @@ from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
-from pvid.run.mechanism_advice import advised
+from pvid.run.mechanism_advice import analysed
 from pvid.run.wild_samples import without_wild_samples
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
@@ -134,11 +134,7 @@ def identify_run(
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
     with working("identifying"):
-        answer = advised(identify_mechanism(recording, model, weights))
-        if not (refine or in_c or answer.is_explained) and weights == "residuals":
-            from pvid.run.judge import judged  # with the simulation, which a good run does not need
-
-            answer = judged(answer)
+        answer = analysed(recording, model, weights, predict=not (refine or in_c))
     print_notes(answer.recording.notes[len(recording.notes) :])
     if refine and not in_c:
         return _refined(answer, partial(_predicted, other, rig, columns), as_json=as_json, figure=figure)
@@ -243,7 +239,7 @@ def plot_run(path: Path, rig: MechanismRig | RigFile, columns: str | None, figur
     from pvid.show.mechanism_figure import write_figure
 
     recording, model = recording_of(path, rig, columns, whole=False)
-    answer = weak = advised(identify_mechanism(recording, model))
+    answer = weak = analysed(recording, model, predict=not refine)
     fit, text = None, f"weak form, float64; status {weak.found.verdict.status}; chi2 {weak.found.chi2:.2g}"
     if refine:
         from pvid.run.refined_mechanism import refined_answer

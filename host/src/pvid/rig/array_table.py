@@ -196,7 +196,7 @@ def numbers_of(path: Path, name: str, data: Any) -> FloatArray:
 
 
 def _of_objects(path: Path, name: str, data: list[Any]) -> FloatArray:
-    """Numbers, texts of numbers and what stands for none: None, NA, NaT."""
+    """Numbers, texts of numbers, and missing values: None, NA, NaT."""
     texts = {k: _text(one) for k, one in enumerate(data) if isinstance(one, str | bytes)}
     evidence = Evidence()
     evidence.add(texts.values())

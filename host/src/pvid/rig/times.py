@@ -46,7 +46,7 @@ class TimesOfDay:
         self._orders: set[bool] = set()  # what dates allow one reading alone, such as 5/13/2024: month first or not
         self._first: int | None = None  # [ns]
         self._minutes: dict[tuple[str | None, str, str], int | None] = {}  # [ns]
-        self._known: dict[tuple[str, str], int] = {}  # [ns], by what stands in front of the seconds and behind
+        self._known: dict[tuple[str, str], int] = {}  # [ns], by the text before the seconds and behind them
         self._form, self._scale = (-1, 0, 0, ""), 1
         self._either = ""  # a date that allows both
         self._period = 0  # [s], after which it starts over; 0: there are dates

@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.wording import listed
-from pvid.codegen.refine import LOG_SD
 from pvid.oracle.weak import verdict
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
@@ -28,9 +28,10 @@ from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.mechanism import MechanismAnswer, gains_of, noise_of, shifts_of, values_of_found
-from pvid.run.refined import Prior, Problem, Refined, Stretch, refined
+from pvid.run.refined import Problem, Refined, Stretch, refined
+from pvid.run.refined_mechanism import prior_about
 from pvid.run.sensor_prediction import SensorPrediction
-from pvid.run.validation import Motion, of_sensor
+from pvid.run.validation import Motion
 
 Float = npt.NDArray[np.float64]
 
@@ -48,7 +49,7 @@ _USUAL = "the usual estimate"
 # Doubts of the usual estimate alone: another has its own, or is one of those that were compared.
 _OF_USUAL = (
     *("not_identified", "undetermined", "near_zero", "range", "not_settled"),
-    *("shape", "halves", "windows", "smoothing", "attenuation", "weights"),
+    *("halves", "windows", "smoothing", "attenuation", "weights"),
 )
 # Of a window, times the chosen one; words, error of the equations in the weights, compensation.
 _LENGTHS = {1.0: _USUAL, 2.0: "the estimate with windows twice as long", 0.5: "the estimate with windows half as long"}
@@ -99,17 +100,17 @@ def judged(answer: MechanismAnswer) -> MechanismAnswer:
 
 def _judged(answer: MechanismAnswer) -> MechanismAnswer:
     trial = _Trial(answer)
-    designs = list(_designs(answer))
-    found = [one for name, design, start in designs for one in trial.estimates(name, design, start, _WEIGHTS[:1])]
+    designs = {name: (design, start) for name, design, start in _designs(answer)}
+    found = [one for name, given in designs.items() for one in trial.estimates(name, *given, _WEIGHTS[:1])]
     if found:
-        name, design, start = designs[[one[0] for one in designs].index(min(found, key=_score).name)]
-        found += trial.estimates(name, design, start, _WEIGHTS[1:])
-        again = trial.refined(min(found, key=_score))
+        best = min(found, key=attrgetter("score"))
+        found += trial.estimates(best.name, *designs[best.name], _WEIGHTS[1:])
+        again = trial.refined(min(found, key=attrgetter("score")))
         found += [] if again is None else [again]
     found = [one for one in found if np.isfinite(one.score)]
     if not found:
         return answer
-    best = min(found, key=_score)
+    best = min(found, key=attrgetter("score"))
     usual = next((one for one in found if one.name == _USUAL), None)
     describes = all(one.r2 > _DESCRIBED for one in best.sensors)
     if usual is None and not describes:
@@ -190,10 +191,7 @@ class _Trial:
         z, x = (np.concatenate([part[:, :shortest] for part in both]) for both in (measured, simulated))
         if not np.isfinite(x).all():
             return one
-        names = motion.problem.kernel.made.outputs
-        sensors = tuple(
-            of_sensor(motion.model, name, z[..., k], x[..., k], motion.sd[k]) for k, name in enumerate(names)
-        )
+        sensors = motion.compared(z, x)
         rms = np.array([one.rms for one in sensors])
         return replace(one, sensors=sensors, score=float(np.mean(np.log(np.maximum(rms, motion.sd)))))
 
@@ -203,12 +201,9 @@ class _Trial:
         if not np.isfinite(best.score):
             return None
         sd = np.maximum(motion.sd, [one.rms for one in best.sensors])
-        made = motion.problem.kernel.made
-        wide = np.array([LOG_SD if one.log and not one.sign else one.prior_sd for one in made.parameters])
 
         def searched(problem: Problem, r: Float) -> Refined:
-            prior = Prior(r, np.maximum(3 * wide, 0.5 * problem.log), ~problem.is_width)
-            return refined(problem, prior, (max(8, samples // 3), samples), most=_PASSES)
+            return refined(problem, prior_about(problem, r), (max(8, samples // 3), samples), most=_PASSES)
 
         try:
             whole = searched(
@@ -220,7 +215,7 @@ class _Trial:
             )
         except FAILURES:
             return None
-        p, covariance = motion.problem.values(whole, made.places_of_p)
+        p, covariance = motion.problem.values(whole, motion.problem.kernel.made.places_of_p)
         if not np.isfinite(covariance).all():
             return None
         name = "the fit of the whole equations" + ("" if best.name == _USUAL else f", from {best.name} on")
@@ -257,18 +252,14 @@ class _Fitted:
         return gated(rows.only(within), fit.p, self.equation_error, self.compensate, _NEAR).p
 
 
-def _score(one: Candidate) -> float:
-    return one.score
-
-
 def _published(
     answer: MechanismAnswer, chosen: Candidate, usual: Candidate | None, alike: Sequence[Candidate]
 ) -> MechanismAnswer:
     """The answer with the chosen estimate; its standard errors contain how far the estimates that predict alike are."""
     found, model = answer.found, answer.model
     fit = chosen.fit.at(chosen.p)
-    of_terms = shifts_of(found)[: len(shifts_of(found)) if chosen is usual else 0]
-    shifts = np.concatenate([of_terms, [one.p - chosen.p for one in alike]])
+    apart = np.array([one.p - chosen.p for one in alike])
+    shifts = np.concatenate([shifts_of(found), apart]) if chosen is usual else apart
     by_model = np.max(np.abs(shifts), axis=0)
     noise = noise_of(model, found) if chosen is usual else chosen.se
     se = np.sqrt(noise**2 + np.sum(gains_of(model, found) ** 2, axis=0) + by_model**2)

@@ -12,9 +12,11 @@ from pvid.model.compiled import CompiledModel, Signal
 from pvid.oracle.weak.choice import score_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.weights import Weights
 from pvid.rig.columns import Columns
 from pvid.rig.mechanism_file import channels_of
-from pvid.run.mechanism import MechanismAnswer
+from pvid.rig.run import Recording
+from pvid.run.mechanism import MechanismAnswer, identify_mechanism
 
 # Residuals over what the sensors explain, above which a mistake is sought.
 _MISFIT = 20.0
@@ -33,6 +35,24 @@ _UNITS = {
     "m": {"mm": "mm", "cm": "cm"},
     **{unit: {f"m{unit}": f"m{unit}"} for unit in ("A", "V", "N")},
 }
+
+
+def analysed(
+    recording: Recording, model: CompiledModel, weights: Weights = "residuals", *, predict: bool = True
+) -> MechanismAnswer:
+    """The answer that `identify` prints in float64, with its advice.
+
+    Parameters
+    ----------
+    weights : of the rows; those of the sensors alone are not compared with others
+    predict : publish the estimate that predicts best where the equations do not explain the recording
+    """
+    answer = advised(identify_mechanism(recording, model, weights))
+    if answer.is_explained or not predict or weights != "residuals":
+        return answer
+    from pvid.run.judge import judged  # with the simulation, which a good run does not need
+
+    return judged(answer)
 
 
 def advised(answer: MechanismAnswer) -> MechanismAnswer:

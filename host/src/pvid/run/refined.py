@@ -305,6 +305,11 @@ class Problem:
                 break
         return self._judged(r, prior, cut, starts, use, converged, passes, cost, found)
 
+    def with_starts(self, prior: Prior, cut: Cut, most: int = PASSES) -> Refined:
+        """Starts that fit the readings at the r of a prior, which stays."""
+        starts = self.first_starts(cut, prior.r)
+        return self.searched(prior.r, prior, cut, starts, self.used(cut), move=False, most=most)
+
     def _is_near(self, triangle: Float, r: Float, prior: Prior, free: npt.NDArray[np.intp]) -> bool:
         """Whether a search that gains no more has arrived: r's step is small with the widths of signs as they are; the
         sum of squares is rough along a width that the run hardly determines."""

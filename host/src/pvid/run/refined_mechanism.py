@@ -138,7 +138,7 @@ def refine_mechanism(
     widths : of signs, by argument; from the sampling by default
     """
     problem, r = problem_of(model, signals, rate, start_of(kernel_of(model), p), widths)
-    prior = _prior(problem, r)
+    prior = prior_about(problem, r)
     samples = max(8, round(block_s * rate))
     shorter = refined(problem, prior, (max(8, samples // 3),))
     found = longest_that_fits((shorter, refined(problem, prior, (samples,), before=shorter)))
@@ -153,7 +153,8 @@ def longest_that_fits(tried: Sequence[Refined]) -> Refined:
     return next((one for one in reversed(tried) if one.converged and one.slow_chi2 <= NOISE), tried[-1])
 
 
-def _prior(problem: Problem, r: Float) -> Prior:
+def prior_about(problem: Problem, r: Float) -> Prior:
+    """Wide, of all parameters but the widths of signs."""
     parameters = problem.kernel.made.parameters
     sd = np.array([LOG_SD if one.log and not one.sign else one.prior_sd for one in parameters])
     return Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~problem.is_width)
@@ -172,9 +173,7 @@ def simulated_at(answer: MechanismAnswer, p: Float) -> RefinedMechanism:
     rate = recording.sample_rate
     problem, r = problem_of(model, recording.signals, rate, start_of(kernel_of(model), p))
     cut = problem.cut(max(8, round(2 * answer.found.design.window_s * rate)))
-    starts = problem.first_starts(cut, r)
-    found = problem.searched(r, _prior(problem, r), cut, starts, problem.used(cut), move=False)
-    return RefinedMechanism(problem, found)
+    return RefinedMechanism(problem, problem.with_starts(prior_about(problem, r), cut))
 
 
 def _softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:

@@ -119,9 +119,15 @@ class Motion:
             every = -(-len(cut.first) * cut.samples // most)
             cut = Cut(cut.first[::every].copy(), cut.samples)
         nothing = Prior(r, np.ones(problem.n), np.zeros(problem.n, np.bool_))
-        starts = problem.first_starts(cut, r)
-        found = problem.searched(r, nothing, cut, starts, problem.used(cut), move=False, most=_PASSES)
-        return cut, problem.simulated(r, cut, found.starts)
+        return cut, problem.simulated(r, cut, problem.with_starts(nothing, cut, _PASSES).starts)
+
+    def compared(self, measured: Float, simulated: Float) -> tuple[SensorPrediction, ...]:
+        """Of each sensor, from readings [blocks, samples, sensors]."""
+        names = self.problem.kernel.made.outputs
+        return tuple(
+            _of_sensor(self.model, name, measured[..., k], simulated[..., k], self.sd[k])
+            for k, name in enumerate(names)
+        )
 
 
 def validated(model: CompiledModel, recording: Recording, p: Float, window_s: float) -> Validation:
@@ -150,12 +156,9 @@ def validated(model: CompiledModel, recording: Recording, p: Float, window_s: fl
             f"the motion of {model.name} runs away with these parameters: they are not those of this recording"
         )
     names = problem.kernel.made.outputs
-    sensors = tuple(
-        of_sensor(model, name, measured[..., k], simulated[..., k], motion.sd[k]) for k, name in enumerate(names)
-    )
     places = cut.first[:, None] + np.arange(cut.samples)
     return Validation(
-        sensors,
+        motion.compared(measured, simulated),
         cut.samples / rate,
         len(cut.first),
         recording.t[places.ravel()],
@@ -185,7 +188,7 @@ def predicted(
     return validated(model, recording, p, window_s or len(recording) / recording.sample_rate / 20)
 
 
-def of_sensor(model: CompiledModel, name: str, measured: Float, simulated: Float, sd: float) -> SensorPrediction:
+def _of_sensor(model: CompiledModel, name: str, measured: Float, simulated: Float, sd: float) -> SensorPrediction:
     """From samples and their simulation, both [blocks, samples]."""
     error = measured - simulated
     rms = float(np.sqrt(np.nanmean(np.square(error))))
