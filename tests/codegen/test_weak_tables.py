@@ -42,6 +42,8 @@ class Emulation:
                 x = (-e[:-3] + 13 * e[1:-2] + 13 * e[2:-1] - e[3:]) / 24
             elif one.source is Source.JUMP:
                 x = np.diff(x, prepend=x[:1]) / (12 * self.form.config.sample_rate)
+            elif one.source is Source.LAST:
+                x = np.concatenate([x[:1], x[:-1]])
             out.append(x)
         return out
 

@@ -13,7 +13,7 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.codegen.build import files_of
 from pvid.model import Integral, Model, cos, sgn, sin
-from pvid.model.corners import with_corners
+from pvid.model.corners import OfInput, with_corners
 from pvid.model.signals import Jet
 from pvid.models.mechanisms import compiled_of, described, names
 
@@ -224,7 +224,7 @@ def test_variants_move_a_derivative_to_the_test_function() -> None:
 def test_corners_of_the_current_are_channels_of_the_motor_and_of_no_other() -> None:
     for name in names():
         model, jumps = with_corners(compiled_of(name))
-        assert jumps == ({"V_jump": "V"} if name == "dc_motor" else {})
+        assert jumps == ({"V_jump": OfInput("V", "jump")} if name == "dc_motor" else {})
         if name != "dc_motor":
             assert model is compiled_of(name)
     motor, _ = with_corners(compiled_of("dc_motor"))

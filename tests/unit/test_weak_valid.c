@@ -87,7 +87,7 @@ static void signals_and_jets(void **state)
 {
     (void)state;
     GIVES(own.signal[0].source = PVID_SIGNAL_JUMP, PVID_OK);
-    GIVES(own.signal[0].source = PVID_SIGNAL_JUMP + 1, PVID_BAD_MODEL);
+    GIVES(own.signal[0].source = PVID_SIGNAL_LAST + 1, PVID_BAD_MODEL);
     GIVES(own.jet[0].order = PVID_MAX_POWER + 1, PVID_BAD_MODEL);
 }
 

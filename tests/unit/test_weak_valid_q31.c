@@ -141,7 +141,7 @@ static void sizes_of_a_design(void **state)
 static void tables_of_a_model(void **state)
 {
     (void)state;
-    GIVES(own.signal[1].source = PVID_SIGNAL_JUMP + 1, PVID_BAD_MODEL);
+    GIVES(own.signal[1].source = PVID_SIGNAL_LAST + 1, PVID_BAD_MODEL);
     GIVES(own.jet[1].order = PVID_MAX_POWER + 1, PVID_BAD_MODEL);
     GIVES(own.channel[CONSTANT].fold = 1, PVID_BAD_MODEL);
     GIVES(own.channel[2] = kapitza_channel[CONSTANT], PVID_BAD_MODEL); /* not the last one */

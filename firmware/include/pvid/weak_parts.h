@@ -11,7 +11,8 @@
 enum {
     PVID_SIGNAL_SAMPLED = 0, /* the sample */
     PVID_SIGNAL_HELD,        /* of an input that is held from tick to tick: its mean about the tick */
-    PVID_SIGNAL_JUMP         /* dt/12 times the sample's difference to the one before, dt the tick */
+    PVID_SIGNAL_JUMP,        /* dt/12 times the sample's difference to the one before, dt the tick */
+    PVID_SIGNAL_LAST         /* the sample before */
 };
 
 typedef struct {

@@ -6,7 +6,7 @@
  * (host/src/pvid/design/weak_q31.py, which also lists the proof's spare bits).
  *
  *   counts         x less the offset, |x| <= full_scale <= 2^24
- *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1)
+ *   signals        exact: SAMPLED x,  HELD -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),  JUMP x_k - x_(k-1),  LAST x_(k-1)
  *   block sums     exact: D^2 |signal| <= 2^31, then shifted to 28 bits
  *   jets           int32 in the formats of `prepare` and `values`: exact sums of weights times block sums, rounded
  *   integrals      int32 in dt/120 (once) and dt^2/240 (twice) of the integrand without its last bits

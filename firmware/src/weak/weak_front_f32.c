@@ -123,6 +123,15 @@ static inline float held_signal(float before, float last, float now, float next)
     return (((-before + (13.0f * last)) + (13.0f * now)) - next) * HELD_SCALE;
 }
 
+/* A signal that is not the sample itself. */
+static inline float other_signal(uint8_t source, float before, float last, float now, float next, float jump_scale)
+{
+    if (source == (uint8_t)PVID_SIGNAL_HELD) {
+        return held_signal(before, last, now, next);
+    }
+    return (source == (uint8_t)PVID_SIGNAL_JUMP) ? (jump_scale * (now - last)) : last;
+}
+
 PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvid_weak_model_f32 *model,
                                             const float sample[])
 {
@@ -143,8 +152,7 @@ PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvi
         const size_t i = signal->sample;
         float x = now[i];
         if (signal->source != (uint8_t)PVID_SIGNAL_SAMPLED) {
-            x = (signal->source == (uint8_t)PVID_SIGNAL_HELD) ? held_signal(self->before[2][i], last[i], x, sample[i])
-                                                              : (self->jump_scale * (x - last[i]));
+            x = other_signal(signal->source, self->before[2][i], last[i], x, sample[i], self->jump_scale);
         }
         const float once = sums[0] + x;
         sums[0] = once;

@@ -1,4 +1,4 @@
-/* Signals of a tick, exact:  SAMPLED  x_k,   HELD  -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),   JUMP  x_k - x_(k-1).
+/* Signals of a tick, exact:  SAMPLED  x_k,   HELD  -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),   JUMP  x_k - x_(k-1),   LAST  x_(k-1).
  * With a held signal k is the tick before the present one. Before the first sample since a restart all were equal to
  * it.
  *
@@ -88,6 +88,9 @@ static int32_t signal_of(const pvid_weak_front_q31 *self, pvid_weak_signal signa
     const int32_t last = held ? self->before[1][i] : self->before[0][i];
     if (signal.source == (uint8_t)PVID_SIGNAL_HELD) {
         return (13 * (last + now)) - (self->before[2][i] + counts[i]);
+    }
+    if (signal.source == (uint8_t)PVID_SIGNAL_LAST) {
+        return last;
     }
     return (signal.source == (uint8_t)PVID_SIGNAL_JUMP) ? (now - last) : now;
 }

@@ -21,7 +21,7 @@ static inline uint8_t pvid_weak_needs(const pvid_weak_signal signal[], size_t si
         const uint8_t source = signal[i].source;
         if (source == (uint8_t)PVID_SIGNAL_HELD) {
             needs = PVID_WEAK_NEEDS_NEXT;
-        } else if ((source == (uint8_t)PVID_SIGNAL_JUMP) && (needs == PVID_WEAK_NEEDS_NOTHING)) {
+        } else if ((source >= (uint8_t)PVID_SIGNAL_JUMP) && (needs == PVID_WEAK_NEEDS_NOTHING)) {
             needs = PVID_WEAK_NEEDS_LAST;
         } else {
             /* the sample itself */
@@ -46,7 +46,7 @@ static inline bool pvid_weak_signals_are_valid(const pvid_weak_signal signal[], 
 {
     bool valid = true;
     for (size_t i = 0; i < signals; i++) {
-        valid = valid && (signal[i].sample < samples) && (signal[i].source <= (uint8_t)PVID_SIGNAL_JUMP);
+        valid = valid && (signal[i].sample < samples) && (signal[i].source <= (uint8_t)PVID_SIGNAL_LAST);
     }
     for (size_t i = 0; i < jets; i++) {
         valid = valid && (jet[i].signal < signals) && (jet[i].order <= PVID_MAX_POWER);

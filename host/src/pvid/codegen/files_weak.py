@@ -16,7 +16,7 @@ from pvid.core.sizes import raised, smallest
 from pvid.design.c_tables import float_literal
 from pvid.settings.weak import NONE, Source, WeakModel
 
-_SOURCES = {Source.SAMPLED: "", Source.HELD: "held until the next", Source.JUMP: ""}
+_SOURCES = {Source.SAMPLED: "", Source.HELD: "held until the next", Source.JUMP: "", Source.LAST: ""}
 
 
 def header(made: WeakFunctions, model: WeakModel, needed: Mapping[str, int], command: str) -> str:

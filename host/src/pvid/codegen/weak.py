@@ -21,6 +21,7 @@ from pvid.codegen.functions import Function, ModelFunctions, functions_of
 from pvid.codegen.names import identifiers
 from pvid.codegen.operations import program_of
 from pvid.model.compiled import CompiledModel
+from pvid.model.corners import OfInput
 from pvid.model.signals import Integral, Jet, jets
 from pvid.oracle.weak.channels import Channel, Channels
 from pvid.oracle.weak.identify import ready
@@ -36,6 +37,9 @@ from pvid.settings.weak import (
 
 _ONE = sp.Integer(1)
 _HIGHEST_FOLD = 2
+
+
+_SOURCES = {"jump": Source.JUMP, "before": Source.LAST, "after": Source.SAMPLED}
 
 
 @dataclass(frozen=True)
@@ -133,9 +137,9 @@ def _ordered(model: CompiledModel, whole: Channels) -> list[Jet]:
     return sorted(whole.needed, key=lambda jet: (order.index(jet.of), jet.order))
 
 
-def _signal(model: CompiledModel, jumps: str | None, name: str, samples: Sequence[str]) -> WeakSignal:
-    if jumps is not None:
-        return WeakSignal(samples.index(jumps), Source.JUMP)
+def _signal(model: CompiledModel, made: OfInput | None, name: str, samples: Sequence[str]) -> WeakSignal:
+    if made is not None:
+        return WeakSignal(samples.index(made.name), _SOURCES[made.kind])
     held = model.signal(name).hold == "zoh"
     return WeakSignal(samples.index(name), Source.HELD if held else Source.SAMPLED)
 

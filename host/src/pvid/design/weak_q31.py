@@ -30,7 +30,7 @@ _FEW_COUNTS = 2.0**12  # of a sample times the root of D, with which a cosine of
 _AMPLITUDES = 256  # of the cosine, among which there is one whose rounding is good-natured
 
 # Of each source: its largest integer in full scales, and its unit in counts.
-_REACH = {Source.SAMPLED: 1, Source.HELD: 28, Source.JUMP: 2}
+_REACH = {Source.SAMPLED: 1, Source.HELD: 28, Source.JUMP: 2, Source.LAST: 1}
 
 
 @dataclass(frozen=True)

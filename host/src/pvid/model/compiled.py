@@ -19,6 +19,9 @@ Part = Mapping[int, sp.Expr]
 _PATIENT_WINDOWS = 100
 
 
+Edge = Literal["between", "before", "after"]
+
+
 @dataclass(frozen=True)
 class Signal:
     """A recorded quantity.
@@ -32,6 +35,9 @@ class Signal:
     noise : standard deviation of its white noise, in resolutions (in its unit where resolution is 0)
     reach : largest absolute value
     hold : "zoh": the value set at t_k holds until t_(k+1); "sampled": the value at t_k
+    edge
+        of a sensor that jumps with a held input: its sample is that "before" the jump at its instant or "after" it;
+        "between": halfway, or not known
     smooth : what a held input is set to never jumps: the refinement in C may take steps of several samples
     driven : the run sets it (every input; a sensor that measures what a drive imposes, such as a load's current)
     gain_sd : relative standard deviation of its gain; part of the standard errors, because a run seldom shows it
@@ -51,6 +57,7 @@ class Signal:
     gain_sd: float = 0.0
     neglected: float = 0.0
     smooth: bool = False
+    edge: Edge = "between"
 
     @property
     def name(self) -> str:

@@ -1,16 +1,21 @@
-"""Corners of a sampled signal: where a held input jumps, the derivative of a sensor that it drives directly jumps too.
+"""Corners and steps of sampled signals: where a held input jumps, so do some sensors, or their derivatives.
 
 A motor's current has the corner (V_k - V_(k-1))/L at every edge of the voltage. By Euler-Maclaurin
 int chi i dt = dt sum chi (i + dt/12 (V_k - V_(k-1))/L): ignored it costs dt^2 R^2/(12 L^2) of L. So every channel that
 contains such a sensor gets a second one in the scaled jump of the input, with a coefficient that follows from p and
 from the signals at the edge: with the voltage d vb of a bridge it is vb (d_k - d_(k-1))/L, and in w Lq iq it is
 multiplied by w.
+
+A sensor that an algebraic equation ties to the input jumps itself, by D = dy/du: the current through a resistor, the
+voltage of a cell, an accelerometer. Sampled behind the jump its integral is dt sum chi (y + D (mean of u about t_k -
+u_k)); sampled before it, u_(k-1) stands for u_k. Ignored it costs half a sample.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import sympy as sp
 
@@ -22,14 +27,65 @@ from pvid.model.terms import added, merged, terms_of, varies
 # A coefficient with more operations than this would burden every row for a correction that smooth inputs do not need.
 _LONGEST = 12
 
-_SUFFIX = "_jump"
+
+@dataclass(frozen=True)
+class OfInput:
+    """A signal made of a held input u: "jump", dt/12 (u_k - u_(k-1)); "after", u_k; or "before", u_(k-1)."""
+
+    name: str
+    kind: Literal["jump", "after", "before"]
+
+    @property
+    def jet(self) -> Jet:
+        """The signal."""
+        return Jet(f"{self.name}_{self.kind}")
+
+
+def feedthroughs(model: CompiledModel) -> dict[tuple[str, str], sp.Expr]:
+    """(sensor, held input) -> d sensor / d input at an instant, a function of p and of the signals.
+
+    Of sensors without derivatives in the equations; what is long is left out.
+    """
+    driven = {one.name for one in model.signals if one.kind == "input" or one.driven}
+    hidden = {jet.of for jet in model.hidden}
+    return {
+        (jet.of, name): ratio
+        for (jet, name), ratio in _solved(model).items()
+        if jet.order == 0 and jet.of not in driven | hidden and _is_usable(ratio, hidden)
+    }
+
+
+def _solved(model: CompiledModel) -> dict[tuple[Jet, str], sp.Expr]:
+    """(highest derivative of a sensor or a hidden quantity, held input) -> its jump over that of the input.
+
+    By the solution of the linear system that all equations are. Empty where no quantity is without derivatives: then
+    each equation shows its own; and where the system's matrix varies, is not square or is singular.
+    """
+    held = [one.name for one in model.signals if one.kind == "input" and one.hold == "zoh"]
+    names = [one.name for one in model.signals if one.kind == "sensor" and not one.driven]
+    names += sorted({str(jet.of) for jet in model.hidden})
+    top = [Jet(name, max((order_of(one, [name]) for one in model.equations), default=0)) for name in names]
+    if not held or all(jet.order for jet in top) or len(top) != len(model.equations):
+        return {}
+    whole = [sp.expand(one) for one in model.equations]
+    matrix = sp.Matrix([[sp.diff(one, jet) for jet in top] for one in whole])
+    if any(varies(one) for one in matrix):
+        return {}
+    right = sp.Matrix([[-sp.diff(one, Jet(name)) for name in held] for one in whole])
+    try:
+        jumps = matrix.LUsolve(right)
+    except ValueError:  # singular
+        return {}
+    ratios = {(jet, name): sp.cancel(jumps[i, k]) for i, jet in enumerate(top) for k, name in enumerate(held)}
+    return {key: ratio for key, ratio in ratios.items() if ratio != 0}
 
 
 def slopes(model: CompiledModel) -> dict[tuple[str, str], sp.Expr]:
     """(sensor, held input) -> d sensor' / d input, a function of p and of the signals.
 
     Of a sensor whose first derivative is the highest one and occurs in one equation, where no other signal with corners
-    does; and of one that an algebraic equation ties to such sensors. Left out: what has an inertia that varies, what
+    does, or that the input drives through algebraic equations; and of one that an algebraic equation ties to such
+    sensors. Left out: what has an inertia that varies, what
     contains a derivative or a hidden quantity, and what is long.
     """
     held = [one for one in model.signals if one.kind == "input" and one.hold == "zoh"]
@@ -48,6 +104,9 @@ def slopes(model: CompiledModel) -> dict[tuple[str, str], sp.Expr]:
             slope = _ratio(own[0], one.jet, rate)
             if slope != 0 and _is_usable(slope, hidden):
                 found[name, one.name] = slope
+    for (jet, of), slope in _solved(model).items():
+        if jet.order == 1 and jet.of in first and _is_usable(slope, hidden):
+            found.setdefault((jet.of, of), slope)
     for name in (name for name in names if top[name] == 0):
         for one in held:
             slope = _tied(
@@ -77,7 +136,6 @@ def _tied(model: CompiledModel, name: str, held: str, known: Mapping[str, sp.Exp
         one
         for one in model.equations
         if Jet(name) in jets(one)
-        and Jet(held) not in jets(one)
         and all(jet.order == 0 for jet in jets(one))
         and any(jet.of in known for jet in jets(one))
         and not any(_jumps(model, jet, held) for jet in jets(one) if jet.of in {of.of for of in model.hidden})
@@ -95,28 +153,29 @@ def _jumps(model: CompiledModel, hidden: Jet, held: str) -> bool:
     return not own or any(Jet(held) in jets(one) for one in own)
 
 
-def with_corners(model: CompiledModel) -> tuple[CompiledModel, dict[str, str]]:
-    """The model with corrected rows, and the inputs of its new signals: name of the jump -> name of the input.
-
-    A jump is dt/12 (u_k - u_(k-1)) of the input u.
-    """
-    found = slopes(model)
-    if not found:
+def with_corners(model: CompiledModel) -> tuple[CompiledModel, dict[str, OfInput]]:
+    """The model with corrected rows, and what its new signals are made of."""
+    corners = [(sensor, slope, OfInput(name, "jump")) for (sensor, name), slope in slopes(model).items()]
+    added_to = [(sensor, slope * of.jet) for sensor, slope, of in corners]
+    made = [of for *_, of in corners]
+    for (sensor, name), ratio in feedthroughs(model).items():
+        edge = model.signal(sensor).edge
+        if edge != "between":
+            made.append(OfInput(name, edge))
+            added_to.append((sensor, ratio * (Jet(name) - made[-1].jet)))
+    if not made:
         return model, {}
-    jumps = {name: name + _SUFFIX for _, name in found}
     rows = []
     for row in model.rows:
         parts = parts_of(row)
-        whole = merged(parts, *(_added(parts, *key, slope, jumps) for key, slope in found.items()))
+        whole = merged(parts, *(_added(parts, *one) for one in added_to))
         rows.append(factor(row.name, whole, model.p, row.nuisances))
-    signals = [Signal(Jet(jump), model.signal(name).unit, "input") for name, jump in jumps.items()]
-    corrected = replace(model, rows=tuple(rows), signals=(*model.signals, *signals))
-    return corrected, {jump: name for name, jump in jumps.items()}
+    named = {str(one.jet): one for one in made}
+    signals = [Signal(one.jet, model.signal(one.name).unit, "input") for one in named.values()]
+    return replace(model, rows=tuple(rows), signals=(*model.signals, *signals)), named
 
 
-def _added(
-    parts: Mapping[int, sp.Expr], sensor: str, name: str, slope: sp.Expr, jumps: Mapping[str, str]
-) -> dict[int, sp.Expr]:
+def _added(parts: Mapping[int, sp.Expr], sensor: str, what: sp.Expr) -> dict[int, sp.Expr]:
     """What the terms that contain the sensor get; one with a derivative or an integral of it gets nothing."""
     jet = Jet(sensor)
     out = {}
@@ -124,5 +183,5 @@ def _added(
         own = [term for term in terms_of(psi) if jet in jets(term) and not term.has(Integral, TIME)]
         plain = [term for term in own if not any(one.of == sensor and one.order for one in jets(term))]
         gains = [sp.diff(term, jet) for term in plain]
-        out[order] = added(gain for gain in gains if not gain.has(sp.Function)) * slope * Jet(jumps[name])
+        out[order] = added(gain for gain in gains if not gain.has(sp.Function)) * what
     return out

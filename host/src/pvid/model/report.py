@@ -8,7 +8,7 @@ import sympy as sp
 
 from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Row
-from pvid.model.corners import slopes
+from pvid.model.corners import feedthroughs, slopes
 from pvid.model.identifiability import Identifiability, Shift, identifiable
 from pvid.model.readable import readable, readable_part
 from pvid.model.signals import jets
@@ -97,6 +97,10 @@ def _advice(compiled: CompiledModel) -> list[str]:
     lines = [
         f"{sensor} has a corner at every step of {name}: rows get a channel for it, with the factor {readable(slope)}."
         for (sensor, name), slope in slopes(compiled).items()
+    ]
+    lines += [
+        f"{sensor} jumps with {name} by {readable(ratio)}: a recording shows on which side it is sampled."
+        for (sensor, name), ratio in feedthroughs(compiled).items()
     ]
     for row in compiled.rows:
         psis = [psi for part in (*row.regressors, row.known) for psi in part.values()]

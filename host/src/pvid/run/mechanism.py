@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -14,10 +14,12 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
+from pvid.model.corners import feedthroughs
 from pvid.model.evaluation import numpy_function
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
 from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.edges import with_edges
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.identify import Identified, given
 from pvid.oracle.weak.identify import identify as identified_by
@@ -166,10 +168,17 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
         When the recording is too short, or holds a signal beyond all reason.
     """
     refuse_constant(recording, model)
-    model = as_sampled(model, recording.ticks_between)
+    model = with_edges(as_sampled(model, recording.ticks_between), recording.signals, recording.sample_rate)
     found = identified_by(model, recording.signals, recording.sample_rate, weights=weights)
-    noted = replace(recording, notes=(*recording.notes, *_of_segments(recording, found)))
+    noted = replace(recording, notes=(*recording.notes, *_of_edges(model), *_of_segments(recording, found)))
     return MechanismAnswer(model, found, values_of_found(model, found), noted, weights)
+
+
+def _of_edges(model: CompiledModel) -> Iterator[str]:
+    """A note on each sensor that is sampled on one side of the jumps of an input."""
+    for sensor, name in feedthroughs(model):
+        if (edge := model.signal(sensor).edge) != "between":
+            yield f"{sensor} jumps with {name}: its samples are those {edge} the jump"
 
 
 def _of_segments(recording: Recording, found: Identified) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ class RefinedKernel:
 
     def __init__(self, model: CompiledModel) -> None:
         made = refine_functions_of(model, None, has_skew(model))
-        self._library = loaded(_code(made))
+        self._library = loaded(_code(made, any(one.edge == "before" for one in model.signals)))
         widths = tuple(width_of(model, one) for one in signs_of(model))
         self.widths = list(range(len(made.parameters), len(made.parameters) + len(widths)))
         self.made = replace(made, parameters=(*made.parameters, *widths), settings=made.settings[len(widths) :])
@@ -201,7 +201,7 @@ def _pointer(array: Float) -> ctypes.c_void_p:
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
-def _code(made: RefineFunctions) -> str:
+def _code(made: RefineFunctions, read_before: bool) -> str:
     counts = {
         "N": len(made.coordinates),
         "ORDER": made.order,
@@ -212,6 +212,7 @@ def _code(made: RefineFunctions) -> str:
         "SKEW": int(made.skew),
         "NS": dict(made.functions["signs"].written)["g"] if "signs" in made.functions else 0,
         "WIDTHS": len(made.parameters),
+        "READ_BEFORE": int(read_before),
         "NUMBER_OF_CONSTANTS": len(made.constants),
     }
     jacobian = [key for key, _ in made.functions["jacobian"].written]

@@ -157,7 +157,9 @@ void refine_blocks(const double *r, int blocks, const int *first, int samples, i
         for (int k = 0; k < samples; k++) {
             const long at = ((long)first[b] + k) * sub;
             const long row = (long)b * samples + k;
-            read_out(m, x, u + at * 3 * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0);
+            /* an output that jumps with a held input: before the jump it is that of the last step's end */
+            const long read = (READ_BEFORE && at > 0) ? at * 3 - 1 : at * 3;
+            read_out(m, x, u + read * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0);
             int together = 1; /* steps: as many as `coarse` in one where no friction reverses */
 #if NS
             if (!is_near(m, r, x, u + at * 3 * NU, before))

@@ -29,6 +29,7 @@ class Source(IntEnum):
     SAMPLED = 0  # the sample
     HELD = 1  # of an input that is held from tick to tick: its mean about the tick
     JUMP = 2  # dt/12 times the sample's difference to the one before
+    LAST = 3  # the sample before
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The jumps of held inputs that a model with corners (pvid.model.corners) has as signals."""
+"""The signals made of held inputs that a model with corners (pvid.model.corners) has."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from pvid.model.corners import OfInput
+
 
 def with_jumps(
-    run: Mapping[str, npt.ArrayLike], jumps: Mapping[str, str], sample_rate: float
+    run: Mapping[str, npt.ArrayLike], made: Mapping[str, OfInput], sample_rate: float
 ) -> dict[str, npt.ArrayLike]:
-    """A run with the scaled jumps of its inputs, dt/12 (u_k - u_(k-1)) [n]."""
+    """A run with these signals of its inputs [n]; the first sample is also the one before it."""
     out = dict(run)
-    for jump, name in jumps.items():
-        if name in run:
-            u = np.asarray(run[name], np.float64)
-            jumped = np.diff(u, prepend=u[:1]) / (12 * sample_rate)
-            out[jump] = np.where(np.isnan(jumped) & np.isfinite(u), 0.0, jumped)
+    for name, of in made.items():
+        if of.name not in run:
+            continue
+        u = np.asarray(run[of.name], np.float64)
+        before = np.concatenate([u[:1], u[:-1]])
+        before = np.where(np.isnan(before) & np.isfinite(u), u, before)
+        out[name] = {"jump": (u - before) / (12 * sample_rate), "before": before, "after": u}[of.kind]
     return out

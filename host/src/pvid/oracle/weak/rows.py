@@ -34,7 +34,7 @@ class Compiled:
     ----------
     bare : as compiled
     model : its rows with the corners of sampled signals
-    jumps : name of a signal in them -> input whose scaled jump it is
+    jumps : name of a signal in them -> what it is made of
     number : of the object in this process
     """
 

@@ -36,6 +36,8 @@ def signals(samples: Float32, model: WeakModel, sample_rate: float) -> Float32:
                     out[:, place] = (((-earlier + _F(13) * before) + _F(13) * x) - behind) * _HELD_SCALE
                 case Source.JUMP:
                     out[:, place] = jump_scale * (x - before)
+                case Source.LAST:
+                    out[:, place] = before
                 case _:
                     out[:, place] = x
     return out

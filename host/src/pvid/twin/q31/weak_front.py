@@ -36,7 +36,7 @@ def signals(counts: Int, design: WeakDesignQ31) -> Int:
         if one.source == Source.HELD:
             found.append(13 * (last + now) - (before + x[3 : n + 3]))
         else:
-            found.append(now - last if one.source == Source.JUMP else now)
+            found.append({Source.JUMP: now - last, Source.LAST: last}.get(one.source, now))
     return np.stack(found)
 
 
