@@ -14,10 +14,8 @@ from pvid.base.errors import PvidError
 from pvid.cli.input import FigurePath, force_option, form_options, print_notes, read_input, with_overrides
 from pvid.cli.result import print_result, print_warning, write_figure, write_refined_figure
 from pvid.core.native import Native
-from pvid.log.mechanism_settings import mechanism_rig
+from pvid.log.mechanism_settings import common_rig
 from pvid.log.rig_settings import rig_for
-from pvid.rig.file import RigFile
-from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.run import answer
 from pvid.run.advised import identified
@@ -25,7 +23,7 @@ from pvid.settings.engine_cores import FLOAT
 
 
 @click.command(name="identify")
-@click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
+@click.argument("run_paths", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
 @form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
@@ -55,7 +53,7 @@ from pvid.settings.engine_cores import FLOAT
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 @force_option
 def command(
-    run_path: Path,
+    run_paths: tuple[Path, ...],
     model: str | None,
     rig_path: Path | None,
     settings: tuple[str, ...],
@@ -83,6 +81,9 @@ def command(
     is the second stage of the C core, as on a board, and the answer is its last estimate. --figure shows the measured
     signals against the simulated.
 
+    Several RUNs are identified together: the parameters are those of all, and no window reaches from one into the next.
+    They have the same columns and the same sample rate.
+
     With --validate the answer is also simulated on another recording with the same columns, in blocks of four windows
     whose initial states alone are fitted: what is left of each sensor's motion, over its motion and its noise.
 
@@ -92,7 +93,8 @@ def command(
     """
     if refine and target is not None and core != FLOAT.name:
         raise PvidError(f"the refinement on a target is in float32: --on {target} --refine --core {FLOAT.name}")
-    described: MechanismRig | RigFile | None = mechanism_rig(run_path, rig_path, settings, model)
+    run_path = run_paths[0]
+    described = common_rig(run_paths, rig_path, settings, model, len(run_paths) > 1)
     if described is None and refine and core == FLOAT.name:
         own = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
         described, law = (own, None) if own.identifier.form_traits.publishes else (None, law)
@@ -101,7 +103,7 @@ def command(
 
         options = {"core": core, "form": form, "law": law, "on": target}
         return identify_run(
-            run_path,
+            run_paths,
             described,
             columns,
             as_json=as_json,

@@ -115,7 +115,14 @@ class FigurePath(NewFile):
 
 
 def read_input(path: Path, rig: RigFile, columns: str | None = None, *, whole: bool = False) -> Run:
-    """The run in a file or a log; prints what was done to it.
+    """The run in a file or a log; prints what was done to it. See `run_of`."""
+    run = run_of(path, rig, columns, whole=whole)
+    print_notes(run.notes)
+    return run
+
+
+def run_of(path: Path, rig: RigFile, columns: str | None, *, whole: bool) -> Run:
+    """The run in a file or a log.
 
     Parameters
     ----------
@@ -135,10 +142,7 @@ def read_input(path: Path, rig: RigFile, columns: str | None = None, *, whole: b
         return aligned(run_of_log(path), rig.sensor.y_delay)
     run = aligned(read_run(path, rig.sample_rate, parsed(columns)), rig.sensor.y_delay)
     run.refuse_damaged()
-    if whole:
-        run = run.whole()
-    print_notes(run.notes)
-    return run
+    return run.whole() if whole else run
 
 
 def print_notes(notes: Iterable[str]) -> None:

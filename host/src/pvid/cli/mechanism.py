@@ -16,7 +16,7 @@ from rich.table import Table
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, working, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
-from pvid.cli.input import print_notes, read_input
+from pvid.cli.input import print_notes, run_of
 from pvid.log.rig import LOG_SUFFIX, recording_of_log
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.columns import parsed
@@ -25,6 +25,7 @@ from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
+from pvid.rig.together import joined, names_of
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
 from pvid.run.mechanism_advice import analysed
 from pvid.run.wild_samples import without_wild_samples
@@ -58,8 +59,30 @@ def recording_of(
     ----------
     whole : the longest stretch without a missing sample alone
     """
+    recording, model = _read(path, rig, columns, whole=whole)
+    print_notes(recording.notes)
+    return recording, model
+
+
+def recordings_of(
+    paths: Sequence[Path], rig: MechanismRig | RigFile, columns: str | None
+) -> tuple[Recording, CompiledModel]:
+    """Several recordings of one mechanism as one, and the model with the values of the rig."""
+    if len(paths) == 1:
+        return recording_of(paths[0], rig, columns, whole=False)
+    names = names_of(paths)
+    found = [_read(path, rig, columns, whole=False) for path in paths]
+    model = found[0][1]
+    recording = joined([one for one, _ in found], names, parsed(columns, channels_of(model)))
+    print_notes(recording.notes)
+    return recording, model
+
+
+def _read(
+    path: Path, rig: MechanismRig | RigFile, columns: str | None, *, whole: bool
+) -> tuple[Recording, CompiledModel]:
     if isinstance(rig, RigFile):
-        return _recording_of_own(path, rig, columns)
+        return _read_own(path, rig, columns, whole=whole)
     model = model_of(rig)
     if path.suffix == LOG_SUFFIX:
         if columns is not None:
@@ -68,19 +91,16 @@ def recording_of(
     else:
         recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
     recording.refuse_damaged()
-    recording = without_wild_samples(recording.whole() if whole else recording, model)
-    print_notes(recording.notes)
-    return recording, model
+    return without_wild_samples(recording.whole() if whole else recording, model), model
 
 
-def _recording_of_own(path: Path, rig: RigFile, columns: str | None) -> tuple[Recording, CompiledModel]:
+def _read_own(path: Path, rig: RigFile, columns: str | None, *, whole: bool) -> tuple[Recording, CompiledModel]:
     """The same of a mechanism that has a rig file of its own: its columns, its corrections, its resolution."""
-    run = read_input(path, rig, columns, whole=True)
+    run = run_of(path, rig, columns, whole=whole)
     found = resolved(rig, run)
-    notes = resolution_note(rig, found)
-    print_notes(notes)
     signals = {one.name: getattr(run, one.name) for one in rig.mechanism.model.channels}
-    return Recording(run.t, signals, run.sample_rate, (*run.notes, *notes)), _model_of(found)
+    notes = (*run.notes, *resolution_note(rig, found))
+    return Recording(run.t, signals, run.sample_rate, notes), _model_of(found)
 
 
 def _model_of(rig: MechanismRig | RigFile) -> CompiledModel:
@@ -88,7 +108,7 @@ def _model_of(rig: MechanismRig | RigFile) -> CompiledModel:
 
 
 def identify_run(
-    path: Path,
+    paths: Sequence[Path],
     rig: MechanismRig | RigFile,
     columns: str | None,
     *,
@@ -100,10 +120,11 @@ def identify_run(
     other: Path | None = None,
     **only_in_c: str | None,
 ) -> int:
-    """Identifies a recording of a described mechanism and prints the answer.
+    """Identifies a recording of a described mechanism, or several together, and prints the answer.
 
     Parameters
     ----------
+    paths : of the recordings
     weights : of the rows, as in pvid.oracle.weak.identify
     refine : the equations are fitted to the whole run, from the answer on
     other : another recording, of which is said how well the answer predicts it
@@ -111,10 +132,12 @@ def identify_run(
     only_in_c : options that the C core alone has, by name; a value is refused
     """
     name = _model_of(rig).name
+    if len(paths) > 1:
+        _refuse_several(on=on, refine=refine, **only_in_c)
     if only_in_c.get("form") == _STRONG:
         if figure is not None or refine or weights != "residuals":
             raise PvidError("--figure, --refine and --weights are for the weak form; omit --form strong")
-        return _identified_by_strong_form(path, rig, columns, as_json=as_json, on=on, **only_in_c)
+        return _identified_by_strong_form(paths[0], rig, columns, as_json=as_json, on=on, **only_in_c)
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
             raise PvidError(
@@ -128,7 +151,10 @@ def identify_run(
         raise PvidError(f"--weights {weights} is for float64; omit --core {in_c.name}")
     if refine and in_c and in_c is not FLOAT:
         raise PvidError(f"--refine is in float32 and float64; omit --core {in_c.name}")
-    recording, model = recording_of(path, rig, columns, whole=on is not None or (refine and in_c is not None))
+    if on is not None or (refine and in_c is not None):
+        recording, model = recording_of(paths[0], rig, columns)
+    else:
+        recording, model = recordings_of(paths, rig, columns)
     if in_c or on is not None:
         refuse_too_many_unknowns(model)
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
@@ -178,6 +204,15 @@ def identify_run(
         write_stderr(f"pvid: nothing identified{reason}")
         return NOTHING_IDENTIFIED
     return DONE
+
+
+def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> None:
+    """PvidError for what takes one recording."""
+    one = {"--form strong": given.get("form") == _STRONG, "--on": on is not None}
+    one["--refine in C"] = refine and given.get("core") in ENGINE_CORES
+    for option, chosen in one.items():
+        if chosen:
+            raise PvidError(f"{option} takes one recording: omit it, or name one file")
 
 
 def _identified_by_strong_form(

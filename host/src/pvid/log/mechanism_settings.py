@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.log.rig import LOG_SUFFIX, described_document_of_log
+from pvid.log.rig_settings import rig_for
 from pvid.models.registry import DEFAULT, MODELS, asked_for, is_named, shipped
-from pvid.rig.file import parsed_file, rig_path_of
+from pvid.rig.file import RigFile, parsed_file, rig_path_of
 from pvid.rig.mechanism_file import MechanismRig, with_settings
 from pvid.rig.run import is_run
 
@@ -48,6 +50,38 @@ def mechanism_rig(
     if isinstance(name, str) and name in MODELS and not _is_described(document):
         return None
     return _of_document(with_settings(document, settings), asked, where)
+
+
+def common_rig(
+    run_paths: Sequence[Path], rig_path: Path | None, settings: Sequence[str], model: str | None, several: bool = False
+) -> MechanismRig | RigFile | None:
+    """The rig of recordings of one mechanism; see `mechanism_rig`.
+
+    Parameters
+    ----------
+    run_paths : files among the recordings
+    several : there are several recordings, which are of a described mechanism: a rig file of the pendulum's own stands
+        for that of its description
+
+    Raises
+    ------
+    PvidError
+        Also where their rig files differ; a recording without one has that of the first.
+    """
+
+    def rig_of(path: Path | None) -> MechanismRig | RigFile | None:
+        found = mechanism_rig(path, rig_path, settings, model)
+        return found if found is not None or not several else rig_for(path, rig_path, settings)
+
+    if not run_paths:
+        return rig_of(None)
+    first, *others = run_paths
+    rig = rig_of(first)
+    for path in others if rig_path is None else ():
+        has_own = path.suffix == LOG_SUFFIX or rig_path_of(path).is_file()
+        if has_own and rig_of(path) != rig:
+            raise PvidError(f"the rig files of {first.name} and {path.name} differ: name that of both with --rig")
+    return rig
 
 
 def _of_document(document: Mapping[str, Any], asked: str | Path | None, where: str) -> MechanismRig:

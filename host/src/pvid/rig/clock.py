@@ -39,10 +39,10 @@ _EMPTY_PERIODS = 2.5
 _ROUNDING = 0.55
 # w is proportional to the square of the sample rate: 1e-4 changes it by 0.02 %, a good run's standard error. So much
 # the rig file's sample rate may differ from t without a word.
-_RATE_TOLERANCE = 1e-4
+RATE_TOLERANCE = 1e-4
 # A quartz is off by 1e-4, a ceramic resonator by 5e-3, the RC oscillator of a microcontroller by 3e-2; beyond that t
 # has another unit, or the rig file is another one's.
-_RATE_LIMIT = 0.05
+RATE_LIMIT = 0.05
 _RATE_RANGE_HZ = (1e-3, 1e9)
 _USUAL_RATES = (20.0, 20_000.0)  # Hz
 _LONGEST_S = 1e20  # nanoseconds taken for seconds, since 1970, are 2e18
@@ -223,7 +223,7 @@ def _with_jitter(
         return _placed(table, fit.ticks, rate, note)
     # the recorded times are believed: any rate near theirs will do
     rate = promised if promised is not None else _shortest_decimal(1 / fit.period, 1e-3)
-    t, signals = _interpolated(table, rate, fit.period)
+    t, signals = interpolated(table, rate, fit.period)
     text = f"t jitters {size}: {listed(table.signals)} are interpolated at {rate:g} Hz from the recorded times"
     long = int(np.count_nonzero(np.diff(table.t) > _GAP_PERIODS * fit.period))
     if long:
@@ -398,9 +398,9 @@ def _rate(table: Table, measured: float, error: float, promised: float | None) -
         return _shortest_decimal(measured, 1e-9 + 3 * error), ()
     off = measured / promised - 1
     # t is trusted only to within the jitter at each end
-    if abs(off) <= _RATE_TOLERANCE + 3 * error + 2 * _JITTER_PERIODS / (table.t.size - 1):
+    if abs(off) <= RATE_TOLERANCE + 3 * error + 2 * _JITTER_PERIODS / (table.t.size - 1):
         return float(promised), ()
-    if abs(off) > _RATE_LIMIT:
+    if abs(off) > RATE_LIMIT:
         raise PvidError(
             f"{table.path}, column {name}: the samples come at {measured:.6g} Hz, but the rig's sample rate is "
             f"{promised:.6g} Hz{_cause(name, measured / promised, measured)}."
@@ -412,7 +412,7 @@ def _rate(table: Table, measured: float, error: float, promised: float | None) -
 def _cause(name: str, ratio: float, measured: float) -> str:
     """Why t may run at another rate than the rig file promises."""
     for unit, per_second in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
-        if abs(ratio * per_second - 1) < 2 * _RATE_LIMIT:
+        if abs(ratio * per_second - 1) < 2 * RATE_LIMIT:
             return f": t looks like {unit}: use --columns t={name}:{unit}"
     return f": if t is right, use --set sample_rate={_shortest_decimal(measured, 1e-3):g}"
 
@@ -467,11 +467,16 @@ def _unexplained(x: FloatArray, t: FloatArray) -> FloatArray:
     return energy
 
 
-def _interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray, dict[str, FloatArray]]:
+def interpolated(table: Table, rate: float, period: float) -> tuple[FloatArray, dict[str, FloatArray]]:
     """t and the signals at uniform times; NaN within gaps.
 
     A sensor is interpolated by the cubics through four samples around a time, a slow one by splines; a held input is
     its mean until the next time.
+
+    Parameters
+    ----------
+    rate : of the uniform times [Hz]
+    period : usual step of the table's times [s]
     """
     first, last = float(table.t[0]), float(table.t[-1])
     t = _times(first, int(np.floor((last - first) * rate * (1 + 1e-12))) + 1, rate)

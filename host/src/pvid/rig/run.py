@@ -57,6 +57,19 @@ _LONG_BLANK_ROWS = 20  # in a column of an input's changes
 _LARGEST = 1e12  # [rad] or [m]: counts of 40 bits
 
 
+# Of a recording that is made of several (pvid.rig.together): the number of each sample's own; no signal has this name.
+NUMBER = "#recording"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """One of several recordings that are identified together: its name, its first sample and its last + 1."""
+
+    name: str
+    first: int
+    end: int
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Signals of any mechanism on a common, uniform clock.
@@ -73,6 +86,8 @@ class Recording:
         What was done to the recording, a sentence each; empty when it is as recorded.
     ticks_between : by name
         Mean ticks from sample to sample of a sensor that is slower than the clock: it is interpolated.
+    origins : tuple of Origin
+        Of several recordings, one behind the other with missing ticks between them; empty of a single one.
     """
 
     t: FloatArray
@@ -80,9 +95,19 @@ class Recording:
     sample_rate: float
     notes: tuple[str, ...] = ()
     ticks_between: Mapping[str, float] = field(default_factory=dict)
+    origins: tuple[Origin, ...] = ()
 
     def __len__(self) -> int:
         return int(self.t.size)
+
+    @property
+    def run(self) -> Mapping[str, FloatArray]:
+        """The signals; of several recordings with the number of each sample's own, 0 and up, under `NUMBER`."""
+        if not self.origins:
+            return self.signals
+        begins = [one.first for one in self.origins]
+        number = np.searchsorted(begins, np.arange(self.t.size), side="right") - 1
+        return {**self.signals, NUMBER: number.astype(np.float64)}
 
     def refuse_damaged(self) -> None:
         """Refuses numbers that no unit explains, and that overflow what is computed with them.
@@ -124,7 +149,9 @@ class Recording:
         t = self.t[part]
         note = f"used is the longest stretch without a gap: {t[0]:.6g} s to {t[-1]:.6g} s"
         signals = {name: one[part] for name, one in self.signals.items()}
-        return replace(self, t=t, signals=signals, notes=(*self.notes, note))
+        own = [one.name for one in self.origins if one.first <= part.start < one.end]
+        note += f", of {own[0]}" if own else ""
+        return replace(self, t=t, signals=signals, notes=(*self.notes, note), origins=())
 
 
 @dataclass(frozen=True, eq=False)

@@ -151,14 +151,14 @@ class _Trial:
         self._parts = _parts(len(answer.recording))
         known = all(one.status == "identified" for one in answer.found.judged)
         p = answer.found.p if known else np.array([one.guess for one in answer.model.unknowns])
-        self._motion = Motion(answer.model, answer.recording.signals, answer.recording.sample_rate, p)
+        self._motion = Motion(answer.model, answer.recording.run, answer.recording.sample_rate, p)
         self._block = self._motion.block(answer.found.design.window_s, _PARTS)
 
     def estimates(
         self, name: str, design: WeakDesign, start: Float, weights: Sequence[tuple[str, bool, bool]]
     ) -> list[Candidate]:
         """By the weak form with these weights (name, error of the equations, compensation), scored."""
-        rows = attempted(lambda: WeakRows.of(self._compiled, self._answer.recording.signals, design))
+        rows = attempted(lambda: WeakRows.of(self._compiled, self._answer.recording.run, design))
         if rows is None:
             return []
         out = []

@@ -169,7 +169,7 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
     """
     refuse_constant(recording, model)
     model = with_edges(as_sampled(model, recording.ticks_between), recording.signals, recording.sample_rate)
-    found = identified_by(model, recording.signals, recording.sample_rate, weights=weights)
+    found = identified_by(model, recording.run, recording.sample_rate, weights=weights)
     noted = replace(recording, notes=(*recording.notes, *_of_edges(model), *_of_segments(recording, found)))
     return MechanismAnswer(model, found, values_of_found(model, found), noted, weights)
 

@@ -70,7 +70,7 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
         return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
     if answer.identified and answer.found.chi2 < _MISFIT and _distance(answer, answer.found.p) < _FAR:
         return ()
-    run = answer.recording.signals
+    run = answer.recording.run
     for one in answer.model.signals:
         if one.kind == "input" and np.nanmax(run[one.name]) == np.nanmin(run[one.name]):
             value = float(np.nanmin(run[one.name]))
@@ -93,7 +93,7 @@ def _unit_of_time(answer: MechanismAnswer) -> str | None:
     """
     if _distance(answer, answer.found.p) < _FAR:
         return None
-    model, signals, design = ready(answer.model), answer.recording.signals, answer.found.design
+    model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
     for unit in _TIMES:
         scale = float(Columns.parse(f"t=t:{unit}", channels_of(answer.model))["t"].in_si(np.ones(1))[0])
         other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
@@ -111,7 +111,7 @@ def _distance(answer: MechanismAnswer, p: Float) -> float:
 
 def _tried(answer: MechanismAnswer) -> Iterator[tuple[float, str, str]]:
     """Part of the residuals that is left by a mistake which explains the run, its sentence, and what to type."""
-    model, signals, design = ready(answer.model), answer.recording.signals, answer.found.design
+    model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
     before = score_of(model, signals, design, None, False)
     far = before is None or _distance(answer, before.p) > _FAR
     for signal in sorted(answer.model.signals, key=lambda one: one.kind != "input"):

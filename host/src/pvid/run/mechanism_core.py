@@ -30,6 +30,8 @@ from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.record import Record
 
+# Reasons of ticks that end no window.
+_WITHIN = (Outcome.WARMING_UP, Outcome.ACCUMULATED, Outcome.REJECTED_NOT_FINITE, Outcome.REJECTED_SATURATED)
 _CLASH = 3.0  # standard errors of noise by which the core and the analysis disagree
 
 
@@ -236,7 +238,7 @@ _RUNS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
 def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
     identifier, record = run.identifier, run.record
     published = identifier.is_published
-    ends = record.reason[(record.reason != Outcome.WARMING_UP) & (record.reason != Outcome.ACCUMULATED)]
+    ends = record.reason[~np.isin(record.reason, _WITHIN)]
     model, found = answer.model, answer.found
     gains = gains_of(model, found)
     # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Integral, Jet, jets, sgn
 from pvid.oracle.weak.channels import broadcast, evaluated
 from pvid.rig.gaps import longest_stretch, stretches
+from pvid.rig.run import NUMBER
 
 Float = npt.NDArray[np.float64]
 
@@ -130,16 +132,26 @@ def _input(model: CompiledModel, jet: Jet, signals: Mapping[str, Float], rate: f
     return smooth(signals[jet.of], sub)
 
 
+def _running(x: Float, is_held: bool) -> Float:
+    """Sums from the first sample on [n]: of a held signal of its values, else by the trapezoid rule."""
+    return np.concatenate([[0.0], np.cumsum(x[:-1] if is_held else (x[1:] + x[:-1]) / 2)])
+
+
 def _computed(model: CompiledModel, value: sp.Expr, signals: Mapping[str, Float], rate: float) -> Float:
-    """A defined signal at the samples; integrals in it begin at the first one."""
+    """A defined signal at the samples; integrals in it begin at the first one, and at the first of each recording of a
+    run (pvid.rig.run.NUMBER)."""
     size = len(next(iter(signals.values())))
     values: dict[sp.Symbol, Float] = {}
     for one in sorted(value.atoms(Integral), key=str):
         x, fold = _computed(model, one.args[0], signals, rate), int(one.args[1])
         is_held = all(model.signal(jet.of).hold == "zoh" for jet in jets(one.args[0]))
+        number = signals.get(NUMBER, np.zeros(size))
+        begins = np.append(np.flatnonzero(np.diff(number, prepend=-1.0)), size)
         for k in range(fold):
-            steps = x[:-1] if is_held and k == 0 else (x[1:] + x[:-1]) / 2
-            x = np.concatenate([[0.0], np.cumsum(steps)]) / rate
+            x = (
+                np.concatenate([_running(x[one:end], is_held and k == 0) for one, end in pairwise(begins.tolist())])
+                / rate
+            )
         mark = sp.Dummy()
         values[mark], value = x, value.xreplace({one: mark})
     for jet in jets(value):

@@ -161,17 +161,16 @@ def prior_about(problem: Problem, r: Float) -> Prior:
 
 
 def simulated_at(answer: MechanismAnswer, p: Float) -> RefinedMechanism:
-    """The motion of a recording's longest segment at p [n_p]: the starts of its blocks, of two windows each, are fitted
-    to it.
+    """The motion of a recording at p [n_p]: the starts of its blocks, of two windows each, are fitted to it.
 
     Raises
     ------
     PvidError
         Where the equations cannot be simulated on it.
     """
-    model, recording = answer.model, answer.recording.whole()
+    model, recording = answer.model, answer.recording
     rate = recording.sample_rate
-    problem, r = problem_of(model, recording.signals, rate, start_of(kernel_of(model), p))
+    problem, r = problem_of(model, recording.run, rate, start_of(kernel_of(model), p))
     cut = problem.cut(max(8, round(2 * answer.found.design.window_s * rate)))
     return RefinedMechanism(problem, problem.with_starts(prior_about(problem, r), cut))
 
@@ -223,15 +222,13 @@ def _as_pendulum(answer: MechanismAnswer) -> RefinedPendulum:
 
 def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMechanism | RefinedPendulum | None, str]:
     """The answer after a refinement that starts from it, the refinement, and what became of it in a clause."""
-    weak, model, recording = answer.found, answer.model, answer.recording.whole()
+    weak, model, recording = answer.found, answer.model, answer.recording
     refined: RefinedMechanism | RefinedPendulum
     try:
         if has_skew(model):
             refined = _as_pendulum(answer)
         else:
-            refined = refine_mechanism(
-                model, recording.signals, recording.sample_rate, weak.p, 2 * weak.design.window_s
-            )
+            refined = refine_mechanism(model, recording.run, recording.sample_rate, weak.p, 2 * weak.design.window_s)
     except PvidError as error:
         return answer, None, f"not refined: {error}"
     found = refined.found
@@ -254,8 +251,9 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
     p, covariance = refined.problem.values(found, made.places_of_p)
     values = values_of(model, p, covariance, refined_gains_of(model, weak), weak.judged, refined_shifts_of(model, weak))
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
-    if len(answer.recording.segments) > 1:
-        text += f"; of the longest segment alone, {recording.t[0]:.6g} s to {recording.t[-1]:.6g} s"
+    if isinstance(refined, RefinedPendulum) and len(recording.segments) > 1:
+        t = recording.whole().t
+        text += f"; of the longest segment alone, {t[0]:.6g} s to {t[-1]:.6g} s"
     for place in refined.problem.kernel.widths:
         if found.covariance[place, place] > 0:
             text += (

@@ -145,7 +145,7 @@ def validated(model: CompiledModel, recording: Recording, p: Float, window_s: fl
     """
     rate = recording.sample_rate
     with np.errstate(all="ignore"):
-        motion = Motion(model, recording.signals, rate, p)
+        motion = Motion(model, recording.run, rate, p)
         problem = motion.within([(0, len(recording))])
         if not problem.measured.stretches or problem.longest < _BLOCKS * SHORTEST:
             raise PvidError(f"the recording is too short to predict it in {_BLOCKS} blocks of {SHORTEST} samples")

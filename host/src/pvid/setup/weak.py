@@ -186,7 +186,7 @@ def config_of(
 def _ranges(model: WeakModel, compiled: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> list[float]:
     """Largest absolute value of each sample that is no fault: the reach of its signal, or more where the run has it."""
     return [
-        max(compiled.signal(name).reach, _RANGE * float(np.max(np.abs(np.asarray(run[name], np.float64)))))
+        max(compiled.signal(name).reach, _RANGE * float(np.nanmax(np.abs(np.asarray(run[name], np.float64)))))
         for name in model.sample_names
     ]
 

@@ -88,7 +88,9 @@ def _write(answer: Answer, fit: Fit | None, path: Path, title: str) -> None:
         parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         _converge(answer, oracle, parts[0])
         if fit is not None:
-            _compare(fit.problem, fit.found, float(oracle.recording.whole().t[0]), parts[1])
+            of_all = isinstance(fit, RefinedMechanism)  # else of the longest segment
+            recording = oracle.recording if of_all else oracle.recording.whole()
+            _compare(fit.problem, fit.found, float(recording.t[0]), parts[1])
         figure.suptitle("\n".join(lines), parse_math=False)
         save(figure, path, dpi=110)
     finally:

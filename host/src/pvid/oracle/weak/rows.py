@@ -22,6 +22,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.noise import NoiseFilters, NoiseModel, ReversalNoise
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.whitener import Whitener
+from pvid.rig.run import NUMBER
 
 # Rows that are numerically dependent get this part of the mean variance.
 _RIDGE = 1e-10
@@ -102,12 +103,13 @@ class WhiteRows:
 def record_of(compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> Record:
     """Channels of a run (name -> samples) at every step; a segment between missing samples is a run of its own.
 
-    A model with an integral since the start of the run has one segment, the longest: behind a gap nobody knows it.
+    A model with an integral since the start of the run has one segment of each recording, its longest: behind a gap
+    nobody knows the integral.
     """
     samples = samples_of(compiled.model, with_jumps(run, compiled.jumps, design.sample_rate))
     segments = segments_of(samples)
     if any(one.has(Integral) for one in compiled.channels.opaque.values()):
-        segments = [max(segments, key=lambda one: one.stop - one.start)] if segments else []
+        segments = _longest_of_each(segments, run)
     size = len(next(iter(samples.values())))
     records, firsts = [], []
     refused = PvidError("no window of the run is whole: every one has a missing sample")
@@ -123,6 +125,17 @@ def record_of(compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: Weak
     if not records:
         raise refused
     return Record.joined(records, firsts, size)
+
+
+def _longest_of_each(segments: Sequence[slice], run: Mapping[str, npt.ArrayLike]) -> list[slice]:
+    """The longest segment of each recording of a run (pvid.rig.run.NUMBER); of the run where it is one recording."""
+    longest: dict[float, slice] = {}
+    for one in segments:
+        number = float(np.asarray(run[NUMBER])[one.start]) if NUMBER in run else 0.0
+        before = longest.setdefault(number, one)
+        if one.stop - one.start > before.stop - before.start:
+            longest[number] = one
+    return list(longest.values())
 
 
 class WeakRows:
