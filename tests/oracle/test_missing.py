@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from bench.lacking import EFFECTS, PLANTS, Effect, Outcome, Row, outcome, summary
+from bench.lacking import EFFECTS, OF_TABLE, Effect, Outcome, Row, outcome, summary
 from bench.mechanisms import design_of, start_of
+from bench.plants import PLANTS
 from pvid.models.mechanisms import compiled_of, names
 from pvid.oracle.weak.identify import Identified, identify
 from pvid.oracle.weak.terms import ACTS, Recorded
@@ -24,10 +25,10 @@ Float = npt.NDArray[np.float64]
 def lacking(plant: str, effect: str) -> Outcome:
     """Of the middle strength."""
     of = next(one for one in EFFECTS if (one.plant, one.name) == (plant, effect))
-    return outcome(PLANTS[plant], len(effect), of, of.sizes[1])
+    return outcome(PLANTS[plant], len(effect), (of, of.sizes[1]))
 
 
-@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("plant", OF_TABLE)
 def test_model_that_lacks_nothing_is_left_alone(plant: str) -> None:
     clean = outcome(PLANTS[plant], 0)
     assert clean.found.verdict.status == "good" and clean.found.named is None
@@ -70,7 +71,7 @@ def test_motion_that_nothing_explains_is_a_doubt_and_in_the_standard_errors() ->
         random = np.random.default_rng(3)
         return np.asarray(u + part * random.normal(0, np.std(u), len(u) // 8 + 1).repeat(8)[: len(u)])
 
-    done = outcome(PLANTS["cart"], 2, Effect("cart", "hand", (), (), acts=hand), 0.5)
+    done = outcome(PLANTS["cart"], 2, (Effect("cart", "hand", (), (), acts=hand), 0.5))
     warning = str(done.found.verdict.warning)
     assert "of its motion unexplained" in warning and "the cause is unknown" in warning
     assert done.found.named is None and np.all(done.found.by_model > 0)

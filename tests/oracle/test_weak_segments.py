@@ -55,6 +55,14 @@ def test_mechanism_is_identified_from_all_segments() -> None:
     assert len(found.times) > 1.5 * len(alone.times)
 
 
+def test_sample_alone_between_two_gaps_is_no_hindrance() -> None:
+    """A derivative of one sample is none; the candidates for what is missing are computed without a warning."""
+    sim = simulation("cart_pendulum")
+    run = with_gaps(sim.run(0, SHARP), slice(3_000, 3_300), slice(3_301, 3_340), slice(3_342, 3_360))
+    found = identify(sim.model, run, 1000.0, start=sim.truth, design=DESIGNS["cart_pendulum"])
+    assert np.all(np.abs(found.p - sim.truth) < 4 * found.se) and found.verdict.status == "good"
+
+
 def test_short_segments_get_a_design_that_fits_them() -> None:
     sim = simulation("cart_pendulum")
     run = sim.run(2)

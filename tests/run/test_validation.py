@@ -9,7 +9,8 @@ import numpy.typing as npt
 import pytest
 from program import pvid
 
-from bench.lacking import EFFECTS, PLANTS, recording
+from bench.lacking import EFFECTS, recording
+from bench.plants import PLANTS
 from pvid.base.errors import PvidError
 from pvid.rig.run import Recording
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
@@ -22,7 +23,7 @@ DRAG = next(one for one in EFFECTS if (one.plant, one.name) == ("cart", "drag"))
 
 
 def recorded(seed: int, drag: float = 0.0, samples: int = 4000) -> Recording:
-    signals = recording(CART, seed, DRAG, drag) if drag else recording(CART, seed)
+    signals = recording(CART, seed, (DRAG, drag)) if drag else recording(CART, seed)
     return Recording(np.arange(samples) / CART.rate, {name: x[:samples] for name, x in signals.items()}, CART.rate)
 
 

@@ -272,13 +272,25 @@ def bench_cost(update: Path | None) -> int:
 
 @bench.command(name="missing")
 @click.option("--clean", default=20, show_default=True, type=click.IntRange(min=1), help="Runs of each plant as it is.")
+@click.option(
+    "--campaign", "count", default=0, type=click.IntRange(min=0), help="A random sample of all effects alone."
+)
+@click.option("--seed", default=1, show_default=True, help="Of the sample.")
 @UPDATE
-def bench_missing(clean: int, update: Path | None) -> int:
+def bench_missing(clean: int, count: int, seed: int, update: Path | None) -> int:
     """Models that lack something: what is warned of, what is named, and what the standard errors contain."""
     from bench import lacking
 
+    if count:
+        found = []
+        with progress_bar("missing", count) as advance:
+            for case in lacking.campaign(count, seed):
+                found += [one for one in [lacking.told(case, seed)] if one is not None]
+                advance(case.number + 1)
+        put_table(update, "missing-campaign", markdown(lacking.CAMPAIGN, lacking.campaign_cells(found)))
+        return DONE
     rows = []
-    with progress_bar("missing", len(lacking.PLANTS) + len(lacking.EFFECTS)) as advance:
+    with progress_bar("missing", lacking.ROWS) as advance:
         for done, row in enumerate(lacking.outcomes(clean), 1):
             rows.append(row)
             advance(done)

@@ -129,6 +129,11 @@ def segments_of(samples: Mapping[str, Float]) -> list[slice]:
     return [slice(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
+def largest(x: Float) -> float:
+    """Largest magnitude of a signal [n] with gaps; 0 where no sample is there."""
+    return float(np.max(np.abs(x), initial=0.0, where=np.isfinite(x)))
+
+
 def in_segments(x: Float, change: Callable[[Float], Float]) -> Float:
     """A change of a signal [n] in each of its segments by itself; NaN between them."""
     parts = segments_of({"": x})

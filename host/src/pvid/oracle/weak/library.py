@@ -13,7 +13,7 @@ from pvid.model.compiled import CompiledModel
 from pvid.model.evaluation import numpy_function
 from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.design import WeakDesign
-from pvid.oracle.weak.front import filtered
+from pvid.oracle.weak.front import filtered, largest
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.polynomials import polynomial_weights
 from pvid.oracle.weak.rows import record_of
@@ -117,7 +117,7 @@ class Library:
         other = recorded.under(act, level)
         step = -1.0
         if act.levels is None:
-            step = -_STEP * recorded.top / max(float(np.nanmax(np.abs(other))), 1e-300)
+            step = -_STEP * recorded.top / max(largest(other), 1e-300)
             other = recorded.values - step * other
         name = recorded.signal.name
         record = record_of(self.fit.rows.compiled, {**self.run, name: other}, self.design)
@@ -126,13 +126,12 @@ class Library:
     def recorded(self, name: str) -> Recorded:
         """A signal as recorded."""
         values, design = np.asarray(self.run[name], np.float64), self.design
-        top = float(np.nanmax(np.abs(values)))
-        return Recorded(self.model.signal(name), values, design.sample_rate, design.window_s, top)
+        return Recorded(self.model.signal(name), values, design.sample_rate, design.window_s, largest(values))
 
     def _recorded(self) -> Iterator[Recorded]:
         for signal in self.model.signals:
-            if signal.name in self.run and np.nanmax(np.abs(self.run[signal.name])) > 0:
-                yield self.recorded(signal.name)
+            if signal.name in self.run and (one := self.recorded(signal.name)).top:
+                yield one
 
     def _change(self, record: Record, step: float) -> Change:
         """Residuals with other channels less those with the recorded ones, over a step."""

@@ -158,8 +158,9 @@ def _shifted(of: Recorded, delay: float) -> Float:
 
 def _early(of: Recorded, _: float) -> Float:
     """What is added to a signal that is recorded late by a second, to first order: 1 s of its rate."""
-    z = of.values
-    return np.asarray(np.concatenate([[0.0], (z[2:] - z[:-2]) / 2, [0.0]]) * of.rate)
+    z, out = of.values, np.zeros(len(of.values))
+    out[1:-1] = (z[2:] - z[:-2]) / 2 * of.rate
+    return out
 
 
 def _dead(of: Recorded, level: float) -> Float:
