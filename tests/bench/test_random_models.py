@@ -17,6 +17,14 @@ from bench.random_rigs import IN_C, KINDS, random_rig
 WHOLE = (2, 65, 1001, 1003)
 ANALYSED = (0, 3, 4, 62, 64, 66, 70)
 
+# Seeds of rigs that failed once, and why.
+CURED = {
+    "the current is sampled before the voltage jumps": 1097,
+    "the rate in abs(v)*v is blurred by a short filter": 5021,
+    "a homogeneous equation shrinks to nothing": 5061,
+    "the voltage of a cell is sampled before the current jumps": 5049,
+}
+
 
 @pytest.mark.parametrize("seed", WHOLE)
 def test_a_random_rig_goes_the_whole_road(seed: int) -> None:
@@ -31,6 +39,19 @@ def test_a_random_rig_is_identified_and_refined_in_float64(seed: int) -> None:
     assert road.failures == []
     assert {"check", "identify", "refine"} <= set(road.reached)
     assert road.outcome != "refused"
+
+
+@pytest.mark.parametrize("why", CURED)
+def test_a_rig_that_failed_once_is_right(why: str) -> None:
+    road = road_of(CURED[why], in_c=False)
+    assert road.failures == []
+    assert road.outcome == "good"
+
+
+def test_a_rig_with_fewer_functions_than_unknowns_is_refused_by_the_cores_in_a_sentence() -> None:
+    road = road_of(5008)
+    assert road.failures == []
+    assert "3 functions of its 4 unknowns" in road.refusals["f32"]
 
 
 def test_every_kind_draws_the_same_rig_again_and_others_from_other_seeds() -> None:

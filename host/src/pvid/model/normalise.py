@@ -7,10 +7,11 @@ one of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import sympy as sp
 
-from pvid.model.compiled import Part, Row, Unknown
+from pvid.model.compiled import CompiledModel, Part, Row, Unknown
 from pvid.model.factor import divided
 from pvid.model.gradient import jacobian_at, rank
 from pvid.model.readable import readable
@@ -30,6 +31,22 @@ def with_scales(rows: Sequence[Row], unknowns: Sequence[Unknown]) -> list[Row]:
         out[k] = rows[k] if kept is not None else divided(rows[k], _normaliser(rows[k], unknowns), p)
         waiting.remove(k)
     return [out[k] for k in range(len(rows))]
+
+
+def with_own_scales(model: CompiledModel) -> CompiledModel | None:
+    """The model with every homogeneous row divided by one of its theta, where that is possible; None: there is none.
+
+    Least squares shrink a homogeneous row's theta where something in it is not explained: none is left of them where
+    the other rows hardly see them.
+    """
+    rows = list(model.rows)
+    for k, row in enumerate(rows):
+        if not row.known:
+            try:
+                rows[k] = divided(row, _normaliser(row, model.unknowns), model.p)
+            except ModelError:
+                continue
+    return replace(model, rows=tuple(rows)) if rows != list(model.rows) else None
 
 
 def _follows(theta: sp.Expr, fixed: Sequence[sp.Expr], p: Sequence[sp.Symbol]) -> bool:

@@ -16,11 +16,13 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Output
 from pvid.model.corners import feedthroughs
 from pvid.model.evaluation import numpy_function
+from pvid.model.normalise import with_own_scales
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
 from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.edges import with_edges
 from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.identify import Identified, given
 from pvid.oracle.weak.identify import identify as identified_by
 from pvid.oracle.weak.naming import terms_of
@@ -168,10 +170,25 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
         When the recording is too short, or holds a signal beyond all reason.
     """
     refuse_constant(recording, model)
-    model = with_edges(as_sampled(model, recording.ticks_between), recording.signals, recording.sample_rate)
+    model = with_edges(as_sampled(model, recording.ticks_between), recording.run, recording.sample_rate)
     found = identified_by(model, recording.run, recording.sample_rate, weights=weights)
+    if _collapsed(model, found) and (other := with_own_scales(model)) is not None:
+        again = attempted(lambda: identified_by(other, recording.run, recording.sample_rate, weights=weights))
+        if again is not None and _determined(again) > _determined(found):
+            model, found = other, again
     noted = replace(recording, notes=(*recording.notes, *_of_edges(model), *_of_segments(recording, found)))
     return MechanismAnswer(model, found, values_of_found(model, found), noted, weights)
+
+
+def _determined(found: Identified) -> int:
+    return sum(one.status == "identified" for one in found.judged)
+
+
+def _collapsed(model: CompiledModel, found: Identified) -> bool:
+    """Whether an unknown of a homogeneous row is not determined."""
+    lost = {name for name, one in zip(found.names, found.judged, strict=True) if one.status != "identified"}
+    homogeneous = {str(one) for row in model.rows if not row.known for theta in row.theta for one in theta.free_symbols}
+    return bool(lost & homogeneous)
 
 
 def _of_edges(model: CompiledModel) -> Iterator[str]:

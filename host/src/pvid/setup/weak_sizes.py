@@ -49,9 +49,15 @@ def refuse_too_many_unknowns(model: CompiledModel) -> None:
 
 
 def _checked(name: str, sizes: Mapping[str, int]) -> dict[str, int]:
-    """PvidError for what is larger than the core allows."""
+    """PvidError for what is larger than the core allows, and for unknowns that no run can determine."""
     if (refusal := too_many_unknowns(name, sizes["PVID_MAX_P"])) is not None:
         raise PvidError(refusal)
+    thetas = sizes["PVID_MAX_THETA" if "PVID_MAX_THETA" in sizes else "PVID_MAX_THETA_Q31"]
+    if thetas < sizes["PVID_MAX_P"]:
+        raise PvidError(
+            f"the rows of {name} have {thetas} functions of its {sizes['PVID_MAX_P']} unknowns, too few for the C core:"
+            " `pvid model check` names the unknowns of which one must be known, and the sensors that are missing"
+        )
     for macro, size in sizes.items():
         if size > (most := most_sizes().get(macro, size)):
             raise PvidError(f"{name} needs {size} {_MEANING.get(macro, macro)} and the C core takes at most {most}")

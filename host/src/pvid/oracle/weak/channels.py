@@ -7,7 +7,7 @@ sum_terms factor (-1)^order sum chi^(order) channel.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -208,14 +208,23 @@ class Channels:
     def _sign_arguments(self) -> Any:
         return numpy_function(sorted(self.needed, key=str), list(self.signs))
 
-    def record(self, grid: Grid) -> Record:
-        """Values of all channels at the steps of a grid."""
+    @property
+    def rates(self) -> set[Jet]:
+        """Derivatives of signals that terms contain otherwise than in signs."""
+        inside = (one for channel in self.channels for one in (channel.gain, channel.integrand))
+        plain = (one.xreplace(dict.fromkeys(one.atoms(sgn), _ONE)) for one in inside)
+        return {jet for one in plain for jet in jets(one) if jet.order} & self.needed
+
+    def record(self, grid: Grid, times: Mapping[Jet, float] | None = None) -> Record:
+        """Values of all channels at the steps of a grid; `times`: with these jets so many times as large, but for the
+        signs."""
         ordered = [grid.jets[jet] for jet in sorted(self.needed, key=str)]
         signs = [
             self._signs(grid, argument, broadcast(values, grid.size))
             for argument, values in zip(self.signs, self._sign_arguments(*ordered), strict=True)
         ]
         values = dict(zip(self.plain, ordered, strict=False))
+        values |= {jet: factor * grid.jets[jet] for jet, factor in (times or {}).items()}
         values |= {mark: one.values for mark, one in zip(self.sign_marks.values(), signs, strict=True)}
         self._auxiliary(values, grid)
         arguments = [values[one] for one in self.plain]

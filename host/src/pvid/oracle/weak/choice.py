@@ -18,7 +18,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.oracle.weak import verdict
 from pvid.oracle.weak.attenuation import other_line
-from pvid.oracle.weak.blur import blur_of, rates_of_drives
+from pvid.oracle.weak.blur import blur_of, rates_of_drives, shift_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.failures import FAILURES, attempted
@@ -26,6 +26,7 @@ from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, WeakRows
+from pvid.oracle.weak.scores import Scores
 from pvid.oracle.weak.starts import starts_about
 from pvid.oracle.weak.zero import ALMOST_0, near_zero
 
@@ -115,13 +116,14 @@ def _scored(
         fit = gated(rows, start, equation_error=errors, passes=_PASSES, settled=_SETTLED)
         found = uncertainty(fit)
         other = other_line(fit)
+        blurred = shift_of(Scores(fit), run, design) if model.channels.rates else np.zeros(len(fit.p))
     except FAILURES:
         return None
     small, of_small = attempted(lambda: near_zero(fit, found.se)) or (np.zeros(len(fit.p), np.bool_), found.se)
     size = np.where(small, fit.parameters.guess, np.where(fit.parameters.positive, np.abs(fit.p), fit.parameters.sd))
     predicted = np.where(small, of_small, found.predicted)
     apart = np.zeros(len(fit.p)) if other is None else other - fit.p
-    relative = np.hypot(np.hypot(predicted, apart) / size, blur_of(model, run, design))
+    relative = np.hypot(np.hypot(np.hypot(predicted, apart), blurred) / size, blur_of(model, run, design))
     if not np.all(np.isfinite(relative)) or not np.all(relative > 0):
         return None
     known = attempted(lambda: verdict.is_known(model.bare, fit, small, of_small)) or False

@@ -15,6 +15,7 @@ from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Known
 from pvid.oracle.weak import verdict
 from pvid.oracle.weak.attenuation import other_line
+from pvid.oracle.weak.blur import shift_of
 from pvid.oracle.weak.choice import Scored, ranked
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
@@ -173,6 +174,7 @@ def identify(
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
     white = attempt("a white force as the error of the equations", lambda: as_white_force(fit))
     library = Library(run, used, fit)
+    blurred = attempt("rates that the filter blurs", lambda: shift_of(library.scores, run, used))
     by_gain = {
         one.name: _or_nan(fit, partial(library.by_gain, one.name))
         for one in compiled.signals
@@ -186,6 +188,7 @@ def identify(
         verdict.widened(found.se, halves),
         *given(compiled, by_gain, by_known),
         by_neglect,
+        *([] if blurred is None else [blurred]),
         *([] if white is None else [white - fit.p]),
     ]
     se = np.sqrt(np.sum(np.square(parts), axis=0))

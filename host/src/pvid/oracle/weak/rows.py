@@ -13,7 +13,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import with_corners
-from pvid.model.signals import Integral
+from pvid.model.signals import Integral, Jet
 from pvid.oracle.weak.channels import Channels, Record
 from pvid.oracle.weak.corners import with_jumps
 from pvid.oracle.weak.design import WeakDesign
@@ -100,7 +100,9 @@ class WhiteRows:
         return np.asarray(self.regressors.transpose(0, 2, 1) @ own)
 
 
-def record_of(compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> Record:
+def record_of(
+    compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign, times: Mapping[Jet, float] | None = None
+) -> Record:
     """Channels of a run (name -> samples) at every step; a segment between missing samples is a run of its own.
 
     A model with an integral since the start of the run has one segment of each recording, its longest: behind a gap
@@ -120,7 +122,7 @@ def record_of(compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: Weak
         except PvidError as error:
             refused = error
             continue
-        records.append(compiled.channels.record(grid))
+        records.append(compiled.channels.record(grid, times))
         firsts.append(part.start)
     if not records:
         raise refused

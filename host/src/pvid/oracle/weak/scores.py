@@ -48,7 +48,12 @@ class Scores:
 
     def shift(self, one: Candidate) -> Float:
         """What p moves by when a term of size 1 is added [n_p]."""
-        return np.asarray(-self.unit * (self.inverse @ np.einsum("wkp,wk->p", self.slopes, self.white(one))))
+        return self.shift_by(one.change(self.theta))
+
+    def shift_by(self, change: Sequence[Float]) -> Float:
+        """What p moves by when each kind's raw residuals change by so much [windows, K] [n_p]."""
+        moved = np.einsum("wkp,wk->p", self.slopes, self.whitened(change))
+        return np.asarray(-self.unit * (self.inverse @ moved))
 
     def white(self, one: Candidate) -> Float:
         """Column of a candidate [windows, rows of all kinds]."""
