@@ -86,5 +86,5 @@ def _response(x: Float, design: WeakDesign, order: int) -> tuple[Float, Float, n
     omega = 2 * np.pi * np.fft.rfftfreq(len(x), 1 / design.sample_rate)[used]
     weights = weights_of(design, order)
     places = np.arange(len(weights)) - len(weights) // 2
-    got = np.exp(1j * np.outer(omega / design.sample_rate, places)) @ weights
+    got = np.asarray(np.exp(1j * np.outer(omega / design.sample_rate, places)) @ weights, np.complex128)
     return np.asarray(power[used], np.float64), np.asarray(omega, np.float64), got
