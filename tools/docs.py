@@ -23,6 +23,7 @@ from typing import cast
 
 import pvid
 from pvid.cli.page_table import put_table, with_table
+from pvid.cli.verdict_table import verdict_table
 from pvid.link import frames
 from pvid.rig.file import Identifier, ModelTable, Nominal, Refine, RigFile, Sensor
 
@@ -184,6 +185,7 @@ GENERATED = (
     ("rig-file.md", "rig-file", rig_file_tables),
     ("link-and-log.md", "schema", schema_block),
     ("api-python.md", "api", python_reference),
+    ("reasons.md", "verdict", verdict_table),
 )
 
 

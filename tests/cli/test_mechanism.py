@@ -53,7 +53,7 @@ def motor(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_simulated_run_is_identified_with_the_rig_file_beside_it(motor: Path, tmp_path: Path) -> None:
     figure = tmp_path / "figure.svg"
     answer = pvid("identify", motor, "--figure", figure)
-    assert answer.return_value == DONE and "status " in answer.stdout and figure.stat().st_size > 10_000
+    assert answer.return_value == DONE and "verdict good" in answer.stdout and figure.stat().st_size > 10_000
     shown = json.loads(pvid("identify", motor, "--json").stdout)
     assert shown["identified"] and shown["model"] == "dc_motor" and set(shown["parameters"]) == set(TRUTH)
     for name, truth in TRUTH.items():

@@ -144,7 +144,7 @@ def test_what_is_not_there_has_a_row_too(tmp_path: Path) -> None:
 
 
 def row(board: str, day: float, value: float, se: float = 0.01, **other: Any) -> Row:
-    made = Row(f"{board}{day}", f"{board}/{day}", board, day * DAY, 100, True, "good")
+    made = Row(f"{board}{day}", f"{board}/{day}", board, day * DAY, 100, True, "good", "good")
     return replace(made, parameters={"g": (value, se, "m/s^2")}, **other)
 
 
@@ -165,15 +165,15 @@ def test_outcomes_are_counted() -> None:
     good = row("a", 1, 9.5)
     rows = [
         good,
-        replace(good, warning="w"),
-        replace(good, identified=False),
-        replace(good, failure="f", identified=None),
+        replace(good, verdict="usable", warning="w"),
+        replace(good, verdict="not_identified", identified=False),
+        replace(good, failure="f", verdict=None, identified=None),
     ]
     rows += [replace(good, verified=EQUAL), replace(good, verified="DIFFERENT at p")]
     assert counts_of(rows) == {
-        "identified": 3,
-        "identified with a warning": 1,
-        "not identified": 1,
+        "good": 3,
+        "usable": 1,
+        "not_identified": 1,
         "failed": 1,
         "logs that are not equal": 1,
     }

@@ -82,7 +82,7 @@ def test_plot_of_a_run_with_a_gap_simulates_its_longest_segment(motor: Path, tmp
     (tmp_path / "run.toml").write_bytes(motor.with_suffix(".toml").read_bytes())
     assert run_pvid("plot", tmp_path / "run.csv", "-o", tmp_path / "a.svg").return_value == 0
     drawn = texts(tmp_path / "a.svg")
-    assert "status good" in drawn and "simulated with the answer" in drawn
+    assert "verdict good" in drawn and "simulated with the answer" in drawn
 
 
 def test_numbers_at_an_axis_are_whole_and_apart() -> None:

@@ -14,6 +14,7 @@ from pvid.api.data import Data, recording_of
 from pvid.base.replacing import replacing
 from pvid.base.rounding import with_error
 from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.words import Word
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import channels_of
 from pvid.run import answer
@@ -27,11 +28,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A value with its standard error `se`, both in `unit` (SI)."""
+    """A value with its standard error `se`, both in `unit` (SI), and its `verdict`, as that of a `Result`."""
 
     value: float
     se: float
     unit: str
+    verdict: Word = "good"
 
     def __str__(self) -> str:
         value, error = with_error(self.value, self.se)
@@ -53,6 +55,7 @@ class Result:
     ----------
     identified : whether the data say enough; otherwise `parameters` is empty and `status` says why
     parameters : by name: physical parameters, then the unknowns of the equations
+    verdict : "good", "usable", "not_explained" or "not_identified": what the values may be used for
     status : the last word of the identifier
     warning : reasons to doubt the estimate; None: there are none
     advice : a sentence each, with what to type, where a column seems to be wrong
@@ -62,6 +65,7 @@ class Result:
 
     identified: bool
     parameters: Mapping[str, Parameter]
+    verdict: Word
     status: str
     warning: str | None
     advice: tuple[str, ...]
@@ -89,9 +93,10 @@ class Result:
 
     @property
     def _doubts(self) -> list[str]:
-        """The warning and the advice, a line each."""
+        """The verdict where it is not the best one, the warning and the advice, a line each."""
+        verdict = [] if self.verdict == "good" else [f"verdict: {self.verdict}"]
         warning = [f"warning: {self.warning}"] if self.warning else []
-        return warning + [f"advice: {one}" for one in self.advice]
+        return verdict + warning + [f"advice: {one}" for one in self.advice]
 
     def _repr_html_(self) -> str:
         if not self.identified:
@@ -194,8 +199,9 @@ def _result(
     model: CompiledModel,
 ) -> Result:
     known = {
-        name: Parameter(one["value"], one["se"], one["unit"])
+        name: Parameter(one["value"], one["se"], one["unit"], one["verdict"])
         for name, one in details["parameters"].items()
         if identified and one["value"] is not None
     }
-    return Result(identified, known, status, warning, tuple(details["advice"]), tuple(notes), details, found, model)
+    word, advice = details["verdict"], tuple(details["advice"])
+    return Result(identified, known, word, status, warning, advice, tuple(notes), details, found, model)

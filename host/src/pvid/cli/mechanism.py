@@ -237,11 +237,11 @@ def _identified_by_strong_form(
         config = answer.design.config
         ends = "" if answer.hash is None or answer.reason is None else f"; {answer.reason.text}; hash {answer.hash:08x}"
         click.echo(
-            f"status {answer.status}; derivatives over {config.window} samples, "
+            f"verdict {answer.verdict.word}; derivatives over {config.window} samples, "
             f"{config.window / config.sample_rate:.3g} s{ends}"
         )
-    for text in answer.doubts.values():
-        write_stderr(f"pvid: {'warning' if answer.identified else 'note'}: {text}")
+    for one in answer.verdict.reasons:
+        write_stderr(f"pvid: {'warning' if answer.identified else 'note'}: {one.text}")
     if not answer.identified:
         write_stderr("pvid: nothing identified")
         return NOTHING_IDENTIFIED
@@ -275,7 +275,7 @@ def plot_run(path: Path, rig: MechanismRig | RigFile, columns: str | None, figur
 
     recording, model = recording_of(path, rig, columns, whole=False)
     answer = weak = analysed(recording, model, predict=not refine)
-    fit, text = None, f"weak form, float64; status {weak.found.verdict.status}; chi2 {weak.found.chi2:.2g}"
+    fit, text = None, f"weak form, float64; verdict {weak.found.verdict.word}; chi2 {weak.found.chi2:.2g}"
     if refine:
         from pvid.run.refined_mechanism import refined_answer
 
@@ -494,7 +494,7 @@ def _print(answer: MechanismAnswer, stage: str = "weak form") -> None:
         _table(answer.values, f"{answer.model.title}: {stage}, float64")
     explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
     click.echo(
-        f"status {found.verdict.status}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "
+        f"verdict {found.verdict.word}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "
         f"{found.design.window_s:.3g} s; R^2 {explained}"
     )
 
@@ -509,24 +509,31 @@ def _print_core(core: CoreAnswer) -> None:
         _table(core.values, f"{core.oracle.model.title}: weak form, C in {ENGINE_CORES[core.core].words}")
     misfit = "not judged" if core.misfit is None else f"{core.misfit:.2g}"
     click.echo(
-        f"status {core.verdict.status}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
+        f"verdict {core.verdict.word}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
         f"windows of {2 * core.hop_s:.3g} s; hash {core.hash:08x}"
     )
 
 
 def _table(values: Mapping[str, Value], title: str) -> None:
+    Console().print(table_of(values, title))
+
+
+def table_of(values: Mapping[str, Value], title: str) -> Table:
+    """Values by name with their standard errors, the parts of these, and the verdict where one is not good."""
     lacking = any((one.se_model or 0.0) > (one.se or 0.0) / 2 for one in values.values())
+    doubted = any(one.word != "good" for one in values.values())
     names = ("parameter", "estimate", "standard error", "of it noise", *(["of it model"] if lacking else []))
-    table = Table(*names, title=title)
-    for column in table.columns[1:]:
+    table = Table(*names, *(["verdict"] if doubted else []), title=title)
+    for column in table.columns[1 : len(names)]:
         column.justify = "right"
     for name, one in values.items():
         label = escape(f"{name} [{one.unit}]" if one.unit else name)
         if one.value is None or one.se is None or one.se_noise is None:
-            table.add_row(label, "not determined")
+            table.add_row(label, "not determined", *[""] * (len(names) - 2), one.word)
             continue
         estimate, error = with_error(one.value, one.se)
         below = "" if one.below is None else f" (below {one.below:.2g})"
         parts = [one.se_noise, *([one.se_model or 0.0] if lacking else [])]
-        table.add_row(label, estimate + below, error, *(f"{part:.2g}" for part in parts))
-    Console().print(table)
+        word = [one.word] if doubted else []
+        table.add_row(label, estimate + below, error, *(f"{part:.2g}" for part in parts), *word)
+    return table

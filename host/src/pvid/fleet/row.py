@@ -70,7 +70,7 @@ class Row:
     board : USB serial number of the board that sent a log, else its name and folder; of a run its folder
     began : seconds since 1970 of a log's first segment; of a run the time of its file
     samples : that were identified
-    identified, status, warning : as in pvid.Result; None where the recording was refused
+    identified, verdict, status, warning : as in pvid.Result; None where the recording was refused
     verified : of a log: EQUAL, or the first difference, or why it was not; None: not asked, or no log
     failure : why there is no result; None: there is one
     parameters : name -> (value, standard error, unit); empty where nothing was identified
@@ -83,6 +83,7 @@ class Row:
     began: float
     samples: int | None = None
     identified: bool | None = None
+    verdict: str | None = None
     status: str | None = None
     warning: str | None = None
     verified: str | None = None
@@ -119,6 +120,7 @@ def row_of(path: str, question: Question) -> Row:
         began,
         result.details.get("samples", result.details.get("ticks")),
         result.identified,
+        result.verdict,
         result.status,
         result.warning,
         _verified(place, question.model) if question.verify and place.suffix == LOG_SUFFIX else None,

@@ -85,16 +85,7 @@ def _drift(board: str, name: str, unit: str, points: np.ndarray[tuple[int, int],
 
 def counts_of(rows: Sequence[Row]) -> Mapping[str, int]:
     """Recordings by outcome."""
-    found = Counter(
-        "failed"
-        if row.failure is not None
-        else "not identified"
-        if not row.identified
-        else "identified with a warning"
-        if row.warning
-        else "identified"
-        for row in rows
-    )
+    found = Counter("failed" if row.verdict is None else row.verdict for row in rows)
     found["logs that are not equal"] = sum(row.verified not in (None, EQUAL) for row in rows)
     return {name: count for name, count in found.items() if count}
 

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from pvid.base.rounding import percent, with_error
 from pvid.models.model import Quantity, Scale
+from pvid.oracle.weak.words import of_warning
 from pvid.rig.file import RigFile
 from pvid.run.identify import Identification
 
@@ -21,6 +22,7 @@ def as_json(result: Identification) -> dict[str, Any]:
     beyond = result.beyond
     return {
         "identified": result.identified,
+        "verdict": of_warning(result.identified, result.warning),
         "status": result.status,
         "warning": result.warning,
         "advice": list(result.advice),
@@ -55,6 +57,7 @@ def _parameter(result: Identification, of: Quantity) -> dict[str, Any]:
         "value": result.value[name] if known else None,
         "se": result.se[name] if known else None,
         "unit": of.unit,
+        "verdict": of_warning(known, result.warning),
         "se_noise": parts.noise if parts else None,
         **{f"se_{one.name}": parts.scales[one.name] if parts else None for one in result.model.scales},
     }

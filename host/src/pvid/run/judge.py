@@ -43,7 +43,7 @@ _PASSES = 8  # of the refinement
 _MOST = 12_000  # samples that it takes: no more are needed where the equations are what errs
 _NEAR = 4  # passes of a fit that begins at that to all data
 _DESCRIBED = 0.5  # R^2 that an estimate has at least that replaces the usual one
-_PREDICTED = 0.9  # R^2 of motion that was not seen, below which the equations do not describe it
+PREDICTED = 0.9  # R^2 of motion that was not seen, below which the equations do not describe it
 
 _USUAL = "the usual estimate"
 # Doubts of the usual estimate alone: another has its own, or is one of those that were compared.
@@ -51,6 +51,7 @@ _OF_USUAL = (
     *("not_identified", "undetermined", "near_zero", "range", "not_settled"),
     *("halves", "windows", "smoothing", "attenuation", "weights"),
 )
+_OF_WIDTH = ("wide", "model_error")  # of standard errors that the spread of the estimates is not in
 # Of a window, times the chosen one; words, error of the equations in the weights, compensation.
 _LENGTHS = {1.0: _USUAL, 2.0: "the estimate with windows twice as long", 0.5: "the estimate with windows half as long"}
 _WEIGHTS = (
@@ -265,14 +266,18 @@ def _published(
     se = np.sqrt(noise**2 + np.sum(gains_of(model, found) ** 2, axis=0) + by_model**2)
     status = tuple(verdict.judged(model, fit, noise))
     r2 = list(found.r2.values()) if chosen is usual else uncertainty(fit).r2
-    reasons = [one for one in found.verdict.reasons if chosen is usual or one.name not in _OF_USUAL]
+    own = (*_OF_WIDTH, *(() if chosen is usual else _OF_USUAL))
+    reasons = [one for one in found.verdict.reasons if one.name not in own]
+    poor = [one for one in chosen.sensors if one.r2 < PREDICTED]
+    if not poor:  # the cause is unknown, but the values are those that move the mechanism
+        reasons = [replace(one, name="missing") if one.name == "unexplained" else one for one in reasons]
+    reasons += verdict.of_width(model, fit, se, by_model, status)
     if chosen is not usual:
         reasons += [
             *verdict.of_parameters(model, fit, noise, status, r2),
             *verdict.of_range(model, chosen.p, status),
             _of_choice(chosen, usual),
         ]
-    poor = [one for one in chosen.sensors if one.r2 < _PREDICTED]
     if poor:
         shares = listed(f"{100 * max(one.r2, 0.0):.0f} % of {one.name}" for one in poor)
         text = f"Of motion that was not fitted the answer predicts {shares}: the equations lack something that matters."

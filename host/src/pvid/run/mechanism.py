@@ -26,8 +26,9 @@ from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.identify import Identified, given
 from pvid.oracle.weak.identify import identify as identified_by
 from pvid.oracle.weak.naming import terms_of
-from pvid.oracle.weak.verdict import Judged, ParameterStatus
+from pvid.oracle.weak.verdict import Judged, ParameterStatus, Verdict
 from pvid.oracle.weak.weights import Weights
+from pvid.oracle.weak.words import WIDE, Word, worst
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.sensor_prediction import SensorPrediction
@@ -48,6 +49,7 @@ class Value:
     se_noise, se_model : the parts of it that are from noise, and from what the equations seem to lack
     status, reason : whether the run determines it; a clause where it does not, or where it may be 0
     below : it is below this with 95 %, where it may be 0
+    word : what it may be used for
     """
 
     unit: str
@@ -58,11 +60,12 @@ class Value:
     reason: str | None = None
     below: float | None = None
     se_model: float | None = None
+    word: Word = "good"
 
     def as_json(self) -> dict[str, Any]:
         """Its entry in the object of `identify --json`."""
         out = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise}
-        out |= {"se_model": self.se_model, "status": self.status}
+        out |= {"se_model": self.se_model, "verdict": self.word, "status": self.status}
         out |= {} if self.reason is None else {"reason": self.reason}
         return out | ({} if self.below is None else {"below": self.below})
 
@@ -113,6 +116,7 @@ class MechanismAnswer:
         parameters = {name: one.as_json() for name, one in self.values.items()}
         return {
             "identified": self.identified,
+            "verdict": found.verdict.word,
             "status": found.verdict.status,
             "warning": found.verdict.warning,
             "advice": list(self.advice),
@@ -246,7 +250,7 @@ def values_of_found(model: CompiledModel, found: Identified) -> dict[str, Value]
     # The correlations of the rows, with the published standard errors but for gains and constants.
     widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
     covariance = found.covariance * np.outer(widened, widened)
-    return values_of(model, found.p, covariance, gains_of(model, found), found.judged, shifts_of(found))
+    return values_of(model, found.p, covariance, gains_of(model, found), found.judged, found.verdict, shifts_of(found))
 
 
 def noise_of(model: CompiledModel, found: Identified) -> Float:
@@ -286,6 +290,7 @@ def values_of(
     covariance: Float,
     gains: Float,
     judged: Sequence[Judged],
+    verdict: Verdict,
     shifts: Float | None = None,
 ) -> dict[str, Value]:
     """Outputs of the model, then p, by name.
@@ -295,26 +300,31 @@ def values_of(
     covariance : of p by noise [n_p, n_p]
     gains : see gains_of
     judged : of each parameter; an output is identified where all parameters that it depends on are
+    verdict : whose word a parameter has; an output has the worst of those that it depends on
     shifts : see shifts_of; None: no terms were tried
     """
     whole = covariance + gains.T @ gains
     terms = np.zeros((0, len(p))) if shifts is None else shifts
 
-    def shown(unit: str, value: float, slope: Float, of: Judged) -> Value:
+    def shown(unit: str, value: float, slope: Float, of: Judged, word: Word) -> Value:
         if of.status == "not_identified":
-            return Value(unit, None, None, None, of.status, of.reason)
+            return Value(unit, None, None, None, of.status, of.reason, word="not_identified")
         se, se_noise = (float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance))
         se_model = float(np.max(np.abs(terms @ slope), initial=0.0))
-        return Value(unit, value, math.hypot(se, se_model), se_noise, of.status, of.reason, of.below, se_model)
+        return Value(unit, value, math.hypot(se, se_model), se_noise, of.status, of.reason, of.below, se_model, word)
 
     values = {}
     for one in model.outputs:
         used = [of for symbol, of in zip(model.p, judged, strict=True) if one.value.has(symbol)]
         missing = next((of for of in used if of.status == "not_identified"), Judged())
         slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := _output(model, p, one))[1])
-        values[one.name] = shown(one.unit, found[0], slope, missing)
+        word = worst(verdict.of(name) for name, p_k in zip(model.p_names, model.p, strict=True) if one.value.has(p_k))
+        own = shown(one.unit, found[0], slope, missing, word)
+        if own.value is not None and not (own.se or 0.0) <= WIDE * abs(own.value):
+            own = replace(own, word=worst([word, "usable"]))
+        values[one.name] = own
     for k, unknown in enumerate(model.unknowns):
-        values[unknown.name] = shown(unknown.unit, float(p[k]), np.eye(len(p))[k], judged[k])
+        values[unknown.name] = shown(unknown.unit, float(p[k]), np.eye(len(p))[k], judged[k], verdict.of(unknown.name))
     return values
 
 

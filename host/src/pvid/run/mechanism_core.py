@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -82,9 +82,9 @@ class CoreAnswer:
         own, model = self.publications, self.oracle.model
         sd = np.sqrt(np.diag(self.oracle.found.covariance))
         correlation = self.oracle.found.covariance / np.outer(sd, sd)
-        none = np.zeros((1, len(sd)))
+        none, judged, verdict = np.zeros((1, len(sd))), self.oracle.found.judged, self.verdict
         return [
-            (float(t), values_of(model, p, correlation * np.outer(se, se), none, self.oracle.found.judged))
+            (float(t), values_of(model, p, correlation * np.outer(se, se), none, judged, verdict))
             for t, p, se in zip(own.t, own.p, own.se, strict=True)
         ]
 
@@ -113,6 +113,7 @@ class CoreAnswer:
                 "core",
                 f"The C core and the float64 analysis disagree on {listed(apart)} ({apart[0]}: "
                 f"{one} and {other}); the analysis is nearer." + (of_signs if self.averages_signs else ""),
+                of=tuple(apart),
             )
         if self.reason not in (Outcome.UPDATED, Outcome.MISFIT):
             yield Reason(
@@ -141,6 +142,7 @@ class CoreAnswer:
             "identified": self.identified,
             "parameters": parameters,
             **own_keys(self.oracle.model, parameters),
+            "verdict": self.verdict.word,
             "status": self.verdict.status,
             "warning": self.verdict.warning,
             "reasons": {one.name: one.text for one in self.verdict.reasons},
@@ -248,16 +250,21 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
     by_analysis = not published and any(one.status == "near_zero" for one in found.judged)
     outcome = Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP
     judged = unless_held(found.judged, None if published else outcome.text)
-    values = answer.values if by_analysis else values_of(model, run.p, covariance, gains, judged, shifts_of(found))
+
+    def values(verdict: Verdict) -> Mapping[str, Value]:
+        if by_analysis:
+            return answer.values
+        return values_of(model, run.p, covariance, gains, judged, verdict, shifts_of(found))
+
     misfit = identifier.misfit
-    return CoreAnswer(
+    core = CoreAnswer(
         oracle=answer,
         core=run.core,
         functions=run.functions,
         decimation=run.decimation,
         hop_s=run.hop_s,
         averages_signs=run.signs > 0,
-        values=values,
+        values=values(found.verdict),
         published=published,
         reason=outcome,
         misfit=None if not published or np.isnan(misfit) else misfit,
@@ -267,6 +274,7 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
         reasons=counted(record.reason),
         by_analysis=by_analysis,
     )
+    return replace(core, values=values(core.verdict))
 
 
 def _published(answer: MechanismAnswer, run: _Run, gains: Float, wider: Float) -> Publications:

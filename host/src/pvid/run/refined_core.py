@@ -113,7 +113,9 @@ class RefinedCoreAnswer:
         for tick in new:
             p = r[tick]
             se = self.record.se[tick, places].astype(np.float64)
-            values = values_of(answer.model, p, correlation * np.outer(se, se), gains, answer.found.judged)
+            values = values_of(
+                answer.model, p, correlation * np.outer(se, se), gains, answer.found.judged, answer.found.verdict
+            )
             out.append((float(answer.recording.t[tick]), values))
         return out
 
@@ -194,7 +196,7 @@ def _values(answer: MechanismAnswer, made: RefineFunctions, estimate: npt.NDArra
     places = made.places_of_p
     model, found, own = answer.model, answer.found, covariance[np.ix_(places, places)]
     gains, shifts = refined_gains_of(model, found), refined_shifts_of(model, found)
-    values = values_of(model, r[places], own, gains, found.judged, shifts)
+    values = values_of(model, r[places], own, gains, found.judged, found.verdict, shifts)
     for k, one in enumerate(parameters):
         if one.place < 0 and answer.identified:
             se = float(np.sqrt(covariance[k, k]))

@@ -249,7 +249,8 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
         return answer, refined, text
     made = refined.problem.kernel.made
     p, covariance = refined.problem.values(found, made.places_of_p)
-    values = values_of(model, p, covariance, refined_gains_of(model, weak), weak.judged, refined_shifts_of(model, weak))
+    shifts = refined_shifts_of(model, weak)
+    values = values_of(model, p, covariance, refined_gains_of(model, weak), weak.judged, weak.verdict, shifts)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
     if isinstance(refined, RefinedPendulum) and len(recording.segments) > 1:
         t = recording.whole().t

@@ -13,7 +13,8 @@ from pvid.codegen.strong_library import strong_native
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import UNKNOWN
-from pvid.oracle.weak.verdict import Judged
+from pvid.oracle.weak.verdict import Judged, Verdict
+from pvid.oracle.weak.verdict import Reason as Doubt
 from pvid.rig.run import Recording
 from pvid.run.mechanism import Value, own_keys, refuse_constant, unless_held, values_of
 from pvid.run.strong_design import StrongDesign, strong_design
@@ -41,7 +42,7 @@ class StrongAnswer:
     core : arithmetic
     reason : of the last tick; None in float64
     hash : running hash after the last tick; None in float64
-    doubts : sentences by name
+    verdict : what it may be used for
     unknown : parameters that the recording does not determine
     recording : the samples
     """
@@ -52,7 +53,7 @@ class StrongAnswer:
     core: str
     reason: Reason | None
     hash: int | None
-    doubts: Mapping[str, str]
+    verdict: Verdict
     unknown: tuple[str, ...]
     recording: Recording
 
@@ -61,23 +62,19 @@ class StrongAnswer:
         """Whether every parameter is."""
         return not self.unknown and (self.reason is None or self.reason in _GOOD)
 
-    @property
-    def status(self) -> str:
-        """In a word, as that of the weak form."""
-        return "warning" if self.identified else "not_identified"
-
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
         parameters = {
-            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise}
+            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise, "verdict": one.word}
             for name, one in self.values.items()
         }
         config = self.design.config
         return {
             "identified": self.identified,
-            "status": self.status,
-            "warning": self.doubts.get("noise"),
-            "reasons": dict(self.doubts),
+            "verdict": self.verdict.word,
+            "status": self.verdict.status,
+            "warning": self.verdict.warning,
+            "reasons": {one.name: one.text for one in self.verdict.reasons},
             "parameters": parameters,
             **own_keys(self.model, parameters),
             "window_s": config.window / config.sample_rate,
@@ -119,10 +116,10 @@ def identify_strong_mechanism(
     held = None if identified else "the strong form does not determine every parameter"
     judged = unless_held([Judged()] * len(p), held)
     # What another window changes is common to all parameters, as a gain is.
-    values = values_of(model, p, np.diag(noise**2), fitted.change[np.newaxis], judged)
-    doubts = dict(_doubts(model, p, design, noise, unknown))
+    verdict = Verdict(tuple(_doubts(model, p, design, noise, unknown, held)))
+    values = values_of(model, p, np.diag(noise**2), fitted.change[np.newaxis], judged, verdict)
     core = STRONG_CORES[0 if in_c else 1]
-    return StrongAnswer(model, design, values, core, reason, running, doubts, unknown, recording)
+    return StrongAnswer(model, design, values, core, reason, running, verdict, unknown, recording)
 
 
 def _last(reasons: list[int]) -> Reason:
@@ -141,13 +138,16 @@ def _unknown(model: CompiledModel, p: Float, error: Float) -> Iterator[str]:
 
 
 def _doubts(
-    model: CompiledModel, p: Float, design: StrongDesign, noise: Float, unknown: tuple[str, ...]
-) -> Iterator[tuple[str, str]]:
+    model: CompiledModel, p: Float, design: StrongDesign, noise: Float, unknown: tuple[str, ...], held: str | None
+) -> Iterator[Doubt]:
     if unknown:
-        yield "not_identified", f"The strong form does not determine {listed(unknown)} from this recording."
-    yield "noise", _BIAS
+        yield Doubt("not_identified", f"The strong form does not determine {listed(unknown)} from this recording.")
+    elif held is not None:
+        yield Doubt("not_identified", "The strong form has published no estimate.")
+    yield Doubt("noise", _BIAS)
     fitted = design.fitted
     bounds = _CLASH * np.hypot(noise, fitted.error)
     apart = [one for one, x, y, most in zip(model.p_names, p, fitted.p, bounds, strict=True) if abs(x - y) > most]
     if apart:
-        yield "core", f"The C core and the float64 analysis disagree on {listed(apart)}."
+        text = f"The C core and the float64 analysis disagree on {listed(apart)}."
+        yield Doubt("core", text, of=tuple(apart))

@@ -211,11 +211,13 @@ def identify(
         if with_error and not weighted_anew:
             reasons.append(Reason("not_settled", _NOT_REWEIGHTED))
     by_model = np.zeros(len(se)) if lacking is None else lacking.error
+    published = np.hypot(se, by_model)
+    reasons += verdict.of_width(compiled, fit, published, by_model, judged)
     return Identified(
         names=compiled.p_names,
         units=tuple(one.unit for one in compiled.unknowns),
         p=fit.p,
-        se=np.hypot(se, by_model),
+        se=published,
         predicted=found.predicted,
         clustered=found.clustered,
         covariance=found.covariance,

@@ -29,7 +29,7 @@ _CHANCE = 1e-8  # of a size beyond the limit, where the residuals are within the
 _SHARE = 0.01  # of the residuals' energy on unseen windows
 _PLAUSIBLE = 0.5  # of the best candidate's share: what may be meant as well
 
-_MOVES = 2.0  # standard errors
+MOVES = 2.0  # standard errors
 VISIBLE = 0.01  # of the value
 
 # Terms are named by fits with them.
@@ -97,7 +97,7 @@ class Missing:
             -1, len(p)
         )
         error = np.max(np.abs(shifts), axis=0, initial=0.0)
-        return cls(there, shifts, (error > _MOVES * se) & (error > VISIBLE * np.abs(p)))
+        return cls(there, shifts, (error > MOVES * se) & (error > VISIBLE * np.abs(p)))
 
     def also(self, shift: Float) -> Missing:
         """With one more plausible shift of p [n_p]."""

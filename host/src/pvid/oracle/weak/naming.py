@@ -17,7 +17,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.missing import VISIBLE, Explained, Missing, word_of
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.terms import CONSTANT, SOFT, Act, Candidate, Law
-from pvid.oracle.weak.verdict import Name, Reason
+from pvid.oracle.weak.verdict import Name, Reason, of_some
 
 _GROSS = 100.0  # chi^2, from which motion that is left unexplained is a doubt
 
@@ -88,13 +88,14 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
     model, p, terms = fit.rows.compiled.bare, fit.p, terms_of(fit, found)
     relative = lacking.error / np.maximum(np.abs(p), 1e-300)
     worst = [k for k in np.argsort(-relative) if lacking.visible[k]]
+    of_visible = of_some(model, [int(k) for k in worst])
     causes = listed([one.text for one in terms] or ["nothing"])
     if not found.complete:
         biased = listed(f"{model.p_names[k]} by {percent(relative[k])}" for k in worst)
         text = f"The equations lack something, or a signal is not what was recorded: it may bias {biased}. "
         best = f"of what was tried most is explained by this, {percent(found.share)}: {causes}."
         text += f"The cause is unknown: {best if terms else 'no term that was tried explains it.'}"
-        return [Reason("missing", text)]
+        return [Reason("unexplained", text, of=of_visible)]
     if terms[0].text.startswith(("equation", "the ")):  # a signal's name keeps its letters
         causes = causes[0].upper() + causes[1:]
     now = found.fit.p
@@ -106,7 +107,7 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
     text = f"{causes}: with that {values}."
     if terms[0].instead:
         text += f" The run does not distinguish it from these: {listed(terms[0].instead, 'or')}."
-    return [Reason(_name_of(found.named[0].chosen), text)]
+    return [Reason(_name_of(found.named[0].chosen), text, of=of_visible)]
 
 
 def of_unexplained(model: CompiledModel, found: Uncertainty, lacking: Missing) -> list[Reason]:
@@ -117,7 +118,7 @@ def of_unexplained(model: CompiledModel, found: Uncertainty, lacking: Missing) -
     row = model.rows[int(np.argmin(found.r2))].name
     text = f"{row[0].upper()}{row[1:]} leaves {percent(left)} of its motion unexplained, and no term that was tried "
     text += "explains it: the cause is unknown. The standard errors contain how far each quarter of the run moves p."
-    return [Reason("missing", text)]
+    return [Reason("unexplained", text)]
 
 
 def _name_of(one: Candidate) -> Name:

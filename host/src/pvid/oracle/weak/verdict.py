@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.rounding import percent
 from pvid.base.wording import listed, with_unit
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
@@ -17,6 +18,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import UNKNOWN, Parameters
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit, Moments, gauss_newton, inverse, normal
+from pvid.oracle.weak.words import WIDE, Word, worst
 from pvid.oracle.weak.zero import upper_bound
 
 Name = Literal[
@@ -42,12 +44,16 @@ Name = Literal[
     "scale",
     "weights",
     "missing",
+    "unexplained",
+    "model_error",
+    "wide",
     "misfit",
     "core",
     "held",
     "prediction",
     "unpredicted",
     "unchecked",
+    "noise",
 ]
 Status = Literal["good", "warning", "not_identified"]
 ParameterStatus = Literal["identified", "near_zero", "not_identified"]
@@ -64,6 +70,16 @@ _VISIBLE = 1e-3
 _CHI2 = 2.0
 
 _FEW_WINDOWS = 8
+
+# What a reason leaves of a value, where its alarm alone does not tell it.
+_LEAVES: dict[Name, Word] = {
+    "not_identified": "not_identified",
+    "undetermined": "not_identified",
+    "unexplained": "not_explained",
+    "model_error": "not_explained",
+    "unpredicted": "not_explained",
+    "wide": "usable",
+}
 
 # R^2 of a run of which a bound of a parameter is no doubt.
 _EXPLAINED = 0.9
@@ -84,11 +100,18 @@ class Reason:
     name : for programs
     text : a sentence
     alarm : the standard errors may not cover it
+    of : the parameters that it concerns; (): all
     """
 
     name: Name
     text: str
     alarm: bool = True
+    of: tuple[str, ...] = ()
+
+    @property
+    def leaves(self) -> Word:
+        """The best word for the values that it concerns."""
+        return _LEAVES.get(self.name, "usable" if self.alarm else "good")
 
 
 @dataclass(frozen=True)
@@ -123,9 +146,18 @@ class Verdict:
         """At least one parameter has a value that means something."""
         return not any(one.name == "not_identified" for one in self.reasons)
 
+    def of(self, name: str) -> Word:
+        """Of one parameter."""
+        return worst(one.leaves for one in self.reasons if not one.of or name in one.of)
+
+    @property
+    def word(self) -> Word:
+        """Of the answer: what concerns some parameters alone leaves the others usable."""
+        return worst("usable" if one.of and one.leaves != "good" else one.leaves for one in self.reasons)
+
     @property
     def status(self) -> Status:
-        """In a word."""
+        """For programs: whether there is a value, and a warning."""
         if not self.identified:
             return "not_identified"
         return "warning" if any(one.alarm for one in self.reasons) else "good"
@@ -219,13 +251,44 @@ def of_parameters(
         text = f"The run does not determine {listed(names)}: {found[missing[0]].reason}"
         if partner is not None:
             text += f"; {names[0]} and {model.p_names[partner]} are not identifiable together"
-        out.append(Reason("not_identified" if len(missing) == len(found) else "undetermined", f"{text}."))
+        name: Name = "not_identified" if len(missing) == len(found) else "undetermined"
+        out.append(Reason(name, f"{text}.", of=of_some(model, missing)))
     small = [k for k, one in enumerate(found) if one.status == "near_zero"]
     if small:
         bounds = listed(f"{found[k].reason}" for k in small)
         beyond = any((found[k].below or 0.0) > fit.parameters.guess[k] for k in small) or min(r2) < _EXPLAINED
-        out.append(Reason("near_zero", f"The run shows an upper bound alone: {bounds}.", alarm=beyond))
+        text = f"The run shows an upper bound alone: {bounds}."
+        out.append(Reason("near_zero", text, alarm=beyond, of=of_some(model, small)))
     return out
+
+
+def of_width(model: CompiledModel, fit: Fit, se: Float, by_model: Float, found: Sequence[Judged]) -> list[Reason]:
+    """Values with large standard errors.
+
+    Parameters
+    ----------
+    se, by_model : published standard errors, and the model's part of them [n_p]
+    """
+    own = np.where(fit.parameters.positive, 0.0, _UNKNOWN_OF_RANGE / UNKNOWN * fit.parameters.sd)
+    size = np.maximum(np.abs(fit.p), own)
+    known = np.array([one.status == "identified" for one in found])
+    out = []
+    lost = [int(k) for k in np.flatnonzero(known & (by_model > UNKNOWN * size))]
+    if lost:
+        names = listed(model.p_names[k] for k in lost)
+        text = f"What the equations seem to lack may change {names} by more than {percent(UNKNOWN)}."
+        out.append(Reason("model_error", text, of=of_some(model, lost)))
+    wide = [int(k) for k in np.flatnonzero(known & (se > WIDE * size)) if k not in lost]
+    if wide:
+        names = listed(model.p_names[k] for k in wide)
+        text = f"The standard error is above {percent(WIDE)} of the value of {names}."
+        out.append(Reason("wide", text, alarm=False, of=of_some(model, wide)))
+    return out
+
+
+def of_some(model: CompiledModel, places: Sequence[int]) -> tuple[str, ...]:
+    """Names of parameters for a reason; () of all."""
+    return () if len(places) == len(model.p_names) else tuple(model.p_names[k] for k in places)
 
 
 def partner_of(fit: Fit, worst: int) -> int | None:
@@ -273,7 +336,7 @@ def disagreement(
     names = listed(model.p_names[bad] for bad in apart)
     values = [with_unit(value, model.unknowns[k].unit, 4) for value in (one[k], other[k])]
     shown = text.format(names=names, name=model.p_names[k], one=values[0], other=values[1])
-    return [Reason(name, shown)]
+    return [Reason(name, shown, of=of_some(model, [int(bad) for bad in apart]))]
 
 
 def of_halves(model: CompiledModel, fit: Fit, halves: Halves | None) -> list[Reason]:
@@ -347,11 +410,14 @@ def of_residuals(found: Uncertainty) -> list[Reason]:
 def of_range(model: CompiledModel, p: Float, found: Sequence[Judged] = ()) -> list[Reason]:
     """Values beyond what the model calls plausible; of what is identified."""
     out = [
-        one.name
+        k
         for k, (one, value) in enumerate(zip(model.unknowns, p, strict=True))
         if one.high > one.low and not one.low <= value <= one.high and (not found or found[k].status == "identified")
     ]
-    return [Reason("range", f"Outside the range (low, high): {listed(out)}.", alarm=True)] if out else []
+    if not out:
+        return []
+    text = f"Outside the range (low, high): {listed(model.p_names[k] for k in out)}."
+    return [Reason("range", text, of=of_some(model, out))]
 
 
 def of_spoiled(rows: WeakRows, fit: Fit) -> list[Reason]:
