@@ -161,6 +161,14 @@ def test_a_drift_is_named_and_chance_is_not() -> None:
     assert text.count('class="alarm"') == 1 and "&lt;fleet&gt;" in text and "http" not in text.split("<svg")[0]
 
 
+def test_scale_that_a_board_has_in_common_hides_no_drift() -> None:
+    """Errors of 0.3, of which 0.01 are apart: 0.06 in a month is beyond chance."""
+    noise = np.random.default_rng(1).normal(0, 0.01, 30)
+    moving = [row("moving", k, 9.5 + 0.002 * k + noise[k], 0.3) for k in range(30)]
+    assert not drifts_of(moving)[0].drifts
+    assert drifts_of([replace(one, se_apart={"g": 0.01}) for one in moving])[0].drifts
+
+
 def test_outcomes_are_counted() -> None:
     good = row("a", 1, 9.5)
     rows = [

@@ -159,14 +159,20 @@ class Result:
     def compare(self, other: Result) -> dict[str, float]:
         """By parameter: this value less the other's, in standard errors of the difference.
 
-        What both share, the scale of one rig's sensors, is in those errors too: they are rather too large.
+        These contain noise and what the equations seem to lack. The scale of one rig's sensors, constants and clock is
+        common to both and cancels.
         """
-        both = [name for name in self.parameters if name in other.parameters]
         return {
-            name: (one.value - two.value) / math.hypot(one.se, two.se)
-            for name in both
-            for one, two in [(self.parameters[name], other.parameters[name])]
+            name: (one.value - other[name].value) / math.hypot(self.se_apart(name), other.se_apart(name))
+            for name, one in self.parameters.items()
+            if name in other.parameters
         }
+
+    def se_apart(self, name: str) -> float:
+        """Standard error of a parameter without the part of scale, which runs of one rig have in common [its unit]."""
+        parts = self.details["parameters"][name]
+        noise, model = parts.get("se_noise"), parts.get("se_model")
+        return self[name].se if noise is None else math.hypot(noise, model or 0.0)
 
 
 def of_pendulum(found: Identification, model: CompiledModel) -> Result:

@@ -290,4 +290,4 @@ def _guessed(model: str, rig: SimulatedRig, simulation: RigSimulation, seed: int
         if x and abs(one.guess / x - 1) < _THE_SAME:
             nominal[one.name] = float(f"{factor * x:.4g}")
     exact = {one.name: {"gain_sd": 0.0} for one in compiled.signals if one.gain_sd > 0}
-    return MechanismRig(model, rig.sample_rate, known=rig.knowns, sensor=exact, nominal=nominal)
+    return MechanismRig(model, rig.sample_rate, known=rig.knowns, sensor=exact, nominal=nominal, clock_sd=0.0)

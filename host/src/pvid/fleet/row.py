@@ -75,6 +75,7 @@ class Row:
     failure : why there is no result; None: there is one
     parameters : name -> (value, standard error, unit); empty where nothing was identified
     took : seconds of work
+    se_apart : name -> standard error without the part of scale, which recordings of one rig have in common
     """
 
     key: str
@@ -90,6 +91,7 @@ class Row:
     failure: str | None = None
     parameters: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
     took: float = 0.0
+    se_apart: Mapping[str, float] = field(default_factory=dict)
 
 
 def row_of(path: str, question: Question) -> Row:
@@ -126,6 +128,7 @@ def row_of(path: str, question: Question) -> Row:
         _verified(place, question.model) if question.verify and place.suffix == LOG_SUFFIX else None,
         parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
         took=time.monotonic() - start,
+        se_apart={name: result.se_apart(name) for name in result.parameters},
     )
 
 

@@ -16,9 +16,10 @@ from pvid.base.json_lines import append_json_line, read_json_lines
 from pvid.base.wording import in_utf8
 from pvid.fleet.row import Row
 
-_PARAMETERS = "parameters"
+_PARAMETERS, _APART = "parameters", "se_apart"
 _SE = "_se"
-_FIXED = tuple(one.name for one in fields(Row) if one.name != _PARAMETERS)
+_SE_APART = f"_{_APART}"
+_FIXED = tuple(one.name for one in fields(Row) if one.name not in (_PARAMETERS, _APART))
 
 
 class Store:
@@ -86,7 +87,9 @@ class Store:
         schema = [arrow.field(name, kinds.get(name, arrow.string())) for name in _FIXED]
         for name, unit in units.items():
             about = {b"unit": unit.encode()}
-            schema += [arrow.field(one, arrow.float64(), metadata=about) for one in (name, name + _SE)]
+            schema += [
+                arrow.field(one, arrow.float64(), metadata=about) for one in (name, name + _SE, name + _SE_APART)
+            ]
         table = arrow.Table.from_pylist([_flat(row) for row in found], schema=arrow.schema(schema))
         try:
             with appearing(self.out, freely=True) as unfinished:
@@ -99,7 +102,7 @@ class Store:
 def _flat(row: Row) -> Mapping[str, Any]:
     flat = {name: in_utf8(one) if isinstance(one := getattr(row, name), str) else one for name in _FIXED}
     for name, (value, se, _) in row.parameters.items():
-        flat |= {name: value, name + _SE: se}
+        flat |= {name: value, name + _SE: se, name + _SE_APART: row.se_apart.get(name)}
     return flat
 
 
@@ -126,6 +129,7 @@ def read_rows(path: Path) -> list[Row]:
         Row(
             **{name: one[name] for name in _FIXED},
             parameters={name: (one[name], one[name + _SE], units[name]) for name in names if one[name] is not None},
+            se_apart={name: se for name in names if (se := one.get(name + _SE_APART)) is not None},
         )
         for one in table.to_pylist()
     ]

@@ -59,12 +59,15 @@ class Drift:
 
 
 def drifts_of(rows: Sequence[Row]) -> list[Drift]:
-    """Of every board and parameter, by weighted least squares; recordings with a warning do not count."""
+    """Of every board and parameter, by weighted least squares; recordings with a warning do not count.
+
+    The errors contain no scale: that of a board is the same in all its recordings.
+    """
     points: dict[tuple[str, str, str], list[tuple[float, float, float]]] = {}
     for row in rows:
         for name, (value, se, unit) in row.parameters.items():
-            if row.warning is None and se > 0:
-                points.setdefault((row.board, name, unit), []).append((row.began / _DAY, value, se))
+            if row.warning is None and (apart := row.se_apart.get(name, se)) > 0:
+                points.setdefault((row.board, name, unit), []).append((row.began / _DAY, value, apart))
     return [_drift(board, name, unit, np.array(one)) for (board, name, unit), one in points.items()]
 
 

@@ -243,6 +243,7 @@ class CompiledModel:
     hidden : unmeasured coordinates, and defined integrals, whose rates are among the equations
     refinement : of the second stage
     following : of the rig: how its estimate follows a change
+    clock_sd : relative standard deviation of the sample rate; part of the standard errors, as no run shows it
     """
 
     name: str
@@ -257,6 +258,7 @@ class CompiledModel:
     hidden: tuple[Jet, ...] = ()
     refinement: Refinement = field(default_factory=Refinement)
     following: Following = Following()
+    clock_sd: float = 5e-5  # of a quartz, its temperature and ageing included
 
     @property
     def p(self) -> tuple[sp.Symbol, ...]:

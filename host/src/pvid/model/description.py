@@ -22,6 +22,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # What ends a comment, a string or a line of a generated file, or is expanded in one (C, Python, YAML, Kconfig, CMake).
 _NOT_IN_A_TITLE = {"\\": "/", '"': "'", "*/": "* /", "/*": "/ *", "$": "S", "{": "(", "}": ")", "??": "?", "`": "'"}
 _GAIN_SD = 0.01  # of what is driven, unless given: no residual shows a torque constant that is 1 % off
+_GAIN_SD_OF_SENSOR = 0.005  # of what measures no angle: shunts, load cells, pulleys behind an encoder
 _TAKEN = {"t": "the time"}
 
 
@@ -69,7 +70,9 @@ class Model:
         noise : standard deviation of its white noise, in resolutions (0.5); in its unit where there is no resolution
         reach : largest absolute value [unit]
         driven : it measures what the drive imposes, such as the current of a load
-        gain_sd : relative standard deviation of its gain, which most runs do not show; 0.01 if it is driven, else 0
+        gain_sd
+            relative standard deviation of its gain, which most runs do not show; 0.01 if it is driven, else 0.005,
+            and 0 of an angle, as an encoder has a whole number of counts a turn
         neglected
             of equations for small values: relative error over the square of the signal, from its mean [1/unit^2]; part
             of the standard errors
@@ -82,7 +85,7 @@ class Model:
             raise self._refused(f"{name}: give its resolution or its noise [{unit or 1}]")
         level = 0.5 if noise is None else noise
         jet = self._signal(name, unit, reach)
-        gain = self._gain(name, gain_sd, driven)
+        gain = self._gain(name, unit, gain_sd, driven)
         self.signals.append(
             Signal(
                 jet,
@@ -115,13 +118,13 @@ class Model:
         if hold not in ("zoh", "sampled"):
             raise self._refused(f'{name}: hold is "{hold}", it must be "zoh" or "sampled"')
         jet = self._signal(name, unit, reach)
-        gain = self._gain(name, gain_sd, driven=True)
+        gain = self._gain(name, unit, gain_sd, driven=True)
         self.signals.append(Signal(jet, unit, "input", 0.0, 0.0, float(reach), hold, True, gain, smooth=smooth))
         return jet
 
-    def _gain(self, name: str, gain_sd: float | None, driven: bool) -> float:
+    def _gain(self, name: str, unit: str, gain_sd: float | None, driven: bool) -> float:
         if gain_sd is None:
-            return _GAIN_SD if driven else 0.0
+            return _GAIN_SD if driven else 0.0 if unit == "rad" else _GAIN_SD_OF_SENSOR
         if not 0 <= gain_sd < 1:
             raise self._refused(f"{name}: gain_sd is a relative standard deviation, from 0 to below 1")
         return float(gain_sd)

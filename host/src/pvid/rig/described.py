@@ -40,6 +40,7 @@ def described(rig: RigFile) -> MechanismRig:
         known_sd=known_sd,
         identifier={key: float(value) for key, value in given.items() if value is not None},
         refine={one.name: getattr(rig.refine, one.name) for one in fields(rig.refine)},
+        clock_sd=0.0,  # such a file has no key of it
     )
 
 

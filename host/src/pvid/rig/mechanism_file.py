@@ -1,6 +1,7 @@
 """The rig file of a mechanism with a compiled model: what of it differs from the model's own description.
 
     sample_rate = 1000        # Hz
+    clock_sd = 5e-5           # relative standard deviation of the clock's rate
     [model]
     name = "dc_motor"         # or the name of a model file, which --model of the call must name as well
     [known]
@@ -57,6 +58,7 @@ class MechanismRig:
     nominal : guesses of the unknowns
     identifier : what differs from Following's defaults
     refine : options of the refinement in C that are chosen or not
+    clock_sd : relative standard deviation of the sample rate; None: the model's
     """
 
     model: str | Path
@@ -67,6 +69,7 @@ class MechanismRig:
     known_sd: Mapping[str, float] = field(default_factory=dict)
     identifier: Mapping[str, float] = field(default_factory=dict)
     refine: Mapping[str, bool] = field(default_factory=dict)
+    clock_sd: float | None = None
 
     @classmethod
     def parse(cls, text: str) -> MechanismRig:
@@ -82,14 +85,24 @@ class MechanismRig:
     @classmethod
     def of_document(cls, document: Mapping[str, Any], asked: str | Path | None = None) -> MechanismRig:
         """From the tables of a text; see `parse`. `asked`: the mechanism of this call, in place of the text's."""
-        known_keys = ("sample_rate", "model", "known", "known_sd", "sensor", "nominal", "identifier", "refine")
+        known_keys = (
+            "sample_rate",
+            "clock_sd",
+            "model",
+            "known",
+            "known_sd",
+            "sensor",
+            "nominal",
+            "identifier",
+            "refine",
+        )
         for key in document:
             if key not in known_keys:
                 raise PvidError(f"{shown(key)} is not a key of the rig file of a mechanism: {listed(known_keys)} are")
         model = _table(document, "model").get("name") if asked is None else asked
         if not isinstance(model, str | Path):
             raise PvidError('the mechanism is missing: [model] name = "dc_motor", or the path of a model file')
-        rate = document.get("sample_rate")
+        top = _numbers({key: document[key] for key in ("sample_rate", "clock_sd") if key in document}, "")
         sensors = {
             name: _numbers(_table(_table(document, "sensor"), name), f"sensor.{name}")
             for name in document.get("sensor", {})
@@ -104,18 +117,20 @@ class MechanismRig:
                 raise PvidError(f"identifier: {shown(key)} is not a key: {listed(OF_THE_IDENTIFIER)} are")
         return cls(
             model,
-            None if rate is None else _numbers({"sample_rate": rate}, "")["sample_rate"],
+            top.get("sample_rate"),
             _numbers(_table(document, "known"), "known"),
             sensors,
             _numbers(_table(document, "nominal"), "nominal"),
             _numbers(_table(document, "known_sd"), "known_sd"),
             identifier,
             _switches(_table(document, "refine"), "refine"),
+            top.get("clock_sd"),
         )
 
     def text(self) -> str:
         """TOML text; `parse` gives the same rig back."""
         lines = [] if self.sample_rate is None else [f"sample_rate = {self.sample_rate!r}  # Hz"]
+        lines += [] if self.clock_sd is None else [f"clock_sd = {self.clock_sd!r}"]
         name = self.model.name if isinstance(self.model, Path) else self.model
         lines += ["", "[model]", f"name = {quoted(name)}"]
         tables: dict[str, Mapping[str, float]] = {"known": self.known, "known_sd": self.known_sd}
@@ -169,7 +184,15 @@ class MechanismRig:
                 raise PvidError(f"nominal.{one.name} must be positive, not {guess:g}")
             unknowns.append(replace(one, guess=guess, sd=2 * guess if one.positive else one.sd))
         following = replace(model.following, **self.identifier)
-        own = replace(model, knowns=knowns, signals=tuple(signals), unknowns=tuple(unknowns), following=following)
+        clock_sd = model.clock_sd if self.clock_sd is None else self.clock_sd
+        own = replace(
+            model,
+            knowns=knowns,
+            signals=tuple(signals),
+            unknowns=tuple(unknowns),
+            following=following,
+            clock_sd=clock_sd,
+        )
         return own.with_options([name for name, chosen in self.refine.items() if chosen])
 
 

@@ -46,7 +46,9 @@ class Value:
     Attributes
     ----------
     value, se : its standard error; None where it is not identified
-    se_noise, se_model : the parts of it that are from noise, and from what the equations seem to lack
+    se_noise, se_scale, se_model
+        its parts, whose squares add up to its own: from noise; from gains, constants, the clock and linearised
+        equations; from what the equations seem to lack
     status, reason : whether the run determines it; a clause where it does not, or where it may be 0
     below : it is below this with 95 %, where it may be 0
     word : what it may be used for
@@ -60,12 +62,13 @@ class Value:
     reason: str | None = None
     below: float | None = None
     se_model: float | None = None
+    se_scale: float | None = None
     word: Word = "good"
 
     def as_json(self) -> dict[str, Any]:
         """Its entry in the object of `identify --json`."""
         out = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise}
-        out |= {"se_model": self.se_model, "verdict": self.word, "status": self.status}
+        out |= {"se_scale": self.se_scale, "se_model": self.se_model, "verdict": self.word, "status": self.status}
         out |= {} if self.reason is None else {"reason": self.reason}
         return out | ({} if self.below is None else {"below": self.below})
 
@@ -267,9 +270,9 @@ def shifts_of(found: Identified) -> Float:
 
 
 def gains_of(model: CompiledModel, found: Identified) -> Float:
-    """What p is off by for one standard deviation of each gain and constant that has any, and of what linearised
-    equations neglect [gains, n_p]."""
-    return np.array([*given(model, found.by_gain, found.by_known), found.by_neglect])
+    """What p is off by for one standard deviation of each gain, constant and clock that has any, and of what
+    linearised equations neglect [gains, n_p]."""
+    return np.array([*given(model, found.by_gain, found.by_known, found.by_clock), found.by_neglect])
 
 
 def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
@@ -303,15 +306,16 @@ def values_of(
     verdict : whose word a parameter has; an output has the worst of those that it depends on
     shifts : see shifts_of; None: no terms were tried
     """
-    whole = covariance + gains.T @ gains
+    scale = gains.T @ gains
     terms = np.zeros((0, len(p))) if shifts is None else shifts
 
     def shown(unit: str, value: float, slope: Float, of: Judged, word: Word) -> Value:
         if of.status == "not_identified":
             return Value(unit, None, None, None, of.status, of.reason, word="not_identified")
-        se, se_noise = (float(np.sqrt(slope @ one @ slope)) for one in (whole, covariance))
+        se_noise, se_scale = (float(np.sqrt(slope @ one @ slope)) for one in (covariance, scale))
         se_model = float(np.max(np.abs(terms @ slope), initial=0.0))
-        return Value(unit, value, math.hypot(se, se_model), se_noise, of.status, of.reason, of.below, se_model, word)
+        se = math.hypot(se_noise, se_scale, se_model)
+        return Value(unit, value, se, se_noise, of.status, of.reason, of.below, se_model, se_scale, word)
 
     values = {}
     for one in model.outputs:

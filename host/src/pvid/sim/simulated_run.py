@@ -50,10 +50,10 @@ class RigSimulation:
         missing = [name for name in model.p_names if name not in rig.truth]
         if missing:
             raise PvidError(f"the simulated rig of {model.name} gives no value of {', '.join(missing)}")
-        # A simulation is exact: it has no error of a gain, and its equations are those of the model.
+        # A simulation is exact: it has no error of a gain or a clock, and its equations are those of the model.
         exact = tuple(replace(one, gain_sd=0.0, neglected=0.0) for one in model.signals)
         linearised = tuple(one.name for one in model.signals if one.neglected)
-        return cls(replace(model, signals=exact), rig, Plant(model), linearised)
+        return cls(replace(model, signals=exact, clock_sd=0.0), rig, Plant(model), linearised)
 
     @property
     def truth(self) -> Float:
@@ -236,7 +236,7 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     settings = rig_path_of(path)
     refuse_foreign(settings)
     write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
-    exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven}
+    exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.gain_sd or one.driven}
     exact |= {name: {"neglected": 0.0} for name in simulation.linearised}
-    MechanismRig(name or model.name, rate, known=simulation.rig.knowns, sensor=exact).write(settings)
+    MechanismRig(name or model.name, rate, known=simulation.rig.knowns, sensor=exact, clock_sd=0.0).write(settings)
     return settings

@@ -46,6 +46,7 @@ class Identified:
     se : published standard errors, those of gains included [n_p]
     by_gain : of each signal but angles, what p is off by over the error of its gain [n_p]
     by_known : of each constant with a standard deviation, what p is off by over the constant's error [n_p]
+    by_clock : what p is off by over the relative error of the sample rate, 0 where the model has none [n_p]
     by_neglect : what p may be off by because equations are linearised [n_p]
     by_model : what p may be off by because the equations lack something, or a signal is not what was recorded [n_p]
     lacking : what the equations seem to lack; None: the numbers of the test ran away
@@ -86,6 +87,7 @@ class Identified:
     ranking: tuple[Scored, ...]
     by_gain: dict[str, Float]
     by_known: dict[str, Float]
+    by_clock: Float
     by_neglect: Float
     by_model: Float
     lacking: Missing | None
@@ -180,13 +182,14 @@ def identify(
         for one in compiled.signals
         if one.gain_sd > 0 or one.unit != "rad"
     }
+    by_clock = _or_nan(fit, library.by_clock) if compiled.clock_sd else np.zeros(len(fit.p))
     by_known = {
         one.name: _or_nan(fit, partial(of_known, compiled, run, fit, one)) for one in compiled.knowns if one.sd > 0
     }
     by_neglect = model.parameters.positive * fit.p * neglected(compiled, run)
     parts = [
         verdict.widened(found.se, halves),
-        *given(compiled, by_gain, by_known),
+        *given(compiled, by_gain, by_known, by_clock),
         by_neglect,
         *([] if blurred is None else [blurred]),
         *([] if white is None else [white - fit.p]),
@@ -234,6 +237,7 @@ def identify(
         ranking=ranking,
         by_gain=by_gain,
         by_known=by_known,
+        by_clock=by_clock,
         by_neglect=by_neglect,
         by_model=by_model,
         lacking=lacking,
@@ -338,9 +342,12 @@ def _determined(model: CompiledModel, fit: Fit, found: Uncertainty) -> bool:
     return bool(attempted(lambda: verdict.is_known(model, fit, *near_zero(fit, found.se))))
 
 
-def given(model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float]) -> list[Float]:
-    """Errors of p [n_p] for one standard deviation of each gain and constant that has any."""
+def given(
+    model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float], by_clock: Float
+) -> list[Float]:
+    """Errors of p [n_p] for one standard deviation of each gain, constant and clock that has any."""
     gains = [one.gain_sd * by_gain[one.name] for one in model.signals if one.gain_sd > 0]
+    gains += [model.clock_sd * by_clock] if model.clock_sd else []
     return gains + [one.sd * by_known[one.name] for one in model.knowns if one.sd > 0]
 
 

@@ -61,6 +61,15 @@ class Library:
             return np.zeros(len(self.fit.p))
         return self.scores.shift(self.act(recorded, GAIN, 0.0))
 
+    def by_clock(self) -> Float:
+        """What p is off by if samples come (1 + g) times as fast as the sample rate is said to be, over g [n_p]."""
+        whole = replace(self.design, window_s=2 * self.design.hop * self.design.dt)  # as many steps at any rate
+        factor = 1 + _STEP
+        faster = replace(whole, sample_rate=whole.sample_rate * factor, window_s=whole.window_s / factor)
+        before, after = (self._columns(record_of(self.fit.rows.compiled, self.run, one)) for one in (whole, faster))
+        change = _between(before, after, _STEP)
+        return self.scores.shift(Candidate("", "", GAIN, 0.0, change))
+
     @cached_property
     def candidates(self) -> list[Candidate]:
         """All, without scores."""
@@ -135,17 +144,23 @@ class Library:
 
     def _change(self, record: Record, step: float) -> Change:
         """Residuals with other channels less those with the recorded ones, over a step."""
-        rows = self.fit.rows
-        moved = [one[rows.numbers] for one in record.columns(rows.functions)]
-        apart = [(now - before) / step for now, before in zip(moved, rows.columns, strict=True)]
+        return _between(self.fit.rows.columns, self._columns(record), step)
 
-        def change(theta: Sequence[Float]) -> list[Float]:
-            return [
-                one[:, len(th)] - np.einsum("wjk,j->wk", one[:, : len(th)], th)
-                for one, th in zip(apart, theta, strict=True)
-            ]
+    def _columns(self, record: Record) -> list[Float]:
+        """Of the windows of the fit, of each row kind."""
+        return [one[self.fit.rows.numbers] for one in record.columns(record.grid.design.test_functions)]
 
-        return change
+
+def _between(before: Sequence[Float], after: Sequence[Float], step: float) -> Change:
+    apart = [(now - one) / step for now, one in zip(after, before, strict=True)]
+
+    def change(theta: Sequence[Float]) -> list[Float]:
+        return [
+            one[:, len(th)] - np.einsum("wjk,j->wk", one[:, : len(th)], th)
+            for one, th in zip(apart, theta, strict=True)
+        ]
+
+    return change
 
 
 def _in_row(sums: Float, kind: int, kinds: int) -> Change:
