@@ -11,7 +11,7 @@ import click
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import FigurePath, force_option, form_options, print_notes, read_input, with_overrides
+from pvid.cli.input import FigurePath, NewFile, force_option, form_options, print_notes, read_input, with_overrides
 from pvid.cli.result import print_result, print_warning, write_figure, write_refined_figure
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import common_rig
@@ -43,6 +43,14 @@ from pvid.settings.engine_cores import FLOAT
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
 )
 @click.option(
+    "--add",
+    metavar="TERM",
+    multiple=True,
+    help="Of a described mechanism: add a term with one new unknown, as in --add 'equation 2: drag*abs(w)*w', or "
+    "change a signal, as in --add 'V: V + drop*sgn(V)', and show the values without it and with it.",
+)
+@click.option("--write-model", type=NewFile(), help="With --add: write the model file with the terms.")
+@click.option(
     "--validate",
     "other",
     metavar="RUN2",
@@ -64,6 +72,8 @@ def command(
     weights: Literal["residuals", "sensors"] | None,
     refine: bool | None,
     target: str | None,
+    add: tuple[str, ...],
+    write_model: Path | None,
     other: Path | None,
     as_json: bool,
     figure: Path | None,
@@ -83,6 +93,9 @@ def command(
 
     Several RUNs are identified together: the parameters are those of all, and no window reaches from one into the next.
     They have the same columns and the same sample rate.
+
+    Where an answer names a term that the equations lack, its advice contains the option --add that identifies with it.
+    A term without an equation's name in front goes to the equation in which it explains most.
 
     With --validate the answer is also simulated on another recording with the same columns, in blocks of four windows
     whose initial states alone are fitted: what is left of each sensor's motion, over its motion and its noise.
@@ -111,8 +124,12 @@ def command(
             weights=weights or "residuals",
             refine=bool(refine),
             other=other,
+            add=add,
+            write_model=write_model,
             **options,
         )
+    if add or write_model is not None:
+        raise PvidError("--add and --write-model are for a described mechanism, --model")
     if other is not None:
         raise PvidError("--validate is for a described mechanism, --model; here: pvid validate RUN2 --from ANSWER")
     if weights is not None:

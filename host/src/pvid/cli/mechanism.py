@@ -13,9 +13,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, working, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
+from pvid.base.wording import listed
 from pvid.cli.input import print_notes, run_of
 from pvid.log.rig import LOG_SUFFIX, recording_of_log
 from pvid.oracle.weak.weights import Weights
@@ -118,6 +120,8 @@ def identify_run(
     refine: bool = False,
     on: str | None = None,
     other: Path | None = None,
+    add: Sequence[str] = (),
+    write_model: Path | None = None,
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism, or several together, and prints the answer.
@@ -128,6 +132,7 @@ def identify_run(
     weights : of the rows, as in pvid.oracle.weak.identify
     refine : the equations are fitted to the whole run, from the answer on
     other : another recording, of which is said how well the answer predicts it
+    add, write_model : terms that are added to the model, and where the model file with them is written
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
@@ -135,8 +140,8 @@ def identify_run(
     if len(paths) > 1:
         _refuse_several(on=on, refine=refine, **only_in_c)
     if only_in_c.get("form") == _STRONG:
-        if figure is not None or refine or weights != "residuals":
-            raise PvidError("--figure, --refine and --weights are for the weak form; omit --form strong")
+        if figure is not None or refine or weights != "residuals" or add:
+            raise PvidError("--figure, --refine, --weights and --add are for the weak form; omit --form strong")
         return _identified_by_strong_form(paths[0], rig, columns, as_json=as_json, on=on, **only_in_c)
     for option, value in only_in_c.items():
         if value is not None and (option, value) not in _POSSIBLE:
@@ -145,6 +150,10 @@ def identify_run(
                 f"omit --{option}"
             )
     in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
+    if add and on is not None:
+        raise PvidError("--add is not for a target: write the model with --write-model FILE and name that with --model")
+    if write_model is not None and not add:
+        raise PvidError("--write-model writes the model with the terms of --add: add one")
     if other is not None and refine and in_c:
         raise PvidError("--validate is not for --core f32 --refine: use pvid validate RUN2 --from ANSWER")
     if weights != "residuals" and in_c:
@@ -159,8 +168,24 @@ def identify_run(
         refuse_too_many_unknowns(model)
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
+    without: MechanismAnswer | None = None
+    if add:
+        from pvid.run.additions import added
+
+        own = described(rig) if isinstance(rig, RigFile) else rig
+        with working("identifying without the added terms"):
+            without = identify_mechanism(recording, model, weights)
+            more = added(without, own, add)
+            model = more.model
     with working("identifying"):
         answer = analysed(recording, model, weights, predict=not (refine or in_c))
+    if without is not None:
+        with_them: dict[str, Any] = {"added": list(more.terms), "without": _values_json(without.values)}
+        if not as_json:
+            Console().print(_beside(without.values, answer.values, more.terms))
+        if write_model is not None:
+            write_whole(write_model, more.text_of(answer))
+            write_stderr(f"pvid: {write_model}: the model with {listed(more.terms)}")
     print_notes(answer.recording.notes[len(recording.notes) :])
     if refine and not in_c:
         return _refined(answer, partial(_predicted, other, rig, columns), as_json=as_json, figure=figure)
@@ -182,8 +207,8 @@ def identify_run(
     shown = core or answer
     validation = _predicted(other, rig, columns, shown)
     if as_json:
-        more = no_second | _validation_json(validation)
-        click.echo(json.dumps(shown.as_json() | more | ({} if on is None else {"on": on})))
+        extra = no_second | _validation_json(validation) | ({} if without is None else with_them)
+        click.echo(json.dumps(shown.as_json() | extra | ({} if on is None else {"on": on})))
     elif core is not None:
         _print_core(core)
     else:
@@ -512,6 +537,26 @@ def _print_core(core: CoreAnswer) -> None:
         f"verdict {core.verdict.word}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
         f"windows of {2 * core.hop_s:.3g} s; hash {core.hash:08x}"
     )
+
+
+def _values_json(values: Mapping[str, Value]) -> dict[str, Any]:
+    return {name: {"value": one.value, "se": one.se} for name, one in values.items()}
+
+
+def _beside(without: Mapping[str, Value], found: Mapping[str, Value], terms: Sequence[str]) -> Table:
+    """The values without added terms and with them."""
+    table = Table("parameter", "without", "with", title=escape(f"added: {listed(terms)}"))
+    for column in table.columns[1:]:
+        column.justify = "right"
+
+    def shown(one: Value | None) -> str:
+        if one is None:
+            return ""
+        return "not determined" if one.value is None or one.se is None else " ± ".join(with_error(one.value, one.se))
+
+    for name, one in found.items():
+        table.add_row(escape(f"{name} [{one.unit}]" if one.unit else name), shown(without.get(name)), shown(one))
+    return table
 
 
 def _table(values: Mapping[str, Value], title: str) -> None:

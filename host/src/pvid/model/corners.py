@@ -125,7 +125,9 @@ def _ratio(equation: sp.Expr, by: Jet, of: Jet) -> sp.Expr:
 
 
 def _is_usable(slope: sp.Expr, hidden: Collection[str]) -> bool:
-    plain = not slope.has(Integral) and all(jet.order == 0 and jet.of not in hidden for jet in jets(slope))
+    plain = not slope.has(Integral, sp.Derivative, sp.Subs) and all(
+        jet.order == 0 and jet.of not in hidden for jet in jets(slope)
+    )
     return plain and sp.count_ops(slope) <= _LONGEST
 
 

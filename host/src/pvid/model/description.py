@@ -16,7 +16,8 @@ from pvid.model.eliminate import Equation
 from pvid.model.normal_form import rational
 from pvid.model.refusal import ModelError, place_of_caller
 from pvid.model.signals import MAX_ORDER, Integral, Jet, jets, total_derivative
-from pvid.model.units import Dimension, dimension_of, dimension_of_unit
+from pvid.model.typed import typed_expression
+from pvid.model.units import NUMBER, Dimension, dimension_of, dimension_of_unit
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 # What ends a comment, a string or a line of a generated file, or is expanded in one (C, Python, YAML, Kconfig, CMake).
@@ -222,6 +223,66 @@ class Model:
         self._agree(whole, title)
         self.equations.append(Equation(title, whole, place_of_caller()))
 
+    def add(self, text: str, guess: float = 0.0, sd: float = 1.0) -> None:
+        """Adds a term with one new unknown, or changes a signal by it.
+
+        Parameters
+        ----------
+        text
+            "drop*sgn(i)": a term of the only equation; "equation 1: drop*sgn(i)": of the equation with this name;
+            "V: V + drop*sgn(V)": what the signal V is in place of what was recorded. The unknown is linear in it.
+        guess, sd : of the unknown [its unit, which follows from the equation where it can]
+
+        Raises
+        ------
+        ModelError
+            Naming what is wrong with it.
+        """
+        where, _, expression = text.rpartition(":")
+        parsed = typed_expression(expression, self._names())
+        if parsed == 0:
+            raise ModelError(f"{text}: the term is 0")
+        new = sorted((one for one in parsed.free_symbols if str(one) not in self._names_of_symbols()), key=str)
+        if len(new) > 1:
+            raise ModelError(f"{text}: {' and '.join(map(str, new))} are new; a term has one new unknown")
+        if new and sp.expand(parsed).diff(new[0]).has(new[0]):
+            raise ModelError(f"{text}: the unknown {new[0]} must be a factor, for example {new[0]}*sgn(...)")
+        where = where.strip()
+        jet = next((one for one in self._jets() if one.of == where), None)
+        places = [k for k, one in enumerate(self.equations) if jet is not None or not where or one.name == where]
+        if jet is None and len(places) != 1:
+            names = ", ".join(one.name for one in self.equations)
+            raise ModelError(f'{text}: write "EQUATION: TERM", with one of {names}')
+        if new:
+            of = sp.expand(parsed).diff(new[0])
+            whole = self.equations[places[0]].expression if jet is None else jet
+            self._add_unknown(str(new[0]), self._unit_between(whole, of), guess, sd)
+        for k in places:
+            own = self.equations[k]
+            changed = own.expression + parsed if jet is None else _changed(own.expression, jet, parsed)
+            self.equations[k] = replace(own, expression=rational(changed))
+
+    def _add_unknown(self, name: str, unit: str, guess: float, sd: float) -> None:
+        symbol = self._symbol(name, unit)
+        self.unknowns.append(Unknown(symbol, unit, guess, False, guess - 10 * sd, guess + 10 * sd, sd))
+
+    def _unit_between(self, whole: sp.Expr, factor: sp.Expr) -> str:
+        """Of a factor's coefficient in a sum; "" where numbers stand for quantities with a unit."""
+        try:
+            one, other = (dimension_of(each, self._dimensions) or NUMBER for each in (whole, factor))
+        except ModelError:
+            return ""
+        return (one * other.power(sp.Integer(-1))).unit
+
+    def _names(self) -> dict[str, sp.Symbol]:
+        """What a typed expression may name."""
+        symbols = [*(one.symbol for one in self.unknowns), *(one.symbol for one in self.knowns)]
+        return {one.of: one for one in self._jets()} | {str(one): one for one in symbols}
+
+    def _names_of_symbols(self) -> set[str]:
+        orders = range(MAX_ORDER + 1)
+        return {str(one.d(k)) for one in self._jets() for k in orders} | set(self._names())
+
     def lagrange(self, lagrangian: sp.Expr, coordinates: Sequence[Jet], forces: Sequence[sp.Expr]) -> None:
         """d/dt dL/dq' - dL/dq = force, for each coordinate."""
         if len(coordinates) != len(forces):
@@ -414,6 +475,12 @@ class Model:
             dimension_of(expression, self._dimensions)
         except ModelError as error:
             raise self._refused(f"{title}: {error.cause}") from None
+
+
+def _changed(expression: sp.Expr, jet: Jet, instead: sp.Expr) -> sp.Expr:
+    """With another expression in place of a signal and its derivatives."""
+    own = [one for one in jets(expression) if one.of == jet.of]
+    return expression.xreplace({one: total_derivative(instead, one.order) for one in own})
 
 
 def _plain(title: str) -> str:

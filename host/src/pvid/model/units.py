@@ -47,6 +47,19 @@ class Dimension:
         named = [(name, one) for name, one in zip(_BASE_NAMES, self.of, strict=True) if one != 0]
         return "*".join(name if one == 1 else f"{name}^{one}" for name, one in named) or "1"
 
+    @property
+    def unit(self) -> str:
+        """The shortest text of it that is a unit of SI; "" of a number."""
+        over = [_power(name, one) for name, one in zip(_BASE_NAMES, self.of, strict=True) if one > 0]
+        under = [_power(name, -one) for name, one in zip(_BASE_NAMES, self.of, strict=True) if one < 0]
+        below = f"/({'*'.join(under)})" if len(under) > 1 else f"/{under[0]}" if under else ""
+        texts = [f"{'*'.join(over) or '1'}{below}", *([_named(self)] if _named(self) else [])]
+        return "" if self == NUMBER else min(texts, key=len)
+
+
+def _power(name: str, exponent: sp.Rational) -> str:
+    return name if exponent == 1 else f"{name}^{exponent}"
+
 
 NUMBER = Dimension()
 

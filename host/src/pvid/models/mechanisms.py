@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import sys
 import traceback
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -47,7 +48,26 @@ def described(mechanism: str | Path) -> Model:
     PvidError
         Where the file cannot be read or run, or leaves no model; the sentence contains the line.
     """
-    _, path = path_of(mechanism)
+    return _left_in(_space_of(path_of(mechanism)[1]), path_of(mechanism)[1])[1]
+
+
+def text_with(mechanism: str | Path, lines: Sequence[str]) -> str:
+    """A model file's text with more calls of its model, each as in "add('a*sgn(v)')".
+
+    Raises
+    ------
+    PvidError
+        As `described`.
+    """
+    path = path_of(mechanism)[1]
+    name, _ = _left_in(_space_of(path), path)
+    head = f"# Made by `pvid identify --write-model` from {path.name}; the last lines are new."
+    own = path.read_text(encoding="utf-8-sig").rstrip()
+    return "\n".join([head, own, "", *(f"{name}.{one}" for one in lines), ""])
+
+
+def _space_of(path: Path) -> dict[str, Any]:
+    """What a model file leaves."""
     space: dict[str, Any] = {"__name__": "pvid_model_file", "__file__": str(path)}
     folder = str(path.resolve().parent)
     sys.path.insert(0, folder)
@@ -67,15 +87,15 @@ def described(mechanism: str | Path) -> Model:
         raise PvidError(f"{where}: {_of_numbers(error, path) or said}") from None
     finally:
         sys.path.remove(folder)
-    return _left_in(space, path)
+    return space
 
 
-def _left_in(space: dict[str, Any], path: Path) -> Model:
-    """The model that a file leaves: its variable `model`, or the only Model that it has, whatever its name."""
+def _left_in(space: dict[str, Any], path: Path) -> tuple[str, Model]:
+    """The model that a file leaves, and its name: its variable `model`, or the only Model that it has."""
     model = space.get("model")
     if isinstance(model, Model):
-        return model
-    others = {id(value): value for value in space.values() if isinstance(value, Model)}
+        return "model", model
+    others = {id(value): (name, value) for name, value in space.items() if isinstance(value, Model)}
     if len(others) == 1 and model is None:
         return next(iter(others.values()))
     count = f"{len(others)} model{'s' if len(others) > 1 else ''}"

@@ -48,6 +48,10 @@ def analysed(
     predict : publish the estimate that predicts best where the equations do not explain the recording
     """
     answer = advised(identify_mechanism(recording, model, weights))
+    if answer.found.named is not None:
+        from pvid.run.additions import to_type
+
+        answer = replace(answer, advice=(*answer.advice, *to_type(answer)))
     if answer.is_explained or not predict or weights != "residuals":
         return answer
     from pvid.run.judge import judged  # with the simulation, which a good run does not need

@@ -34,6 +34,7 @@ class Term:
     se : standard error of it
     unit : of a number of a signal; a law's is that of the equation over the law
     text : a clause
+    typed : what `identify --add` takes, with {a} for the name of the unknown; None: the model language does not have it
     instead : clauses, of terms that explain the run alike
     """
 
@@ -43,6 +44,7 @@ class Term:
     se: float | None
     unit: str | None
     text: str
+    typed: str | None
     instead: tuple[str, ...]
 
 
@@ -59,12 +61,17 @@ def terms_of(fit: Fit, found: Explained) -> tuple[Term, ...]:
     for one in found.named:
         term = one.chosen
         law: str | None = None
+        typed: str | None = None
         unit: str | None = ""
         factor: float | None = 1.0
         if isinstance(term.kind, Act):
             unit = {"signal": model.signal(term.signal).unit, "time": "s", "part": "", "percent": ""}[term.kind.measure]
+            if term.kind.typed:
+                typed = f"{term.signal}: {term.kind.typed.replace('{u}', term.signal)}"
         elif term.kind is not SOFT:
             law, factor, unit = _law(term), scale[term.where], None
+            own = "{a}" if term.kind is CONSTANT else f"{{a}}*{law}"
+            typed = own if factor is None else f"{term.where}: {own}"
         out.append(
             Term(
                 where=term.where,
@@ -73,6 +80,7 @@ def terms_of(fit: Fit, found: Explained) -> tuple[Term, ...]:
                 se=_over(one.error, abs(factor) if factor else factor),
                 unit=unit,
                 text=in_words(model, term, scale),
+                typed=typed,
                 instead=tuple(in_words(model, other, scale) for other in one.rivals),
             )
         )

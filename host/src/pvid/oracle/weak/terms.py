@@ -122,6 +122,7 @@ class Act:
     most : from what was recorded the largest believable size
     applies : to what was recorded
     exact : of a size that is not small: the same, as levels; `of` is its first order
+    typed : the true signal from the recorded one {u}, with the unknown {a}, as typed in a model; "": it cannot be
     """
 
     text: str
@@ -132,6 +133,7 @@ class Act:
     most: Callable[[Recorded], float] = lambda _: np.inf
     applies: Callable[[Recorded], bool] = lambda _: True
     exact: Act | None = None
+    typed: str = ""
 
     def tried(self, recorded: Recorded) -> tuple[float, ...]:
         """Levels."""
@@ -221,9 +223,18 @@ GAIN = Act(
     ("larger", "smaller"),
     most=lambda _: 0.2,
     applies=_is_input,
+    typed="{u}*(1 + {a})",
 )
 
-_DELAY = Act("is {word} by {size}", _shifted, "time", ("delayed", "advanced"), levels=lambda _: (), applies=_is_sensor)
+_DELAY = Act(
+    "is {word} by {size}",
+    _shifted,
+    "time",
+    ("delayed", "advanced"),
+    levels=lambda _: (),
+    applies=_is_sensor,
+    typed="{u} + {a}*{u}.d()",
+)
 _LATE = Act(
     "acts {word} by {size}",
     _shifted,
@@ -260,6 +271,7 @@ ACTS = (
         ("+", "-"),
         most=lambda _: 0.6,
         applies=_is_input,
+        typed="{u} + {a}*abs({u})*{u}",
     ),
     Act(
         "acts as {u}*(1 {word} {size}*({u}/{top})**2)",
@@ -268,6 +280,7 @@ ACTS = (
         ("+", "-"),
         most=lambda _: 0.6,
         applies=_is_input,
+        typed="{u} + {a}*{u}**3",
     ),
     Act(
         "acts with {size}*sgn({u}) {word} than recorded",
@@ -276,6 +289,7 @@ ACTS = (
         ("more", "less"),
         most=lambda of: 0.4 * of.top,
         applies=_is_input,
+        typed="{u} + {a}*sgn({u})",
     ),
     GAIN,
     Act("has a backlash of {size}", _play, "signal", most=_resolutions, applies=_is_stepped),
@@ -296,6 +310,7 @@ ACTS = (
         ("-", "+"),
         most=lambda _: 0.5,
         applies=_is_measured,
+        typed="{u} + {a}*{u}**3",
     ),
 )
 
