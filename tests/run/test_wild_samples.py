@@ -87,3 +87,27 @@ def test_error_codes_of_an_encoder_cost_no_answer(share: float, code: float) -> 
     x[np.random.default_rng(2).random(len(x)) < 0.06] = code
     with pytest.raises(PvidError, match=f"x is far .* most often {code:g} m: an error code of the sensor"):
         without_wild_samples(replace(recording, signals={**recording.signals, "x": x}), model)
+
+
+@pytest.mark.parametrize(("code", "in_a_row"), [(0.0, 1), (32.767, 1), (0.0, 6)])
+def test_error_codes_of_a_current_are_interpolated_though_it_has_corners(code: float, in_a_row: int) -> None:
+    """A failed read that is recorded as 0 lies within the motion."""
+    recording, model = recorded("dc_motor"), compiled_of("dc_motor")
+    i, rng = recording.signals["i"].copy(), np.random.default_rng(8)
+    for first in np.cumsum(rng.integers(40 * in_a_row, 160 * in_a_row, 78 // in_a_row)):
+        i[first : first + in_a_row] = code
+    cleaned = without_wild_samples(replace(recording, signals={**recording.signals, "i": i}), model)
+    left = (cleaned.signals["i"] == code) & (np.abs(code - recording.signals["i"]) > 0.3)
+    assert np.count_nonzero(left) <= 5  # of 78: in the steepest motion the code lies between its neighbours
+    assert np.median(np.abs(cleaned.signals["i"] - recording.signals["i"])[cleaned.signals["i"] != i]) < 0.2
+    assert len(cleaned.notes) == 1
+    assert cleaned.notes[0].split("samples of i")[1].startswith(f" are far from those about it ({code:g} A in ")
+
+
+def test_a_current_that_follows_short_pulses_of_the_voltage_has_no_error_codes() -> None:
+    """Sampled slower than L/R, it falls to exactly 0 with every pulse."""
+    recording, model = recorded("dc_motor"), compiled_of("dc_motor")
+    pulses = np.where(np.arange(8000) % 40 < 3, 0.0, 6.0)
+    quick = {"V": pulses, "i": np.rint(pulses / 1.2 / 0.005) * 0.005}
+    pulsed = replace(recording, signals={**recording.signals, **quick})
+    assert without_wild_samples(pulsed, model).signals["i"] is pulsed.signals["i"]

@@ -178,7 +178,7 @@ def _in_fixed_point(shown: Demonstrated, target: str) -> bool:
 
 def _by_the_paper(shown: Demonstrated, seed: int) -> None:
     """The strong form on this computer, in a line. It differentiates its samples, and needs finer ones."""
-    form = f"The paper's own form (derivatives, regressor, M, solve at each tick), sensors {_FINER} times finer"
+    form = f"The paper's own form (derivatives, a row, its sums, a solution at each tick), sensors {_FINER} times finer"
     try:
         values = _strong_pendulum(shown, seed) if shown.answer.model.name == DEFAULT else _strong(shown, seed)
     except PvidError as error:

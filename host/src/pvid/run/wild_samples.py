@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel, Signal
-from pvid.model.signals import jets
+from pvid.model.signals import order_of
 from pvid.rig.breaks import breaks
 from pvid.rig.gaps import bridge, stretches
 from pvid.rig.run import Recording
 
 Float = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 _SPAN = 0.5  # [s] over which a signal may change its character
 _SHORTEST = 50  # samples of it
@@ -23,27 +26,68 @@ _MOST = 1e-3  # of the samples: where more are, they belong to the signal
 # Far samples: off the median about them by so many times the sensor's noise, what nine of ten samples are off it,
 # or twice the usual motion; in runs of a few, with neighbours that are off by a small part of that.
 _MEDIAN_OF, _FAR, _RUN, _NEIGHBOUR = 11, 10.0, 3, 0.2
+# An error code: so many samples in a row, so often where both neighbours agree, while no input moves by so much of its
+# range.
+_CODES, _FEWEST_CODES, _STEADY = 8, 4, 0.05
 _MOST_FAR = 0.05  # of the samples: with more, the recording is refused
 
 
-def _without_far_samples(recording: Recording, signal: Signal) -> tuple[Float, str]:
-    """A sensor's samples without those that are far from all about them, and a note on these."""
-    x = recording.signals[signal.name]
+def _far_from_median(x: Float, sd: float) -> Mask:
+    """Samples that are far from the median about them, alone or in runs of a few."""
     half = _MEDIAN_OF // 2
-    if len(x) <= _MEDIAN_OF:
-        return x, ""
     about = np.lib.stride_tricks.sliding_window_view(np.pad(x, half, mode="edge"), _MEDIAN_OF)
     off = np.abs(x - np.partition(about, half, axis=1)[:, half])  # NaN is partitioned to the end
     there = np.isfinite(off)
     moves = np.abs(np.diff(x[there]))
     if not moves.size:
-        return x, ""
-    limit = _FAR * max(2 * signal.sd, float(np.quantile(off[there], 0.9)), 2 * float(np.median(moves)))
+        return np.zeros(len(x), np.bool_)
+    limit = _FAR * max(2 * sd, float(np.quantile(off[there], 0.9)), 2 * float(np.median(moves)))
     far = there & (off > limit)
     for first, end in zip(*stretches(far), strict=True):
         beside = [off[k] for k in (first - 1, end) if 0 <= k < len(x) and np.isfinite(off[k])]
         if end - first > _RUN or max(beside, default=np.inf) > _NEIGHBOUR * off[first:end].min():
             far[first:end] = False
+    return np.asarray(far)
+
+
+def _error_codes(x: Float, sd: float, steady: Mask) -> Mask:
+    """Samples of a sensor that cannot jump that have, alone or in runs of a few, one value time and again, off both
+    neighbours in the same direction: at first where these agree and the inputs are steady, then wherever it stands."""
+    far = np.zeros(len(x), np.bool_)
+    for run in range(1, _CODES + 1):
+        first = np.arange(1, len(x) - run)
+        inside = np.array([x[first + k] for k in range(run)])
+        before, after = x[first - 1] - inside[0], x[first + run] - inside[0]
+        same = (inside == inside[0]).all(axis=0) & (np.sign(before) == np.sign(after))
+        off = np.minimum(np.abs(before), np.abs(after))
+        with np.errstate(invalid="ignore"):
+            alone = same & (off > 2 * _FAR * sd)
+            clear = alone & (np.abs(before - after) < _NEIGHBOUR * off)
+        clear &= np.lib.stride_tricks.sliding_window_view(steady, run + 2).all(axis=1)
+        values, times = np.unique(inside[0][clear], return_counts=True)
+        codes = values[times >= _FEWEST_CODES]
+        begins = first[alone & np.isin(inside[0], codes)]
+        for k in range(run):
+            far[begins + k] = True
+    return far
+
+
+def _steady(recording: Recording, model: CompiledModel) -> Mask:
+    """Samples before which no input moves by much."""
+    steady = np.ones(len(recording), np.bool_)
+    for one in model.signals:
+        if one.driven or one.kind == "input":
+            u = recording.signals[one.name]
+            steady[1:] &= ~(np.abs(np.diff(u)) > _STEADY * (np.nanmax(u) - np.nanmin(u)))
+    return steady
+
+
+def _without_far_samples(recording: Recording, signal: Signal, find: Callable[[Float], Mask]) -> tuple[Float, str]:
+    """A sensor's samples without those that are far from all about them, and a note on these."""
+    x = recording.signals[signal.name]
+    if len(x) <= _MEDIAN_OF:
+        return x, ""
+    there, far = np.isfinite(x), find(x)
     count = int(np.count_nonzero(far))
     if not count:
         return x, ""
@@ -72,10 +116,11 @@ def _without_far_samples(recording: Recording, signal: Signal) -> tuple[Float, s
 def without_wild_samples(recording: Recording, model: CompiledModel) -> Recording:
     """The recording with the wild samples of its coordinates interpolated, and a note for each changed signal.
 
-    A coordinate is a sensor whose acceleration is in the equations: unlike a current, it cannot jump for one sample. A
+    A coordinate is a sensor whose acceleration is in the equations: unlike a current, it has no corners. A
     sample is wild if its neighbours lie on a smooth curve within their noise and it is off this curve. Jumps and
     corners are kept, and so is a signal of which more than 0.1 % of the samples look wild. Far ones, such as the error
-    codes of a sensor, are interpolated up to 5 % of the samples.
+    codes of a sensor, are interpolated up to 5 % of the samples. Of a sensor whose rate alone is in the equations those
+    are error codes that have one value time and again; a sensor without any, which may jump, is kept as it is.
 
     Raises
     ------
@@ -85,14 +130,19 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     changed = dict(recording.signals)
     notes = list(recording.notes)
     span = max(_SHORTEST, round(_SPAN * recording.sample_rate))
-    moving = {jet.of for equation in model.equations for jet in jets(equation) if jet.order >= 2}
+    orders = {one.name: max(order_of(equation, [one.name]) for equation in model.equations) for one in model.signals}
     for one in model.signals:
-        if one.kind != "sensor" or one.name not in moving:
+        if one.kind != "sensor" or one.driven or not orders[one.name]:
             continue
-        x, note = _without_far_samples(recording, one)
+        find = partial(_far_from_median, sd=one.sd)
+        if orders[one.name] < 2:
+            find = partial(_error_codes, sd=one.sd, steady=_steady(recording, model))
+        x, note = _without_far_samples(recording, one, find)
         if note:
             changed[one.name] = x
             notes.append(note)
+        if orders[one.name] < 2:
+            continue
         found = breaks(x, span, one.sd)
         for first, end in zip(*stretches(found), strict=True):
             if end - first > _LONGEST:
