@@ -72,6 +72,16 @@ def test_the_c_core_takes_one_recording_after_the_other(springs: list[str | Path
     assert all(both["parameters"][name]["se"] < alone["parameters"][name]["se"] for name in TRUTH)
 
 
+def test_own_parameters_have_the_names_of_the_files(springs: list[str | Path]) -> None:
+    answer = json.loads(pvid("identify", *springs, "--own", "m,b", "--validate", springs[0], "--json").stdout)
+    assert set(answer["parameters"]) == {"m[s1]", "m[s2]", "b[s1]", "b[s2]", "k"}
+    assert answer["validation"]["fitted"]["m"] == pytest.approx(1.0, rel=1e-3)
+    table = pvid("identify", *springs, "--own", "m", "--refine")
+    assert "m[s1]" in table.stdout and "each recording has its own m" in table.stderr
+    with pytest.raises(PvidError, match="there is one"):
+        pvid("identify", springs[0], *springs[2:], "--own", "m")
+
+
 @pytest.mark.parametrize("more", [["--form", "strong"], ["--on", "stream-host"], ["--refine", "--core", "f32"]])
 def test_what_takes_one_recording_refuses_several(springs: list[str | Path], more: list[str]) -> None:
     with pytest.raises(PvidError, match="takes one recording"):

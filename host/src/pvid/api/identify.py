@@ -26,7 +26,7 @@ from pvid.rig.run import Recording, Run
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.rig.together import joined, names_of
 from pvid.run.advised import identified
-from pvid.run.mechanism import model_of
+from pvid.run.mechanism import model_of, own_of
 from pvid.run.mechanism_advice import analysed
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.skew import aligned
@@ -42,6 +42,8 @@ def identify(
     columns: str | None = None,
     core: Literal["f32", "q31", "f64"] | None = None,
     settings: Mapping[str, Any] | None = None,
+    own: Sequence[str] = (),
+    shared: Sequence[str] = (),
     **keys: Any,
 ) -> Result:
     """Identifies a mechanism from measured data.
@@ -61,6 +63,9 @@ def identify(
     core
         Arithmetic: float32 by default for the pendulum, float64 for other mechanisms,
         whose C core is compiled for f32 and q31.
+    own, shared
+        Of several recordings: unknowns with a value of their own in each, such as a payload, `m[A]` and `m[B]`; offsets
+        of sensors, which have their own, with one value in all.
     settings, keys
         Keys of the rig file, which come before the file: l1=0.25, settings={"sensor.phi_lsb": 0.0015}.
 
@@ -79,7 +84,7 @@ def identify(
     """
     # Matrices are small: threads would wait for each other, on all cores.
     with threadpool_limits(limits=1, user_api="blas"):
-        return _identify(data, model, rig, columns, core, {**(settings or {}), **keys})
+        return _identify(data, model, rig, columns, core, {**(settings or {}), **keys}, own, shared)
 
 
 def _identify(
@@ -89,6 +94,8 @@ def _identify(
     columns: str | None,
     core: Literal["f32", "q31", "f64"] | None,
     settings: Mapping[str, Any],
+    own: Sequence[str],
+    shared: Sequence[str],
 ) -> Result:
     several = list(data) if isinstance(data, list | tuple) else [data]
     if not several:
@@ -100,14 +107,17 @@ def _identify(
     asked = None if model is None else os.fspath(model)
     described = common_rig(files, rig_path, texts, asked, len(several) > 1)
     if described is not None:
-        own = described_by(described) if isinstance(described, RigFile) else described
-        compiled = model_of(own)
+        described = described_by(described) if isinstance(described, RigFile) else described
+        compiled = model_of(described)
         given = parsed(columns, channels_of(compiled))
-        parts = [_part(*one, own.sample_rate, given, compiled) for one in zip(several, paths, strict=True)]
+        parts = [_part(*one, described.sample_rate, given, compiled) for one in zip(several, paths, strict=True)]
         recording = joined(parts, _names(paths), given)
         engine = ENGINE_CORES.get(core or "")
-        answer = analysed(recording, compiled, predict=engine is None)
+        of_each = own_of(compiled, recording, own, shared, in_c=engine is not None)
+        answer = analysed(recording, compiled, predict=engine is None, own=of_each)
         return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
+    if own or shared:
+        raise PvidError("own and shared are for several recordings")
     path = paths[0]
     file = rig_for(path, rig_path, texts)
     if core is not None:

@@ -57,6 +57,13 @@ from pvid.settings.engine_cores import FLOAT
     type=click.Path(path_type=Path),
     help="Of a described mechanism: also say how well the answer predicts RUN2, another run of it.",
 )
+@click.option(
+    "--own",
+    metavar="NAME,...",
+    multiple=True,
+    help="Of several RUNs: parameters with a value of their own in each, such as a payload; sensor offsets have one.",
+)
+@click.option("--shared", metavar="NAME,...", multiple=True, help="Offsets of sensors that have one value in all RUNs.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 @force_option
@@ -75,6 +82,8 @@ def command(
     add: tuple[str, ...],
     write_model: Path | None,
     other: Path | None,
+    own: tuple[str, ...],
+    shared: tuple[str, ...],
     as_json: bool,
     figure: Path | None,
 ) -> int:
@@ -92,7 +101,8 @@ def command(
     signals against the simulated.
 
     Several RUNs are identified together: the parameters are those of all, and no window reaches from one into the next.
-    They have the same columns and the same sample rate.
+    They have the same columns and the same sample rate. With --own m, each has its own m: m[A] and m[B] of A.csv and
+    B.csv.
 
     Where an answer names a term that the equations lack, its advice contains the option --add that identifies with it.
     A term without an equation's name in front goes to the equation in which it explains most.
@@ -109,8 +119,8 @@ def command(
     run_path = run_paths[0]
     described = common_rig(run_paths, rig_path, settings, model, len(run_paths) > 1)
     if described is None and refine and core == FLOAT.name:
-        own = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
-        described, law = (own, None) if own.identifier.form_traits.publishes else (None, law)
+        file = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
+        described, law = (file, None) if file.identifier.form_traits.publishes else (None, law)
     if described is not None:
         from pvid.cli.mechanism import identify_run  # loads SymPy
 
@@ -126,12 +136,16 @@ def command(
             other=other,
             add=add,
             write_model=write_model,
+            own=_names(own),
+            shared=_names(shared),
             **options,
         )
     if add or write_model is not None:
         raise PvidError("--add and --write-model are for a described mechanism, --model")
     if other is not None:
         raise PvidError("--validate is for a described mechanism, --model; here: pvid validate RUN2 --from ANSWER")
+    if own or shared:
+        raise PvidError("--own and --shared are for several recordings of a described mechanism")
     if weights is not None:
         raise PvidError(f"--weights {weights} is for a described mechanism, --model; the pendulum has its own weights")
     rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
@@ -172,3 +186,8 @@ def command(
     for sentence in result.advice:
         write_stderr(f"pvid: advice: {sentence}")
     return DONE if result.identified else NOTHING_IDENTIFIED
+
+
+def _names(given: tuple[str, ...]) -> list[str]:
+    """Names of a repeated option with lists of names."""
+    return list(dict.fromkeys(name.strip() for one in given for name in one.split(",") if name.strip()))

@@ -28,7 +28,7 @@ from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, read_recording
 from pvid.rig.sensor_steps import resolution_note, resolved
 from pvid.rig.together import joined, names_of
-from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of
+from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of, own_of
 from pvid.run.mechanism_advice import analysed
 from pvid.run.wild_samples import without_wild_samples
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
@@ -122,6 +122,8 @@ def identify_run(
     other: Path | None = None,
     add: Sequence[str] = (),
     write_model: Path | None = None,
+    own: Sequence[str] = (),
+    shared: Sequence[str] = (),
     **only_in_c: str | None,
 ) -> int:
     """Identifies a recording of a described mechanism, or several together, and prints the answer.
@@ -133,6 +135,7 @@ def identify_run(
     refine : the equations are fitted to the whole run, from the answer on
     other : another recording, of which is said how well the answer predicts it
     add, write_model : terms that are added to the model, and where the model file with them is written
+    own, shared : unknowns that each recording has of its own, or not, as in pvid.run.mechanism.own_of
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
@@ -168,17 +171,18 @@ def identify_run(
         refuse_too_many_unknowns(model)
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
         return DIFFERENT
+    of_each = own_of(model, recording, own, shared, in_c=in_c is not None)
     without: MechanismAnswer | None = None
     if add:
         from pvid.run.additions import added
 
-        own = described(rig) if isinstance(rig, RigFile) else rig
+        of_mechanism = described(rig) if isinstance(rig, RigFile) else rig
         with working("identifying without the added terms"):
-            without = identify_mechanism(recording, model, weights)
-            more = added(without, own, add)
+            without = identify_mechanism(recording, model, weights, of_each)
+            more = added(without, of_mechanism, add)
             model = more.model
     with working("identifying"):
-        answer = analysed(recording, model, weights, predict=not (refine or in_c))
+        answer = analysed(recording, model, weights, predict=not (refine or in_c), own=of_each)
     if without is not None:
         with_them: dict[str, Any] = {"added": list(more.terms), "without": _values_json(without.values)}
         if not as_json:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import sympy as sp
@@ -227,6 +228,26 @@ class Following:
 
 
 @dataclass(frozen=True)
+class Together:
+    """What a model of several recordings has of its own.
+
+    Attributes
+    ----------
+    unknowns, outputs : of one recording
+    own : of each recording, symbol of an unknown in the rows and equations -> its symbol in p
+    """
+
+    unknowns: tuple[Unknown, ...]
+    outputs: tuple[Output, ...]
+    own: tuple[Mapping[sp.Symbol, sp.Symbol], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the own parameters, as of one recording."""
+        return tuple(str(one) for one in self.own[0])
+
+
+@dataclass(frozen=True)
 class CompiledModel:
     """A mechanism ready to identify.
 
@@ -244,6 +265,8 @@ class CompiledModel:
     refinement : of the second stage
     following : of the rig: how its estimate follows a change
     clock_sd : relative standard deviation of the sample rate; part of the standard errors, as no run shows it
+    together : of several recordings with own parameters (pvid.model.together): p has one for each recording, which the
+        rows and equations contain as one symbol; None: p is what they contain
     """
 
     name: str
@@ -259,6 +282,24 @@ class CompiledModel:
     refinement: Refinement = field(default_factory=Refinement)
     following: Following = Following()
     clock_sd: float = 5e-5  # of a quartz, its temperature and ageing included
+    together: Together | None = None
+
+    @cached_property
+    def alone(self) -> CompiledModel:
+        """Of one recording."""
+        if self.together is None:
+            return self
+        return replace(self, unknowns=self.together.unknowns, outputs=self.together.outputs, together=None)
+
+    @cached_property
+    def places(self) -> tuple[tuple[int, ...], ...]:
+        """Of each recording the entries of p that are its own and the shared ones, in the order of `alone`."""
+        of_recordings: tuple[Mapping[sp.Symbol, sp.Symbol], ...] = ({},)
+        if self.together is not None:
+            of_recordings = self.together.own
+        return tuple(
+            tuple(self.p.index(own.get(one.symbol, one.symbol)) for one in self.alone.unknowns) for own in of_recordings
+        )
 
     @property
     def p(self) -> tuple[sp.Symbol, ...]:

@@ -96,9 +96,10 @@ def _scaled(answer: MechanismAnswer, before: Additions, term: str) -> Additions:
     if len(model.unknowns) == len(before.model.unknowns):
         return replace(before, terms=terms, sd=(*before.sd, 1.0))
     compiled, design = ready(model), answer.found.design
-    rows = WeakRows.of(compiled, answer.recording.signals, design)
+    rows = WeakRows.of(compiled, answer.recording.run, design)
     guess = np.array([one.guess for one in model.unknowns])
-    p = np.append(answer.found.p, guess[len(answer.found.p) :])
+    of_first = answer.found.p[list(answer.model.places[0])]  # of several recordings with own parameters
+    p = np.append(of_first, guess[len(of_first) :])
     p = np.where(np.isfinite(p), p, guess)
     sizes = []
     for own, at, off in zip(
@@ -116,7 +117,7 @@ def _scaled(answer: MechanismAnswer, before: Additions, term: str) -> Additions:
 
 def _misfit(answer: MechanismAnswer, one: Additions) -> float:
     recording = answer.recording
-    found = attempted(lambda: identify(one.model, recording.signals, recording.sample_rate, design=answer.found.design))
+    found = attempted(lambda: identify(one.model, recording.run, recording.sample_rate, design=answer.found.design))
     return np.inf if found is None else found.chi2
 
 

@@ -9,9 +9,10 @@ Where the residuals are those of the sensors' noise alone, or a missing term exp
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise
 from operator import attrgetter
 
 import numpy as np
@@ -27,6 +28,7 @@ from pvid.oracle.weak.identify import Identified, ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
+from pvid.rig.run import Recording
 from pvid.run.mechanism import MechanismAnswer, gains_of, noise_of, shifts_of, values_of_found
 from pvid.run.refined import Problem, Refined, Stretch, refined
 from pvid.run.refined_mechanism import prior_about
@@ -73,6 +75,7 @@ class Candidate:
     halves : r from each half of the parts [2][parameters and settings of the simulation]
     fit : of the weak form; of the refinement the estimate at which it began
     sensors : how well the halves predict each other
+    of_recordings : the same in each of several recordings, by name
     """
 
     name: str
@@ -81,6 +84,7 @@ class Candidate:
     halves: tuple[Float, Float]
     fit: Fit
     sensors: tuple[SensorPrediction, ...] = ()
+    of_recordings: Mapping[str, tuple[SensorPrediction, ...]] = field(default_factory=dict)
     score: float = np.inf
 
 
@@ -138,10 +142,19 @@ def _designs(answer: MechanismAnswer) -> Iterator[tuple[str, WeakDesign, Float]]
             yield name, least.design, least.p
 
 
-def _parts(samples: int) -> tuple[list[Stretch], list[Stretch]]:
-    edges = np.linspace(0, samples, _PARTS + 1).astype(int).tolist()
-    parts = list(zip(edges[:-1], edges[1:], strict=True))
-    return parts[0::2], parts[1::2]
+def _parts(recording: Recording) -> tuple[list[Stretch], list[Stretch]]:
+    """Of the run, the first, third, ... and the others: about as many as _PARTS, each within one recording, and as many
+    of each recording in either half."""
+    whole = [(one.first, one.end) for one in recording.origins] or [(0, len(recording))]
+    total = sum(end - first for first, end in whole)
+    halves: tuple[list[Stretch], list[Stretch]] = ([], [])
+    for first, end in whole:
+        count = 2 * max(1, round(_PARTS / 2 * (end - first) / total))
+        edges = np.linspace(first, end, count + 1).astype(int).tolist()
+        parts = list(pairwise(edges))
+        halves[0].extend(parts[0::2])
+        halves[1].extend(parts[1::2])
+    return halves
 
 
 class _Trial:
@@ -149,7 +162,7 @@ class _Trial:
 
     def __init__(self, answer: MechanismAnswer) -> None:
         self._answer, self._compiled = answer, ready(answer.model)
-        self._parts = _parts(len(answer.recording))
+        self._parts = _parts(answer.recording)
         known = all(one.status == "identified" for one in answer.found.judged)
         p = answer.found.p if known else np.array([one.guess for one in answer.model.unknowns])
         self._motion = Motion(answer.model, answer.recording.run, answer.recording.sample_rate, p)
@@ -180,7 +193,7 @@ class _Trial:
     def _scored(self, one: Candidate) -> Candidate:
         """With how well each half predicts the other."""
         motion, samples = self._motion, self._block
-        measured, simulated = [], []
+        measured, simulated, firsts = [], [], []
         for r, others in zip(one.halves, reversed(self._parts), strict=True):
             problem = motion.within(others)
             if not problem.measured.stretches or problem.longest < samples:
@@ -188,13 +201,22 @@ class _Trial:
             cut, z = motion.simulated(r, problem, samples, _SAMPLES)
             measured.append(cut.rows(problem.measured.z))
             simulated.append(z)
+            firsts.append(cut.first)
         shortest = min(part.shape[1] for part in measured)
         z, x = (np.concatenate([part[:, :shortest] for part in both]) for both in (measured, simulated))
         if not np.isfinite(x).all():
             return one
         sensors = motion.compared(z, x)
         rms = np.array([one.rms for one in sensors])
-        return replace(one, sensors=sensors, score=float(np.mean(np.log(np.maximum(rms, motion.sd)))))
+        first = np.concatenate(firsts)
+        of_recordings = {
+            own.name: motion.compared(z[inside], x[inside])
+            for own in self._answer.recording.origins
+            if (inside := (own.first <= first) & (first < own.end)).any()
+        }
+        return replace(
+            one, sensors=sensors, of_recordings=of_recordings, score=float(np.mean(np.log(np.maximum(rms, motion.sd))))
+        )
 
     def refined(self, best: Candidate) -> Candidate | None:
         """The refinement from an estimate on: it is weighted by what that reaches, not by the sensors' noise."""
@@ -278,6 +300,9 @@ def _published(
             *verdict.of_range(model, chosen.p, status),
             _of_choice(chosen, usual),
         ]
+    if not poor and (worse := _poorly_predicted(chosen)):
+        text = f"The answer predicts {listed(worse)}: did something change, or does a parameter differ there (--own)?"
+        reasons.append(Reason("unpredicted", text))
     if poor:
         shares = listed(f"{100 * max(one.r2, 0.0):.0f} % of {one.name}" for one in poor)
         text = f"Of motion that was not fitted the answer predicts {shares}: the equations lack something that matters."
@@ -292,7 +317,23 @@ def _published(
         judged=status,
         verdict=Verdict(verdict.sorted_by_gravity(reasons)),
     )
-    return replace(answer, found=judged_found, values=values_of_found(model, judged_found), prediction=chosen.sensors)
+    return replace(
+        answer,
+        found=judged_found,
+        values=values_of_found(model, judged_found),
+        prediction=chosen.sensors,
+        predicted=chosen.of_recordings,
+    )
+
+
+def _poorly_predicted(one: Candidate) -> list[str]:
+    """Of several recordings: how much of the motion of a sensor is predicted in those where it is too little."""
+    return [
+        f"{100 * max(sensor.r2, 0.0):.0f} % of {sensor.name} in {name}"
+        for name, sensors in one.of_recordings.items()
+        for sensor in sensors
+        if sensor.r2 < PREDICTED
+    ]
 
 
 def _of_choice(chosen: Candidate, usual: Candidate | None) -> Reason:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -13,10 +13,12 @@ import numpy.typing as npt
 import sympy as sp
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Output
 from pvid.model.corners import feedthroughs
 from pvid.model.evaluation import numpy_function
 from pvid.model.normalise import with_own_scales
+from pvid.model.together import offsets, with_own
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
 from pvid.oracle.weak.choice import Scored
@@ -86,6 +88,7 @@ class MechanismAnswer:
     weights : of the rows
     advice : sentences with what to type, where a column seems to be wrong
     prediction : how well each sensor's motion is predicted that was not fitted; none: it was not looked at
+    predicted : the same in each of several recordings, by name
     """
 
     model: CompiledModel
@@ -95,6 +98,7 @@ class MechanismAnswer:
     weights: Weights = "residuals"
     advice: tuple[str, ...] = ()
     prediction: tuple[SensorPrediction, ...] = ()
+    predicted: Mapping[str, tuple[SensorPrediction, ...]] = field(default_factory=dict)
 
     @property
     def identified(self) -> bool:
@@ -130,6 +134,7 @@ class MechanismAnswer:
             "chi2": found.chi2,
             "r2": found.r2,
             "prediction": {one.name: one.as_json() for one in self.prediction},
+            **recordings_of(self),
             "window_s": found.design.window_s,
             "windows": len(found.times),
             "weights": self.weights,
@@ -139,6 +144,22 @@ class MechanismAnswer:
             "core": "f64",
             "form": "weak",
         }
+
+
+def recordings_of(answer: MechanismAnswer) -> dict[str, Any]:
+    """Of several recordings: samples of each, begin on the common time axis [s], and how well it is predicted."""
+    recording = answer.recording
+    if not recording.origins:
+        return {}
+    each = {
+        one.name: {
+            "samples": one.end - one.first,
+            "begin_s": float(recording.t[one.first]),
+            "prediction": {sensor.name: sensor.as_json() for sensor in answer.predicted.get(one.name, ())},
+        }
+        for one in recording.origins
+    }
+    return {"recordings": each}
 
 
 def missing_of(found: Identified) -> dict[str, Any] | None:
@@ -164,11 +185,14 @@ def model_of(rig: MechanismRig) -> CompiledModel:
 
 
 @np.errstate(all="ignore")  # what diverges is judged, and told in words
-def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weights = "residuals") -> MechanismAnswer:
+def identify_mechanism(
+    recording: Recording, model: CompiledModel, weights: Weights = "residuals", own: Collection[str] = ()
+) -> MechanismAnswer:
     """Parameters of a mechanism from all segments of a recording.
 
     Parameters
     ----------
+    own : unknowns that have a value of their own in each of several recordings
     weights : of the rows, as in pvid.oracle.weak.identify
 
     Raises
@@ -178,12 +202,17 @@ def identify_mechanism(recording: Recording, model: CompiledModel, weights: Weig
     """
     refuse_constant(recording, model)
     model = with_edges(as_sampled(model, recording.ticks_between), recording.run, recording.sample_rate)
-    found = identified_by(model, recording.run, recording.sample_rate, weights=weights)
-    if _collapsed(model, found) and (other := with_own_scales(model)) is not None:
+    names = [one.name for one in recording.origins]
+    whole = with_own(model, own, names)
+    found = identified_by(whole, recording.run, recording.sample_rate, weights=weights)
+    if _collapsed(model, found) and (scaled := with_own_scales(model)) is not None:
+        other = with_own(scaled, own, names)
         again = attempted(lambda: identified_by(other, recording.run, recording.sample_rate, weights=weights))
         if again is not None and _determined(again) > _determined(found):
-            model, found = other, again
-    noted = replace(recording, notes=(*recording.notes, *_of_edges(model), *_of_segments(recording, found)))
+            whole, found = other, again
+    model = whole
+    notes = *_of_own(model, own), *_of_edges(model), *_of_segments(recording, found)
+    noted = replace(recording, notes=(*recording.notes, *notes))
     return MechanismAnswer(model, found, values_of_found(model, found), noted, weights)
 
 
@@ -193,7 +222,8 @@ def _determined(found: Identified) -> int:
 
 def _collapsed(model: CompiledModel, found: Identified) -> bool:
     """Whether an unknown of a homogeneous row is not determined."""
-    lost = {name for name, one in zip(found.names, found.judged, strict=True) if one.status != "identified"}
+    judged = zip(found.names, found.judged, strict=True)
+    lost = {name.partition("[")[0] for name, one in judged if one.status != "identified"}  # m of m[A], too
     homogeneous = {str(one) for row in model.rows if not row.known for theta in row.theta for one in theta.free_symbols}
     return bool(lost & homogeneous)
 
@@ -203,6 +233,54 @@ def _of_edges(model: CompiledModel) -> Iterator[str]:
     for sensor, name in feedthroughs(model):
         if (edge := model.signal(sensor).edge) != "between":
             yield f"{sensor} jumps with {name}: its samples are those {edge} the jump"
+
+
+def own_of(
+    model: CompiledModel,
+    recording: Recording,
+    own: Sequence[str] = (),
+    shared: Sequence[str] = (),
+    *,
+    in_c: bool = False,
+) -> tuple[str, ...]:
+    """Unknowns that have a value of their own in each of several recordings: these, and offsets of sensors.
+
+    Parameters
+    ----------
+    own, shared : names that were asked for
+    in_c : for the C core, which has one value of each
+
+    Raises
+    ------
+    PvidError
+        For a name that is no unknown of the model, and where there is one recording, or the C core.
+    """
+    for option, names in (("own", own), ("shared", shared)):
+        for name in names:
+            if name not in model.p_names:
+                raise PvidError(f"{option} {name}: {model.name} has no such unknown; it has {listed(model.p_names)}")
+    if both := [name for name in own if name in shared]:
+        raise PvidError(f"{both[0]} is both own and shared")
+    if own and not recording.origins:
+        raise PvidError(f"own {own[0]}: a parameter has values of its own in several recordings, and there is one")
+    if own and in_c:
+        raise PvidError(f"own {own[0]}: the C core has one value of each parameter; identify in float64")
+    if not recording.origins or in_c:
+        return ()
+    of_sensors = [name for name in offsets(model) if name not in shared]
+    return tuple(name for name in model.p_names if name in own or name in of_sensors)
+
+
+def _of_own(model: CompiledModel, own: Collection[str]) -> tuple[str, ...]:
+    """A note on the parameters that each recording has of its own."""
+    if not own:
+        return ()
+    text = f"each recording has its own {listed(own)}"
+    of_sensors = [name for name in offsets(model.alone) if name in own]
+    if of_sensors:
+        be = "is the offset of a sensor" if len(of_sensors) == 1 else "are offsets of sensors"
+        text += f" ({listed(of_sensors)} {be}; --shared {','.join(of_sensors)}: one value in all)"
+    return (text,)
 
 
 def _of_segments(recording: Recording, found: Identified) -> tuple[str, ...]:

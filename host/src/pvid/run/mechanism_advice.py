@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from pvid.base.wording import with_unit
 from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.together import with_own
 from pvid.oracle.weak.choice import score_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.identify import ready
@@ -20,6 +21,8 @@ from pvid.run.mechanism import MechanismAnswer, identify_mechanism
 
 # Residuals over what the sensors explain, above which a mistake is sought.
 _MISFIT = 20.0
+# Of several recordings: above it, a parameter is sought that differs; it is named if it leaves residuals below it.
+_DIFFER = 2.0
 # A mistake is named if it leaves less than this part of the residuals, relative to the motion ...
 _PART = 1 / 30
 # ... or, where the answer without it is implausible, this part: another sign gives a linear mechanism other residuals,
@@ -38,7 +41,12 @@ _UNITS = {
 
 
 def analysed(
-    recording: Recording, model: CompiledModel, weights: Weights = "residuals", *, predict: bool = True
+    recording: Recording,
+    model: CompiledModel,
+    weights: Weights = "residuals",
+    *,
+    predict: bool = True,
+    own: Collection[str] = (),
 ) -> MechanismAnswer:
     """The answer that `identify` prints in float64, with its advice.
 
@@ -46,8 +54,9 @@ def analysed(
     ----------
     weights : of the rows; those of the sensors alone are not compared with others
     predict : publish the estimate that predicts best where the equations do not explain the recording
+    own : as of identify_mechanism
     """
-    answer = advised(identify_mechanism(recording, model, weights))
+    answer = advised(identify_mechanism(recording, model, weights, own))
     if answer.found.named is not None:
         from pvid.run.additions import to_type
 
@@ -72,6 +81,8 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
     """
     if (unit := _unit_of_time(answer)) is not None:
         return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
+    if answer.recording.origins and answer.found.chi2 > _DIFFER and (own := _of_own(answer)) is not None:
+        return (own,)
     if answer.identified and answer.found.chi2 < _MISFIT and _distance(answer, answer.found.p) < _FAR:
         return ()
     run = answer.recording.run
@@ -132,6 +143,26 @@ def _tried(answer: MechanismAnswer) -> Iterator[tuple[float, str, str]]:
             implausible = far or (scale < 0 and before is not None and not before.known)
             if left < (most if implausible else _PART):
                 yield left, said, typed
+
+
+def _of_own(answer: MechanismAnswer) -> str | None:
+    """Of several recordings: which parameter explains them if each has its own; the one that leaves least."""
+    model, run, design = answer.model, answer.recording.run, answer.found.design
+    before = score_of(ready(model), run, design, None, False)
+    if before is None or not answer.recording.origins:
+        return None
+    names = [one.name for one in answer.recording.origins]
+    own = set(model.together.names) if model.together is not None else set()
+    left = {}
+    for name in model.alone.p_names:
+        if name not in own:
+            one = score_of(ready(with_own(model.alone, own | {name}, names)), run, design, None, False)
+            if one is not None and one.known:
+                left[name] = one.chi2 / before.chi2
+    best = min(left, key=lambda name: left[name], default="")
+    if not best or left[best] > max(_PART, min(0.5, _DIFFER / before.chi2)):
+        return None
+    return f"the recordings differ in {best}: --own {best} gives each its own"
 
 
 def _with_noise(model: CompiledModel, name: str, scale: float) -> CompiledModel:

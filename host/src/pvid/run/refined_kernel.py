@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 
@@ -196,6 +197,83 @@ class PlayedKernel(RefinedKernel):
         return bool(r[self._place] >= 0) and self._inner.possible(self._without(r))
 
 
+class TogetherKernel(RefinedKernel):
+    """A kernel of several recordings, with the parameters of all: blocks of each have its own.
+
+    Parameters
+    ----------
+    inner : of one recording
+    model : with the parameters of all
+    begins : first sample of each recording
+    """
+
+    def __init__(self, inner: RefinedKernel, model: CompiledModel, begins: Sequence[int]) -> None:
+        self._inner, self._begins, self.states = inner, begins, inner.states
+        own = inner.made
+        parameters: list[RefinedParameter] = []
+        self._places: list[list[int]] = [[] for _ in model.places]  # of each recording, in `parameters`
+        for one in own.parameters:
+            of_p = [one.place] if one.place < 0 else list(dict.fromkeys(places[one.place] for places in model.places))
+            for at in self._places:
+                at.append(len(parameters))
+            for k, place in enumerate(of_p):
+                name = one.name if place < 0 else model.p_names[place]
+                parameters.append(replace(one, name=name, place=place))
+                if len(of_p) > 1:
+                    self._places[k][-1] = len(parameters) - 1
+        extra = len(parameters) - len(own.parameters)
+        # every own parameter is one of the motion or of the readings; both stand in the order of `inner`
+        moving = self._places[-1][own.moving - 1] + 1 if own.moving else 0
+        self.made = replace(own, model=model, parameters=tuple(parameters), moving=moving)
+        self.widths = [one + extra for one in inner.widths]
+        self.columns = inner.columns + extra
+
+    def blocks(
+        self,
+        r: Float,
+        first: npt.NDArray[np.int32],
+        samples: int,
+        sub: int,
+        h: float,
+        u: Float,
+        du: Float,
+        starts: Float,
+        derivatives: bool = True,
+        coarse: int = 1,
+    ) -> tuple[Float, Float | None, Float]:
+        """As of RefinedKernel."""
+        z = np.empty((len(first), samples, len(self.made.outputs)))
+        jacobian = np.zeros((*z.shape, self.columns)) if derivatives else None
+        ends = np.empty((len(first), self.states))
+        number = np.searchsorted(self._begins, first, side="right") - 1
+        for k in np.unique(number).tolist():
+            own = np.flatnonzero(number == k)
+            begun = np.ascontiguousarray(starts[own])
+            z[own], inner, ends[own] = self._inner.blocks(
+                self._of(r, k), first[own], samples, sub, h, u, du, begun, derivatives, coarse
+            )
+            if jacobian is not None and inner is not None:
+                columns = np.array([*range(self.states), *(self.states + place for place in self._places[k])])
+                jacobian[own[:, None], :, :, columns] = np.moveaxis(inner, 3, 1)
+        return z, jacobian, ends
+
+    def _of(self, r: Float, k: int) -> Float:
+        """Parameters and settings of one recording."""
+        return np.concatenate([r[self._places[k]], r[len(self.made.parameters) :]])
+
+    def derivatives(self, r: Float, q: Float, v: Float, u: Float) -> dict[str, Float]:
+        """As of RefinedKernel, of the first recording."""
+        return self._inner.derivatives(self._of(r, 0), q, v, u)
+
+    def chart(self, r: Float) -> Float:
+        """As of RefinedKernel, of the first recording."""
+        return self._inner.chart(self._of(r, 0))
+
+    def possible(self, r: Float) -> bool:
+        """Whether a mechanism can have these parameters, of each recording."""
+        return all(self._inner.possible(self._of(r, k)) for k in range(len(self._places)))
+
+
 def _pointer(array: Float) -> ctypes.c_void_p:
     assert array.dtype == np.float64 and array.flags.c_contiguous
     return array.ctypes.data_as(ctypes.c_void_p)
@@ -239,6 +317,13 @@ def _code(made: RefineFunctions, read_before: bool) -> str:
 _made = Recent(RefinedKernel, 32)
 
 
-def kernel_of(model: CompiledModel, optional: tuple[str, ...] = ()) -> RefinedKernel:
-    """The kernel of a compiled model with these of its optional extras."""
+def kernel_of(model: CompiledModel, optional: tuple[str, ...] = (), begins: Sequence[int] = ()) -> RefinedKernel:
+    """The kernel of a compiled model with these of its optional extras.
+
+    Parameters
+    ----------
+    begins : first sample of each recording, of a model of several; without them no block can be simulated
+    """
+    if model.together is not None:
+        return TogetherKernel(kernel_of(model.alone, optional), model, begins)
     return _made(without_optional(model, optional))

@@ -15,7 +15,7 @@ from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
 from pvid.rig.file import Nominal, RigFile, Sensor
 from pvid.rig.gaps import stretches
-from pvid.rig.run import Run
+from pvid.rig.run import NUMBER, Run
 from pvid.run.mechanism import MechanismAnswer, refined_gains_of, refined_shifts_of, values_of
 from pvid.run.refined import (
     GOOD,
@@ -78,7 +78,8 @@ def problem_of(
     model: CompiledModel, signals: Mapping[str, Float], rate: float, r: Float, widths: Mapping[str, float] | None = None
 ) -> tuple[Problem, Float]:
     """The problem, and r with widths of the signs."""
-    kernel = kernel_of(model)
+    number = signals.get(NUMBER, np.zeros(1))
+    kernel = kernel_of(model, begins=np.flatnonzero(np.diff(number, prepend=-1.0)).tolist())
     made = kernel.made
     r = r.copy()
     zero = np.zeros(kernel.states)

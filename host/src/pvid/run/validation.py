@@ -6,8 +6,8 @@ the start alone: an error of the parameters or of the equations grows in it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,9 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
-from pvid.run.refined import Cut, Prior, Problem, Stretch
+from pvid.run.refined import Cut, Prior, Problem, Stretch, refined
 from pvid.run.refined_kernel import kernel_of
-from pvid.run.refined_mechanism import problem_of, start_of
+from pvid.run.refined_mechanism import prior_about, problem_of, start_of
 from pvid.run.sensor_prediction import SensorPrediction
 
 Float = npt.NDArray[np.float64]
@@ -39,6 +39,7 @@ class Validation:
     sensors : how well each is predicted
     block_s, blocks : length [s] and number of the blocks
     t, measured, simulated : of the samples in them [n]; by sensor [n] each
+    fitted : by name: parameters of which the recording has its own values, fitted to it beside the starts
     """
 
     sensors: tuple[SensorPrediction, ...]
@@ -47,16 +48,20 @@ class Validation:
     t: Float
     measured: Mapping[str, Float]
     simulated: Mapping[str, Float]
+    fitted: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
         """A sentence."""
-        return f"predicts {listed(self.sensors)}, in {self.blocks} blocks of {self.block_s:.3g} s"
+        own = listed(f"its own {name} of {value:.4g}" for name, value in self.fitted.items())
+        with_own = f", with {own}" if own else ""
+        return f"predicts {listed(self.sensors)}, in {self.blocks} blocks of {self.block_s:.3g} s{with_own}"
 
     def as_json(self) -> dict[str, Any]:
         """The object of `validate --json`."""
         sensors = {one.name: one.as_json() for one in self.sensors}
-        return {"sensors": sensors, "block_s": self.block_s, "blocks": self.blocks}
+        own = {"fitted": dict(self.fitted)} if self.fitted else {}
+        return {"sensors": sensors, "block_s": self.block_s, "blocks": self.blocks} | own
 
 
 class Motion:
@@ -121,6 +126,14 @@ class Motion:
         nothing = Prior(r, np.ones(problem.n), np.zeros(problem.n, np.bool_))
         return cut, problem.simulated(r, cut, problem.with_starts(nothing, cut, _PASSES).starts)
 
+    def fitted(self, r: Float, problem: Problem, samples: int, names: Collection[str]) -> Float:
+        """r with these parameters fitted to the recording, in blocks of so many samples; r where it runs away."""
+        parameters = problem.kernel.made.parameters
+        free = np.array([one.name in names for one in parameters])
+        prior = replace(prior_about(problem, r), free=free)
+        found = refined(problem, prior, (max(SHORTEST, samples // WINDOWS), samples))
+        return found.r if np.isfinite(found.sum_of_squares) else r
+
     def compared(self, measured: Float, simulated: Float) -> tuple[SensorPrediction, ...]:
         """Of each sensor, from readings [blocks, samples, sensors]."""
         names = self.problem.kernel.made.outputs
@@ -130,13 +143,16 @@ class Motion:
         )
 
 
-def validated(model: CompiledModel, recording: Recording, p: Float, window_s: float) -> Validation:
+def validated(
+    model: CompiledModel, recording: Recording, p: Float, window_s: float, own: Collection[str] = ()
+) -> Validation:
     """How well p predicts a recording, all of it that can be simulated.
 
     Parameters
     ----------
     p : all parameters of the model [n_p]
     window_s : of the weak form that gave p [s]
+    own : names of those that are fitted to the recording, from p on
 
     Raises
     ------
@@ -149,7 +165,10 @@ def validated(model: CompiledModel, recording: Recording, p: Float, window_s: fl
         problem = motion.within([(0, len(recording))])
         if not problem.measured.stretches or problem.longest < _BLOCKS * SHORTEST:
             raise PvidError(f"the recording is too short to predict it in {_BLOCKS} blocks of {SHORTEST} samples")
-        cut, simulated = motion.simulated(motion.r_of(p), problem, motion.block(window_s, _BLOCKS))
+        r, samples = motion.r_of(p), motion.block(window_s, _BLOCKS)
+        if own:
+            r = motion.fitted(r, problem, samples, own)
+        cut, simulated = motion.simulated(r, problem, samples)
     measured = cut.rows(problem.measured.z)
     if not np.isfinite(simulated).all():
         raise PvidError(
@@ -164,13 +183,15 @@ def validated(model: CompiledModel, recording: Recording, p: Float, window_s: fl
         recording.t[places.ravel()],
         {name: measured[..., k].ravel() for k, name in enumerate(names)},
         {name: simulated[..., k].ravel() for k, name in enumerate(names)},
+        {one.name: float(r[k]) for k, one in enumerate(problem.kernel.made.parameters) if one.name in own},
     )
 
 
 def predicted(
     model: CompiledModel, recording: Recording, values: Mapping[str, float | None], window_s: float | None
 ) -> Validation:
-    """The same with values by name, as an answer has them.
+    """The same with values by name, as an answer has them. Parameters of which an answer from several recordings has a
+    value for each, `m[A]` and `m[B]`, are fitted.
 
     Parameters
     ----------
@@ -181,11 +202,17 @@ def predicted(
     PvidError
         Also where a parameter has no value.
     """
-    missing = [name for name in model.p_names if values.get(name) is None]
+    model = model.alone
+    of_each = {name: [value for key, value in values.items() if key.startswith(f"{name}[")] for name in model.p_names}
+    own = {name: [one for one in each if one is not None] for name, each in of_each.items() if each}
+    known = {name: values.get(name) for name in model.p_names if name not in own}
+    missing = [name for name, value in known.items() if value is None] + [
+        name for name, each in own.items() if not each
+    ]
     if missing:
         raise PvidError(f"{listed(missing)} of {model.name} has no value there: without it no motion can be predicted")
-    p = np.array([values[name] for name in model.p_names], np.float64)
-    return validated(model, recording, p, window_s or len(recording) / recording.sample_rate / 20)
+    p = np.array([np.mean(own[name]) if name in own else known[name] for name in model.p_names], np.float64)
+    return validated(model, recording, p, window_s or len(recording) / recording.sample_rate / 20, list(own))
 
 
 def _of_sensor(model: CompiledModel, name: str, measured: Float, simulated: Float, sd: float) -> SensorPrediction:

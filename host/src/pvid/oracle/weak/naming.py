@@ -177,7 +177,8 @@ def scale_of(model: CompiledModel, kind: int, p: Float) -> float | None:
     whole = sum(
         sp.sympify(theta) * total_derivative(psi, order) for theta, part in parts for order, psi in part.items()
     )
-    at_p = dict(zip(model.p, map(sp.Float, p), strict=True))
+    of_first = p[list(model.places[0])]  # of several recordings: the row has the symbols of one
+    at_p = dict(zip(model.alone.p, map(sp.Float, of_first), strict=True))
     whole, equation = (model.with_knowns(sp.sympify(one)).xreplace(at_p) for one in (whole, equation))
     symbols = sorted(whole.free_symbols | equation.free_symbols, key=str)
     random = np.random.default_rng(1)

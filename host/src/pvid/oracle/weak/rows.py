@@ -14,6 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import with_corners
 from pvid.model.signals import Integral, Jet
+from pvid.model.together import in_columns
 from pvid.oracle.weak.channels import Channels, Record
 from pvid.oracle.weak.corners import with_jumps
 from pvid.oracle.weak.design import WeakDesign
@@ -34,8 +35,9 @@ class Compiled:
     Attributes
     ----------
     bare : as compiled
-    model : its rows with the corners of sampled signals
+    model : its rows with the corners of sampled signals, and with columns for each recording
     jumps : name of a signal in them -> what it is made of
+    within : names of signals in them that are 1 in one recording, of each
     number : of the object in this process
     """
 
@@ -45,7 +47,8 @@ class Compiled:
         self.number = next(Compiled._numbers)
         self.bare = model
         model, self.jumps = with_corners(model)
-        self.model = model
+        self.model, self.within = in_columns(model)
+        model = self.model
         self.channels = Channels(model)
         self.filters = NoiseFilters(self.channels)
         self.parameters = Parameters(model)
@@ -108,7 +111,10 @@ def record_of(
     A model with an integral since the start of the run has one segment of each recording, its longest: behind a gap
     nobody knows the integral.
     """
-    samples = samples_of(compiled.model, with_jumps(run, compiled.jumps, design.sample_rate))
+    whole = with_jumps(run, compiled.jumps, design.sample_rate)
+    for number, name in enumerate(compiled.within):
+        whole[name] = (np.asarray(run[NUMBER]) == number).astype(np.float64)
+    samples = samples_of(compiled.model, whole)
     segments = segments_of(samples)
     if any(one.has(Integral) for one in compiled.channels.opaque.values()):
         segments = _longest_of_each(segments, run)

@@ -122,19 +122,22 @@ def _in_signs(psi: sp.Expr) -> set[Jet]:
 
 
 def too_slow(model: CompiledModel, samples: Mapping[str, Float], rate: float, fit: Fit) -> list[Reason]:
-    """The fastest mode of the equations passes within a sample: parameters of its highest derivative are lost."""
+    """The fastest mode of the equations passes within a sample: parameters of its highest derivative are lost. Of
+    several recordings with own parameters, the modes are those of the first."""
+    p = fit.p[list(model.places[0])]
+    model = model.alone
     try:
         modes = _Modes(model, samples)
     except PvidError:  # no simulation, no modes
         return []
     guess = np.array([one.guess for one in model.unknowns])
-    fastest = modes.fastest(fit.p)
+    fastest = modes.fastest(p)
     if not _FASTEST * rate < fastest < np.inf or modes.fastest(guess) < _FAST_GUESS * rate:
         return []
     lost = [
         one.name
         for k, one in enumerate(model.unknowns)
-        if one.symbol in modes.inertias and abs(np.log(modes.fastest(_moved(fit.p, k)) / fastest) / 0.1) > _SENSITIVE
+        if one.symbol in modes.inertias and abs(np.log(modes.fastest(_moved(p, k)) / fastest) / 0.1) > _SENSITIVE
     ]
     if not lost:
         return []
