@@ -11,6 +11,7 @@ from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.choice import ranked
 from pvid.oracle.weak.identify import identify, ready
 from pvid.oracle.weak.rows import WeakRows
+from pvid.rig.run import NUMBER
 
 Float = npt.NDArray[np.float64]
 
@@ -79,3 +80,19 @@ def test_integral_since_the_start_ends_at_a_gap() -> None:
     gapped = with_gaps(run, slice(n // 3, n // 3 + 20))
     rows = WeakRows.of(ready(compiled_of("battery_2rc")), gapped, DESIGNS["battery_2rc"])
     assert len(rows.record.grid.parts) == 1 and rows.record.grid.places[0] > n // 3
+
+
+def test_parts_of_a_run_have_windows_of_every_recording() -> None:
+    """Halves and folds compare like with like: one recording may not determine what the others do."""
+    run: dict[str, npt.ArrayLike] = dict(with_gaps(simulation("cart_pendulum").run(2), slice(5_000, 5_100)))
+    design = DESIGNS["cart_pendulum"]
+    n = len(np.asarray(run["x"]))
+    rows = WeakRows.of(ready(compiled_of("cart_pendulum")), {**run, NUMBER: np.arange(n) >= 5_100}, design)
+    own = rows.end_times() * design.sample_rate > 5_100
+    np.testing.assert_array_equal(rows.recordings, own)
+    for count in (2, 4):
+        for part in range(count):
+            for recording in (0, 1):
+                windows = np.flatnonzero((rows.parts(count) == part) & (rows.recordings == recording))
+                whole = np.count_nonzero(rows.recordings == recording)
+                assert abs(windows.size - whole / count) < 1 and np.all(np.diff(windows) == 1)

@@ -81,7 +81,7 @@ class WhiteRows:
     whitener: Whitener
     free: int
 
-    def only(self, windows: slice) -> WhiteRows:
+    def only(self, windows: slice | npt.NDArray[np.bool_]) -> WhiteRows:
         """Some of the windows."""
         n = self.regressors[windows]
         free = round(self.free * len(n) / len(self.regressors))
@@ -155,6 +155,7 @@ class WeakRows:
     record : channels at every step
     columns : of each row kind [windows, columns, K]; theta's, then Y, then the nuisances
     numbers : of the windows in the run; those with a missing sample are left out
+    recordings : of each window, of a run of several, the number of its own
     noise, reversals : covariances
     groups : of kinds that are whitened together
     """
@@ -168,6 +169,7 @@ class WeakRows:
         if not whole.any():
             raise PvidError("no window of the run is whole: every one has a missing sample")
         self.numbers = np.flatnonzero(whole)
+        self.recordings = np.zeros(len(self.numbers), np.int64)
         self.columns = [one[whole] for one in columns]
         self.noise = NoiseModel(compiled.filters, record)
         self.reversals = ReversalNoise(compiled.channels, record)
@@ -177,7 +179,11 @@ class WeakRows:
     @classmethod
     def of(cls, compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> WeakRows:
         """Those of a run: name -> samples."""
-        return cls(compiled, record_of(compiled, run, design))
+        rows = cls(compiled, record_of(compiled, run, design))
+        if NUMBER in run:
+            grid = rows.record.grid
+            rows.recordings = np.asarray(run[NUMBER])[grid.places[grid.design.hop * rows.numbers]].astype(np.int64)
+        return rows
 
     @property
     def windows(self) -> int:
@@ -193,7 +199,16 @@ class WeakRows:
         """Some of the windows; the noise stays that of the run."""
         out = copy.copy(self)
         out.columns = [one[windows] for one in self.columns]
-        out.numbers = self.numbers[windows]
+        out.numbers, out.recordings = self.numbers[windows], self.recordings[windows]
+        return out
+
+    def parts(self, count: int) -> npt.NDArray[np.int64]:
+        """In which part of its recording each window lies, of so many of equal length [windows]: a part of the run has
+        windows of every recording."""
+        out = np.empty(self.windows, np.int64)
+        for number in np.unique(self.recordings):
+            own = np.flatnonzero(self.recordings == number)
+            out[own] = np.arange(own.size) * count // own.size
         return out
 
     def end_times(self) -> Float:

@@ -22,7 +22,7 @@ from pvid.oracle.weak.rows import WhiteRows
 from pvid.oracle.weak.solve import Fit, inverse
 from pvid.oracle.weak.terms import Candidate
 
-FOLDS = 4  # contiguous parts of a run: p and sizes from three, the share on the fourth
+FOLDS = 4  # contiguous parts of each recording: p and sizes from three, the share on the fourth
 
 # A column of which the parameters explain all but this part is theirs: no data show it.
 _OWN = 1e-4
@@ -76,8 +76,7 @@ class Scores:
 
     def _folds(self) -> list[npt.NDArray[np.intp]]:
         """Windows of each part of the run."""
-        windows = len(self.residuals)
-        fold = np.minimum(np.arange(windows) * FOLDS // windows, FOLDS - 1)
+        fold = self.fit.rows.parts(FOLDS)
         return [np.flatnonzero(fold == part) for part in range(FOLDS)]
 
     def by_parts(self) -> Float:

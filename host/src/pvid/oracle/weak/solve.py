@@ -160,7 +160,7 @@ class Fit:
         """Of its model."""
         return self.rows.compiled.parameters
 
-    def only(self, windows: slice) -> Fit:
+    def only(self, windows: slice | npt.NDArray[np.bool_]) -> Fit:
         """The same estimate and weights, with some of the windows."""
         return replace(self, rows=self.rows.only(windows), white=[one.only(windows) for one in self.white])
 

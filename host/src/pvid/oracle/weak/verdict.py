@@ -304,12 +304,13 @@ def partner_of(fit: Fit, worst: int) -> int | None:
 
 
 def halves_of(fit: Fit) -> Halves | None:
-    """The run's two halves, each from its own windows; None where there are too few."""
-    count = fit.rows.windows
-    if count < 2 * _FEW_WINDOWS:
+    """The run's two halves, each from its own windows; None where there are too few. Of several recordings a half has
+    one of each, as one recording may not determine what the others do."""
+    if fit.rows.windows < 2 * _FEW_WINDOWS:
         return None
     parts = []
-    for windows in (slice(0, count // 2), slice(count - count // 2, None)):
+    half = fit.rows.parts(2)
+    for windows in (half == 0, half == 1):
         own = fit.only(windows)
         p, _ = gauss_newton(own.parameters, Moments.of(own.white), own.p, own.parameters.prior(own.start), 30)
         moved = own.at(p)

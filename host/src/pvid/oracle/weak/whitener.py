@@ -99,7 +99,7 @@ class Whitener:
             alike.append(_Alike.of(windows, entries, base @ own.transpose(0, 2, 1)))
         return cls(base, directions.shape, tuple(alike))
 
-    def only(self, windows: slice) -> Whitener:
+    def only(self, windows: slice | npt.NDArray[np.bool_]) -> Whitener:
         """Of some of the windows."""
         kept = np.arange(self.shape[0])[windows]
         return replace(self, shape=(len(kept), *self.shape[1:]), alike=tuple(one.only(kept) for one in self.alike))
