@@ -53,8 +53,8 @@ class Validation:
     @property
     def text(self) -> str:
         """A sentence."""
-        own = listed(f"its own {name} of {value:.4g}" for name, value in self.fitted.items())
-        with_own = f", with {own}" if own else ""
+        own = [f"its own {name} of {value:.4g}" for name, value in self.fitted.items()]
+        with_own = f", with {listed(own)}" if own else ""
         return f"predicts {listed(self.sensors)}, in {self.blocks} blocks of {self.block_s:.3g} s{with_own}"
 
     def as_json(self) -> dict[str, Any]:
