@@ -57,7 +57,7 @@ def test_recordings_are_identified_together(springs: list[str | Path]) -> None:
     assert both["samples"] > 2 * alone["samples"] and both["status"] == "good"
     for name in TRUTH:
         # twice the data: 0.71 times the standard error, of which either run's estimate is off by 15 %
-        assert both["parameters"][name]["se"] < 0.9 * alone["parameters"][name]["se"]
+        assert both["parameters"][name]["se_noise"] < 0.9 * alone["parameters"][name]["se_noise"]
 
 
 def test_the_refinement_fits_all_recordings(springs: list[str | Path]) -> None:
@@ -69,7 +69,7 @@ def test_the_c_core_takes_one_recording_after_the_other(springs: list[str | Path
     both, alone = found(*springs, "--core", "f32"), found(springs[0], *springs[2:], "--core", "f32")
     # the missing ticks between them are no windows; a design may have windows of half or twice the length
     assert 0.8 * alone["windows"] < both["windows"] < 5 * alone["windows"]
-    assert all(both["parameters"][name]["se"] < alone["parameters"][name]["se"] for name in TRUTH)
+    assert all(both["parameters"][name]["se_noise"] < alone["parameters"][name]["se_noise"] for name in TRUTH)
 
 
 def test_own_parameters_have_the_names_of_the_files(springs: list[str | Path]) -> None:

@@ -42,7 +42,7 @@ def spring(coil: bool = False) -> CompiledModel:
     """A mass on a spring whose sensor has an unknown offset; also with a coil, whose force is g times its current."""
     model = Model("mass on a spring")
     F = model.input("F", "N", hold="zoh", reach=20, gain_sd=0)
-    x = model.sensor("x", "m", resolution=0, noise=NOISE, reach=0.5)
+    x = model.sensor("x", "m", resolution=0, noise=NOISE, reach=0.5, gain_sd=0)
     m, b, k = model.unknown("m", "kg", 0.8), model.unknown("b", "N*s/m", 1.5), model.unknown("k", "N/m", 40.0)
     x0 = model.unknown("x0", "m", 0.0, positive=False, sd=0.05)
     force = F
@@ -50,7 +50,7 @@ def spring(coil: bool = False) -> CompiledModel:
         force = F + model.unknown("g", "N/A", 3.0) * model.input("i", "A", hold="zoh", reach=5, gain_sd=0)
     model.output("period", "s", 2 * np.pi * (m / k) ** 0.5)
     model.equation(m * x.d(2) + b * x.d() + k * (x - x0) - force)
-    return model.compiled("spring")
+    return replace(model.compiled("spring"), clock_sd=0.0)
 
 
 SPRING = spring()
@@ -198,7 +198,7 @@ def test_another_recording_is_predicted_with_its_own_parameter_fitted() -> None:
 
 def test_a_mechanism_without_an_input_has_a_start_in_each_recording() -> None:
     model = Model("free pendulum")
-    th = model.sensor("th", "rad", resolution=0, noise=1e-3, reach=2)
+    th = model.sensor("th", "rad", resolution=0, noise=1e-3, reach=2, gain_sd=0)
     w, b = model.unknown("w", "1/s^2", 20.0), model.unknown("b", "1/s", 0.2)
     c = model.unknown("c", "rad", 0.0, positive=False, sd=0.2)
     model.equation(th.d(2) + b * th.d() + w * sin(th - c))
@@ -223,8 +223,8 @@ def test_an_algebraic_equation_has_own_parameters() -> None:
     """A motor without inductance, with one load and then another."""
     model = Model("motor without inductance")
     v = model.input("v", "V", hold="zoh", reach=12, gain_sd=0)
-    i = model.sensor("i", "A", resolution=0, noise=5e-3, reach=10)
-    s = model.sensor("s", "rad/s", resolution=0, noise=0.05, reach=200)
+    i = model.sensor("i", "A", resolution=0, noise=5e-3, reach=10, gain_sd=0)
+    s = model.sensor("s", "rad/s", resolution=0, noise=0.05, reach=200, gain_sd=0)
     r, k = model.unknown("R", "ohm", 1.0), model.unknown("k", "N*m/A", 0.04)
     j, b = model.unknown("J", "kg*m^2", 2e-4), model.unknown("b", "N*m*s", 2e-4)
     model.equation(r * i + k * s - v)
