@@ -119,10 +119,10 @@ class RandomRig:
                 given = f'"{drive.name}", "{drive.unit}", hold="{hold}", reach={reach}, gain_sd=0'
                 signals.append(f"{drive.name} = model.input({given})")
         for one in self.sensed:
-            exact = ", driven=True, gain_sd=0" if one.driven else ""
+            driven = ", driven=True" if one.driven else ""
             signals.append(
                 f'{one.name} = model.sensor("{one.name}", "{one.unit}", resolution={one.resolution!r}, '
-                f"reach={_digits(one.reach)}{exact})"
+                f"reach={_digits(one.reach)}, gain_sd=0{driven})"
             )
         body = "\n".join([f'model = Model("{self.title}")', *signals, *self.declared, *self.equations])
         names = ", ".join(["Model", *(one for one in _LANGUAGE if re.search(rf"\b{one}\(", body))])
