@@ -10,7 +10,7 @@ static pvid_weak_f32 identifier;
 void weak_rig_prepare(float (*noise)(void))
 {
     pvid_weak_config_f32 config = kapitza_config_f32;
-    config.drive_min = NULL; /* every window is worked off */
+    config.drive_min = NULL; /* every window is processed */
     config.range = NULL;
     config.estimator.forgetting_s = 7.4f; /* 9.6 windows: a fold at every one */
     config.estimator.kappa_min = 0.0f;

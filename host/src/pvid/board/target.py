@@ -178,7 +178,7 @@ def _open_or_kill(place: str, process: subprocess.Popen[bytes]) -> Port:
 class Playback:
     """What came of a run on a target: the exact account of the link.
 
-    `done` samples of `ticks` were worked off, each exactly once, in the present session; `hash` is the running hash
+    `done` samples of `ticks` were processed, each exactly once, in the present session; `hash` is the running hash
     after them. `hashes` are the checkpoints that arrived, by ticks done; `missing_hashes` those that did not.
     `sent` counts samples put on the wire, `repeated` those of them sent before, `restarts` new beginnings after the
     board had forgotten its session. `received` is what the PC's decoder saw, `board` the target's last status.
@@ -200,7 +200,7 @@ class Playback:
 
     @property
     def complete(self) -> bool:
-        """Whether the target worked off every sample and said so."""
+        """Whether the target processed every sample and said so."""
         return self.done == self.ticks and self.hash is not None
 
     @property
@@ -216,7 +216,7 @@ class Playback:
         lost = self.received.missing + (self.board.missing if self.board else 0)
         damaged = self.received.damaged + (self.board.malformed + self.board.bad_crc if self.board else 0)
         text = (
-            f"{self.done} of {self.ticks} samples worked off, {self.repeated} sent again; {lost} frames lost, "
+            f"{self.done} of {self.ticks} samples processed, {self.repeated} sent again; {lost} frames lost, "
             f"{damaged} damaged, {len(self.missing_hashes)} checkpoints missing, {self.restarts} restarts"
         )
         return text if self.complete else f"{text}; {self.ended}"
@@ -465,7 +465,7 @@ def play(
 
 @dataclass(frozen=True)
 class Verdict:
-    """The hashes of a target against those of the host: equal only where every sample was worked off."""
+    """The hashes of a target against those of the host: equal only where every sample was processed."""
 
     playback: Playback
     expected: int

@@ -567,11 +567,17 @@ def _table(values: Mapping[str, Value], title: str) -> None:
     Console().print(table_of(values, title))
 
 
+def _is_large(value: Value, part: str) -> bool:
+    """Whether a part is most of a standard error."""
+    return (getattr(value, part) or 0.0) > (value.se or 0.0) / 2
+
+
 def table_of(values: Mapping[str, Value], title: str) -> Table:
     """Values by name with their standard errors, the parts of these, and the verdict where one is not good."""
-    lacking = any((one.se_model or 0.0) > (one.se or 0.0) / 2 for one in values.values())
+    large = {"from scale": "se_scale", "from the model": "se_model"}
+    large = {name: of for name, of in large.items() if any(_is_large(one, of) for one in values.values())}
     doubted = any(one.word != "good" for one in values.values())
-    names = ("parameter", "estimate", "standard error", "of it noise", *(["of it model"] if lacking else []))
+    names = ("parameter", "estimate", "standard error", "from noise", *large)
     table = Table(*names, *(["verdict"] if doubted else []), title=title)
     for column in table.columns[1 : len(names)]:
         column.justify = "right"
@@ -582,7 +588,7 @@ def table_of(values: Mapping[str, Value], title: str) -> Table:
             continue
         estimate, error = with_error(one.value, one.se)
         below = "" if one.below is None else f" (below {one.below:.2g})"
-        parts = [one.se_noise, *([one.se_model or 0.0] if lacking else [])]
+        parts = [one.se_noise, *(getattr(one, of) or 0.0 for of in large.values())]
         word = [one.word] if doubted else []
         table.add_row(label, estimate + below, error, *(f"{part:.2g}" for part in parts), *word)
     return table

@@ -1,4 +1,4 @@
-"""A run through an identifier whose windows are worked off in stages, some a tick."""
+"""A run through an identifier whose windows are processed in stages, some a tick."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from math import pi
 
 from pvid.model import Model, cos, sgn
 
-model = Model("cart-pendulum, unknown zero")
+model = Model("cart-pendulum, encoder offset")
 F, x = model.input("F", "N", hold="zoh", reach=20), model.sensor("x", "m", resolution=2e-5, reach=1)
 a = model.sensor("a", "rad", resolution=2 * pi / 2**12, reach=4)
 mt, ml, J = model.unknown("mt", "kg", 0.8), model.unknown("ml", "kg*m", 0.04), model.unknown("J", "kg*m^2", 0.0107)

@@ -4,7 +4,7 @@ from math import pi
 
 from pvid.model import Model, cos, sgn, sin
 
-model = Model("Kapitza pendulum, unknown zero")
+model = Model("Kapitza pendulum, encoder offset")
 l1 = model.known("l1", "m", 0.3)
 y = model.sensor("y", "m", resolution=5e-6, noise=0.4, reach=0.02, driven=True)
 phi = model.sensor("phi", "rad", resolution=2 * pi / 2**14, reach=0.2, neglected=1.0)  # small angles
