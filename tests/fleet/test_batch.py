@@ -18,8 +18,10 @@ from conftest import ROOT
 from program import pvid
 
 from pvid.base.cluster import _distributed
+from pvid.base.console import DONE
 from pvid.base.errors import PvidError
 from pvid.cli.batch import command
+from pvid.cli.main import commands
 from pvid.fleet import run as fleet
 from pvid.fleet.row import EQUAL, Question, Row, row_of
 from pvid.fleet.store import Store, read_rows
@@ -212,3 +214,44 @@ def test_wrong_usage_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyP
         with pytest.raises(PvidError, match=words):
             command.main([*arguments, "-o", "x.parquet"], standalone_mode=False)
     assert os.listdir(tmp_path) == []
+
+
+SPRING = """
+from pvid.model import Model
+model = Model("mass on a spring")
+F = model.input("F", "N", hold="zoh", reach=5)
+x = model.sensor("x", "m", resolution=1e-5, reach=0.1)
+m, b, k = model.unknown("m", "kg", 1.0), model.unknown("b", "N*s/m", 1.0), model.unknown("k", "N/m", 50.0)
+model.equation(m * x.d(2) + b * x.d() + k * x - F)
+"""
+
+
+def test_recordings_of_a_folder_are_identified_together(tmp_path: Path) -> None:
+    model = tmp_path / "spring.py"
+    model.write_text(SPRING)
+    for folder, seeds in {"a": (1, 2), "b": (3,)}.items():
+        (tmp_path / folder).mkdir()
+        for seed in seeds:
+            given = ("--duration", "6", "--rate", "500", "--seed", str(seed))
+            place = str(tmp_path / folder / f"s{seed}.csv")
+            CliRunner().invoke(commands, ["model", "simulate", str(model), place, *given], catch_exceptions=False)
+    asked_for = ("--model", str(model), "-o", str(tmp_path / "fleet.parquet"), "--workers", "1", "--together")
+    batch = [str(tmp_path / "*" / "*.csv"), *asked_for, "--own", "m"]
+    assert CliRunner().invoke(command, batch, standalone_mode=False).return_value == DONE
+    rows = {Path(one.path).name: one for one in read_rows(tmp_path / "fleet.parquet")}
+    assert set(rows) == {"a", "b"} and all(one.identified for one in rows.values())
+    assert {"m[s1]", "m[s2]", "b", "k"} == set(rows["a"].parameters) and set(rows["b"].parameters) == {"m", "b", "k"}
+    assert (rows["a"].samples or 0) > 2 * (rows["b"].samples or 1)
+
+
+def test_a_folder_with_a_new_recording_is_identified_again(tmp_path: Path) -> None:
+    paths = [tmp_path / name for name in ("a.csv", "b.csv")]
+    for path in paths:
+        path.write_text("t,phi,y\n")
+    keys = {asked().key(*paths[:count]) for count in (1, 2)}
+    assert len(keys) == 2 and asked().key(*paths) in keys
+
+
+def test_own_parameters_need_recordings_together(tmp_path: Path) -> None:
+    refused = CliRunner().invoke(command, ["x.csv", "-o", str(tmp_path / "f.parquet"), "--own", "m"])
+    assert isinstance(refused.exception, PvidError) and "--together" in str(refused.exception)

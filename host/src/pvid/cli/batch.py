@@ -12,7 +12,7 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.replacing import refuse_foreign
-from pvid.cli.input import NewFile, columns_option, force_option, rig_options
+from pvid.cli.input import NewFile, columns_option, force_option, listed_names, rig_options
 
 _SHOWN = 20  # failures
 
@@ -26,6 +26,9 @@ _SHOWN = 20  # failures
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
 @columns_option
 @rig_options
+@click.option("--together", is_flag=True, help="Identify the FILEs of one folder together: a row a folder.")
+@click.option("--own", metavar="NAME,...", multiple=True, help="With --together: as of identify.")
+@click.option("--shared", metavar="NAME,...", multiple=True, help="With --together: as of identify.")
 @click.option("--no-verify", is_flag=True, help="Do not compute logs again with the twin.")
 @click.option("--page", type=NewFile(), help="Summary page.  [default: OUT with .html]")
 @click.option("--scheduler", metavar="ADDRESS", help="A running scheduler of dask.distributed (tcp://HOST:PORT).")
@@ -36,6 +39,9 @@ def command(
     out: Path,
     rig_path: Path | None,
     settings: tuple[str, ...],
+    together: bool,
+    own: tuple[str, ...],
+    shared: tuple[str, ...],
     no_verify: bool,
     page: Path | None,
     scheduler: str | None,
@@ -46,7 +52,8 @@ def command(
 
     FILE may be a pattern in quotes: 'runs/*.csv', 'fleet/**/*.pvlog'. A second call with the same -o computes only what
     is new or has changed, also after an interruption. The page shows what failed and how the parameters of each board
-    drift: a board is the USB serial number of a log, or the folder of a run.
+    drift: a board is the USB serial number of a log, or the folder of a run. With --together the FILEs of a folder are
+    recordings of one mechanism, which are identified together.
 
     Exit code 1: a log is not equal to its twin. 3: nothing was identified.
     """
@@ -60,14 +67,17 @@ def command(
     if wrong := [one for one in settings if "=" not in one]:
         raise PvidError(f"--set {wrong[0]}: write KEY=VALUE, as in --set l1=0.25")
     rig = None if rig_path is None else str(rig_path)
-    question = Question(rig=rig, settings=given, verify=not no_verify, **asked)
+    if (own or shared) and not together:
+        raise PvidError("--own and --shared are of recordings that are identified --together")
+    each, all_ = (tuple(listed_names(one)) for one in (own, shared))
+    question = Question(rig=rig, settings=given, verify=not no_verify, own=each, shared=all_, **asked)
     paths = _files(patterns)
     if not out.name:
         raise PvidError(f"{out}: -o is a Parquet file to write")
     place = page or out.with_suffix(".html")
     refuse_foreign(place)
     with progress_bar("identifying", len(paths)) as advance:
-        rows = run(paths, question, Store(out), advance, scheduler=scheduler, workers=workers)
+        rows = run(paths, question, Store(out), advance, scheduler=scheduler, workers=workers, together=together)
     write_whole(place, summary(rows, f"pvid batch {' '.join(patterns)}"))
     for name, count in counts_of(rows).items():
         click.echo(f"{name}: {count} of {len(rows)}")

@@ -11,7 +11,16 @@ import click
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import FigurePath, NewFile, force_option, form_options, print_notes, read_input, with_overrides
+from pvid.cli.input import (
+    FigurePath,
+    NewFile,
+    force_option,
+    form_options,
+    listed_names,
+    print_notes,
+    read_input,
+    with_overrides,
+)
 from pvid.cli.result import print_result, print_warning, write_figure, write_refined_figure
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import common_rig
@@ -136,8 +145,8 @@ def command(
             other=other,
             add=add,
             write_model=write_model,
-            own=_names(own),
-            shared=_names(shared),
+            own=listed_names(own),
+            shared=listed_names(shared),
             **options,
         )
     if add or write_model is not None:
@@ -186,8 +195,3 @@ def command(
     for sentence in result.advice:
         write_stderr(f"pvid: advice: {sentence}")
     return DONE if result.identified else NOTHING_IDENTIFIED
-
-
-def _names(given: tuple[str, ...]) -> list[str]:
-    """Names of a repeated option with lists of names."""
-    return list(dict.fromkeys(name.strip() for one in given for name in one.split(",") if name.strip()))

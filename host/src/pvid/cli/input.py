@@ -76,6 +76,11 @@ def with_overrides(rig: RigFile, **overrides: str | None) -> RigFile:
     return replace(rig, identifier=replace(rig.identifier, **given)) if given else rig  # type: ignore[arg-type]
 
 
+def listed_names(given: Iterable[str]) -> list[str]:
+    """Names of a repeated option with lists of names, each once."""
+    return list(dict.fromkeys(name.strip() for one in given for name in one.split(",") if name.strip()))
+
+
 log_argument = click.argument("log", type=click.Path(path_type=Path))
 log_rig = click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file.  [default: the log's own]")
 

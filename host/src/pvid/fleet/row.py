@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -31,6 +31,7 @@ class Question:
     Attributes
     ----------
     verify : whether a log is computed again with the twin, bit for bit
+    own, shared : of recordings that are identified together
     """
 
     model: str | None = None
@@ -39,18 +40,21 @@ class Question:
     core: Literal["f32", "q31", "f64"] | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     verify: bool = True
+    own: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
 
-    def key(self, path: Path) -> str:
-        """Sixteen digits that change with the recording's content, the rig file beside it, the question or the version.
+    def key(self, *paths: Path) -> str:
+        """Sixteen digits that change with the content of the recordings, the rig files beside them, the question or the
+        version.
 
         Raises
         ------
         OSError
             When it cannot be read.
         """
-        digest = hashlib.sha256(repr((__version__, self, path.name)).encode())
+        digest = hashlib.sha256(repr((__version__, self, *(path.name for path in paths))).encode())
         others = [Path(one) for one in (self.model, self.rig) if one is not None]
-        for one in (path, path.with_suffix(".toml"), *others):
+        for one in (*(file for path in paths for file in (path, path.with_suffix(".toml"))), *others):
             digest.update(b"\0")
             if one.is_file():
                 with one.open("rb") as file:
@@ -66,7 +70,7 @@ class Row:
     Attributes
     ----------
     key : of its content and the question
-    path : as it was given
+    path : as it was given; of recordings that are identified together their folder
     board : USB serial number of the board that sent a log, else its name and folder; of a run its folder
     began : seconds since 1970 of a log's first segment; of a run the time of its file
     samples : that were identified
@@ -94,24 +98,29 @@ class Row:
     se_apart: Mapping[str, float] = field(default_factory=dict)
 
 
-def row_of(path: str, question: Question) -> Row:
-    """Identifies a recording, and verifies it if it is a log; whatever it contains, there is a row."""
+def row_of(given: str | tuple[str, ...], question: Question) -> Row:
+    """Identifies a recording, or several of one folder together, and verifies logs; whatever they contain, there is a
+    row."""
     start = time.monotonic()
-    place = Path(path)
+    places = [Path(given)] if isinstance(given, str) else [Path(one) for one in given]
+    place = places[0]
+    path = given if isinstance(given, str) else str(place.parent)
     key = ""
     try:
-        key = question.key(place)
+        key = question.key(*places)
         board, began = _origin(place)
     except (OSError, PvidError) as error:
         return Row(key, path, str(place.parent), 0.0, failure=_told(error), took=time.monotonic() - start)
     try:
         result = identify(
-            place,
+            places if len(places) > 1 else place,
             model=question.model,
             rig=question.rig,
             columns=question.columns,
             core=question.core,
             settings=question.settings,
+            own=question.own if len(places) > 1 else (),
+            shared=question.shared if len(places) > 1 else (),
         )
     except (PvidError, OSError) as error:
         return Row(key, path, board, began, failure=_told(error), took=time.monotonic() - start)
@@ -125,7 +134,7 @@ def row_of(path: str, question: Question) -> Row:
         result.verdict,
         result.status,
         result.warning,
-        _verified(place, question.model) if question.verify and place.suffix == LOG_SUFFIX else None,
+        _all_verified(places, question) if question.verify else None,
         parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
         took=time.monotonic() - start,
         se_apart={name: result.se_apart(name) for name in result.parameters},
@@ -151,6 +160,12 @@ def _origin(path: Path) -> tuple[str, float]:
         return serial, began
     hello = hello_of_log(path)
     return (f"{hello.board} in {path.parent}" if hello is not None else str(path.parent)), began
+
+
+def _all_verified(paths: Sequence[Path], question: Question) -> str | None:
+    """Of all logs among them: EQUAL, or what is not of the first one that is not; None: there is no log."""
+    found = [_verified(one, question.model) for one in paths if one.suffix == LOG_SUFFIX]
+    return next((one for one in found if one != EQUAL), EQUAL) if found else None
 
 
 def _verified(path: Path, model: str | None) -> str:
