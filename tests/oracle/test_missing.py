@@ -9,12 +9,27 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from bench.lacking import EFFECTS, OF_TABLE, Effect, Outcome, Row, outcome, summary
+from bench.lacking import (
+    EFFECTS,
+    OF_TABLE,
+    Case,
+    Effect,
+    Outcome,
+    Row,
+    Told,
+    campaign,
+    campaign_cells,
+    effects_of,
+    outcome,
+    summary,
+    told,
+)
 from bench.mechanisms import design_of, start_of
 from bench.plants import PLANTS
 from pvid.models.mechanisms import compiled_of, names
 from pvid.oracle.weak.identify import Identified, identify
 from pvid.oracle.weak.terms import ACTS, Recorded
+from pvid.oracle.weak.verdict import Verdict
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of
 
@@ -88,6 +103,57 @@ def test_row_of_the_bench_counts_what_is_named_rightly() -> None:
     text = summary([row, clean])
     assert "Of 1 recordings with an effect 0 are wrong" in text and "1 would be" in text
     assert "the first named term is right in 1" in text and "without an effect 0 have a warning" in text
+
+
+def case_of(plant: str, effect: str, size: float) -> Case:
+    """Of the campaign."""
+    return Case(0, plant, ((next(one for one in effects_of(plant) if one.name == effect), size),))
+
+
+@cache
+def found_of(plant: str, effect: str, size: float) -> Told:
+    """What `identify` makes of it."""
+    found = told(case_of(plant, effect, size), 3)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("plant", "effect", "size", "words"),
+    [
+        ("pendulum", "offset (q)", 0.25, r"q has an offset of 0\.1[56]\d* rad"),
+        ("cart", "even spring (x)", 0.1, r"lack 7[5-8]\.?\d*\*x\*\*2"),
+    ],
+)
+def test_offset_and_even_law_are_named(plant: str, effect: str, size: float, words: str) -> None:
+    """0.25 of the angle's rms of 0.64 rad; 0.4 N at the rms of 0.072 m."""
+    found = found_of(plant, effect, size)
+    assert found.right and not found.silent and re.search(words, found.found.named[0].text)
+
+
+@pytest.mark.parametrize("effect", ["R steps", "R warms up"])
+def test_what_changes_during_a_run_has_no_name(effect: str) -> None:
+    """A law that makes up for some of it leaves the halves of the run apart."""
+    found = found_of("motor", effect, 0.12)
+    assert not found.found.named and found.found.found.verdict.status != "good"
+    assert "halves" in [one.name for one in found.found.found.verdict.reasons]
+
+
+@pytest.mark.parametrize("case", campaign(6, 5), ids=lambda one: f"{one.plant}: {one.words}")
+def test_sample_of_the_campaign_has_no_silent_wrong_answer(case: Case) -> None:
+    found = told(case, 5)
+    assert found is None or not found.silent
+    if found is not None and not case.acting:
+        assert found.found.found.verdict.status == "good"
+
+
+def test_campaign_counts_silent_and_named_wrongly() -> None:
+    found = found_of("cart", "even spring (x)", 0.1)
+    quiet = replace(found.found.found, verdict=Verdict(), se=1e-9 * found.found.found.se)
+    silent = replace(found, found=replace(found.found, found=quiet))
+    other = replace(found, case=case_of("cart", "offset (x)", 0.1))
+    assert campaign_cells([found])[-1][1:8] == ("1", "0", "1", "1", "1", "0", "0")
+    assert campaign_cells([silent, other])[-1][1:8] == ("2", "1", "2", "2", "1", "1", "0")
 
 
 @cache

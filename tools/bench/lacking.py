@@ -180,7 +180,7 @@ _MOTIONS: tuple[tuple[str, tuple[str, ...], Shape], ...] = (
     ("pushes", (), lambda x, v, t: float(t * 17 % 1 < 0.06)),
     ("cubic spring", ("{x}**3",), lambda x, v, t: x**3),
     ("square spring", ("abs({x})*{x}",), lambda x, v, t: abs(x) * x),
-    ("even spring", (), lambda x, v, t: x * x),
+    ("even spring", ("{x}**2",), lambda x, v, t: x * x),
     ("preload of a spring", ("sgn({x})",), lambda x, v, t: tanh(x / 0.01)),
     ("stop", (), lambda x, v, t: 5 * (max(x - 1.2, 0.0) + min(x + 1.2, 0.0))),
 )
@@ -225,12 +225,13 @@ def _laws_of(plant: Plant, axis: Axis) -> Iterator[Effect]:
             (axis.coulomb, _OF_SIGN, axis.force),
             (axis.viscous, _OF_RATE, axis.force / v_rms),
             (axis.stiffness, _OF_PLACE, axis.force / x_rms),
+            (axis.gravity, {"gravity": (1.0, 1.0)}, axis.force),
         )
         adds = tuple((own, unit * of[name][0], unit * of[name][1]) for own, of, unit in parts if own and name in of)
         return Effect(plant.name, f"{name} ({axis.sensor})", terms, FORCES, law, axis.row, memory=memory, adds=adds)
 
     for name, named, shape in _MOTIONS:
-        if axis.v is not None or "{x}" not in "".join(named):
+        if axis.v is not None or "{x}" not in "".join(named) or name == "even spring":  # others are motions of a level
             yield effect(name, named, law(shape, x_rms))
     for name, named, shape in _OF_ANGLES if axis.angle else ():
         yield effect(name, named, law(shape, 1.0))
@@ -291,9 +292,9 @@ def _inputs_of(plant: Plant) -> Iterator[Effect]:
     if not plant.drive:
         return
     top = plant.amplitude + abs(plant.bias)
-    sensor = next(iter(plant.sensors), "")
+    sensors = (*plant.sensors, *plant.shown)
     for name, named, sizes, acts in _INPUTS:
-        terms = tuple(one.format(u=plant.drive, x=sensor) for one in named)
+        terms = tuple(dict.fromkeys(one.format(u=plant.drive, x=sensor) for one in named for sensor in sensors))
 
         def true(u: Float, size: float, acts: Callable[[Float, float], Float] = acts) -> Float:
             return np.asarray(top * acts(u / top, size))
@@ -318,7 +319,7 @@ def _spiked(x: Float, size: float) -> Float:
 _SENSORS: tuple[tuple[str, tuple[str, ...], tuple[float, ...], Callable[[Float, float], Float]], ...] = (
     ("delay", _LATE_NAMES, (0.5, 1.5, 4, 8, 16), lambda x, late: _late(x, 1.0, late)),
     ("lag", _LATE_NAMES, (0.5, 1.5, 4, 8, 16), _behind),
-    ("offset", ("1", "shows"), (0.003, 0.01, 0.03, 0.1, 0.3), lambda x, part: x + part),
+    ("offset", ("1", "has an offset"), (0.003, 0.01, 0.03, 0.1, 0.3), lambda x, part: x + part),
     ("cubic error", ("shows",), (0.003, 0.01, 0.03, 0.1, 0.2), lambda x, part: x * (1 + part * x**2)),
     ("play", ("backlash",), (0.001, 0.004, 0.015, 0.05, 0.15), lambda x, width: _play(x, 0.0, width)),
     ("clipping", (), (1.9, 1.6, 1.3, 1.1, 0.9), _clip),
@@ -365,6 +366,11 @@ def _sensors_of(plant: Plant) -> Iterator[Effect]:
             )
 
 
+# A parameter that falls with a signal is a law of that signal, times that of the parameter.
+_OF_FALL = (
+    *("abs({x})*{x}", "{x}**3", "{x}**2*{x}.d()", "abs({x}.d())*{x}.d()", "{x}.d()**3"),
+    *("abs({x})", "abs({x}.d())", "shows {x}*"),
+)
 _CHANGES = (0.01, 0.03, 0.1, 0.2, 0.4)
 
 
@@ -384,7 +390,8 @@ def _values_of(plant: Plant) -> Iterator[Effect]:
             def saturating(s: States, t: float, axis: Axis = axis, rms: float = float(plant.sizes[axis.x])) -> float:
                 return -1 / (1 + (rms / s[axis.x]) ** 2) if s[axis.x] else 0.0
 
-            yield Effect(plant.name, f"{name} falls with {axis.sensor}", (), _CHANGES, value=name, course=saturating)
+            laws = tuple(one.format(x=axis.sensor) for one in _OF_FALL)
+            yield Effect(plant.name, f"{name} falls with {axis.sensor}", laws, _CHANGES, value=name, course=saturating)
     for name in plant.constants:
         yield Effect(
             plant.name,

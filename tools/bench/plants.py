@@ -37,7 +37,8 @@ class Axis:
     force : typical size of the equation's left side [its unit]
     x, v : states: of the sensor, and its rate; None: the rate is no state
     angle : of a turning motion
-    coulomb, viscous, stiffness : parameters that the equation has in sgn(rate), the rate and the place; "": none
+    coulomb, viscous, stiffness, gravity : parameters that the equation has in sgn(rate), in the rate, in the place and
+        in its sine; "": none
     """
 
     sensor: str
@@ -49,6 +50,7 @@ class Axis:
     coulomb: str = ""
     viscous: str = ""
     stiffness: str = ""
+    gravity: str = ""
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,7 @@ def _cart_model() -> CompiledModel:
     model = Model("cart")
     F, x = (
         model.input("F", "N", hold="zoh", reach=12, gain_sd=0),
-        model.sensor("x", "m", resolution=1e-5, reach=0.5),
+        model.sensor("x", "m", resolution=1e-5, reach=0.5, gain_sd=0),
     )
     m, c, k = (
         model.unknown("m", "kg", 1),
@@ -198,7 +200,7 @@ def _stage_model() -> CompiledModel:
     model = Model("stage")
     F, x = (
         model.input("F", "N", hold="zoh", reach=40, gain_sd=0.01),
-        model.sensor("x", "m", resolution=2e-6, reach=2),
+        model.sensor("x", "m", resolution=2e-6, reach=2, gain_sd=0),
     )
     m, c = model.unknown("m", "kg", 1), model.unknown("c", "N*s/m", 3)
     Fc, o = (
@@ -218,8 +220,8 @@ def _stage(s: States, F: float, more: States, p: Values) -> States:
 def _motor_model() -> CompiledModel:
     model = Model("motor")
     V = model.input("V", "V", hold="zoh", reach=15, gain_sd=0)
-    i = model.sensor("i", "A", resolution=2e-3, reach=15)
-    w = model.sensor("w", "rad/s", resolution=0.02, reach=500)
+    i = model.sensor("i", "A", resolution=2e-3, reach=15, gain_sd=0)
+    w = model.sensor("w", "rad/s", resolution=0.02, reach=500, gain_sd=0)
     R, L, k = (
         model.unknown("R", "ohm", 1),
         model.unknown("L", "H", 5e-3),
@@ -240,7 +242,7 @@ def _motor(s: States, V: float, more: States, p: Values) -> States:
 def _servo_model() -> CompiledModel:
     model = Model("servo")
     V = model.input("V", "V", hold="zoh", reach=30, gain_sd=0)
-    i = model.sensor("i", "A", resolution=4e-3, reach=20)
+    i = model.sensor("i", "A", resolution=4e-3, reach=20, gain_sd=0)
     q = model.sensor("q", "rad", resolution=2 * pi / 2**14, reach=1000)
     R, k = model.unknown("R", "ohm", 2), model.unknown("k", "N*m/A", 0.1)
     J, b, Tc = (
@@ -315,7 +317,7 @@ def _swing(s: States, _: float, more: States, p: Values) -> States:
 def _lag_model() -> CompiledModel:
     model = Model("lag")
     u = model.input("u", "V", hold="zoh", reach=4, gain_sd=0)
-    y = model.sensor("y", "V", resolution=1e-3, reach=6)
+    y = model.sensor("y", "V", resolution=1e-3, reach=6, gain_sd=0)
     T, K = model.unknown("T", "s", 0.2), model.unknown("K", "", 1)
     o = model.unknown("o", "V", 0, positive=False, sd=0.5)
     model.equation(T * y.d() + y - K * u - o)
@@ -331,7 +333,7 @@ def _tank_model() -> CompiledModel:
     """A tank that runs out by Torricelli's law; the sensor is in the outlet and measures the flow's speed."""
     model = Model("tank")
     u = model.input("u", "m^3/s", hold="zoh", reach=2e-3, gain_sd=0)
-    w = model.sensor("w", "m/s", resolution=1e-3, reach=10)
+    w = model.sensor("w", "m/s", resolution=1e-3, reach=10, gain_sd=0)
     g = model.known("g", "m/s^2", 9.81)
     A, a = model.unknown("A", "m^2", 0.02), model.unknown("a", "m^2", 2e-4)
     model.equation(A * w * w.d() / g + a * w - u)
@@ -346,7 +348,7 @@ def _tank(s: States, u: float, more: States, p: Values) -> States:
 def _plates_model() -> CompiledModel:
     model = Model("plates")
     P = model.input("P", "W", hold="zoh", reach=100, gain_sd=0)
-    a, b = (model.sensor(name, "K", resolution=0.02, reach=100) for name in ("Ta", "Tb"))
+    a, b = (model.sensor(name, "K", resolution=0.02, reach=100, gain_sd=0) for name in ("Ta", "Tb"))
     Ca, Cb = model.unknown("Ca", "J/K", 40), model.unknown("Cb", "J/K", 100)
     G, H = model.unknown("G", "W/K", 1), model.unknown("H", "W/K", 1)
     model.equation(Ca * a.d() + G * (a - b) - P)
@@ -389,7 +391,7 @@ def _cell_model() -> CompiledModel:
     """Its overvoltage is not measured."""
     model = Model("cell")
     i = model.input("i", "A", hold="zoh", reach=12, gain_sd=0)
-    v, h = model.sensor("v", "V", resolution=5e-4, reach=5), model.unmeasured("h", "V")
+    v, h = model.sensor("v", "V", resolution=5e-4, reach=5, gain_sd=0), model.unmeasured("h", "V")
     R0, R1 = model.unknown("R0", "ohm", 0.02), model.unknown("R1", "ohm", 0.02)
     T, E = model.unknown("T1", "s", 30), model.unknown("E", "V", 3.7, sd=1.0)
     model.equation(v - E + R0 * i + h)
@@ -444,7 +446,7 @@ PLANTS = {
             2,
             {"q": (0, 2e-4)},
             0.6,
-            (Axis("q", 0, 0.8, 0, 1, angle=True, viscous="b"),),
+            (Axis("q", 0, 0.8, 0, 1, angle=True, viscous="b", gravity="G"),),
         ),
         Plant(
             "lag",
@@ -505,7 +507,7 @@ PLANTS = {
             _swing,
             2,
             {"q": (0, 2 * pi / 2**13)},
-            axes=(Axis("q", 0, 15.0, 0, 1, angle=True, viscous="c"),),
+            axes=(Axis("q", 0, 15.0, 0, 1, angle=True, viscous="c", gravity="w2"),),
             start=(2.2, 0.0),
         ),
         Plant(

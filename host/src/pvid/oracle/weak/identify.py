@@ -203,6 +203,8 @@ def identify(
         reasons += attempt.reasons(_checks(rows, run, fit, found, halves, judged, with_error))
         if lacking is not None and lacking.visible.any() and not explains(reasons, lacking.there[0], sample_rate):
             named = attempt("what is missing", partial(explained, library, lacking))
+            if named is not None and any(one.name == "halves" for one in reasons):
+                named = replace(named, complete=named.complete and _halves_agree(compiled, named.fit))
             if named is not None:
                 lacking = lacking.also(named.fit.p - fit.p) if named.complete else lacking
                 reasons += of_missing(fit, lacking, named)
@@ -323,6 +325,12 @@ def _checks(
             verdict.of_smoothing, shorter_rates(model, run, design, fit.p, equation_error)
         ),
     }
+
+
+def _halves_agree(model: CompiledModel, fit: Fit) -> bool:
+    """Whether the halves of a run agree in a fit with terms: else something changed, which those terms imitate."""
+    found = attempted(lambda: verdict.of_halves(model, fit, verdict.halves_of(fit)))
+    return found is not None and not any(one.alarm for one in found)
 
 
 def _or_nan(fit: Fit, computation: Callable[[], Float]) -> Float:

@@ -62,6 +62,7 @@ CONSTANT = Law("1", lambda x, v, w: np.ones(x.shape))
 LAWS = (
     Law("{x}", lambda x, v, w: x),
     Law("abs({x})*{x}", lambda x, v, w: np.abs(x) * x),
+    Law("{x}**2", lambda x, v, w: x**2),
     Law("{x}**3", lambda x, v, w: x**3),
     Law("sgn({x})", lambda x, v, w: _sign(x)),
     Law("{x}**2*{x}.d()", lambda x, v, w: x**3 / 3, order=1),
@@ -292,6 +293,14 @@ ACTS = (
         typed="{u} + {a}*sgn({u})",
     ),
     GAIN,
+    Act(
+        "has an offset of {word}{size}",
+        lambda of, _: np.full(len(of.values), -1.0),
+        "signal",
+        ("", "-"),
+        most=lambda of: of.top,
+        applies=_is_measured,
+    ),
     Act("has a backlash of {size}", _play, "signal", most=_resolutions, applies=_is_stepped),
     *(
         Act(
