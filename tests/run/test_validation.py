@@ -11,9 +11,11 @@ from program import pvid
 
 from bench.lacking import EFFECTS, recording
 from bench.plants import PLANTS
+from pvid.api.result import of_mechanism
 from pvid.base.errors import PvidError
 from pvid.rig.run import Recording
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
+from pvid.run.mechanism_advice import analysed
 from pvid.run.validation import Validation, validated
 
 Float = npt.NDArray[np.float64]
@@ -63,6 +65,24 @@ m, c, k = model.unknown("m", "kg", 1), model.unknown("c", "N*s/m", 1), model.unk
 x0 = model.unknown("x0", "m", 0, positive=False, sd=0.05)
 model.equation(m * x.d(2) + c * x.d() + k * (x - x0) - F)
 '''
+
+
+@pytest.mark.parametrize("plant", ["cart", "lag", "pendulum"])
+def test_explained_run_is_predicted_half_by_half_and_keeps_its_estimate(plant: str) -> None:
+    own = PLANTS[plant]
+    signals = recording(own, 3)
+    run = Recording(np.arange(len(next(iter(signals.values())))) / own.rate, signals, own.rate)
+    plain, found = (analysed(run, own.model(), predict=one) for one in (False, True))
+    assert plain.is_explained and not plain.prediction and np.array_equal(plain.found.p, found.found.p)
+    (shown,) = found.as_json()["prediction"].values()
+    assert shown["of_noise"] < 2.5 and shown["r2"] > 0.99
+
+
+def test_result_predicts_the_sensors_of_a_whole_recording() -> None:
+    result, run = of_mechanism(answer()), recorded(2)
+    found = result.predict({"t": run.t, **run.signals})
+    assert set(found) == {"t", "x"} and found["x"].shape == found["t"].shape == run.t.shape
+    assert np.std(found["x"] - run.signals["x"]) < 1e-3 * np.std(run.signals["x"])
 
 
 def test_command_prints_what_it_predicts_and_has_it_in_the_json(tmp_path: Path) -> None:

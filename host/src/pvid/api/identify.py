@@ -114,7 +114,7 @@ def _identify(
         recording = joined(parts, _names(paths), given)
         engine = ENGINE_CORES.get(core or "")
         of_each = own_of(compiled, recording, own, shared, in_c=engine is not None)
-        answer = analysed(recording, compiled, predict=engine is None, own=of_each)
+        answer = analysed(recording, compiled, own=of_each)
         return of_mechanism(answer) if engine is None else of_core(identify_in_c(answer, engine.name))
     if own or shared:
         raise PvidError("own and shared are for several recordings")

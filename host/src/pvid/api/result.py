@@ -10,6 +10,9 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import numpy.typing as npt
+
 from pvid.api.data import Data, recording_of
 from pvid.base.replacing import replacing
 from pvid.base.rounding import with_error
@@ -17,6 +20,7 @@ from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.words import Word
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import channels_of
+from pvid.rig.run import Recording
 from pvid.run import answer
 from pvid.run.identify import Identification
 from pvid.run.mechanism import MechanismAnswer
@@ -150,11 +154,35 @@ class Result:
         """
         from pvid.run.validation import predicted
 
-        path = Path(data) if isinstance(data, str | os.PathLike) else None
-        channels = channels_of(self._model)
-        recording = recording_of(data, path, None, parsed(columns, channels))
         values = {name: one.value for name, one in self.parameters.items()}
-        return predicted(self._model, recording, values, self.details.get("window_s"))
+        return predicted(self._model, self._recording(data, columns), values, self.details.get("window_s"))
+
+    def predict(self, data: Data, *, columns: str | None = None) -> dict[str, npt.NDArray[np.float64]]:
+        """The sensors as these parameters predict them: the whole recording is simulated by the full equations under
+        its recorded inputs, from the start that fits it best.
+
+        Parameters
+        ----------
+        data, columns : as of `pvid.identify`
+
+        Returns
+        -------
+        "t" [s] and each sensor by name, shape (n,): of the longest stretch without a missing sample.
+
+        Raises
+        ------
+        PvidError
+            Where the data cannot be read, a parameter has no value, or the motion runs away, as an unstable one does:
+            `validate` simulates it in blocks.
+        """
+        from pvid.run.validation import p_of, simulation_of
+
+        values = {name: one.value for name, one in self.parameters.items()}
+        return simulation_of(self._model, self._recording(data, columns), p_of(self._model, values))
+
+    def _recording(self, data: Data, columns: str | None) -> Recording:
+        path = Path(data) if isinstance(data, str | os.PathLike) else None
+        return recording_of(data, path, None, parsed(columns, channels_of(self._model)))
 
     def compare(self, other: Result) -> dict[str, float]:
         """By parameter: this value less the other's, in standard errors of the difference.

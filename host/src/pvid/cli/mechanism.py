@@ -182,7 +182,7 @@ def identify_run(
             more = added(without, of_mechanism, add)
             model = more.model
     with working("identifying"):
-        answer = analysed(recording, model, weights, predict=not (refine or in_c), own=of_each)
+        answer = analysed(recording, model, weights, predict=not refine, own=of_each)
     if without is not None:
         with_them: dict[str, Any] = {"added": list(more.terms), "without": _values_json(without.values)}
         if not as_json:
@@ -311,6 +311,8 @@ def plot_run(path: Path, rig: MechanismRig | RigFile, columns: str | None, figur
         answer, fit, text = refined_answer(weak)
     verdict = weak.found.verdict
     lines = [f"{path.name}: {model.title}", text if answer.identified else f"nothing identified; {text}"]
+    if answer is weak and answer.prediction:
+        lines.append(f"predicts motion that was not fitted: {listed(answer.prediction)}")
     if answer is weak and verdict.warning:
         lines.append(f"warning: {verdict.warning}")
     lines += [f"advice: {sentence}" for sentence in answer.advice]
@@ -526,6 +528,8 @@ def _print(answer: MechanismAnswer, stage: str = "weak form") -> None:
         f"verdict {found.verdict.word}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "
         f"{found.design.window_s:.3g} s; R^2 {explained}"
     )
+    if answer.prediction:
+        click.echo(f"predicts motion that was not fitted: {listed(answer.prediction)}")
 
 
 def _print_advice(answer: MechanismAnswer) -> None:

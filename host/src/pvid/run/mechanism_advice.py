@@ -53,7 +53,8 @@ def analysed(
     Parameters
     ----------
     weights : of the rows; those of the sensors alone are not compared with others
-    predict : publish the estimate that predicts best where the equations do not explain the recording
+    predict : with the prediction of unseen motion; where the equations do not explain the recording, publish the
+        estimate that predicts it best
     own : as of identify_mechanism
     """
     answer = advised(identify_mechanism(recording, model, weights, own))
@@ -61,11 +62,11 @@ def analysed(
         from pvid.run.additions import to_type
 
         answer = replace(answer, advice=(*answer.advice, *to_type(answer)))
-    if answer.is_explained or not predict or weights != "residuals":
+    if not predict or not answer.identified and answer.is_explained:
         return answer
-    from pvid.run.judge import judged  # with the simulation, which a good run does not need
+    from pvid.run.judge import judged, with_prediction  # loads the simulation
 
-    return judged(answer)
+    return with_prediction(answer) if answer.is_explained or weights != "residuals" else judged(answer)
 
 
 def advised(answer: MechanismAnswer) -> MechanismAnswer:

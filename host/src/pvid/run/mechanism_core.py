@@ -251,10 +251,15 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
     outcome = Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP
     judged = unless_held(found.judged, None if published else outcome.text)
 
+    # Where the analysis publishes another estimate of the same equations, its distance belongs to the model's part.
+    apart = np.abs(found.p - run.p)
+    noise = np.hypot(noise_of(model, found), np.sqrt(np.diag(covariance)))
+    shifts = np.vstack([shifts_of(found), np.where(apart > _CLASH * noise, apart, 0.0)])
+
     def values(verdict: Verdict) -> Mapping[str, Value]:
         if by_analysis:
             return answer.values
-        return values_of(model, run.p, covariance, gains, judged, verdict, shifts_of(found))
+        return values_of(model, run.p, covariance, gains, judged, verdict, shifts)
 
     misfit = identifier.misfit
     core = CoreAnswer(

@@ -187,6 +187,46 @@ def validated(
     )
 
 
+def simulation_of(model: CompiledModel, recording: Recording, p: Float) -> dict[str, Float]:
+    """What p predicts of a recording's longest stretch, simulated as a whole from the start that fits it best.
+
+    Returns
+    -------
+    "t" [s], and of each sensor its readings [n].
+
+    Raises
+    ------
+    PvidError
+        Where the equations cannot be simulated on it, or the motion runs away.
+    """
+    recording = recording.whole()
+    with np.errstate(all="ignore"):
+        motion = Motion(model, recording.signals, recording.sample_rate, p)
+        problem = motion.within([(0, len(recording))])
+        cut, simulated = motion.simulated(motion.r_of(p), problem, problem.longest)
+    if not np.isfinite(simulated).all():
+        raise PvidError(
+            f"the motion of {model.name} runs away over the whole recording: `validate` simulates it in blocks"
+        )
+    first, names = int(cut.first[0]), problem.kernel.made.outputs
+    t = recording.t[first : first + cut.samples]
+    return {"t": t} | {name: simulated[0, :, k] for k, name in enumerate(names)}
+
+
+def p_of(model: CompiledModel, values: Mapping[str, float | None]) -> Float:
+    """Parameters by name as an array [n_p].
+
+    Raises
+    ------
+    PvidError
+        Where one has no value.
+    """
+    missing = [name for name in model.p_names if values.get(name) is None]
+    if missing:
+        raise PvidError(f"{listed(missing)} of {model.name} has no value there: without it no motion can be predicted")
+    return np.array([values[name] for name in model.p_names], np.float64)
+
+
 def predicted(
     model: CompiledModel, recording: Recording, values: Mapping[str, float | None], window_s: float | None
 ) -> Validation:
