@@ -22,6 +22,7 @@ CURED = {
     "the current is sampled before the voltage jumps": 1097,
     "the rate in abs(v)*v is blurred by a short filter": 5021,
     "a homogeneous equation shrinks to nothing": 5061,
+    "a friction that may be 0 is found by the refinement": 6011,
     "the voltage of a cell is sampled before the current jumps": 5049,
 }
 
@@ -46,6 +47,12 @@ def test_a_rig_that_failed_once_is_right(why: str) -> None:
     road = road_of(CURED[why], in_c=False)
     assert road.failures == []
     assert road.outcome == "good"
+
+
+def test_a_drag_that_ran_down_to_0_starts_the_core_within_float32() -> None:
+    road = road_of(6028)
+    assert road.failures == []
+    assert {"f32", "q31", "deploy"} <= set(road.reached)
 
 
 def test_a_rig_with_fewer_functions_than_unknowns_is_refused_by_the_cores_in_a_sentence() -> None:

@@ -13,6 +13,8 @@ from pvid.codegen.refine import LOG_SD, has_skew
 from pvid.model.compiled import CompiledModel
 from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
+from pvid.oracle.weak import verdict
+from pvid.oracle.weak.identify import Identified
 from pvid.rig.file import Nominal, RigFile, Sensor
 from pvid.rig.gaps import stretches
 from pvid.rig.run import NUMBER, Run
@@ -229,7 +231,9 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
         if has_skew(model):
             refined = _as_pendulum(answer)
         else:
-            refined = refine_mechanism(model, recording.run, recording.sample_rate, weak.p, 2 * weak.design.window_s)
+            refined = refine_mechanism(
+                model, recording.run, recording.sample_rate, _start(weak), 2 * weak.design.window_s
+            )
     except PvidError as error:
         return answer, None, f"not refined: {error}"
     found = refined.found
@@ -251,7 +255,11 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
     made = refined.problem.kernel.made
     p, covariance = refined.problem.values(found, made.places_of_p)
     shifts = refined_shifts_of(model, weak)
-    values = values_of(model, p, covariance, refined_gains_of(model, weak), weak.judged, weak.verdict, shifts)
+    judged = verdict.judged_again(model, weak.judged, p, np.sqrt(np.diag(covariance)))
+    kept = [one for one in weak.verdict.reasons if one.name != "near_zero"]
+    told = verdict.sorted_by_gravity([*kept, *verdict.of_bounds(model, judged, min(weak.r2.values()))])
+    weak = replace(weak, judged=judged, verdict=verdict.Verdict(told))
+    values = values_of(model, p, covariance, refined_gains_of(model, weak), judged, weak.verdict, shifts)
     text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
     if isinstance(refined, RefinedPendulum) and len(recording.segments) > 1:
         t = recording.whole().t
@@ -261,7 +269,13 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
             text += (
                 f"; sgn({made.parameters[place].sign}) changes over {found.r[place]:.2g} {made.parameters[place].unit}"
             )
-    return replace(answer, values=values), refined, text
+    return replace(answer, found=weak, values=values), refined, text
+
+
+def _start(weak: Identified) -> Float:
+    """p, but half of its bound for what may be 0: its logarithm has run down, where nothing moves it."""
+    half = [p if one.below is None else max(p, one.below / 2) for p, one in zip(weak.p, weak.judged, strict=True)]
+    return np.array(half, np.float64)
 
 
 def _spread(refined: RefinedMechanism, se: Float) -> float:

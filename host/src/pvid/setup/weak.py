@@ -35,6 +35,7 @@ _NOISE_MARGIN = 4.0
 # Limits of the samples: times the largest value of a run; times the standard deviation of a sensor's noise.
 _RANGE = 1.5
 _STILL = 4.0
+_RAN_DOWN = 1e-6  # of the low end of its range: a positive parameter that may be 0 starts no lower
 
 
 def for_engine(design: WeakDesign) -> WeakDesign:
@@ -156,8 +157,9 @@ def config_of(
     start : of p; None: the guesses
     run : name of each signal -> samples [n], from which limits of the samples follow; None: there are none
     """
-    p = parameters.checked(start)
     unknowns = parameters.model.unknowns
+    least = np.array([_RAN_DOWN * one.low if one.positive else -np.inf for one in unknowns])
+    p = np.maximum(parameters.checked(start), least)
     # The prior of the oracle, in units of p.
     unit = parameters.unit(p)
     start_sd = np.abs(unit) / np.sqrt(parameters.prior(p))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.rounding import percent
 from pvid.base.wording import listed, with_unit
-from pvid.model.compiled import CompiledModel
+from pvid.model.compiled import CompiledModel, Unknown
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
 from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
@@ -201,14 +201,27 @@ def judged(model: CompiledModel, fit: Fit, se: Float) -> list[Judged]:
         elif not se[k] <= limit:
             out.append(Judged("not_identified", f"the standard error of {one.name} is {with_unit(se[k], one.unit, 2)}"))
         elif own_scale and se[k] > UNKNOWN * abs(p):
-            below = upper_bound(p, float(se[k]))
-            out.append(Judged("near_zero", f"{one.name} is below {with_unit(below, one.unit, 2)} with 95 %", below))
+            out.append(_near_zero(one, p, float(se[k])))
         else:
             out.append(Judged())
     known = [one.status == "identified" for one in out]
     if not any(known):  # all at 0: the equations do not describe the run
         return [replace(one, status="not_identified") for one in out]
     return out
+
+
+def _near_zero(unknown: Unknown, p: float, se: float) -> Judged:
+    below = upper_bound(p, se)
+    return Judged("near_zero", f"{unknown.name} is below {with_unit(below, unknown.unit, 2)} with 95 %", below)
+
+
+def judged_again(model: CompiledModel, before: Sequence[Judged], p: Float, se: Float) -> tuple[Judged, ...]:
+    """What may be 0, by a further estimate [n_p] with its standard errors; the others as before."""
+    out = list(before)
+    for k, one in enumerate(before):
+        if one.status == "near_zero":
+            out[k] = _near_zero(model.unknowns[k], p[k], se[k]) if se[k] > UNKNOWN * abs(p[k]) else Judged()
+    return tuple(out)
 
 
 def with_unsettled(fit: Fit, found: Sequence[Judged]) -> list[Judged]:
@@ -253,13 +266,22 @@ def of_parameters(
             text += f"; {names[0]} and {model.p_names[partner]} are not identifiable together"
         name: Name = "not_identified" if len(missing) == len(found) else "undetermined"
         out.append(Reason(name, f"{text}.", of=of_some(model, missing)))
+    return [*out, *of_bounds(model, found, min(r2))]
+
+
+def of_bounds(model: CompiledModel, found: Sequence[Judged], r2: float) -> list[Reason]:
+    """What may be 0.
+
+    Parameters
+    ----------
+    r2 : the least of the row kinds
+    """
     small = [k for k, one in enumerate(found) if one.status == "near_zero"]
-    if small:
-        bounds = listed(f"{found[k].reason}" for k in small)
-        beyond = any((found[k].below or 0.0) > fit.parameters.guess[k] for k in small) or min(r2) < _EXPLAINED
-        text = f"The run shows an upper bound alone: {bounds}."
-        out.append(Reason("near_zero", text, alarm=beyond, of=of_some(model, small)))
-    return out
+    if not small:
+        return []
+    bounds = listed(f"{found[k].reason}" for k in small)
+    beyond = any((found[k].below or 0.0) > model.unknowns[k].guess for k in small) or r2 < _EXPLAINED
+    return [Reason("near_zero", f"The run shows an upper bound alone: {bounds}.", beyond, of=of_some(model, small))]
 
 
 def of_width(model: CompiledModel, fit: Fit, se: Float, by_model: Float, found: Sequence[Judged]) -> list[Reason]:
