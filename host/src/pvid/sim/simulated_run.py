@@ -236,7 +236,7 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     settings = rig_path_of(path)
     refuse_foreign(settings)
     write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
-    exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.gain_sd or one.driven}
+    exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven or one.unit != "rad"}
     exact |= {name: {"neglected": 0.0} for name in simulation.linearised}
     MechanismRig(name or model.name, rate, known=simulation.rig.knowns, sensor=exact, clock_sd=0.0).write(settings)
     return settings
