@@ -1,6 +1,6 @@
-/* Signals of a tick, exact:  SAMPLED  x_k,   HELD  -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),   JUMP  x_k - x_(k-1),   LAST  x_(k-1).
- * With a held signal k is the tick before the present one. Before the first sample since a restart all were equal to
- * it.
+/* Signals of a tick, exact:  SAMPLED  x_k,   HELD  -x_(k-2) + 13 x_(k-1) + 13 x_k - x_(k+1),   JUMP  x_k - x_(k-1),
+ * LAST  x_(k-1). With a held signal k is the tick before the present one. Before the first sample since a restart all
+ * were equal to it.
  *
  * A block of D ticks gives one output of each signal, the sum with weights 1, 2, .., D, .., 2, 1 about the block's
  * first tick: with  a += x,  b += a  from 0 in every block, b + D a' - b', a' and b' those of the block before. It is

@@ -39,6 +39,7 @@ from pvid.models.kapitza.refinement import refine_rig
 from pvid.models.registry import DEFAULT, asked_for, is_named, shipped
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.edges import with_edges
 from pvid.rig.described import rig_of_document
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
@@ -121,9 +122,9 @@ class MechanismBoard:
         PvidError
             When the recording is too short, or the engine or its second stage does not have what the model needs.
         """
-        compiled = model_of(rig)
         recording.refuse_damaged()
         whole = recording.whole()
+        compiled = with_edges(model_of(rig), whole.signals, whole.sample_rate)
         config = (config_to_identify if to_identify else config_for_recording)(compiled, whole, ranking=ranking)
         refine = refine_design(compiled, config, whole.signals) if refined else None
         return cls(rig, compiled, config, samples_of(config, whole.signals), refine)

@@ -27,6 +27,7 @@ from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Fo
 from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.edges import with_edges
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
@@ -79,7 +80,8 @@ class MechanismBoardQ31:
         """As MechanismBoard.of_recording."""
         recording.refuse_damaged()
         whole = recording.whole()
-        engine = (engine_to_identify if to_identify else engine_for_recording)(model_of(rig), whole, ranking=ranking)
+        compiled = with_edges(model_of(rig), whole.signals, whole.sample_rate)
+        engine = (engine_to_identify if to_identify else engine_for_recording)(compiled, whole, ranking=ranking)
         return cls(rig, engine, engine.counts_of(whole.signals))
 
     @classmethod

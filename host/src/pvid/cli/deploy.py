@@ -84,6 +84,7 @@ def _deployment(
 ) -> Deployment:
     from pvid.deploy.of_rig import deployment_f32, deployment_q31
     from pvid.models.mechanisms import names as names_of_shipped
+    from pvid.oracle.weak.edges import with_edges
     from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped, simulated_run_of
     from pvid.run.engine_design_q31 import engine_for_recording, engine_for_rig_like_the_shipped
     from pvid.run.refine_design import full_motion_of, refine_design, refine_for_simulated_rig
@@ -93,6 +94,7 @@ def _deployment(
     refuse_too_many_unknowns(compiled)
     if run_path is not None:
         recording = recorded(compiled, rig, run_path, columns)
+        compiled = with_edges(compiled, recording.signals, recording.sample_rate)
         if is_integer:
             return deployment_q31(engine_for_recording(compiled, recording, functions), recording.signals, title)
         config = config_for_recording(compiled, recording, functions)

@@ -189,10 +189,14 @@ def build(
     """
     from pvid.codegen import build as generated
     from pvid.codegen.reaches import Reaches
+    from pvid.oracle.weak.edges import with_edges
     from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     refuse_too_many_unknowns(compiled)
+    if run_path is not None:
+        recording = recorded(compiled, rig, run_path, columns)
+        compiled = with_edges(compiled, recording.signals, recording.sample_rate)
     design = _design_of(compiled, rig, model, run_path, columns, functions)
     limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
     soft = _numbers(soft_signs, "--soft-sign")

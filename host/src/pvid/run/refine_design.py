@@ -11,6 +11,7 @@ import numpy.typing as npt
 import sympy as sp
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.codegen import files_refine
 from pvid.codegen.build import Options, refine_functions
 from pvid.codegen.refine import RefineFunctions, is_measured, signs_of
@@ -71,6 +72,12 @@ def refine_design(
     PvidError
         Where the refinement in C does not have what the model needs: the reason in a sentence.
     """
+    before = [one.name for one in compiled.signals if one.edge == "before"]
+    if before:
+        raise PvidError(
+            f"{compiled.name}: the recording has {listed(before)} before the jumps of the inputs, and the second stage"
+            " in C reads samples behind them"
+        )
     made = refine_functions(compiled, Options(soft_signs=soft_signs or {}))
     files_refine.check_outputs(made)
     near = config.estimator.start if p is None else p
