@@ -238,6 +238,8 @@ def prepared(folder: Path) -> None:
         of_a_sketch = {"t": ("t", 1e3), "duty": ("V", 255 / 12), "current": ("i", 1023 / 5)}
         turned = {"counts": ("phi", 2400 / (2 * np.pi))}
         with_columns(Path("motor.csv"), Path("sketch.csv"), of_a_sketch | turned, keep=False)
+        for day in ("monday", "tuesday", "wednesday"):
+            shutil.copy("motor.csv", f"{day}.csv")
         for place, name in (("fleet/a", "run.pvlog"), ("runs", "run.csv"), ("motors/a", "motor.csv")):
             Path(place).mkdir(parents=True)
             shutil.copy(name, place)

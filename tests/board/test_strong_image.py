@@ -87,7 +87,7 @@ def test_noise_that_decides_the_answer_is_no_answer(tmp_path: Path) -> None:
     ("options", "sentence"),
     [
         (("--core", "q31"), "--core q31: the strong form of rigid_body is in float32 and float64"),
-        (("--refine",), "--figure, --refine and --weights are for the weak form"),
+        (("--refine",), "--figure, --refine, --weights and --add are for the weak form"),
         (("--on", "mps2-an386"), "is for `compare`"),
     ],
 )

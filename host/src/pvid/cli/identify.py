@@ -70,9 +70,10 @@ from pvid.settings.engine_cores import FLOAT
     "--own",
     metavar="NAME,...",
     multiple=True,
-    help="Of several RUNs: parameters with a value of their own in each, such as a payload; sensor offsets have one.",
+    help="Of several RUNs: parameters with a separate value in each, such as a payload. Offsets of sensors are separate "
+    "without this option.",
 )
-@click.option("--shared", metavar="NAME,...", multiple=True, help="Offsets of sensors that have one value in all RUNs.")
+@click.option("--shared", metavar="NAME,...", multiple=True, help="Offsets of sensors with the same value in all RUNs.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--figure", type=FigurePath(), help="Write a figure of the convergence (png, svg, pdf).")
 @force_option
@@ -116,8 +117,9 @@ def command(
     Where an answer names a term that the equations lack, its advice contains the option --add that identifies with it.
     A term without an equation's name in front goes to the equation in which it explains most.
 
-    With --validate the answer is also simulated on another recording with the same columns, in blocks of four windows
-    whose initial states alone are fitted: what is left of each sensor's motion, over its motion and its noise.
+    With --validate the answer is also simulated on another recording with the same columns, in blocks of four windows.
+    Fitted are the initial states of each block, and the --own parameters. Printed is the rms error of each sensor's
+    prediction, over its motion and over its noise.
 
     With --on the run is also streamed to a target; the result is printed only if the target's hashes are equal at every
     reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both

@@ -13,10 +13,10 @@ HEADER = ("verdict", "meaning", "rule, of a parameter", "rule, of the answer", "
 
 ROWS: dict[Word, tuple[str, str, str, str]] = {
     "good": (
-        "the value is within its standard error",
-        f"no warning concerns it: what the equations seem to lack moves it by less than {MOVES:g} of its other "
-        f"standard errors, or by less than {percent(VISIBLE)}; and its standard error is at most {percent(WIDE)} of "
-        "it. A parameter that may be 0 (`below`) is good where its upper bound is below its guess",
+        "the standard error holds: the truth is within two of them in 95 % of all runs",
+        f"no warning concerns it: what the equations seem to lack moves it by less than {MOVES:g} "
+        f"standard errors (without `se_model`), or by less than {percent(VISIBLE)}; and its standard error is at most {percent(WIDE)} of "
+        "it. A parameter that may be 0 is good where its upper bound (`below`) is below its guess",
         "all parameters are good",
         "use them with their standard errors",
     ),
@@ -24,9 +24,9 @@ ROWS: dict[Word, tuple[str, str, str, str]] = {
         "the value is about right, with a large error, or a cause of error that is named",
         f"its standard error is above {percent(WIDE)} of it, or a warning concerns it. The standard error contains "
         "what the warning has found",
-        "some parameter is usable, or has one of the words below while others are better",
-        "read the warning; use them with their standard errors where these suffice; do not compare rigs, do not set "
-        "limits or alarms with them",
+        "not all parameters are good, and at least one is good or usable",
+        "read the warning; use the values that there are with their standard errors where these suffice; do not compare "
+        "rigs, do not set limits or alarms with them",
     ),
     "not_explained": (
         "the equations do not describe the run, and no cause was found",

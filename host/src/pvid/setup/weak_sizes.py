@@ -48,16 +48,19 @@ def refuse_too_many_unknowns(model: CompiledModel) -> None:
         raise PvidError(refusal)
 
 
+def refuse_too_few_functions(name: str, thetas: int, unknowns: int) -> None:
+    """PvidError for rows that cannot determine all unknowns, whatever the run is: the C core refuses them."""
+    if thetas < unknowns:
+        raise PvidError(
+            f"the rows of {name} have {thetas} functions of its {unknowns} unknowns, too few for the C core: `pvid model"
+            " check` names the unknowns of which one must be known, and the sensors that are missing"
+        )
+
+
 def _checked(name: str, sizes: Mapping[str, int]) -> dict[str, int]:
-    """PvidError for what is larger than the core allows, and for unknowns that no run can determine."""
+    """PvidError for what is larger than the core allows."""
     if (refusal := too_many_unknowns(name, sizes["PVID_MAX_P"])) is not None:
         raise PvidError(refusal)
-    thetas = sizes["PVID_MAX_THETA" if "PVID_MAX_THETA" in sizes else "PVID_MAX_THETA_Q31"]
-    if thetas < sizes["PVID_MAX_P"]:
-        raise PvidError(
-            f"the rows of {name} have {thetas} functions of its {sizes['PVID_MAX_P']} unknowns, too few for the C core:"
-            " `pvid model check` names the unknowns of which one must be known, and the sensors that are missing"
-        )
     for macro, size in sizes.items():
         if size > (most := most_sizes().get(macro, size)):
             raise PvidError(f"{name} needs {size} {_MEANING.get(macro, macro)} and the C core takes at most {most}")
@@ -88,7 +91,8 @@ def sizes_of_model(model: WeakModel) -> dict[str, int]:
 
 
 def sizes_of_design(design: WeakDesign32) -> dict[str, int]:
-    """Those of its model among them; raises as for that."""
+    """Those of its model among them; raises as for that, and where the rows cannot determine all unknowns."""
+    refuse_too_few_functions(design.model.name, design.model.model.n_theta, design.model.model.n_p)
     sizes = sizes_of_model(design.model) | {
         "PVID_MAX_RING": design.model.signals * (4 * design.half_steps + 5),
         "PVID_MAX_HARMONICS": design.highest + 1,
@@ -116,6 +120,7 @@ def sizes_of_q31(design: WeakDesignQ31, n_p: int, n_c: int) -> dict[str, int]:
     a model in float32."""
     model = design.model
     thetas = [one.thetas for one in model.kind]
+    refuse_too_few_functions("the model", sum(thetas), n_p)
     sizes = {
         "PVID_MAX_THETA_Q31": sum(thetas),
         "PVID_MAX_P": n_p,
