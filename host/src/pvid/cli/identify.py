@@ -70,8 +70,8 @@ from pvid.settings.engine_cores import FLOAT
     "--own",
     metavar="NAME,...",
     multiple=True,
-    help="Of several RUNs: parameters with a separate value in each, such as a payload. Offsets of sensors are separate "
-    "without this option.",
+    help="Of several RUNs: parameters with a separate value in each, such as a payload. Offsets of sensors are "
+    "separate without this option.",
 )
 @click.option("--shared", metavar="NAME,...", multiple=True, help="Offsets of sensors with the same value in all RUNs.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

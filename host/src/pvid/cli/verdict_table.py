@@ -14,9 +14,9 @@ HEADER = ("verdict", "meaning", "rule, of a parameter", "rule, of the answer", "
 ROWS: dict[Word, tuple[str, str, str, str]] = {
     "good": (
         "the standard error holds: the truth is within two of them in 95 % of all runs",
-        f"no warning concerns it: what the equations seem to lack moves it by less than {MOVES:g} "
-        f"standard errors (without `se_model`), or by less than {percent(VISIBLE)}; and its standard error is at most {percent(WIDE)} of "
-        "it. A parameter that may be 0 is good where its upper bound (`below`) is below its guess",
+        f"no warning concerns it: what the equations seem to lack moves it by less than {MOVES:g} standard errors "
+        f"(without `se_model`), or by less than {percent(VISIBLE)}; and its standard error is at most {percent(WIDE)} "
+        "of it. A parameter that may be 0 is good where its upper bound (`below`) is below its guess",
         "all parameters are good",
         "use them with their standard errors",
     ),
@@ -25,8 +25,8 @@ ROWS: dict[Word, tuple[str, str, str, str]] = {
         f"its standard error is above {percent(WIDE)} of it, or a warning concerns it. The standard error contains "
         "what the warning has found",
         "not all parameters are good, and at least one is good or usable",
-        "read the warning; use the values that there are with their standard errors where these suffice; do not compare "
-        "rigs, do not set limits or alarms with them",
+        "read the warning; use the values that there are with their standard errors where these suffice; do not "
+        "compare rigs, do not set limits or alarms with them",
     ),
     "not_explained": (
         "the equations do not describe the run, and no cause was found",

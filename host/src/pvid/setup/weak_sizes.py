@@ -52,8 +52,8 @@ def refuse_too_few_functions(name: str, thetas: int, unknowns: int) -> None:
     """PvidError for rows that cannot determine all unknowns, whatever the run is: the C core refuses them."""
     if thetas < unknowns:
         raise PvidError(
-            f"the rows of {name} have {thetas} functions of its {unknowns} unknowns, too few for the C core: `pvid model"
-            " check` names the unknowns of which one must be known, and the sensors that are missing"
+            f"the rows of {name} have {thetas} functions of its {unknowns} unknowns, too few for the C core: `pvid "
+            "model check` names the unknowns of which one must be known, and the sensors that are missing"
         )
 
 
