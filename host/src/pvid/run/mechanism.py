@@ -38,6 +38,7 @@ from pvid.run.sensor_prediction import SensorPrediction
 Float = npt.NDArray[np.float64]
 
 
+_NOTHING = 1e-6  # of its guess: a positive parameter that has shrunk
 _NOISE = 2.0  # chi^2 over the sensors' noise up to which it explains the residuals
 
 
@@ -221,11 +222,11 @@ def _determined(found: Identified) -> int:
 
 
 def _collapsed(model: CompiledModel, found: Identified) -> bool:
-    """Whether an unknown of a homogeneous row is not determined."""
-    judged = zip(found.names, found.judged, strict=True)
-    lost = {name.partition("[")[0] for name, one in judged if one.status != "identified"}  # m of m[A], too
+    """Whether an unknown of a homogeneous row has shrunk to nothing."""
     homogeneous = {str(one) for row in model.rows if not row.known for theta in row.theta for one in theta.free_symbols}
-    return bool(lost & homogeneous)
+    guesses = {one.name: one.guess for one in model.unknowns if one.positive and one.name in homogeneous}
+    names = (name if name in guesses else name.partition("[")[0] for name in found.names)  # m of m[A], too
+    return any(p < _NOTHING * guesses.get(name, -np.inf) for name, p in zip(names, found.p, strict=True))
 
 
 def _of_edges(model: CompiledModel) -> Iterator[str]:

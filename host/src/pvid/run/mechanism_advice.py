@@ -58,6 +58,8 @@ def analysed(
     own : as of identify_mechanism
     """
     answer = advised(identify_mechanism(recording, model, weights, own))
+    if answer.advice and not answer.identified:  # another column, sign or unit: no estimate of this one can help
+        return answer
     if answer.found.named is not None:
         from pvid.run.additions import to_type
 
