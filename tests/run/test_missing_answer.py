@@ -4,49 +4,18 @@ import json
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 import pytest
+from lag_plant import DRAG, RATE, K, T, lag, signals
 
 from pvid.api.result import of_mechanism
-from pvid.model import Model
-from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
-
-Float = npt.NDArray[np.float64]
-
-RATE, T, K, DRAG = 200.0, 0.35, 2.0, 0.04
-
-
-def lag() -> CompiledModel:
-    """T y' + y = K u, with the gain of a slow output."""
-    model = Model("lag")
-    u = model.input("u", "V", hold="zoh", reach=4, gain_sd=0)
-    y = model.sensor("y", "V", resolution=1e-3, noise=1e-3, reach=6)
-    time, gain = model.unknown("T", "s", 0.2), model.unknown("K", "", 1)
-    model.equation(2 * (time * y.d() + y - gain * u))  # a factor of the equation is one of the term
-    model.output("pole", "1/s", 1 / time)
-    return model.compiled("lag")
-
-
-def signals(drag: float) -> dict[str, Float]:
-    """T y' + y + drag |y| y = K u, in 20 steps a sample."""
-    random = np.random.default_rng(5)
-    u = random.uniform(-2, 2, 40).repeat(100)
-    y, h = np.zeros(len(u)), 1 / RATE / 20
-    for place in range(1, len(u)):
-        now = y[place - 1]
-        for _ in range(20):
-            middle = now + h / 2 * (K * u[place - 1] - now - drag * abs(now) * now) / T
-            now += h * (K * u[place - 1] - middle - drag * abs(middle) * middle) / T
-        y[place] = now
-    return {"u": u, "y": np.round((y + random.normal(0, 1e-3, len(u))) / 1e-3) * 1e-3}
 
 
 @cache
 def answer(drag: float) -> MechanismAnswer:
     samples = signals(drag)
-    return identify_mechanism(Recording(np.arange(len(samples["u"])) / RATE, samples, RATE), lag())
+    return identify_mechanism(Recording(np.arange(len(samples["u"])) / RATE, samples, RATE), lag(2))
 
 
 def test_term_and_the_parameters_with_it_are_in_the_json() -> None:

@@ -8,9 +8,9 @@ from functools import cache
 from typing import get_args
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from conftest import ROOT
+from lag_plant import DRAG, RATE, K, T, lag, signals
 from rich.console import Console
 
 from pvid.api.result import of_mechanism
@@ -18,8 +18,6 @@ from pvid.base.rounding import percent
 from pvid.cli.mechanism import table_of
 from pvid.cli.page_table import table_in
 from pvid.cli.verdict_table import ROWS, verdict_table
-from pvid.model import Model
-from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Reason, Verdict, of_width
 from pvid.oracle.weak.words import WIDE, Word, of_warning
@@ -28,40 +26,14 @@ from pvid.run.judge import PREDICTED
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
 from pvid.run.mechanism_advice import analysed
 
-Float = npt.NDArray[np.float64]
-
-RATE, T, K, DRAG = 200.0, 0.35, 2.0, 0.04
-
-
-def lag() -> CompiledModel:
-    """T y' + y = K u, with the gain of a slow output."""
-    model = Model("lag")
-    u = model.input("u", "V", hold="zoh", reach=4, gain_sd=0)
-    y = model.sensor("y", "V", resolution=1e-3, noise=1e-3, reach=6)
-    time, gain = model.unknown("T", "s", 0.2), model.unknown("K", "", 1)
-    model.equation(time * y.d() + y - gain * u)
-    model.output("pole", "1/s", 1 / time)
-    return model.compiled("lag")
-
 
 @cache
 def answer(drag: float = 0.0, noise: float = 1e-3, hand: float = 0.0, judged: bool = False) -> MechanismAnswer:
     """T y' + y + drag |y| y = K u + a random push, in 20 steps a sample."""
-    random = np.random.default_rng(5)
-    u = random.uniform(-2, 2, 40).repeat(100)
-    push = hand * random.normal(0, 2, len(u) // 20).repeat(20)
-    y, h = np.zeros(len(u)), 1 / RATE / 20
-    for place in range(1, len(u)):
-        now = y[place - 1]
-        for _ in range(20):
-            middle = now + h / 2 * (K * u[place - 1] + push[place - 1] - now - drag * abs(now) * now) / T
-            now += h * (K * u[place - 1] + push[place - 1] - middle - drag * abs(middle) * middle) / T
-        y[place] = now
-    y = np.round((y + random.normal(0, noise, len(u))) / 1e-3) * 1e-3
-    model = lag()
-    signals = tuple(replace(one, noise=noise) if one.name == "y" else one for one in model.signals)
-    recording = Recording(np.arange(len(u)) / RATE, {"u": u, "y": y}, RATE)
-    model = replace(model, signals=signals)
+    samples, model = signals(drag, noise, hand), lag()
+    noisy = tuple(replace(one, noise=noise) if one.name == "y" else one for one in model.signals)
+    recording = Recording(np.arange(len(samples["u"])) / RATE, samples, RATE)
+    model = replace(model, signals=noisy)
     return analysed(recording, model) if judged else identify_mechanism(recording, model)
 
 

@@ -688,7 +688,7 @@ class Told:
 
     @property
     def named_wrongly(self) -> bool:
-        """It is none of them, nor is one of those that it stands for alike."""
+        """The first named term is none of its effects, nor is a term that explains the run equally well."""
         named = self.found.named
         return bool(named) and not self.right and not any(self._among(text) for text in named[0].instead)
 

@@ -21,8 +21,7 @@ if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.codegen.strong_twin import StrongModelConfig
     from pvid.model.compiled import CompiledModel
     from pvid.models.simulated_rig import SimulatedRig
-    from pvid.rig.file import RigFile
-    from pvid.rig.mechanism_file import MechanismRig
+    from pvid.rig.run import Recording
     from pvid.settings.refine import RefineConfig
     from pvid.settings.weak import WeakConfig
 
@@ -194,10 +193,12 @@ def build(
 
     compiled, rig = model_of_rig(model, rig_path, run_path)
     refuse_too_many_unknowns(compiled)
-    if run_path is not None:
-        recording = recorded(compiled, rig, run_path, columns)
+    if columns is not None and run_path is None:
+        raise PvidError("--columns needs --run")
+    recording = None if run_path is None else recorded(compiled, rig, run_path, columns)
+    if recording is not None:
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
-    design = _design_of(compiled, rig, model, run_path, columns, functions)
+    design = _design_of(compiled, model, recording, functions)
     limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
     soft = _numbers(soft_signs, "--soft-sign")
     given = [*(["--strong"] if strong else []), *(f"--soft-sign {one}" for one in soft_signs)]
@@ -212,11 +213,11 @@ def build(
     fixed_weak: dict[str, str] = {}
     no_fixed_weak = None
     if design is not None:
-        fixed_weak, no_fixed_weak = _fixed_weak(compiled, rig, run_path, columns, functions, soft, title)
-    strong_design = _strong_design_of(compiled, rig, model, run_path, columns) if strong else None
+        fixed_weak, no_fixed_weak = _fixed_weak(compiled, recording, functions, soft, title)
+    strong_design = _strong_design_of(compiled, model, recording) if strong else None
     refine_design, no_refinement = None, generated.refine_refusal(compiled)
     if design is not None and no_refinement is None:
-        refine_design, no_refinement = _refine_design_of(compiled, rig, run_path, columns, design, soft)
+        refine_design, no_refinement = _refine_design_of(compiled, recording, design, soft)
     options = generated.Options(limits, soft, strong, design, fixed_weak, strong_design, refine_design)
     if not only_check:
         for path in generated.build(compiled, out, title, options):
@@ -331,17 +332,15 @@ def _name_beside(out: Path, model: str) -> str:
     return os.path.relpath(model, out.parent) if model.endswith(".py") else model
 
 
-def _strong_design_of(
-    compiled: CompiledModel, rig: MechanismRig | RigFile | None, model: str, run_path: Path | None, columns: str | None
-) -> StrongModelConfig | None:
+def _strong_design_of(compiled: CompiledModel, model: str, recording: Recording | None) -> StrongModelConfig | None:
     """Of the strong form for the rig of a recording, or for the shipped rig of a shipped mechanism."""
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.rig.run import Recording
     from pvid.run.strong_design import strong_design
     from pvid.sim.simulated_run import simulation_of
 
-    if run_path is not None:
-        return strong_design(compiled, recorded(compiled, rig, run_path, columns)).config
+    if recording is not None:
+        return strong_design(compiled, recording).config
     if model not in names_of_shipped():
         return None
     simulation = simulation_of(model)
@@ -352,9 +351,7 @@ def _strong_design_of(
 
 def _refine_design_of(
     compiled: CompiledModel,
-    rig: MechanismRig | RigFile | None,
-    run_path: Path | None,
-    columns: str | None,
+    recording: Recording | None,
     design: WeakConfig,
     soft_signs: dict[str, float],
 ) -> tuple[RefineConfig | None, str | None]:
@@ -362,8 +359,7 @@ def _refine_design_of(
     from pvid.run.refine_design import refine_design, refine_for_simulated_rig
 
     try:
-        if run_path is not None:
-            recording = recorded(compiled, rig, run_path, columns)
+        if recording is not None:
             return refine_design(compiled, design, recording.signals, soft_signs=soft_signs), None
         return refine_for_simulated_rig(compiled, design, soft_signs), None
     except PvidError as error:
@@ -372,22 +368,18 @@ def _refine_design_of(
 
 def _design_of(
     compiled: CompiledModel,
-    rig: MechanismRig | RigFile | None,
     model: str,
-    run_path: Path | None,
-    columns: str | None,
+    recording: Recording | None,
     functions: int | None,
 ) -> WeakConfig | None:
     from pvid.codegen.build import weak_refusal
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped
 
-    if columns is not None and run_path is None:
-        raise PvidError("--columns needs --run")
     if weak_refusal(compiled) is not None:
         return None
-    if run_path is not None:
-        return config_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions)
+    if recording is not None:
+        return config_for_recording(compiled, recording, functions)
     if model in names_of_shipped():
         return config_for_rig_like_the_shipped(compiled, functions)
     if functions is not None:
@@ -397,9 +389,7 @@ def _design_of(
 
 def _fixed_weak(
     compiled: CompiledModel,
-    rig: MechanismRig | RigFile | None,
-    run_path: Path | None,
-    columns: str | None,
+    recording: Recording | None,
     functions: int | None,
     soft_signs: dict[str, float],
     title: str,
@@ -409,10 +399,10 @@ def _fixed_weak(
     from pvid.run.engine_files_q31 import config_of, files_of
 
     try:
-        if run_path is None:
+        if recording is None:
             engine = engine_for_rig_like_the_shipped(compiled, functions, soft_signs)
         else:
-            engine = engine_for_recording(compiled, recorded(compiled, rig, run_path, columns), functions, soft_signs)
+            engine = engine_for_recording(compiled, recording, functions, soft_signs)
     except PvidError as error:
         return {}, str(error)
     return files_of(engine, title) | config_of(engine, title), None

@@ -8,13 +8,14 @@ multiplied by w.
 
 A sensor that an algebraic equation ties to the input jumps itself, by D = dy/du: the current through a resistor, the
 voltage of a cell, an accelerometer. Sampled behind the jump its integral is dt sum chi (y + D (mean of u about t_k -
-u_k)); sampled before it, u_(k-1) stands for u_k. Ignored it costs half a sample.
+u_k)); sampled before it, u_k is replaced by u_(k-1). Without the correction the sensor is half a sample late or early.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import sympy as sp
@@ -55,7 +56,7 @@ def feedthroughs(model: CompiledModel) -> dict[tuple[str, str], sp.Expr]:
     }
 
 
-def _solved(model: CompiledModel) -> dict[tuple[Jet, str], sp.Expr]:
+def _solved(model: CompiledModel) -> Mapping[tuple[Jet, str], sp.Expr]:
     """(highest derivative of a sensor or a hidden quantity, held input) -> its jump over that of the input.
 
     By the solution of the linear system that all equations are. Empty where no quantity is without derivatives: then
@@ -64,10 +65,18 @@ def _solved(model: CompiledModel) -> dict[tuple[Jet, str], sp.Expr]:
     held = [one.name for one in model.signals if one.kind == "input" and one.hold == "zoh"]
     names = [one.name for one in model.signals if one.kind == "sensor" and not one.driven]
     names += sorted({str(jet.of) for jet in model.hidden})
-    top = [Jet(name, max((order_of(one, [name]) for one in model.equations), default=0)) for name in names]
-    if not held or all(jet.order for jet in top) or len(top) != len(model.equations):
+    return _jumps_of(model.equations, tuple(held), tuple(names))
+
+
+@lru_cache(maxsize=16)
+def _jumps_of(
+    equations: tuple[sp.Expr, ...], held: tuple[str, ...], names: tuple[str, ...]
+) -> Mapping[tuple[Jet, str], sp.Expr]:
+    """The same of the quantities of these names."""
+    top = [Jet(name, max((order_of(one, [name]) for one in equations), default=0)) for name in names]
+    if not held or all(jet.order for jet in top) or len(top) != len(equations):
         return {}
-    whole = [sp.expand(one) for one in model.equations]
+    whole = [sp.expand(one) for one in equations]
     matrix = sp.Matrix([[sp.diff(one, jet) for jet in top] for one in whole])
     if any(varies(one) for one in matrix):
         return {}

@@ -48,7 +48,8 @@ def described(mechanism: str | Path) -> Model:
     PvidError
         Where the file cannot be read or run, or leaves no model; the sentence contains the line.
     """
-    return _left_in(_space_of(path_of(mechanism)[1]), path_of(mechanism)[1])[1]
+    path = path_of(mechanism)[1]
+    return _left_in(_space_of(path), path)[1]
 
 
 def text_with(mechanism: str | Path, lines: Sequence[str]) -> str:

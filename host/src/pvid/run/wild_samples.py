@@ -131,12 +131,13 @@ def without_wild_samples(recording: Recording, model: CompiledModel) -> Recordin
     notes = list(recording.notes)
     span = max(_SHORTEST, round(_SPAN * recording.sample_rate))
     orders = {one.name: max(order_of(equation, [one.name]) for equation in model.equations) for one in model.signals}
+    steady = _steady(recording, model)
     for one in model.signals:
         if one.kind != "sensor" or one.driven or not orders[one.name]:
             continue
         find = partial(_far_from_median, sd=one.sd)
         if orders[one.name] < 2:
-            find = partial(_error_codes, sd=one.sd, steady=_steady(recording, model))
+            find = partial(_error_codes, sd=one.sd, steady=steady)
         x, note = _without_far_samples(recording, one, find)
         if note:
             changed[one.name] = x

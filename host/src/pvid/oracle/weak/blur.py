@@ -18,6 +18,7 @@ from pvid.oracle.weak.front import segments_of, weights_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import Compiled, record_of
 from pvid.oracle.weak.scores import Scores
+from pvid.oracle.weak.solve import Fit
 
 # A frequency belongs to the drive if its power is so many times the median, the noise: noise reaches 40 times at one of
 # 2^40 frequencies. (Ten times are reached at one of a thousand, and a second derivative makes those the largest.)
@@ -40,21 +41,16 @@ def blur_of(model: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesig
     )
 
 
-def shift_of(scores: Scores, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> Float:
+def shift_of(fit: Fit, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> Float:
     """What p is off by, about, because the rates in terms are too small at the frequencies of the motion [n_p]."""
-    rows = scores.fit.rows
-    model = rows.compiled
+    model = fit.rows.compiled
     rates = model.channels.rates - set(rates_of_drives(model))
     gains = {jet: _gain(_longest(np.asarray(run[jet.of], np.float64)), design, jet.order) for jet in rates}
     if all(abs(gain - 1) < _EXACT for gain in gains.values()):
-        return np.zeros(len(scores.fit.p))
+        return np.zeros(len(fit.p))
     true = record_of(model, run, design, {jet: 2 - gain for jet, gain in gains.items()})
-    moved = [one[rows.numbers] for one in true.columns(rows.functions)]
-    change = []
-    for before, now, theta in zip(rows.columns, moved, scores.theta, strict=True):
-        apart = before - now
-        change.append(apart[:, len(theta)] - np.einsum("wjk,j->wk", apart[:, : len(theta)], theta))
-    return scores.shift_by(change)
+    scores = Scores(fit)
+    return scores.shift_by(scores.change_to(true, -1.0)(scores.theta))
 
 
 def _gain(x: Float, design: WeakDesign, order: int) -> float:

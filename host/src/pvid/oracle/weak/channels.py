@@ -208,7 +208,7 @@ class Channels:
     def _sign_arguments(self) -> Any:
         return numpy_function(sorted(self.needed, key=str), list(self.signs))
 
-    @property
+    @cached_property
     def rates(self) -> set[Jet]:
         """Derivatives of signals that terms contain otherwise than in signs."""
         inside = (one for channel in self.channels for one in (channel.gain, channel.integrand))

@@ -26,7 +26,6 @@ from pvid.oracle.weak.front import samples_of, segments_of
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.rows import Compiled, WeakRows
-from pvid.oracle.weak.scores import Scores
 from pvid.oracle.weak.starts import starts_about
 from pvid.oracle.weak.zero import ALMOST_0, near_zero
 
@@ -116,7 +115,7 @@ def _scored(
         fit = gated(rows, start, equation_error=errors, passes=_PASSES, settled=_SETTLED)
         found = uncertainty(fit)
         other = other_line(fit)
-        blurred = shift_of(Scores(fit), run, design) if model.channels.rates else np.zeros(len(fit.p))
+        blurred = shift_of(fit, run, design)
     except FAILURES:
         return None
     small, of_small = attempted(lambda: near_zero(fit, found.se)) or (np.zeros(len(fit.p), np.bool_), found.se)

@@ -176,7 +176,7 @@ def identify(
     halves = attempt("the halves of the run", lambda: verdict.halves_of(fit))
     white = attempt("a white force as the error of the equations", lambda: as_white_force(fit))
     library = Library(run, used, fit)
-    blurred = attempt("rates that the filter blurs", lambda: shift_of(library.scores, run, used))
+    blurred = attempt("rates that the filter blurs", lambda: shift_of(fit, run, used))
     by_gain = {
         one.name: _or_nan(fit, partial(library.by_gain, one.name))
         for one in compiled.signals

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,13 +11,12 @@ import numpy.typing as npt
 
 from pvid.model.compiled import CompiledModel
 from pvid.model.evaluation import numpy_function
-from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.front import filtered, largest
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.polynomials import polynomial_weights
 from pvid.oracle.weak.rows import record_of
-from pvid.oracle.weak.scores import Scores
+from pvid.oracle.weak.scores import Scores, between
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.terms import ACTS, CONSTANT, GAIN, LAWS, SOFT, SOFT_WIDTHS, Act, Candidate, Change, Law, Recorded
 
@@ -66,9 +65,10 @@ class Library:
         whole = replace(self.design, window_s=2 * self.design.hop * self.design.dt)  # as many steps at any rate
         factor = 1 + _STEP
         faster = replace(whole, sample_rate=whole.sample_rate * factor, window_s=whole.window_s / factor)
-        before, after = (self._columns(record_of(self.fit.rows.compiled, self.run, one)) for one in (whole, faster))
-        change = _between(before, after, _STEP)
-        return self.scores.shift(Candidate("", "", GAIN, 0.0, change))
+        before, after = (
+            self.scores.columns_of(record_of(self.fit.rows.compiled, self.run, one)) for one in (whole, faster)
+        )
+        return self.scores.shift_by(between(before, after, _STEP)(self.scores.theta))
 
     @cached_property
     def candidates(self) -> list[Candidate]:
@@ -111,7 +111,7 @@ class Library:
         rms = float(np.sqrt(np.mean(np.square(speed))))
         for part in SOFT_WIDTHS:
             soft = replace(self.design, reversals="soft", soft=part * rms)
-            change = self._change(record_of(self.fit.rows.compiled, self.run, soft), -1.0)
+            change = self.scores.change_to(record_of(self.fit.rows.compiled, self.run, soft), -1.0)
             yield Candidate(str(argument), str(argument), SOFT, part * rms, change)
 
     def _acts(self) -> Iterator[Candidate]:
@@ -130,7 +130,7 @@ class Library:
             other = recorded.values - step * other
         name = recorded.signal.name
         record = record_of(self.fit.rows.compiled, {**self.run, name: other}, self.design)
-        return Candidate(name, name, act, level, self._change(record, step), recorded.top, act.most(recorded))
+        return Candidate(name, name, act, level, self.scores.change_to(record, step), recorded.top, act.most(recorded))
 
     def recorded(self, name: str) -> Recorded:
         """A signal as recorded."""
@@ -141,26 +141,6 @@ class Library:
         for signal in self.model.signals:
             if signal.name in self.run and (one := self.recorded(signal.name)).top:
                 yield one
-
-    def _change(self, record: Record, step: float) -> Change:
-        """Residuals with other channels less those with the recorded ones, over a step."""
-        return _between(self.fit.rows.columns, self._columns(record), step)
-
-    def _columns(self, record: Record) -> list[Float]:
-        """Of the windows of the fit, of each row kind."""
-        return [one[self.fit.rows.numbers] for one in record.columns(record.grid.design.test_functions)]
-
-
-def _between(before: Sequence[Float], after: Sequence[Float], step: float) -> Change:
-    apart = [(now - one) / step for now, one in zip(after, before, strict=True)]
-
-    def change(theta: Sequence[Float]) -> list[Float]:
-        return [
-            one[:, len(th)] - np.einsum("wjk,j->wk", one[:, : len(th)], th)
-            for one, th in zip(apart, theta, strict=True)
-        ]
-
-    return change
 
 
 def _in_row(sums: Float, kind: int, kinds: int) -> Change:

@@ -16,11 +16,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from pvid.oracle.weak.channels import Record
 from pvid.oracle.weak.errors import clustered_variance
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.rows import WhiteRows
 from pvid.oracle.weak.solve import Fit, inverse
-from pvid.oracle.weak.terms import Candidate
+from pvid.oracle.weak.terms import Candidate, Change
 
 FOLDS = 4  # contiguous parts of each recording: p and sizes from three, the share on the fourth
 
@@ -32,6 +33,19 @@ _CANCELS = 0.25
 
 # What replaces a signal as a whole has a column of size 1.
 _WHOLE = (0.4, 2.5)
+
+
+def between(before: Sequence[Float], after: Sequence[Float], step: float) -> Change:
+    """Residuals with the columns `after` less those with the columns `before`, over a step; both of each row kind."""
+    apart = [(now - one) / step for now, one in zip(after, before, strict=True)]
+
+    def change(theta: Sequence[Float]) -> list[Float]:
+        return [
+            one[:, len(th)] - np.einsum("wjk,j->wk", one[:, : len(th)], th)
+            for one, th in zip(apart, theta, strict=True)
+        ]
+
+    return change
 
 
 class Scores:
@@ -49,6 +63,14 @@ class Scores:
     def shift(self, one: Candidate) -> Float:
         """What p moves by when a term of size 1 is added [n_p]."""
         return self.shift_by(one.change(self.theta))
+
+    def change_to(self, record: Record, step: float) -> Change:
+        """Residuals with other channels less those with the recorded ones, over a step."""
+        return between(self.fit.rows.columns, self.columns_of(record), step)
+
+    def columns_of(self, record: Record) -> list[Float]:
+        """Of other channels, at the windows of the fit, of each row kind."""
+        return [one[self.fit.rows.numbers] for one in record.columns(record.grid.design.test_functions)]
 
     def shift_by(self, change: Sequence[Float]) -> Float:
         """What p moves by when each kind's raw residuals change by so much [windows, K] [n_p]."""
