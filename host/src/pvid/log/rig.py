@@ -104,6 +104,20 @@ def described_document_of_log(path: Path) -> dict[str, Any] | None:
     return document
 
 
+def document_of_log(path: Path) -> dict[str, Any] | None:
+    """The tables of the rig in a log, without the engine's; None: the log has none.
+
+    Raises
+    ------
+    PvidError
+        When the log cannot be read, or the rig file in it is none.
+    """
+    text = _text_of_log(path)
+    if text is None:
+        return None
+    return {key: value for key, value in toml_document(text).items() if key != "engine"}
+
+
 def mechanism_of_log(path: Path) -> Mechanism:
     """The mechanism of a log: that of its rig file, else the first one that the board named; UNKNOWN_RIG if none did.
 

@@ -45,6 +45,8 @@ class Signal:
     neglected
         the equations are linearised: their relative error is up to this many times the square of the signal, from its
         mean; part of the standard errors [1/unit^2]
+    delay : its samples are taken so much later than those of the others [s]
+    given : the rig file states the resolution; else it may be taken from a recording
     """
 
     jet: Jet
@@ -59,6 +61,8 @@ class Signal:
     neglected: float = 0.0
     smooth: bool = False
     edge: Edge = "between"
+    delay: float = 0.0
+    given: bool = False
 
     @property
     def name(self) -> str:
@@ -86,6 +90,7 @@ class Unknown:
     low, high : range of the plausible
     sd : how far off the guess can be [unit]; of positive ones 2 |guess| unless given
     bounds : low and high where the author gave them: the search stays between them
+    guess_of : what the guess follows from, in known constants; None: it is a number
     """
 
     symbol: sp.Symbol
@@ -96,6 +101,7 @@ class Unknown:
     high: float
     sd: float
     bounds: tuple[float, float] = (-math.inf, math.inf)
+    guess_of: sp.Expr | None = None
 
     @property
     def name(self) -> str:
@@ -105,12 +111,16 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Known:
-    """A constant with a value, and the standard deviation of it [unit], that the rig file may set."""
+    """A constant with a value, and the standard deviation of it [unit], that the rig file may set.
+
+    required : it differs from rig to rig: a recording is identified with the value of its rig file alone
+    """
 
     symbol: sp.Symbol
     unit: str
     value: float
     sd: float = 0.0
+    required: bool = False
 
     @property
     def name(self) -> str:

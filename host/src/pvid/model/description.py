@@ -144,21 +144,25 @@ class Model:
         self._agree(jet - self.defined[jet], f"the definition of {name}")
         return jet
 
-    def known(self, name: str, unit: str, value: float, sd: float = 0.0) -> sp.Symbol:
-        """A constant with a value and the standard deviation of it, which a rig file may change."""
+    def known(self, name: str, unit: str, value: float, sd: float = 0.0, required: bool = False) -> sp.Symbol:
+        """A constant with a value and the standard deviation of it, which a rig file may change.
+
+        required : it differs from rig to rig, as a length does: the value here is an example, which no recording is
+            identified with
+        """
         symbol = self._symbol(name, unit)
         if not math.isfinite(value):
             raise self._refused(f"{name}: its value {value} is no number")
         if not 0 <= sd < math.inf:
             raise self._refused(f"{name}: its standard deviation must be a number of at least 0, not {sd}")
-        self.knowns.append(Known(symbol, unit, float(value), float(sd)))
+        self.knowns.append(Known(symbol, unit, float(value), float(sd), required))
         return symbol
 
     def unknown(
         self,
         name: str,
         unit: str,
-        guess: float,
+        guess: float | sp.Expr,
         positive: bool = True,
         low: float | None = None,
         high: float | None = None,
@@ -168,19 +172,25 @@ class Model:
 
         Parameters
         ----------
-        guess : rough value [unit]
+        guess : rough value [unit], a number or what it follows from in known constants, as in 9.8 / l1
         positive : it cannot be 0 or below
         low, high
             range of the plausible [unit], which the search does not leave where given; else a hundredth and a hundred
             times the guess, or 10 sd around it, with a warning beyond
         sd : how far off the guess can be [unit]; 2 |guess|
         """
+        guess_of = guess if isinstance(guess, sp.Expr) and guess.free_symbols else None
+        if guess_of is not None:
+            guess = guess_of.subs({one.symbol: one.value for one in self.knowns})
+            if guess.free_symbols:
+                raise self._refused(f"{name}: its guess {guess_of} must follow from known constants")
         if not math.isfinite(guess) or positive and guess <= 0:
             raise self._refused(
                 f"{name}: the guess {guess} is not positive; give positive=False if it may have any sign"
             )
         if sd is None and guess == 0:
             raise self._refused(f"{name}: with a guess of 0, give sd, how far off it can be [{unit or 1}]")
+        guess = float(guess)
         spread = 2 * abs(guess) if sd is None else sd
         if not spread > 0:
             raise self._refused(f"{name}: sd must be positive")
@@ -191,7 +201,7 @@ class Model:
         symbol = self._symbol(name, unit)
         bounds = (-math.inf if low is None else float(low), math.inf if high is None else float(high))
         self.unknowns.append(
-            Unknown(symbol, unit, float(guess), positive, float(least), float(most), float(spread), bounds)
+            Unknown(symbol, unit, guess, positive, float(least), float(most), float(spread), bounds, guess_of)
         )
         return symbol
 

@@ -22,6 +22,18 @@ FloatArray = npt.NDArray[np.float64]
 
 _TIME = Channel("t", "s", "time", usual_names=r"^t$|^t[^a-z]|time|zeit|temps|tiempo|stamp|clock|millis|micros|^sec")
 
+# What people call a signal of a unit, besides its own name.
+_USUAL_NAMES = {
+    "rad": r"phi|φ|angle|ang|theta|winkel|enc|deg|rad|pend|°",
+    "m": r"height|^h$|^h[^a-z]|pivot|cart|base|pos|disp|laser|dist|^x$|^y$|^z",
+    "rad/s": r"omega|ω|rate|speed|veloc|rpm|gyro|drehzahl",
+    "m/s": r"speed|veloc|^v$",
+    "V": r"volt|spannung|^u$|^u[^a-z]|^v$",
+    "A": r"curr|strom|amp|^i$|^i[^a-z]",
+    "N": r"force|kraft|load",
+    "N*m": r"torque|moment|drehmoment",
+}
+
 _UNIT_AT_END = re.compile(r"(?:^|[\s_.\-/(\[])(?P<unit>[a-zµμ°]+)[)\]]?\s*$", re.I)
 _IN_BRACKETS = re.compile(r"[\[(](?P<unit>[^\[\]()]+)[\])]\s*$")
 _PART = re.compile(r'(?:[^,"]|"(?:[^"]|"")*"?)+')
@@ -171,7 +183,7 @@ class Columns:
                 for signal in missing
             )
             found = ", ".join(shown(name, 24) for name in names[:8]) + (", ..." if len(names) > 8 else "")
-            raise PvidError(
+            raise MissingColumnError(
                 f"{path}{where}: no column {wanted} among {found or 'none'}: "
                 f"use --columns {self._suggestion(names, places)}."
             )
@@ -206,6 +218,17 @@ class Columns:
             parts.append(f"{signal}={typed}:{_unit_in(name, unit) or unit or 1}")
         text = ",".join(parts)
         return text if re.fullmatch(r"[\w=:,.\-]+", text, re.ASCII) else f"'{text}'"
+
+
+class MissingColumnError(PvidError):
+    """A file has no column for a signal."""
+
+
+def channel_of(name: str, unit: str, held: bool) -> Channel:
+    """A signal that a recording is to have; a column's name may carry a unit behind the signal's."""
+    own = rf"^{re.escape(name)}([\s_(\[].*)?$"
+    usual = _USUAL_NAMES.get(unit)
+    return Channel(name, unit, name, usual_names=own if usual is None else f"{own}|{usual}", held=held)
 
 
 def parsed(text: str | None, channels: tuple[Channel, ...] = MODELS[DEFAULT].channels) -> Columns:

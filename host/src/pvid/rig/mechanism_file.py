@@ -10,10 +10,12 @@
     g = 0.01                  # standard deviations of constants, in their units; 0 where none is given
     [sensor.phi]
     resolution = 0.0015       # in the unit of the signal; noise in resolutions
+    delay = 0.002             # its samples are taken so much later than those of the other signals [s]
     [sensor.V]
     gain_sd = 0.005           # of any signal, an input too: relative standard deviation of its gain
+    reach = 24                # largest absolute value: the range of a fixed-point core
     [nominal]
-    R = 1.2                   # rough guesses: the start of the estimate
+    R = 1.2                   # rough guesses of unknowns or outputs of the model: the start of the estimate
     [identifier]
     forgetting_s = 20         # how the estimate follows a change: see Following
     [refine]
@@ -24,7 +26,6 @@ A key that the model does not have becomes a PvidError that names it and lists t
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
@@ -36,11 +37,15 @@ from pvid.base.errors import PvidError
 from pvid.base.toml_text import key_and_value, quoted, toml_document
 from pvid.base.wording import listed, shown
 from pvid.models.model import Channel
+from pvid.rig.columns import channel_of
 
-if TYPE_CHECKING:  # it loads SymPy, without which a run of the pendulum does
-    from pvid.model.compiled import CompiledModel
+if TYPE_CHECKING:  # it loads SymPy
+    from pvid.model.compiled import CompiledModel, Unknown
+    from pvid.model.description import Model as Description
 
-_OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected")
+_OF_AN_INPUT = ("gain_sd", "reach")
+_OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected", "delay", "reach")
+_POSITIVE = ("reach", "sample_rate")
 OF_THE_IDENTIFIER = ("forgetting_s", "outlier_gate", "outlier_patience_s", "dead_zone")  # fields of Following
 
 
@@ -53,9 +58,9 @@ class MechanismRig:
     model : name of a shipped mechanism, or the path of a model file that this call named (pvid.models.registry)
     sample_rate : [Hz]; None: that of the run
     known, known_sd : values of the model's constants, and standard deviations of them
-    sensor : by signal: resolution [its unit], noise [resolutions], gain_sd [relative], neglected (see Signal); of an
-        input gain_sd alone
-    nominal : guesses of the unknowns
+    sensor : by signal: resolution, reach [its unit], noise [resolutions], gain_sd [relative], delay [s], neglected (see
+        Signal); of an input gain_sd and reach alone
+    nominal : guesses of unknowns, or of outputs, from which those of unknowns follow
     identifier : what differs from Following's defaults
     refine : options of the refinement in C that are chosen or not
     clock_sd : relative standard deviation of the sample rate; None: the model's
@@ -161,52 +166,65 @@ class MechanismRig:
         _refuse_unknown("known", self.known, [one.name for one in model.knowns])
         _refuse_unknown("sensor", self.sensor, [one.name for one in model.signals])
         for signal in model.signals:
-            if signal.kind == "input" and set(self.sensor.get(signal.name, {})) - {"gain_sd"}:
-                raise PvidError(f"sensor.{signal.name}: an input of the model has a gain_sd alone")
-        _refuse_unknown("nominal", self.nominal, list(model.p_names))
+            if signal.kind == "input" and set(self.sensor.get(signal.name, {})) - {*_OF_AN_INPUT}:
+                raise PvidError(f"sensor.{signal.name}: an input of the model has {listed(_OF_AN_INPUT)} alone")
+        _refuse_unknown("nominal", self.nominal, [*model.p_names, *(one.name for one in model.outputs)])
         _refuse_unknown("known_sd", self.known_sd, [one.name for one in model.knowns])
         _refuse_unknown("refine", self.refine, list(model.options))
         knowns = tuple(
-            replace(one, value=self.known.get(one.name, one.value), sd=self.known_sd.get(one.name, one.sd))
+            replace(one, value=value, sd=self.known_sd.get(one.name, one.sd * grown))
             for one in model.knowns
+            for value in [self.known.get(one.name, one.value)]
+            for grown in [abs(value / one.value) if one.value else 1.0]
         )
         signals = []
         for signal in model.signals:
-            given = self.sensor.get(signal.name, {})
-            resolution, noise = given.get("resolution", signal.resolution), given.get("noise", signal.noise)
-            gain_sd = given.get("gain_sd", signal.gain_sd)
-            neglected = given.get("neglected", signal.neglected)
-            signals.append(replace(signal, resolution=resolution, noise=noise, gain_sd=gain_sd, neglected=neglected))
-        unknowns = []
-        for one in model.unknowns:
-            guess = self.nominal.get(one.name, one.guess)
-            if one.positive and not guess > 0:
-                raise PvidError(f"nominal.{one.name} must be positive, not {guess:g}")
-            unknowns.append(replace(one, guess=guess, sd=2 * guess if one.positive else one.sd))
+            given: dict[str, Any] = dict(self.sensor.get(signal.name, {}))
+            signals.append(replace(signal, given=signal.given or "resolution" in given, **given))
+        unknowns = self._unknowns(replace(model, knowns=knowns))
         following = replace(model.following, **self.identifier)
         clock_sd = model.clock_sd if self.clock_sd is None else self.clock_sd
         own = replace(
             model,
             knowns=knowns,
             signals=tuple(signals),
-            unknowns=tuple(unknowns),
+            unknowns=unknowns,
             following=following,
             clock_sd=clock_sd,
         )
         return own.with_options([name for name, chosen in self.refine.items() if chosen])
 
+    def _unknowns(self, model: CompiledModel) -> tuple[Unknown, ...]:
+        """Those of a model that has the constants of this rig, with the guesses of this rig."""
+        unknowns = []
+        for one in model.unknowns:
+            follows = one.guess if one.guess_of is None else float(model.with_knowns(one.guess_of))
+            guess, grown = self.nominal.get(one.name, follows), follows / one.guess if one.guess_of is not None else 1.0
+            if one.positive and not guess > 0:
+                raise PvidError(f"nominal.{one.name} must be positive, not {guess:g}")
+            sd, low, high = 2 * guess if one.positive else one.sd, grown * one.low, grown * one.high
+            unknowns.append(replace(one, guess=guess, sd=sd, low=low, high=high))
+        outputs = {name: value for name, value in self.nominal.items() if name not in model.p_names}
+        if not outputs:
+            return tuple(unknowns)
+        from pvid.rig.guesses import unknowns_of  # SciPy's search, a quarter of a second
 
-def channels_of(model: CompiledModel) -> tuple[Channel, ...]:
-    """The signals of a model as channels of a recording; a column's name may carry a unit behind the signal's."""
+        fixed = frozenset(self.nominal) & frozenset(model.p_names)
+        return unknowns_of(replace(model, unknowns=tuple(unknowns)), outputs, fixed)
+
+    def refuse_lacking(self, model: CompiledModel) -> None:
+        """PvidError where a constant that differs from rig to rig has no value in this one."""
+        lacking = [one for one in model.knowns if one.required and one.name not in self.known]
+        if lacking:
+            typed = " ".join(f"--set known.{one.name}={one.value:g}" for one in lacking)
+            names = listed(f"{one.name} [{one.unit}]" if one.unit else one.name for one in lacking)
+            raise PvidError(f"{names} of the rig is missing: use {typed} with the value of your rig")
+
+
+def channels_of(model: CompiledModel | Description) -> tuple[Channel, ...]:
+    """The signals of a model as channels of a recording."""
     return tuple(
-        Channel(
-            one.name,
-            one.unit,
-            one.name,
-            usual_names=rf"^{re.escape(one.name)}([\s_(\[].*)?$",
-            held=one.kind == "input" and one.hold == "zoh",
-        )
-        for one in model.signals
+        channel_of(one.name, one.unit, held=one.kind == "input" and one.hold == "zoh") for one in model.signals
     )
 
 
@@ -247,8 +265,11 @@ def _numbers(table: Mapping[str, Any], place: str) -> dict[str, float]:
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             name = f"{place}.{key}" if place else key
             raise PvidError(f"{name} must be a number, not {shown(str(value))}")
-        if (key in (*_OF_A_SENSOR, "sample_rate") or place in ("known_sd", "identifier")) and not value >= 0:
+        least = key in (*_OF_A_SENSOR, "sample_rate") or place in ("known_sd", "identifier")
+        if least and key != "delay" and not value >= 0:
             raise PvidError(f"{place}.{key} must not be negative".removeprefix("."))
+        if key in _POSITIVE and value == 0:
+            raise PvidError(f"{place}.{key} must be positive".removeprefix("."))
     return {key: float(value) for key, value in table.items()}
 
 

@@ -1,0 +1,147 @@
+"""The rig of a recording: --model, --rig, a log, RUN.toml beside RUN.csv, and --set over any of them; where nothing
+names a mechanism, the one whose signals the recording has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pvid.base.errors import PvidError
+from pvid.base.toml_text import toml_document
+from pvid.base.wording import listed
+from pvid.log.rig import LOG_SUFFIX, document_of_log
+from pvid.models.mechanisms import compiled_of
+from pvid.models.mechanisms import described as description_of
+from pvid.models.registry import asked_for, is_named, names, shipped
+from pvid.rig.columns import Columns, MissingColumnError, parsed
+from pvid.rig.file import parsed_file, rig_path_of
+from pvid.rig.former import mechanism_of_former, translated
+from pvid.rig.mechanism_file import MechanismRig, channels_of, with_settings
+from pvid.rig.run import is_run, read_recording
+
+
+def rig_of(
+    run_path: Path | None,
+    rig_path: Path | None = None,
+    settings: Sequence[str] = (),
+    model: str | None = None,
+    columns: str | None = None,
+    read: Callable[[Columns], object] | None = None,
+) -> MechanismRig:
+    """The rig of a recording.
+
+    Parameters
+    ----------
+    run_path, rig_path : a log has its own rig, a run may have a rig file beside it; the other one comes before both
+    settings : `KEY=VALUE`, which come before the file; the name of a constant of the mechanism alone is a key as well
+    model : name or model file of this call, before both
+    columns : the text of --columns
+    read : reads the recording, where it is no file
+
+    Raises
+    ------
+    PvidError
+        Where the file cannot be read, a key or a value is wrong, a constant that differs from rig to rig has no value,
+        no mechanism is named and none or several have the signals of the recording, or a log or rig file names a model
+        file that `model` does not name: what they name is never run.
+    """
+    asked = None if model is None else asked_for(model)
+    where = "this recording" if rig_path is None else str(rig_path)
+    document = _document(run_path, rig_path, asked)
+    document = with_settings(document, settings)
+    name = asked if asked is not None else _named(document)
+    if name is None:
+        if read is None and run_path is not None:
+            read = lambda wanted: read_recording(run_path, None, wanted)  # noqa: E731
+        name = _proposed(run_path, read, columns)
+    if isinstance(name, str):
+        name = shipped(name, where)
+        document = translated(document, name)
+    compiled = compiled_of(name)
+    constants = {one.name: document.pop(one.name) for one in compiled.knowns if one.name in document}
+    if constants:
+        document = with_settings(document, [f"known.{key}={value}" for key, value in constants.items()])
+    rig = MechanismRig.of_document(document, name)
+    rig.refuse_lacking(compiled)
+    return rig
+
+
+def common_rig(
+    run_paths: Sequence[Path],
+    rig_path: Path | None = None,
+    settings: Sequence[str] = (),
+    model: str | None = None,
+    columns: str | None = None,
+) -> MechanismRig:
+    """The rig of recordings of one mechanism; see `rig_of`.
+
+    Raises
+    ------
+    PvidError
+        Also where their rig files differ; a recording without one has that of the first.
+    """
+    first, *others = run_paths
+    rig = rig_of(first, rig_path, settings, model, columns)
+    for path in others if rig_path is None else ():
+        has_own = path.suffix == LOG_SUFFIX or rig_path_of(path).is_file()
+        if has_own and rig_of(path, None, settings, model, columns) != rig:
+            raise PvidError(f"the rig files of {first.name} and {path.name} differ: name that of both with --rig")
+    return rig
+
+
+def _document(run_path: Path | None, rig_path: Path | None, asked: str | Path | None) -> Mapping[str, Any]:
+    """The tables of the file that a rig is in; none: it is in none."""
+    if rig_path is None and run_path is not None and is_run(run_path) and rig_path_of(run_path).is_file():
+        rig_path = rig_path_of(run_path)
+    if rig_path is not None:
+        return parsed_file(rig_path, toml_document)
+    if run_path is not None and run_path.suffix == LOG_SUFFIX:
+        logged = document_of_log(run_path)
+        if logged is not None and (asked is None or is_named(asked, _named(logged) or "")):
+            return logged
+    if run_path is not None and not run_path.exists():
+        raise PvidError(f"{run_path} does not exist")
+    return {}
+
+
+def _named(document: Mapping[str, Any]) -> str | None:
+    """The mechanism that a file names, or whose former keys it has."""
+    table = document.get("model", {})
+    name = table.get("name") if isinstance(table, Mapping) else None
+    return name if isinstance(name, str) else mechanism_of_former(document)
+
+
+def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, columns: str | None) -> str:
+    """The shipped mechanism whose signals a recording has.
+
+    Raises
+    ------
+    PvidError
+        Where none has, or several have.
+    """
+    if read is None:
+        raise PvidError(f"no mechanism is named: use --model, with {listed(names(), 'or')}, or a model file")
+    found = []
+    for name in names():
+        try:
+            wanted = parsed(columns, channels_of(description_of(name)))
+        except PvidError:  # --columns names another mechanism's signals
+            continue
+        try:
+            read(wanted)
+        except MissingColumnError:
+            continue
+        except PvidError:  # it has the columns, and something else is wrong
+            pass
+        found.append(name)
+    if len(found) == 1:
+        return found[0]
+    what = "the data" if run_path is None else str(run_path)
+    if not found:
+        signals = [f"{name} ({', '.join(one.name for one in description_of(name).signals)})" for name in names()]
+        raise PvidError(
+            f"{what}: no shipped mechanism has these columns: name yours with --model, and its columns with --columns; "
+            f"they are {listed(signals, 'or')}"
+        )
+    raise PvidError(f"{what} can be of {listed(found, 'or')}: name the mechanism with --model")
