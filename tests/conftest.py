@@ -25,7 +25,7 @@ settings.load_profile("seeded")
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = (
-    *("tools/pages", "run/advice", "board/targets", "bench/campaign_run", "tools/wheel", "run/refined"),
+    *("tools/pages", "board/targets", "bench/campaign_run", "tools/wheel", "run/refined"),
     *("cli/design_cost", "cli/mechanism_core", "log/log", "deploy/deploy", "twin/strong_bits_q31", "cli/cli"),
     *("show/report", "board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
     *("bench/refine_bench", "bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
@@ -42,7 +42,7 @@ SLOW = (
     *("core/dead_zone", "twin/weak_sums_q31", "oracle/weak_choice", "codegen/weak_c", "oracle/oracle"),
     *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/mechanism_demo", "bench/model_boards"),
     *("core/dropped_calls", "bench/build_choices", "board/generated", "tools/core_rooms", "board/strong_image"),
-    *("codegen/model_q31", "core/freeze", "twin/estimator_q31", "run/engine_identify", "bench/mechanisms"),
+    *("codegen/model_q31", "core/freeze", "twin/estimator_q31", "bench/mechanisms"),
     *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
     *("bench/campaign_population", "twin/kinds", "bench/random_models", "board/refined_board", "run/skew"),
     *("tools/analysis", "board/engine_boards", "oracle/strong_described", "core/snapshot", "codegen/random"),

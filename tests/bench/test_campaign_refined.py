@@ -15,6 +15,7 @@ from bench.campaign.population import RandomRig
 from bench.campaign.truth import SimulatedRig, measure, rig_file
 from pvid.core.native import Native
 from pvid.rig.run import Run
+from pvid.run.mechanism import MechanismAnswer
 
 _PENDULUM = RIG.pendulum
 _DRY = 1e-3 * _PENDULUM.g * _PENDULUM.l2  # of pivot and joint [m^2/s^2]
@@ -51,11 +52,11 @@ def test_an_imperfection_is_fitted_and_the_answer_is_right(
     native: Native, imperfections: dict[str, object], found: dict[str, float]
 ) -> None:
     """Without its equation each is refused, or moves w, d1 and d2 by many standard errors."""
-    record, answer = identify_rig(native, recorded(native, replace(RIG, **imperfections)))  # type: ignore[arg-type]
+    record, answer = identify_rig(recorded(native, replace(RIG, **imperfections)))  # type: ignore[arg-type]
     assert record["published"] and record["answered"] and not record["silently_wrong"]
-    assert answer is not None and answer.refinement is not None and answer.refinement.adopted
+    assert isinstance(answer, MechanismAnswer) and answer.refinement is not None and answer.refinement.adopted
     assert isinstance(record["worst_error"], float) and record["worst_error"] < 0.005
-    extras = answer.refinement.outcome.extras
+    extras = answer.refinement.as_json()["parameters"]
     for name, truth in found.items():
-        value, se = extras[name]
+        value, se = extras[name]["value"], extras[name]["se"]
         assert math.isclose(value, truth, rel_tol=0.1) or abs(value - truth) < 4 * se, name

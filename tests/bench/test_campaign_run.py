@@ -72,7 +72,7 @@ def test_four_rigs_through_the_command_line(population: Path, native: Native, tm
     rows = pyarrow.parquet.read_table(out).to_pylist()
     assert [row["rig"] for row in rows] == [0, 1, 2, 3] and {row["condition"] for row in rows} == {"clean", "skew"}
     # what a worker found is what this process finds
-    expected, _ = identify_rig(native, simulate_rig(native, parse(SMALL), 3, 2))
+    expected, _ = identify_rig(simulate_rig(native, parse(SMALL), 3, 2))
     found = {name: rows[2][name] for name in COLUMNS}
     assert {**found, "seconds": 0} == {**expected, "seconds": 0}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results.parquet", "small.toml"]

@@ -168,8 +168,9 @@ def test_a_kept_rig_is_the_simulated_one(native: Native, tmp_path: Path) -> None
 def test_campaign_rig_file_contains_rod_1_sensors_and_guess_only() -> None:
     tilted = replace(RIG, pendulum=replace(STANDARD_PENDULUM, g=6.0))
     file = rig_file(tilted)
-    assert (file.l1, file.sensor.phi_lsb, file.sensor.y_lsb) == (0.3, RIG.phi_lsb, RIG.y_lsb)
-    assert (file.nominal.l2, file.nominal.rho2, file.nominal.g) == (0.1, 0.1, 9.8)
+    assert file.known == {"l1": 0.3}
+    assert file.sensor == {"phi": {"resolution": RIG.phi_lsb}, "y": {"resolution": RIG.y_lsb}}
+    assert file.nominal == {"l2": 0.1, "rho2": 0.1, "g": 9.8}
     assert file.sample_rate == 1000.0
 
 

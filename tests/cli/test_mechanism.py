@@ -80,7 +80,7 @@ def test_a_run_is_refined_and_shown_beside_its_simulation(motor: Path, tmp_path:
         assert abs(one["value"] - truth) < max(4 * one["se"], 1e-3 * abs(truth)), name
 
 
-def test_a_run_of_the_pendulum_is_identified_without_loading_sympy() -> None:
+def test_the_help_of_a_command_is_shown_without_loading_sympy() -> None:
     """It takes a third of a second, for nothing there."""
     loaded = "import sys, pvid.cli.identify, pvid.cli.tune; print('sympy' in sys.modules)"
     assert (

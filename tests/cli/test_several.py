@@ -109,7 +109,7 @@ def test_the_pendulum_takes_the_road_of_every_mechanism(tmp_path: Path) -> None:
         assert pvid("simulate", path, "--l1", "0.25", "--duration", "12", "--seed", str(seed), *tones).return_value == 0
     answer = json.loads(pvid("identify", *paths, "--json").stdout)
     assert answer["identified"] and answer["model"] == "kapitza" and answer["core"] == "f64"
-    assert answer["g"]["value"] == pytest.approx(9.81, rel=0.1)  # the rows are linear in the angles
+    assert answer["parameters"]["g"]["value"] == pytest.approx(9.81, rel=0.1)  # the rows are linear in the angles
 
 
 def test_python_takes_a_list_of_files_or_of_arrays(springs: list[str | Path]) -> None:

@@ -86,7 +86,7 @@ def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> Non
     done = pvid(tmp_path, "batch", pattern, "-o", str(out), "--set", "l1=0.3", "--workers", "2")
     assert done.returncode == 0, done.stderr
     assert ": 2 of 3" in done.stdout and "failed: 1 of 3" in done.stdout
-    assert "broken.csv, line 2, column phi" in done.stderr
+    assert "broken.csv, line 2, column y" in done.stderr
     table = pyarrow.parquet.read_table(out)
     rows = {f"{Path(row['board']).name}/{Path(row['path']).name}": row for row in table.to_pylist()}
     assert set(rows) == {"a/run.npz", "b/run.npz", "b/broken.csv"}
@@ -110,7 +110,7 @@ def test_the_workers_of_a_running_scheduler_do_the_work(runs: Path, tmp_path: Pa
     ) as cluster:
         store = Store(tmp_path / "fleet.parquet")
         (row,) = fleet.run([broken], asked(), store, lambda _: None, scheduler=cluster.scheduler_address)
-    assert "line 2, column phi" in (row.failure or "")
+    assert "line 2, column y" in (row.failure or "")
 
 
 def test_an_interrupted_batch_goes_on_and_a_changed_file_is_done_again(

@@ -5,15 +5,11 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterator
-from dataclasses import replace
-from pathlib import Path
 
 import field_board
-import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 import pytest
-from matplotlib.figure import Figure
 from rich.console import Console
 
 from pvid.core.native import Native
@@ -24,14 +20,8 @@ from pvid.log.reader import LogStream, Record
 from pvid.log.status import StatusLine
 from pvid.log.values import Values, tables_of
 from pvid.models.model import Channel, Constant, Constants, Float, Mechanism, Model, Parameter, Quantity, Scale
-from pvid.rig.file import RigFile
-from pvid.run import answer
-from pvid.run.engine_identify import identify_by_engine
-from pvid.run.identify import ErrorParts, Identification, Publications, Trajectory
-from pvid.show import figures
 from pvid.show.models_table import models_table
 from pvid.show.view import LiveView
-from pvid.sim.pendulum import simulate
 
 
 def _physical(p: npt.ArrayLike, _: Constants) -> Float:
@@ -67,67 +57,6 @@ MOTOR = Model(
     scales=(Scale("v_gain", "v_gain_sd", "the gain of v", (0.0, -1.0), (0.0, 0.0)),),
 )
 MECHANISM = Mechanism(MOTOR, {"k": 0.1})
-NAMES = ["res", "ind", "a", "b", "i0"]
-
-
-@pytest.fixture
-def result() -> Identification:
-    """What an identification of the motor would give."""
-    p, covariance = np.array([200.0, 100.0]), np.diag([4.0, 1.0])
-    names = (*MOTOR.physical_names, *MOTOR.p_names)
-    value = dict(zip(names, [*MECHANISM.physical(p), *p, 0.25], strict=True))
-    errors = [*MECHANISM.physical_errors(p, covariance), 2.0, 1.0, 0.01]
-    t = np.linspace(0, 1, 5)
-    made = replace(
-        identify_by_engine(simulate(duration=8.0).run, RigFile.standard()),
-        model=MOTOR,
-        value={name: float(one) for name, one in value.items()},
-        se={name: float(one) for name, one in zip(names, errors, strict=True)},
-        parts={name: ErrorParts(float(one), {"v_gain": 0.0}) for name, one in zip(names, errors, strict=True)},
-        trajectory=Trajectory(t, np.tile(p, (5, 1)), np.ones((5, 2)), np.ones((5, 2)), np.ones((5, 2)), t),
-        publications=Publications.none(MOTOR),
-    )
-    assert made.identified
-    return made
-
-
-def test_the_answer_has_the_names_and_units_of_its_model(result: Identification) -> None:
-    told = answer.as_json(result)
-    assert list(told["parameters"]) == NAMES
-    assert {name: one["unit"] for name, one in told["parameters"].items()} == {
-        "res": "ohm",
-        "ind": "H",
-        "a": "1/s",
-        "b": "1/H",
-        "i0": "A",
-    }
-    assert told["res"]["value"] == 2.0 and told["res"]["se_v_gain"] == 0.0 and "se_l1" not in told["res"]
-    assert told["modes_hz"] == [200 / 6.28]
-    assert [pair.split()[0] for pair in answer.one_line(result).split(", ")] == NAMES
-
-
-def test_the_table_of_an_answer_has_the_names_and_units_of_its_model(result: Identification) -> None:
-    table = answer.table(result)
-    assert table is not None
-    console = Console(record=True, width=100)
-    console.print(table)
-    seen = console.export_text()
-    for label in ("res [ohm]", "ind [H]", "a [1/s]", "b [1/H]", "i0 [A]"):
-        assert label in seen
-
-
-def test_the_figure_has_an_axis_for_each_physical_parameter(
-    result: Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    labels: list[str] = []
-
-    def kept(figure: Figure, path: Path, dpi: int) -> None:
-        labels.extend(axis.get_ylabel() for axis in figure.axes)
-
-    monkeypatch.setattr(figures, "save", kept)
-    figures.convergence(result, tmp_path / "a.png", truth={"res": 2.0, "ind": 0.01})
-    assert labels == ["resistance R [ohm]", "inductance L [H]"]
-    assert not plt.get_fignums()
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.strong_pendulum import identify
 from pvid.core.native import Native
 from pvid.oracle import strong as oracle
 from pvid.rig.file import Core, RigFile
-from pvid.run.identify import identify
 from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import GateConfig
 from pvid.setup.f32 import strong_config

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pvid.rig.file import RigFile, Unset
-from pvid.rig.run import Run
-from pvid.rig.sensor_steps import resolution_note, resolution_of, resolved
+from pvid.models.mechanisms import compiled_of
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording
+from pvid.rig.sensor_steps import resolution_of, with_resolutions
 
 T = np.arange(0.0, 15.0, 1 / 500)
 SWING = np.sin(5 * T) + 0.3 * np.sin(17 * T + 1)
@@ -70,14 +71,16 @@ def test_interpolated_samples_do_not_show_another_step() -> None:
     assert resolution_of(values) == pytest.approx(step, rel=1e-3)
 
 
-def test_a_step_that_the_rig_file_does_not_give_is_the_runs() -> None:
-    step = 2 * np.pi / 2**12
-    run = Run(T, recorded(step, 0.1), 0 * T, 500.0)
-    silent = RigFile.parse("l1 = 0.3")
-    rig = resolved(silent, run)
-    assert rig.sensor.phi_lsb == float(f"{step:.4g}") and isinstance(rig.sensor.phi_lsb, Unset)
-    assert resolution_note(silent, rig) == ("phi moves in steps of 0.001534 rad: taken as phi_lsb, which is not given",)
-    given = RigFile.parse("l1 = 0.3\n[sensor]\nphi_lsb = 1e-4")
-    assert resolved(given, run) == given and resolution_note(given, given) == ()
-    for other in (np.degrees(run.phi), 0.1 * SWING, recorded(2 * np.pi / 2**14, 0.1)):  # coarse, none, the default
-        assert resolved(silent, Run(T, other, 0 * T, 500.0)) is silent
+@pytest.mark.parametrize(("name", "sensor"), [("kapitza", "phi"), ("cart_pendulum", "a")])
+def test_a_step_that_the_rig_does_not_give_is_the_recordings(name: str, sensor: str) -> None:
+    step, model = 2 * np.pi / 2**13, MechanismRig(name).applied(compiled_of(name))
+    signals = {one.name: np.zeros_like(T) for one in model.signals} | {sensor: recorded(step, 0.1)}
+    noted, found = with_resolutions(Recording(T, signals, 500.0), model)
+    assert found.signal(sensor).resolution == float(f"{step:.4g}")
+    said = f"{sensor} moves in steps of 0.000767 rad: taken as its resolution, which is not given"
+    assert noted.notes == (said,)
+    given = MechanismRig(name, sensor={sensor: {"resolution": 1e-4}}).applied(model)
+    assert with_resolutions(Recording(T, signals, 500.0), given)[1] is given
+    own = model.signal(sensor).resolution
+    for other in (np.degrees(recorded(0.01, 1.0)), 0.1 * SWING, recorded(own, 0.1)):  # too coarse, none, the model's
+        assert with_resolutions(Recording(T, {**signals, sensor: other}, 500.0), model)[1] is model

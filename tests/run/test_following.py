@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from pvid.base.errors import PvidError
+from pvid.cli.main import commands
 from pvid.codegen.build import refine_functions
 from pvid.model.compiled import Following
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
-from pvid.rig.described import described, refuse_strong, rig_of_document
-from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
 from pvid.run.engine_design_q31 import engine_for_simulated_rig
-from pvid.run.engine_identify import ALL_ALIKE, identify_by_engine
-from pvid.run.mechanism import model_of
 from pvid.run.refine_design import refine_settings
-from pvid.settings.forms import AnyCore
-from pvid.sim.pendulum import simulate
 
 GIVEN = {"forgetting_s": 20.0, "outlier_gate": 5.0, "outlier_patience_s": 8.0, "dead_zone": 0.5}
 
@@ -71,30 +66,13 @@ def test_the_refinement_forgets_alike() -> None:
     assert refine_settings(refine_functions(compiled), run, rate, p, 1.0).forgetting_s == 15.0
 
 
-def test_a_pendulums_rig_file_says_the_same() -> None:
-    lines = "\n".join(f"{key} = {value}" for key, value in GIVEN.items())
-    rig = RigFile.parse(f"l1 = 0.3\n[identifier]\n{lines}\n")
-    assert model_of(described(rig)).following == Following(**GIVEN)
-    assert model_of(described(RigFile.parse("l1 = 0.3"))).following == Following()
-
-
-@pytest.mark.parametrize("setting", ["divider = 3", "feedback_hz = 5.0", "kappa_min = 0.1"])
-def test_settings_of_the_strong_form_are_refused_by_the_weak_one(setting: str) -> None:
-    rig = RigFile.parse(f"l1 = 0.3\n[identifier]\n{setting}\n")
-    with pytest.raises(PvidError, match=rf"identifier\.{setting.split()[0]} is of the strong form: leave it out"):
-        refuse_strong(rig)
-
-
-def test_the_rig_of_a_log_is_told_by_its_form() -> None:
-    for rig in (RigFile.standard(), MechanismRig("kapitza", 1000.0, identifier={"forgetting_s": 3.0})):
-        assert rig_of_document(tomllib.loads(rig.text())) == rig
-    with pytest.raises(PvidError, match="identifier must be a table"):
-        rig_of_document({"model": {"name": "kapitza"}, "identifier": 3})
-
-
-@pytest.mark.parametrize("core", ["f64", "f32"])
-def test_the_float64_analysis_says_that_it_does_not_forget(core: AnyCore) -> None:
-    rig = RigFile.standard()
-    rig = replace(rig, identifier=replace(rig.identifier, core=core, forgetting_s=20.0))
-    found = identify_by_engine(simulate(truth="linear", duration=10.0).run, rig)
-    assert found.identified and (ALL_ALIKE in found.remarks) == (core == "f64")
+@pytest.mark.parametrize("name", ["kapitza", "dc_motor"])
+def test_identify_notes_that_the_float64_analysis_does_not_forget(tmp_path: Path, name: str) -> None:
+    run, rig = tmp_path / "run.csv", tmp_path / "run.toml"
+    made = CliRunner().invoke(commands, ["model", "simulate", name, str(run), "--duration", "12"])
+    assert made.exit_code == 0, made.output
+    rig.write_text(rig.read_text(encoding="utf-8") + "\n[identifier]\nforgetting_s = 20.0\n", encoding="utf-8")
+    for core in ("f64", "f32"):
+        told = CliRunner().invoke(commands, ["identify", str(run), "--core", core, "--no-refine"])
+        assert told.exit_code == 0, told.output
+        assert ("[identifier] has no effect" in told.stderr) == (core == "f64")

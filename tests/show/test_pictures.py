@@ -21,8 +21,8 @@ from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
 from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
+from pvid.show.log_figure import write_log_figure
 from pvid.show.page import page
-from pvid.show.report import recording_of, write_report
 from pvid.show.view import LiveView
 
 TICKS = 20_000
@@ -131,9 +131,6 @@ def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Pat
         photograph(browser, pictures / "page.png")
 
 
-def test_report_has_a_title_and_its_titles_fit(log: Path, pictures: Path) -> None:
-    recording = recording_of(log, None)
-    misfit = replace(recording, reasons={Reason.MISFIT.text: 190, Reason.UPDATED.text: 10}, state=Reason.MISFIT.text)
-    for name, one in (("report.png", recording), ("report-misfit.png", misfit)):
-        write_report(one, pictures / name)
-        assert 50_000 < (pictures / name).stat().st_size < 1_000_000
+def test_figure_of_a_log_has_a_title_and_its_titles_fit(log: Path, pictures: Path) -> None:
+    assert write_log_figure(log, RigFile.standard().mechanism, pictures / "log.png")
+    assert 50_000 < (pictures / "log.png").stat().st_size < 1_000_000

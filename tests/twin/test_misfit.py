@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pytest
 from lanes import assert_lanes_equal
 
+from bench.strong_pendulum import identify
 from pvid.cases import CASES
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.identify import identify
 from pvid.settings.enums import Reason
 from pvid.setup.f32 import nominal_start, strong_config
 from pvid.setup.q31 import counts_of, strong_config_q31

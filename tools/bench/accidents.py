@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from pvid.core.native import Native
 from pvid.models.mechanisms import compiled_of
-from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording, Run
-from pvid.run.advised import identified
-from pvid.run.mechanism import identify_mechanism
+from pvid.run.identification import identified
+from pvid.run.mechanism import MechanismAnswer, identify_mechanism
+from pvid.run.reading import read_all
 from pvid.run.wild_samples import without_wild_samples
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.sim.simulated_run import PERFECT, simulation_of
@@ -172,10 +173,12 @@ def pendulum_with(accident: Accident, seed: int) -> Outcome:
     signals = {"phi": run.phi.copy(), "y": run.y.copy()}
     left = accident.happens(signals, np.random.default_rng(seed), run.sample_rate) or signals
     spoilt = Run(run.t[: len(left["y"])], left["phi"], left["y"], run.sample_rate)
-    found = identified(spoilt, RigFile.standard(), Native())
+    rig = MechanismRig(
+        "kapitza", known={"l1": STANDARD_PENDULUM.l1}, known_sd={"l1": 0.0}, sensor={"y": {"gain_sd": 0.0}}
+    )
+    found = identified(*read_all(rig, [lambda _: spoilt.recording], (), None))
     truth = {"g": STANDARD_PENDULUM.g, "l2": STANDARD_PENDULUM.l2, "rho2": STANDARD_PENDULUM.rho2}
-    values = {name: (found.value[name], found.se[name]) for name in truth} if found.identified else {}
-    return outcome_of(values, truth, found.warning is not None)
+    return outcome_of(_known(found, truth), truth, found.found.verdict.warning is not None)
 
 
 def motor_with(accident: Accident, seed: int) -> Outcome:
@@ -187,12 +190,13 @@ def motor_with(accident: Accident, seed: int) -> Outcome:
     recording = Recording(np.arange(len(left["V"])) / rate, left, rate).whole()
     found = identify_mechanism(without_wild_samples(recording, model), model)
     truth = dict(zip(model.p_names, map(float, simulation.truth), strict=True))
-    values = {
-        name: (one.value, one.se)
-        for name, one in found.values.items()
-        if name in truth and one.value is not None and one.se is not None
-    }
-    return outcome_of(values, truth, found.found.verdict.warning is not None)
+    return outcome_of(_known(found, truth), truth, found.found.verdict.warning is not None)
+
+
+def _known(found: MechanismAnswer, names: Collection[str]) -> dict[str, tuple[float, float]]:
+    """Values and standard errors of these, where they are identified."""
+    values = {name: one for name, one in found.values.items() if name in names}
+    return {name: (one.value, one.se) for name, one in values.items() if one.value is not None and one.se is not None}
 
 
 def row_of(mechanism: str, accident: Accident, outcomes: list[Outcome]) -> tuple[str, ...]:

@@ -7,18 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.campaign.judge import SUFFICES, Judgement
+from bench.campaign.judge import NAMES, SUFFICES, Judgement
 from bench.campaign.population import shipped
 from bench.campaign.truth import SimulatedRig, simulate_rig
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.models.kapitza import MODEL
-from pvid.rig.described import described
-from pvid.rig.file import Refine
-from pvid.rig.run import Recording
-from pvid.rig.sensor_steps import resolved
-from pvid.run.mechanism import Value, identify_mechanism, model_of
+from pvid.run.mechanism import Value, identify_mechanism
 from pvid.run.mechanism_core import identify_in_c
+from pvid.run.reading import read_all
 from pvid.run.refined_core import refined_in_c
 
 HEADER = (
@@ -35,7 +31,7 @@ HEADER = (
     "of the same, weak",
 )
 # What the equations of a condition need.
-_OPTIONS = {"dry": Refine(dry_friction=True), "nonvert": Refine(slant=True)}
+_OPTIONS = {"dry": {"dry_friction": True}, "nonvert": {"slant": True}}
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,7 @@ class Outcome:
 
 
 def _judged(values: Mapping[str, Value], rig: SimulatedRig) -> Judgement | None:
-    found = [values[name] for name in MODEL.mapped_names]
+    found = [values[name] for name in NAMES]
     p, se = ([getattr(one, name) for one in found] for name in ("value", "se"))
     return None if None in p or None in se else Judgement.of(p, se, rig.p)
 
@@ -78,9 +74,8 @@ def _judged(values: Mapping[str, Value], rig: SimulatedRig) -> Judgement | None:
 def outcome_of(simulated: SimulatedRig) -> Outcome:
     """Identifies a rig as `identify --core f32 --refine` does, with the options that its condition needs."""
     run, condition = simulated.run, simulated.rig.condition
-    file = replace(simulated.file, refine=_OPTIONS.get(condition, Refine()))
-    model = model_of(described(resolved(file, run)))
-    recording = Recording(run.t, {"phi": run.phi, "y": run.y}, run.sample_rate)
+    file = replace(simulated.file, refine=_OPTIONS.get(condition, {}))
+    recording, model = read_all(file, [lambda _: run.recording], (), None)
     suffices = bool((simulated.bound[:2] < SUFFICES).all())
     try:
         weak = identify_in_c(identify_mechanism(recording, model), "f32")

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from bench.board_engine import board_of
 from bench.pendulum import RIGS, design_for, model_for
 from bench.references import KalmanSettings, kalman, output_error, smoothed_drive
+from bench.strong_pendulum import identify
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
 from pvid.models.kapitza.physical import physical
@@ -21,7 +22,6 @@ from pvid.oracle.weak.solve import batch
 from pvid.rig.file import Identifier as Settings
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.identify import identify
 from pvid.setup.weak import for_engine
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, is_physical, simulate, standard_sensors, standard_start
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bench.strong_pendulum import identify
 from pvid.core.native import Native
 from pvid.rig.file import Differentiator, Identifier, RigFile
-from pvid.run.identify import identify
 from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate, standard_sensors, standard_start
 
 SEEDS = 5

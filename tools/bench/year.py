@@ -28,8 +28,8 @@ from pvid.log.recorder import EmulatorSource, Logger
 from pvid.log.values import Rows, Values
 from pvid.log.verify import Verdict, Verifier
 from pvid.rig.file import RigFile
+from pvid.show.log_figure import write_log_figure
 from pvid.show.page_state import LiveState
-from pvid.show.report import recording_of, write_report
 
 TURN = 1 << 32
 _SOON_NS = 600 * 10**9  # from the link's coming up to the first sample
@@ -114,7 +114,7 @@ def emulated_year(
     faults += _faults_of_times(log, rig)
     faults += _faults_of_exports(log, rig)
     faults += _faults_of_page(log)
-    write_report(recording_of(log, rig), log.with_suffix(".png"))
+    write_log_figure(log, rig.mechanism, log.with_suffix(".png"))
     return Year(reader.account, verdict, len(crossed), tuple(faults))
 
 

@@ -10,7 +10,7 @@ import click
 from rich.console import Console
 
 from pvid.base.console import DONE, progress_bar, write_stderr
-from pvid.rig.file import Core
+from pvid.settings.forms import AnyCore
 
 _WIDTH = 220  # of tables that go into a file
 
@@ -19,7 +19,7 @@ _WIDTH = 220  # of tables that go into a file
 @click.argument("population_path", metavar="[POPULATION]", required=False, type=click.Path(path_type=Path))
 @click.option("--rigs", default=190, show_default=True, type=click.IntRange(min=1), help="How many.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of the rigs.")
-@click.option("--core", default="f32", show_default=True, type=click.Choice(["f32", "q31", "f64"]), help="Identifier.")
+@click.option("--core", default="f64", show_default=True, type=click.Choice(["f32", "q31", "f64"]), help="Identifier.")
 @click.option("--refine/--no-refine", default=True, show_default=True, help="As for identify.")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a running dask.distributed, as tcp://host:8786.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes on this machine.  [default: its processors]")
@@ -56,7 +56,7 @@ def campaign(
             raise PvidError(f"--by {name}: not a property; there are {', '.join(table.PROPERTIES)}")
     population = shipped() if population_path is None else load(population_path)
     kept = None if cache is None else cache.resolve()
-    task = Campaign(population, rigs, seed, cast(Core, core), refine, kept)
+    task = Campaign(population, rigs, seed, cast(AnyCore, core), refine, kept)
     store = Store(out, task.key)
     begun = sum(rig < rigs for rig in store.records)
     if begun:

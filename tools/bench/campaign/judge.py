@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.campaign.truth import SimulatedRig
 from pvid.base.errors import PvidError
-from pvid.core.native import Native
-from pvid.models.kapitza import MODEL
-from pvid.rig.file import Core
-from pvid.run.advised import answered
-from pvid.run.identify import Identification, Publications
+from pvid.run.identification import identified
+from pvid.run.mechanism import MechanismAnswer
+from pvid.run.mechanism_advice import analysed
+from pvid.run.mechanism_core import CoreAnswer, Publications, identify_in_c
+from pvid.run.reading import read_all
+from pvid.settings.forms import AnyCore
 
 Float = npt.NDArray[np.float64]
+
+NAMES = ("w", "d1", "d2")
 
 # An answer is wrong where an error exceeds both, right where it is within either.
 WRONG_SE, WRONG_RELATIVE = 3.0, 0.01
@@ -36,7 +40,7 @@ COLUMNS: dict[str, type] = {
     **dict.fromkeys(("bound_w", "bound_d1", "bound_d2"), float),
     **dict.fromkeys(("suffices", "published", "answered", "within_1", "within_5"), bool),
     **dict.fromkeys(("warned", "silently_wrong", "right", "missed", "crashed"), bool),
-    **{f"{name}{what}": float for name in MODEL.mapped_names for what in ("", "_se", "_error", "_z")},
+    **{f"{name}{what}": float for name in NAMES for what in ("", "_se", "_error", "_z")},
     **dict.fromkeys(("worst_error", "misfit", "first_s"), float),
     **dict.fromkeys(("publications", "publications_wrong", "publications_right", "publications_right_alarmed"), int),
     **dict.fromkeys(("status", "reason", "warning"), str),
@@ -76,57 +80,99 @@ class Judgement:
 
 
 def identify_rig(
-    native: Native, simulated: SimulatedRig, core: Core = "f32", *, refine: bool = True
-) -> tuple[Record, Identification | None]:
+    simulated: SimulatedRig, core: AnyCore = "f64", *, refine: bool = True
+) -> tuple[Record, MechanismAnswer | CoreAnswer | None]:
     """Identifies a rig as `pvid identify` does; the record of `judge`, and the answer.
 
     A crash is no refusal: it is recorded as one, with its exception as the reason.
     """
-    file = replace(simulated.file, identifier=replace(simulated.file.identifier, core=core))
     began = time.perf_counter()
     try:
-        result = answered(simulated.run, file, native, refine=refine)
+        recording, model = read_all(simulated.file, [lambda _: simulated.run.recording], (), None)
+        if core == "f64":
+            result: MechanismAnswer | CoreAnswer = identified(recording, model, refine=refine)
+        else:
+            result = identify_in_c(analysed(recording, model), core)
     except PvidError as error:
         return judge(simulated, None, refusal=str(error), seconds=time.perf_counter() - began), None
     except Exception as error:  # one rig must not end the campaign, nor be taken for a refusal
         record = judge(simulated, None, refusal=f"{type(error).__name__}: {error}", seconds=time.perf_counter() - began)
         return {**record, "crashed": True}, None
-    return judge(simulated, result, refusal=None, seconds=time.perf_counter() - began), result
+    return judge(simulated, Told.of(result), refusal=None, seconds=time.perf_counter() - began), result
 
 
-def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: str | None, seconds: float) -> Record:
+@dataclass(frozen=True)
+class Told:
+    """What an answer says.
+
+    Attributes
+    ----------
+    values : of the parameters in NAMES: value and standard error; empty where one of them is not identified
+    verdict, warning : in words
+    misfit : residuals over what the sensors explain
+    reason : why there are no values
+    publications : of a C core
+    """
+
+    values: Mapping[str, tuple[float, float]]
+    verdict: str
+    warning: str | None
+    misfit: float | None
+    reason: str | None = None
+    publications: Publications | None = None
+
+    @classmethod
+    def of(cls, result: MechanismAnswer | CoreAnswer) -> Told:
+        """An answer of `identify`."""
+        if isinstance(result, CoreAnswer):
+            verdict, misfit, text, publications = result.verdict, result.misfit, "", result.publications
+        else:
+            verdict, misfit, publications = result.found.verdict, result.found.chi2, None
+            text = "" if result.refinement is None else f"; {result.refinement.text}"
+        values = {
+            name: (one.value, one.se)
+            for name, one in result.values.items()
+            if name in NAMES and one.value is not None and one.se is not None and result.identified
+        }
+        whole = values if len(values) == len(NAMES) else {}
+        return cls(
+            whole, verdict.word, verdict.warning, misfit, (verdict.warning or verdict.status) + text, publications
+        )
+
+
+def judge(simulated: SimulatedRig, told: Told | None, *, refusal: str | None, seconds: float) -> Record:
     """One record: the rig, its bound, the answer, and what the answer is worth; None where there is none."""
     suffices = bool((simulated.bound[:2] < SUFFICES).all())
     record: Record = {**_of_rig(simulated), "suffices": suffices, "seconds": round(seconds, 3)}
-    published = result is not None and result.identified
+    published = told is not None and bool(told.values)
     record["published"] = published
     record["missed"] = suffices and not published
     for name in ("warned", "within_1", "within_5", "silently_wrong", "right", "answered", "crashed"):
         record[name] = False
-    for name in MODEL.mapped_names:
+    for name in NAMES:
         record.update({name: None, f"{name}_se": None, f"{name}_error": None, f"{name}_z": None})
     record.update(warning=None, misfit=None, status=None, reason=refusal, worst_error=None)
     record.update(
         first_s=None, publications=0, publications_wrong=0, publications_right=0, publications_right_alarmed=0
     )
-    if result is None:
+    if told is None:
         return record
-    record.update(status=result.status, misfit=_finite(result.chi2))
-    record.update(_of_publications(result.publications, simulated))
+    record.update(status=told.verdict, misfit=_finite(told.misfit))
+    warned = told.warning is not None
+    if told.publications is not None:
+        record.update(_of_publications(told.publications, simulated, warned))
     if not published:
-        record["reason"] = result.verdict
+        record["reason"] = told.reason
         return record
-    value = np.array([result.value[name] for name in MODEL.mapped_names])
-    se = np.array([result.se[name] for name in MODEL.mapped_names])
+    value, se = np.array([told.values[name] for name in NAMES], np.float64).T
     judgement = Judgement.of(value, se, simulated.p)
-    for at, name in enumerate(MODEL.mapped_names):
+    for at, name in enumerate(NAMES):
         record[name], record[f"{name}_se"] = float(value[at]), float(se[at])
         record[f"{name}_error"] = float(value[at] / simulated.p[at] - 1)
         record[f"{name}_z"] = float(judgement.z[at])
-    warned = result.warning is not None
     record.update(
         warned=warned,
-        warning=result.warning,
+        warning=told.warning,
         worst_error=float(judgement.relative.max()),
         within_1=bool((judgement.relative <= 0.01).all()),
         within_5=bool((judgement.relative <= 0.05).all()),
@@ -137,7 +183,7 @@ def judge(simulated: SimulatedRig, result: Identification | None, *, refusal: st
     return record
 
 
-def _of_publications(publications: Publications, simulated: SimulatedRig) -> Record:
+def _of_publications(publications: Publications, simulated: SimulatedRig, alarm: bool) -> Record:
     """Seconds to the first publication; how many there were, how many of them silently wrong, right, right but with
     the alarm."""
     if len(publications.t) == 0:
@@ -147,9 +193,9 @@ def _of_publications(publications: Publications, simulated: SimulatedRig) -> Rec
     return {
         "first_s": float(publications.t[0] - simulated.run.t[0]),
         "publications": len(publications.t),
-        "publications_wrong": int((judgement.wrong & ~publications.alarm).sum()),
+        "publications_wrong": 0 if alarm else int(judgement.wrong.sum()),
         "publications_right": int(judgement.right.sum()),
-        "publications_right_alarmed": int((judgement.right & publications.alarm).sum()),
+        "publications_right_alarmed": int(judgement.right.sum()) if alarm else 0,
     }
 
 
@@ -175,7 +221,7 @@ def _of_rig(simulated: SimulatedRig) -> Record:
         "y_lsb": rig.y_lsb,
         "largest_phi": simulated.largest,
         "gain": rig.gain,
-        **{f"bound_{name}": _finite(simulated.bound[at]) for at, name in enumerate(MODEL.mapped_names)},
+        **{f"bound_{name}": _finite(simulated.bound[at]) for at, name in enumerate(NAMES)},
     }
 
 

@@ -15,7 +15,7 @@ from bench.campaign.truth import GENERATOR, kept_rig, simulate_rig
 from pvid.base.cluster import client, each, processors
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.rig.file import Core
+from pvid.settings.forms import AnyCore
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Campaign:
     population: Population
     rigs: int
     seed: int = 1
-    core: Core = "f32"
+    core: AnyCore = "f64"
     refine: bool = True
     cache: Path | None = None
 
@@ -89,7 +89,7 @@ def _work(rig: int, *, campaign: Campaign, code: str) -> Record:
         simulated = simulate_rig(native, campaign.population, campaign.seed, rig)
     else:
         simulated = kept_rig(native, campaign.population, campaign.seed, rig, campaign.cache)
-    return identify_rig(native, simulated, campaign.core, refine=campaign.refine)[0]
+    return identify_rig(simulated, campaign.core, refine=campaign.refine)[0]
 
 
 @lru_cache(maxsize=1)

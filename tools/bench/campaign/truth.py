@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from bench.campaign.motion import accelerations, integrate, relative_angle, step
 from bench.campaign.population import Population, RandomRig
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.rig.file import Identifier, Nominal, RigFile, Sensor
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Run
 
 Float = npt.NDArray[np.float64]
@@ -40,7 +40,7 @@ class SimulatedRig:
     ----------
     rig : as drawn
     run : what the sensors recorded
-    file : the rig file of a user of this rig
+    file : the rig of a user of this rig
     p : the truth's (w, d1, d2), shape (3,)
     bound : Cramer-Rao bound of their relative standard errors from the whole run, shape (3,)
     largest : largest |phi| [rad]
@@ -48,7 +48,7 @@ class SimulatedRig:
 
     rig: RandomRig
     run: Run
-    file: RigFile
+    file: MechanismRig
     p: Float
     bound: Float
     largest: float
@@ -86,14 +86,14 @@ def _assembled(
     return SimulatedRig(rig, run, rig_file(rig), rig.pendulum.linear, bound, largest)
 
 
-def rig_file(rig: RandomRig) -> RigFile:
+def rig_file(rig: RandomRig) -> MechanismRig:
     """What a user of this rig knows: rod 1, the sensors' resolution, a guess of body 2, and gravity untilted."""
-    return RigFile(
-        l1=rig.pendulum.l1,
-        sample_rate=rig.sample_rate,
-        sensor=Sensor(phi_lsb=rig.phi_lsb, y_lsb=rig.y_lsb),
-        nominal=Nominal(l2=rig.guess_l2, rho2=rig.guess_rho2, g=9.8),
-        identifier=Identifier(),
+    return MechanismRig(
+        "kapitza",
+        rig.sample_rate,
+        known={"l1": rig.pendulum.l1},
+        sensor={"phi": {"resolution": rig.phi_lsb}, "y": {"resolution": rig.y_lsb}},
+        nominal={"l2": rig.guess_l2, "rho2": rig.guess_rho2, "g": 9.8},
     )
 
 
@@ -188,8 +188,3 @@ def kept_rig(native: Native, population: Population, seed: int, index: int, fold
     )
     os.replace(unfinished, path)
     return simulated
-
-
-def with_identifier(file: RigFile, **settings: object) -> RigFile:
-    """A rig file with other settings of its identifier."""
-    return replace(file, identifier=replace(file.identifier, **settings))  # type: ignore[arg-type]

@@ -21,8 +21,6 @@ from pvid.oracle.weak.words import Word
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Recording
-from pvid.run import answer
-from pvid.run.identify import Identification
 from pvid.run.mechanism import MechanismAnswer
 from pvid.run.mechanism_core import CoreAnswer
 
@@ -75,7 +73,7 @@ class Result:
     advice: tuple[str, ...]
     notes: tuple[str, ...]
     details: Mapping[str, Any]
-    _answer: Identification | MechanismAnswer | CoreAnswer
+    _answer: MechanismAnswer | CoreAnswer
     _model: CompiledModel
 
     def __getitem__(self, name: str) -> Parameter:
@@ -125,14 +123,9 @@ class Result:
         """
         out = Picture(path)
         with replacing(force):
-            if isinstance(self._answer, Identification):
-                from pvid.show.figures import convergence
+            from pvid.show.mechanism_figure import write_figure
 
-                convergence(self._answer, out)
-            else:
-                from pvid.show.mechanism_figure import write_figure
-
-                write_figure(self._answer, out)
+            write_figure(self._answer, out)
         return out
 
     def validate(self, data: Data, *, columns: str | None = None) -> Validation:
@@ -203,20 +196,15 @@ class Result:
         return self[name].se if noise is None else math.hypot(noise, model or 0.0)
 
 
-def of_pendulum(found: Identification, model: CompiledModel) -> Result:
-    """Of the pendulum's identifier; model: its description, with the values of the rig."""
-    return _result(found, answer.as_json(found), found.identified, found.status, found.warning, found.notes, model)
-
-
 def of_mechanism(found: MechanismAnswer) -> Result:
-    """Of a described mechanism."""
+    """Of the analysis."""
     verdict = found.found.verdict
     notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
     return _result(found, found.as_json(), found.identified, verdict.status, verdict.warning, notes, found.model)
 
 
 def of_core(found: CoreAnswer) -> Result:
-    """Of a described mechanism by the C core."""
+    """Of the C core."""
     verdict = found.verdict
     notes = (*found.oracle.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
     status = verdict.status if found.published else found.reason.text
@@ -224,7 +212,7 @@ def of_core(found: CoreAnswer) -> Result:
 
 
 def _result(
-    found: Identification | MechanismAnswer | CoreAnswer,
+    found: MechanismAnswer | CoreAnswer,
     details: Mapping[str, Any],
     identified: bool,
     status: str,

@@ -12,7 +12,7 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.replacing import refuse_foreign
-from pvid.cli.input import NewFile, columns_option, force_option, listed_names, rig_options
+from pvid.cli.input import NewFile, columns_option, force_option, listed_names, model_option, rig_options
 
 _SHOWN = 20  # failures
 
@@ -22,8 +22,8 @@ _SHOWN = 20  # failures
 @click.option(
     "-o", "--out", required=True, type=click.Path(path_type=Path), help="Parquet file to write, a row a file."
 )
-@click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
-@click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
+@model_option
+@click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic.  [default: f64]")
 @columns_option
 @rig_options
 @click.option("--together", is_flag=True, help="Identify the FILEs of one folder together: a row a folder.")

@@ -17,6 +17,7 @@ from pvid.cli.input import form_options, read_input, with_overrides
 from pvid.core.native import Native
 from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.rig_settings import rig_for
+from pvid.rig.described import described as of_rig_file
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.sensor_steps import resolved
@@ -71,7 +72,8 @@ def command(
         from pvid.cli.mechanism import compare_recording  # loads SymPy
 
         given = {"core": core, "form": form, "law": law}
-        return _shown(compare_recording(run_path, described, columns, targets_of(targets), **given))
+        own = of_rig_file(described) if isinstance(described, RigFile) else described
+        return _shown(compare_recording(run_path, own, columns, targets_of(targets), **given))
     run = read_input(run_path, rig, columns)
     rig = resolved(rig, run)
     native = Native()

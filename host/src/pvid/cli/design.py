@@ -96,7 +96,7 @@ def command(
         return print_design(compiled, recording, asked, as_json=as_json)
     assert rig is not None
     if run_path is not None:
-        recording, compiled = recording_of(run_path, rig, columns)
+        recording, compiled = recording_of(run_path, of_pendulum(rig), columns)
         return print_design(compiled, recording, asked, as_json=as_json)
     if duration is not None and not 0 < duration < float("inf"):
         raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")

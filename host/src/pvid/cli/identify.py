@@ -2,51 +2,32 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import click
 
-from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import (
-    FigurePath,
-    NewFile,
-    force_option,
-    form_options,
-    listed_names,
-    print_notes,
-    read_input,
-    with_overrides,
-)
-from pvid.cli.result import print_result, print_warning, write_figure, write_refined_figure
-from pvid.core.native import Native
-from pvid.log.mechanism_settings import common_rig
-from pvid.log.rig_settings import rig_for
-from pvid.rig.sensor_steps import resolution_note, resolved
-from pvid.run import answer
-from pvid.run.advised import identified
+from pvid.cli.input import FigurePath, NewFile, force_option, form_options, listed_names, model_option
 from pvid.settings.engine_cores import FLOAT
 
 
 @click.command(name="identify")
 @click.argument("run_paths", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
+@model_option
 @form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
 @click.option(
     "--weights",
     type=click.Choice(["residuals", "sensors"]),
-    help="Of the rows of a described mechanism: an error of the equations, estimated from the residuals, beside the "
-    "noise of the sensors; or that noise alone.  [default: residuals]",
+    help="Of the rows: an error of the equations, estimated from the residuals, beside the noise of the sensors; or "
+    "that noise alone.  [default: residuals]",
 )
 @click.option(
     "--refine/--no-refine",
     default=None,
     help="Fit the full equations to the whole run, from this answer on: any angle, friction, skew. In float64, or with "
-    "--core f32 by the second stage in C.  [default: of the pendulum's weak form, in float64]",
+    "--core f32 by the second stage in C.  [default: of a model with equations of its own for it, such as kapitza]",
 )
 @click.option(
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."
@@ -55,7 +36,7 @@ from pvid.settings.engine_cores import FLOAT
     "--add",
     metavar="TERM",
     multiple=True,
-    help="Of a described mechanism: add a term with one new unknown, as in --add 'equation 2: drag*abs(w)*w', or "
+    help="Add a term with one new unknown, as in --add 'equation 2: drag*abs(w)*w', or "
     "change a signal, as in --add 'V: V + drop*sgn(V)', and show the values without it and with it.",
 )
 @click.option("--write-model", type=NewFile(), help="With --add: write the model file with the terms.")
@@ -64,7 +45,7 @@ from pvid.settings.engine_cores import FLOAT
     "other",
     metavar="RUN2",
     type=click.Path(path_type=Path),
-    help="Of a described mechanism: also say how well the answer predicts RUN2, another run of it.",
+    help="Also say how well the answer predicts RUN2, another run of the mechanism.",
 )
 @click.option(
     "--own",
@@ -97,18 +78,21 @@ def command(
     as_json: bool,
     figure: Path | None,
 ) -> int:
-    """Identifies the parameters from a recorded or simulated RUN with columns t [s], phi [rad] and y [m].
+    """Identifies the parameters of a mechanism from a recorded or simulated RUN, whose columns are t [s] and the
+    signals of the mechanism.
 
-    --columns maps other names and units. Without a rig file --set l1=0.25, the length of rod 1 [m], is enough. Short
-    gaps are interpolated, long gaps stay empty, a non-uniform clock is corrected; each correction is reported.
+    Without --model, and where no rig file names one, it is the shipped mechanism that has the signals of the columns.
+    Your own one is a model file (host/docs/models.md). --columns maps other names and units; --set known.l1=0.25, or
+    l1=0.25, gives a constant. Short gaps are interpolated, long gaps stay empty, a non-uniform clock is corrected; each
+    correction is reported.
 
-    With --model, or a rig file with [model], the run is one of another mechanism (host/docs/models.md): its columns are
-    t and the signals of the model. It is identified in float64; with --core f32 also by the C core, compiled for it.
+    The answer is that of the analysis in float64; with --core f32 or q31 that of the C core, compiled for the
+    mechanism, beside it.
 
     The refinement fits the full equations to the whole run. In float64 its answer replaces that of the weak form where
-    its residuals are those of the sensors' noise; the last line says which it is and why. With --core f32 --refine it
-    is the second stage of the C core, as on a board, and the answer is its last estimate. --figure shows the measured
-    signals against the simulated.
+    its residuals are those of the sensors' noise; a line says which it is and why. With --core f32 --refine it is the
+    second stage of the C core, as on a board, and the answer is its last estimate. --figure shows the measured signals
+    against the simulated.
 
     Several RUNs are identified together: the parameters are those of all, and no window reaches from one into the next.
     They have the same columns and the same sample rate. With --own m, each has its own m: m[A] and m[B] of A.csv and
@@ -125,75 +109,26 @@ def command(
     reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both
     stages.
     """
+    from pvid.cli.mechanism import identify_run  # loads SymPy
+    from pvid.log.rig_choice import common_rig
+
     if refine and target is not None and core != FLOAT.name:
         raise PvidError(f"the refinement on a target is in float32: --on {target} --refine --core {FLOAT.name}")
-    run_path = run_paths[0]
-    described = common_rig(run_paths, rig_path, settings, model, len(run_paths) > 1)
-    if described is None and refine and core == FLOAT.name:
-        file = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
-        described, law = (file, None) if file.identifier.form_traits.publishes else (None, law)
-    if described is not None:
-        from pvid.cli.mechanism import identify_run  # loads SymPy
-
-        options = {"core": core, "form": form, "law": law, "on": target}
-        return identify_run(
-            run_paths,
-            described,
-            columns,
-            as_json=as_json,
-            figure=figure,
-            weights=weights or "residuals",
-            refine=bool(refine),
-            other=other,
-            add=add,
-            write_model=write_model,
-            own=listed_names(own),
-            shared=listed_names(shared),
-            **options,
-        )
-    if add or write_model is not None:
-        raise PvidError("--add and --write-model are for a described mechanism, --model")
-    if other is not None:
-        raise PvidError("--validate is for a described mechanism, --model; here: pvid validate RUN2 --from ANSWER")
-    if own or shared:
-        raise PvidError("--own and --shared are for several recordings of a described mechanism")
-    if weights is not None:
-        raise PvidError(f"--weights {weights} is for a described mechanism, --model; the pendulum has its own weights")
-    rig = with_overrides(rig_for(run_path, rig_path, settings), law=law, form=form, core=core)
-    if target is not None and rig.identifier.core == "f64":
-        raise PvidError("targets hold the cores f32 and q31, not f64: use --core f32")
-    run = read_input(run_path, rig, columns, whole=not rig.identifier.core_traits.takes_gaps)
-    given, rig = rig, resolved(rig, run)
-    notes = resolution_note(given, rig)
-    print_notes(notes)
-    native = Native()
-    noted = replace(run, notes=(*run.notes, *notes))
-    result = identified(noted, rig, native, refine=refine, streamed=target is not None)
-    if target is not None:
-        from pvid.board.compare_on import verify_run
-
-        with progress_bar(f"streaming to {target}", len(run.t)) as advance:
-            verdict = verify_run(target, rig, run, native, advance)
-        write_stderr(f"{target}: {verdict.playback.account}")
-        if not verdict.equal:
-            write_stderr(f"pvid: {target}: {verdict.text}")
-            return DIFFERENT
-        result = replace(result, on=target)
-    if as_json:
-        click.echo(json.dumps(answer.as_json(result)))
-    else:
-        print_result(result, rig)
-    if figure is not None:
-        outcome = None if result.refinement is None else result.refinement.outcome
-        if outcome is not None:
-            write_refined_figure(outcome, figure)
-        else:
-            write_figure(result, figure, None)
-    for sentence in result.remarks:
-        write_stderr(f"pvid: note: {sentence}")
-    print_warning(result)
-    if not result.identified:
-        write_stderr(f"pvid: nothing identified: {result.verdict}")
-    for sentence in result.advice:
-        write_stderr(f"pvid: advice: {sentence}")
-    return DONE if result.identified else NOTHING_IDENTIFIED
+    return identify_run(
+        run_paths,
+        common_rig(run_paths, rig_path, settings, model, columns),
+        columns,
+        as_json=as_json,
+        figure=figure,
+        weights=weights or "residuals",
+        refine=refine,
+        other=other,
+        add=add,
+        write_model=write_model,
+        own=listed_names(own),
+        shared=listed_names(shared),
+        core=core,
+        form=form,
+        law=law,
+        on=target,
+    )

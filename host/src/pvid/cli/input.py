@@ -35,10 +35,19 @@ def rig_options(command: Command) -> Command:
         "settings",
         metavar="KEY=VALUE",
         multiple=True,
-        help="Sets a key of the rig file, overriding the file: l1=0.25 [m] or sensor.phi_lsb=0.0015 [rad]. "
-        "Only l1 is needed. Repeatable.",
+        help="Sets a key of the rig file, overriding the file: known.l1=0.25 [m] or sensor.phi.resolution=0.0015 "
+        "[rad]. Repeatable.",
     )
     return rig(settings(command))
+
+
+def model_option(command: Command) -> Command:
+    """Adds --model: parameter model."""
+    return click.option(
+        "--model",
+        help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, else the shipped one with "
+        "the signals of the columns]",
+    )(command)
 
 
 def columns_option(command: Command) -> Command:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,19 +17,15 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar,
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.base.wording import listed
-from pvid.cli.input import print_notes, run_of
-from pvid.log.rig import LOG_SUFFIX, recording_of_log
+from pvid.cli.input import print_notes
 from pvid.oracle.weak.weights import Weights
-from pvid.rig.columns import parsed
-from pvid.rig.described import described
-from pvid.rig.file import RigFile
-from pvid.rig.mechanism_file import MechanismRig, channels_of
-from pvid.rig.run import Recording, read_recording
-from pvid.rig.sensor_steps import resolution_note, resolved
-from pvid.rig.together import joined, names_of
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording
+from pvid.rig.together import names_of
+from pvid.run.identification import identified
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of, own_of
 from pvid.run.mechanism_advice import analysed
-from pvid.run.wild_samples import without_wild_samples
+from pvid.run.reading import read_all
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
@@ -40,8 +35,6 @@ if TYPE_CHECKING:
     from pvid.model.compiled import CompiledModel
     from pvid.run.compare import Comparison
     from pvid.run.mechanism_core import CoreAnswer
-    from pvid.run.refined_mechanism import RefinedMechanism
-    from pvid.run.refined_pendulum import RefinedPendulum
     from pvid.run.validation import Validation
 
 _FORM = ("form", "weak")
@@ -53,71 +46,36 @@ _LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
 
 def recording_of(
-    path: Path, rig: MechanismRig | RigFile, columns: str | None, *, whole: bool = True
+    path: Path, rig: MechanismRig, columns: str | None, *, whole: bool = True
 ) -> tuple[Recording, CompiledModel]:
-    """A recording with its wild samples interpolated, and the model with the values of the rig.
+    """A recording as it is identified, and the model with the values of the rig; prints what was done to it.
 
     Parameters
     ----------
     whole : the longest stretch without a missing sample alone
     """
-    recording, model = _read(path, rig, columns, whole=whole)
-    print_notes(recording.notes)
-    return recording, model
+    return recordings_of([path], rig, columns, whole=whole)
 
 
 def recordings_of(
-    paths: Sequence[Path], rig: MechanismRig | RigFile, columns: str | None
+    paths: Sequence[Path], rig: MechanismRig, columns: str | None, *, whole: bool = False
 ) -> tuple[Recording, CompiledModel]:
-    """Several recordings of one mechanism as one, and the model with the values of the rig."""
-    if len(paths) == 1:
-        return recording_of(paths[0], rig, columns, whole=False)
-    names = names_of(paths)
-    found = [_read(path, rig, columns, whole=False) for path in paths]
-    model = found[0][1]
-    recording = joined([one for one, _ in found], names, parsed(columns, channels_of(model)))
+    """Several recordings of one mechanism as one, likewise."""
+    names = names_of(paths) if len(paths) > 1 else ()
+    recording, model = read_all(rig, paths, names, columns, whole=whole)
     print_notes(recording.notes)
     return recording, model
-
-
-def _read(
-    path: Path, rig: MechanismRig | RigFile, columns: str | None, *, whole: bool
-) -> tuple[Recording, CompiledModel]:
-    if isinstance(rig, RigFile):
-        return _read_own(path, rig, columns, whole=whole)
-    model = model_of(rig)
-    if path.suffix == LOG_SUFFIX:
-        if columns is not None:
-            raise PvidError(f"{path} is a log with known columns: omit --columns")
-        recording = recording_of_log(path, [one.name for one in model.signals])
-    else:
-        recording = read_recording(path, rig.sample_rate, parsed(columns, channels_of(model)))
-    recording.refuse_damaged()
-    return without_wild_samples(recording.whole() if whole else recording, model), model
-
-
-def _read_own(path: Path, rig: RigFile, columns: str | None, *, whole: bool) -> tuple[Recording, CompiledModel]:
-    """The same of a mechanism that has a rig file of its own: its columns, its corrections, its resolution."""
-    run = run_of(path, rig, columns, whole=whole)
-    found = resolved(rig, run)
-    signals = {one.name: getattr(run, one.name) for one in rig.mechanism.model.channels}
-    notes = (*run.notes, *resolution_note(rig, found))
-    return Recording(run.t, signals, run.sample_rate, notes), _model_of(found)
-
-
-def _model_of(rig: MechanismRig | RigFile) -> CompiledModel:
-    return model_of(described(rig) if isinstance(rig, RigFile) else rig)
 
 
 def identify_run(
     paths: Sequence[Path],
-    rig: MechanismRig | RigFile,
+    rig: MechanismRig,
     columns: str | None,
     *,
     as_json: bool,
     figure: Path | None,
     weights: Weights = "residuals",
-    refine: bool = False,
+    refine: bool | None = None,
     on: str | None = None,
     other: Path | None = None,
     add: Sequence[str] = (),
@@ -132,16 +90,16 @@ def identify_run(
     ----------
     paths : of the recordings
     weights : of the rows, as in pvid.oracle.weak.identify
-    refine : the equations are fitted to the whole run, from the answer on
+    refine : the equations are fitted to the whole run, from the answer on; None: as of pvid.run.identification
     other : another recording, of which is said how well the answer predicts it
     add, write_model : terms that are added to the model, and where the model file with them is written
     own, shared : unknowns that each recording has of its own, or not, as in pvid.run.mechanism.own_of
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
-    name = _model_of(rig).name
+    name = model_of(rig).name
     if len(paths) > 1:
-        _refuse_several(on=on, refine=refine, **only_in_c)
+        _refuse_several(on=on, refine=bool(refine), **only_in_c)
     if only_in_c.get("form") == _STRONG:
         if figure is not None or refine or weights != "residuals" or add:
             raise PvidError("--figure, --refine, --weights and --add are for the weak form; omit --form strong")
@@ -169,20 +127,22 @@ def identify_run(
         recording, model = recordings_of(paths, rig, columns)
     if in_c or on is not None:
         refuse_too_many_unknowns(model)
-    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, refine):
+    if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, bool(refine)):
         return DIFFERENT
     of_each = own_of(model, recording, own, shared, in_c=in_c is not None)
     without: MechanismAnswer | None = None
     if add:
         from pvid.run.additions import added
 
-        of_mechanism = described(rig) if isinstance(rig, RigFile) else rig
         with working("identifying without the added terms"):
             without = identify_mechanism(recording, model, weights, of_each)
-            more = added(without, of_mechanism, add)
+            more = added(without, rig, add)
             model = more.model
     with working("identifying"):
-        answer = analysed(recording, model, weights, predict=not refine, own=of_each)
+        if in_c:
+            answer = analysed(recording, model, weights, predict=not refine, own=of_each)
+        else:
+            answer = identified(recording, model, weights, refine=refine, own=of_each)
     if without is not None:
         with_them: dict[str, Any] = {"added": list(more.terms), "without": _values_json(without.values)}
         if not as_json:
@@ -191,8 +151,6 @@ def identify_run(
             write_whole(write_model, more.text_of(answer))
             write_stderr(f"pvid: {write_model}: the model with {listed(more.terms)}")
     print_notes(answer.recording.notes[len(recording.notes) :])
-    if refine and not in_c:
-        return _refined(answer, partial(_predicted, other, rig, columns), as_json=as_json, figure=figure)
     core: CoreAnswer | None = None
     no_second: dict[str, Any] = {}
     if in_c:
@@ -220,11 +178,9 @@ def identify_run(
     if validation is not None and not as_json:
         click.echo(f"{other}: the answer {validation.text}")
     if core is None and not model.following.is_usual:
-        from pvid.run.engine_identify import ALL_ALIKE  # the core and its design, which this road does not need
-
-        write_stderr(f"pvid: note: {ALL_ALIKE}")
+        write_stderr("pvid: note: the analysis in float64 takes all windows alike: [identifier] has no effect")
     if figure is not None:
-        _draw(shown, None, figure)
+        _draw(shown, figure)
     for one in (core.verdict if core is not None else answer.found.verdict).reasons:
         write_stderr(f"pvid: {'warning' if one.alarm and shown.identified else 'note'}: {one.text}")
     _print_advice(answer)
@@ -245,12 +201,12 @@ def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> Non
 
 
 def _identified_by_strong_form(
-    path: Path, rig: MechanismRig | RigFile, columns: str | None, *, as_json: bool, **given: str | None
+    path: Path, rig: MechanismRig, columns: str | None, *, as_json: bool, **given: str | None
 ) -> int:
     """Identifies a recording by the strong form and prints the answer."""
     from pvid.run.strong_mechanism import identify_strong_mechanism
 
-    core = _strong_core(_model_of(rig).name, given)
+    core = _strong_core(model_of(rig).name, given)
     if given.get("on") is not None:
         raise PvidError("--on with the strong form of a described mechanism is for `compare`")
     recording, model = recording_of(path, rig, columns)
@@ -285,15 +241,15 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
     return core
 
 
-def _draw(answer: MechanismAnswer | CoreAnswer, fit: RefinedMechanism | RefinedPendulum | None, figure: Path) -> None:
+def _draw(answer: MechanismAnswer | CoreAnswer, figure: Path) -> None:
     """What was printed, as a figure."""
     from pvid.show.mechanism_figure import write_figure  # loads matplotlib
 
-    write_figure(answer, figure, fit)
+    write_figure(answer, figure)
     click.echo(f"figure: {figure}")
 
 
-def plot_run(path: Path, rig: MechanismRig | RigFile, columns: str | None, figure: Path, *, refine: bool) -> None:
+def plot_run(path: Path, rig: MechanismRig, columns: str | None, figure: Path, *, refine: bool | None) -> None:
     """Identifies a recording of a described mechanism as `identify` does, and writes the answer as a figure.
 
     Parameters
@@ -303,29 +259,25 @@ def plot_run(path: Path, rig: MechanismRig | RigFile, columns: str | None, figur
     from pvid.show.mechanism_figure import write_figure
 
     recording, model = recording_of(path, rig, columns, whole=False)
-    answer = weak = analysed(recording, model, predict=not refine)
-    fit, text = None, f"weak form, float64; verdict {weak.found.verdict.word}; chi2 {weak.found.chi2:.2g}"
-    if refine:
-        from pvid.run.refined_mechanism import refined_answer
-
-        answer, fit, text = refined_answer(weak)
-    verdict = weak.found.verdict
+    answer = identified(recording, model, refine=refine)
+    verdict, refinement = answer.found.verdict, answer.refinement
+    text = f"{_stage(answer)}, float64; verdict {verdict.word}; chi2 {answer.found.chi2:.2g}"
     lines = [f"{path.name}: {model.title}", text if answer.identified else f"nothing identified; {text}"]
-    if answer is weak and answer.prediction:
+    lines += [] if refinement is None else [refinement.text]
+    if answer.prediction:
         lines.append(f"predicts motion that was not fitted: {listed(answer.prediction)}")
-    if answer is weak and verdict.warning:
+    if verdict.warning:
         lines.append(f"warning: {verdict.warning}")
     lines += [f"advice: {sentence}" for sentence in answer.advice]
-    write_figure(answer, figure, None if answer is weak else fit, "\n".join(lines))
+    write_figure(answer, figure, "\n".join(lines))
 
 
-def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, core: Core, refined: bool) -> bool:
+def _streamed(target: str, rig: MechanismRig, recording: Recording, core: Core, refined: bool) -> bool:
     """Streams a recording to a target and prints the account; whether every hash is that of this machine."""
     from pvid.board.engine_board import verify_recording
 
-    own = described(rig) if isinstance(rig, RigFile) else rig
     with progress_bar(f"streaming to {target}", len(recording)) as advance:
-        verdict = verify_recording(target, own, recording, core, advance, refined=refined)
+        verdict = verify_recording(target, rig, recording, core, advance, refined=refined)
     write_stderr(f"{target}: {verdict.playback.account}")
     if not verdict.equal:
         write_stderr(f"pvid: {target}: {verdict.text}")
@@ -333,7 +285,7 @@ def _streamed(target: str, rig: MechanismRig | RigFile, recording: Recording, co
 
 
 def _predicted(
-    other: Path | None, rig: MechanismRig | RigFile, columns: str | None, answer: MechanismAnswer | CoreAnswer
+    other: Path | None, rig: MechanismRig, columns: str | None, answer: MechanismAnswer | CoreAnswer
 ) -> Validation | None:
     """How well an answer predicts another recording of the rig; None: none was given."""
     from pvid.run.validation import predicted
@@ -350,39 +302,6 @@ def _validation_json(validation: Validation | None) -> dict[str, Any]:
     return {} if validation is None else {"validation": validation.as_json()}
 
 
-def _refined(
-    answer: MechanismAnswer,
-    predicted: Callable[[MechanismAnswer], Validation | None],
-    *,
-    as_json: bool,
-    figure: Path | None,
-) -> int:
-    """Refines an answer and prints it, and how well it predicts another recording."""
-    from pvid.run.refined_mechanism import refined_answer
-
-    weak = answer
-    with working("refining"):
-        answer, refined, text = refined_answer(weak)
-    validation = predicted(answer)
-    if as_json:
-        found = None if refined is None else refined.found
-        shown = None if found is None else {"chi2": found.chi2, "slow_chi2": found.slow_chi2}
-        more = {"refinement": {"text": text, **(shown or {})}, **_validation_json(validation)}
-        click.echo(json.dumps(answer.as_json() | more))
-    else:
-        _print(answer, "weak form" if answer is weak else "refined")
-        click.echo(text)
-        if validation is not None:
-            click.echo(f"another run: the answer {validation.text}")
-    if figure is not None:
-        _draw(answer, None if answer is weak else refined, figure)
-    _print_advice(answer)
-    if not answer.identified:
-        write_stderr("pvid: nothing identified")
-        return NOTHING_IDENTIFIED
-    return DONE
-
-
 def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> MechanismAnswer | None:
     """The refined answer of a recording, or that of the weak form; None: neither identifies it. A sentence on standard
     error says which and why.
@@ -391,13 +310,15 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     ----------
     figure : where the measured and the simulated signals are drawn
     """
-    from pvid.cli.result import write_refined_figure
     from pvid.run.refined_mechanism import refined_answer
 
     answer, refined, text = refined_answer(identify_mechanism(recording, model))
     write_stderr(f"pvid: {text}")
     if figure is not None and refined is not None:
-        write_refined_figure(refined, figure)
+        from pvid.show.mechanism_figure import write_comparison  # loads matplotlib
+
+        write_comparison(refined, figure)
+        click.echo(f"figure: {figure}")
     return answer if answer.identified else None
 
 
@@ -432,7 +353,7 @@ def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
 
 def compare_recording(
     path: Path,
-    rig: MechanismRig | RigFile,
+    rig: MechanismRig,
     columns: str | None,
     targets: Sequence[str] = (),
     **given: str | None,
@@ -453,8 +374,7 @@ def compare_recording(
 
     if given.get("form") == _STRONG:
         return _compared_strong(path, rig, columns, targets, given)
-    own = described(rig) if isinstance(rig, RigFile) else rig
-    name = _model_of(rig).name
+    name = model_of(rig).name
     for option, value in given.items():
         if value is not None and (option, value) not in _COMPARED:
             raise PvidError(
@@ -477,7 +397,7 @@ def compare_recording(
             write_stderr(f"pvid: note: no second stage: {second}")
         for target in targets:
             with progress_bar(f"{core} on {target}", len(recording)) as advance:
-                there = verify_recording(target, own, recording, core, advance)
+                there = verify_recording(target, rig, recording, core, advance)
             ticks, last = there.playback.done, there.playback.hash
             outcomes.append(Outcome(target, core, "weak", "stationary", ticks, last, there.equal, there.text))
     return outcomes
@@ -492,7 +412,7 @@ def _compared(form: str, core: Core, found: Comparison) -> Outcome:
 
 def _compared_strong(
     path: Path,
-    rig: MechanismRig | RigFile,
+    rig: MechanismRig,
     columns: str | None,
     targets: Sequence[str],
     given: Mapping[str, str | None],
@@ -502,7 +422,7 @@ def _compared_strong(
     from pvid.board.strong_image import compare_on_board
     from pvid.run.strong_compare import StrongComparison
 
-    core = _strong_core(_model_of(rig).name, given)
+    core = _strong_core(model_of(rig).name, given)
     if core != STRONG.name:
         raise PvidError(f"--core {core} has no twin; omit it")
     recording, model = recording_of(path, rig, columns)
@@ -519,15 +439,23 @@ def _compared_strong(
     return outcomes
 
 
-def _print(answer: MechanismAnswer, stage: str = "weak form") -> None:
+def _stage(answer: MechanismAnswer) -> str:
+    return "refined" if answer.refinement is not None and answer.refinement.adopted else "weak form"
+
+
+def _print(answer: MechanismAnswer) -> None:
     found = answer.found
     if answer.identified:
-        _table(answer.values, f"{answer.model.title}: {stage}, float64")
+        _table(answer.values, f"{answer.model.title}: {_stage(answer)}, float64")
     explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
     click.echo(
         f"verdict {found.verdict.word}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "
         f"{found.design.window_s:.3g} s; R^2 {explained}"
     )
+    if answer.refinement is not None and answer.identified:
+        shown = answer.refinement.as_json().get("parameters", {}) if answer.refinement.adopted else {}
+        extras = [f"{name} {one['value']:.3g} ± {one['se']:.1g}" for name, one in shown.items()]
+        click.echo("; ".join([answer.refinement.text, *([", ".join(extras)] if extras else [])]))
     if answer.prediction:
         click.echo(f"predicts motion that was not fitted: {listed(answer.prediction)}")
 

@@ -18,16 +18,12 @@ from pvid.base.rounding import percent, with_prefix
 from pvid.board.design_cost import Asked, Cost, CostedDesign
 from pvid.board.engine_board import verify_recording
 from pvid.board.target import HOST_TARGET, Verdict
-from pvid.core.native import Native
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import names as shipped
-from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
-from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison
-from pvid.run.identify import identify
 from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of, outputs_at
 from pvid.run.mechanism_compare import compare_recording
 from pvid.run.mechanism_core import CoreAnswer, identify_in_c
@@ -36,7 +32,6 @@ from pvid.run.refined_core import RefinedCoreAnswer, compare_both, refined_in_c
 from pvid.run.strong_mechanism import identify_strong_mechanism
 from pvid.settings.engine_cores import FIXED, FLOAT
 from pvid.show.demo_figure import convergence
-from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.sim.simulated_run import RigSimulation
 
 _THE_SAME = 1e-3  # relative, of a guess and the truth
@@ -180,7 +175,7 @@ def _by_the_paper(shown: Demonstrated, seed: int) -> None:
     """The strong form on this computer, in a line. It differentiates its samples, and needs finer ones."""
     form = f"The paper's own form (derivatives, a row, its sums, a solution at each tick), sensors {_FINER} times finer"
     try:
-        values = _strong_pendulum(shown, seed) if shown.answer.model.name == DEFAULT else _strong(shown, seed)
+        values = _strong(shown, seed)
     except PvidError as error:
         click.echo(f"{form}: {error}.")
         return
@@ -195,21 +190,6 @@ def _strong(shown: Demonstrated, seed: int) -> Mapping[str, Value]:
     rig = simulated_rig(model.name)
     run = RigSimulation.of(finer, rig).run(seed)
     return identify_strong_mechanism(Recording(run.pop("t"), run, rig.sample_rate), finer).values
-
-
-def _strong_pendulum(shown: Demonstrated, seed: int) -> Mapping[str, Value]:
-    """By the hand-written C of the paper's identifier."""
-    sensors = standard_sensors(_BITS + round(np.log2(_FINER)))
-    run = simulate(sensors=sensors, truth="linear", seed=seed).run
-    standard = RigFile.standard()
-    rig = replace(
-        standard,
-        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
-        identifier=replace(standard.identifier, form="strong"),
-    )
-    found = identify(run, rig, Native())
-    units = {name: shown.answer.values[name].unit for name in shown.names}
-    return {name: Value(unit, found.value[name], found.se[name], None) for name, unit in units.items()}
 
 
 def _cost(shown: Demonstrated, target: str, refined: bool) -> Cost | None:
@@ -290,4 +270,5 @@ def _guessed(model: str, rig: SimulatedRig, simulation: RigSimulation, seed: int
         if x and abs(one.guess / x - 1) < _THE_SAME:
             nominal[one.name] = float(f"{factor * x:.4g}")
     exact = {one.name: {"gain_sd": 0.0} for one in compiled.signals if one.gain_sd > 0}
-    return MechanismRig(model, rig.sample_rate, known=rig.knowns, sensor=exact, nominal=nominal, clock_sd=0.0)
+    known_sd = {one.name: 0.0 for one in compiled.knowns if one.sd}
+    return MechanismRig(model, rig.sample_rate, rig.knowns, exact, nominal, known_sd, clock_sd=0.0)

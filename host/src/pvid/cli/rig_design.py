@@ -44,12 +44,13 @@ def recorded(
     """
     from pvid.cli.mechanism import recording_of
     from pvid.rig.columns import parsed
+    from pvid.rig.described import described
     from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import channels_of
     from pvid.rig.run import read_recording
 
     if isinstance(rig, RigFile):
-        return recording_of(run_path, rig, columns)[0]
+        return recording_of(run_path, described(rig), columns)[0]
     rate = None if rig is None else rig.sample_rate
     recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
     recording.refuse_damaged()

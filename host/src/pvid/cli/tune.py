@@ -7,14 +7,12 @@ from pathlib import Path
 import click
 
 from pvid.base.errors import PvidError
-from pvid.cli.input import FigurePath, columns_option, force_option, rig_options
-from pvid.log.mechanism_settings import mechanism_rig
-from pvid.log.rig_settings import rig_for
+from pvid.cli.input import FigurePath, columns_option, force_option, model_option, rig_options
 
 
 @click.command(name="tune")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
-@click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
+@model_option
 @rig_options
 @columns_option
 @click.option(
@@ -40,11 +38,10 @@ def command(
     """
     from pvid.cli.mechanism import recording_of, refined_reference  # loads SymPy
     from pvid.cli.mechanism_design import print_tuning
+    from pvid.log.rig_choice import rig_of
 
     if figure is not None and not refine:
         raise PvidError("--figure is of the refinement: add --refine")
-
-    described = mechanism_rig(run_path, rig_path, settings, model) or rig_for(run_path, rig_path, settings)
-    recording, compiled = recording_of(run_path, described, columns)
+    recording, compiled = recording_of(run_path, rig_of(run_path, rig_path, settings, model, columns), columns)
     reference = refined_reference(compiled, recording, figure) if refine else None
     return print_tuning(compiled, recording, reference)

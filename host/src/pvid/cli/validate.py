@@ -10,9 +10,8 @@ import click
 
 from pvid.base.console import DONE
 from pvid.base.errors import PvidError
-from pvid.cli.input import columns_option, rig_options
-from pvid.log.mechanism_settings import mechanism_rig
-from pvid.log.rig_settings import rig_for
+from pvid.cli.input import columns_option, model_option, rig_options
+from pvid.models.registry import names
 
 
 @click.command(name="validate")
@@ -25,7 +24,7 @@ from pvid.log.rig_settings import rig_for
     type=click.Path(path_type=Path),
     help="A file with what `identify --json` printed for another run.",
 )
-@click.option("--model", help="A mechanism of `pvid models` or a model file.  [default: that of the rig file, kapitza]")
+@model_option
 @rig_options
 @columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -45,9 +44,12 @@ def command(
     more than the noise, whatever warnings it has.
     """
     from pvid.cli.mechanism import recording_of  # loads SymPy
+    from pvid.log.rig_choice import rig_of
     from pvid.run.validation import predicted
 
-    rig = mechanism_rig(run_path, rig_path, settings, model) or rig_for(run_path, rig_path, settings)
+    if model is None and answer_path.is_file():
+        model = _shipped_in(_answer(answer_path))
+    rig = rig_of(run_path, rig_path, settings, model, columns)
     answer = _answer(answer_path)
     recording, compiled = recording_of(run_path, rig, columns, whole=False)
     named = answer.get("model", compiled.name)
@@ -60,6 +62,12 @@ def command(
     else:
         click.echo(f"{answer_path} {found.text}")
     return DONE
+
+
+def _shipped_in(answer: dict[str, Any]) -> str | None:
+    """The shipped mechanism that an answer is of; None: it is of a model file, which this call must name."""
+    name = answer.get("model")
+    return name if name in names() else None
 
 
 def _answer(path: Path) -> dict[str, Any]:

@@ -4,13 +4,14 @@ names a mechanism, the one whose signals the recording has."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
-from pvid.log.rig import LOG_SUFFIX, document_of_log
+from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import described as description_of
 from pvid.models.registry import asked_for, is_named, names, shipped
@@ -52,8 +53,6 @@ def rig_of(
     document = with_settings(document, settings)
     name = asked if asked is not None else _named(document)
     if name is None:
-        if read is None and run_path is not None:
-            read = lambda wanted: read_recording(run_path, None, wanted)  # noqa: E731
         name = _proposed(run_path, read, columns)
     if isinstance(name, str):
         name = shipped(name, where)
@@ -113,13 +112,17 @@ def _named(document: Mapping[str, Any]) -> str | None:
 
 
 def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, columns: str | None) -> str:
-    """The shipped mechanism whose signals a recording has.
+    """The shipped mechanism whose signals a recording has, or that a board named.
 
     Raises
     ------
     PvidError
         Where none has, or several have.
     """
+    if run_path is not None and run_path.suffix == LOG_SUFFIX:
+        return mechanism_of_log(run_path).model.name
+    if read is None and run_path is not None:
+        read = partial(read_recording, run_path, None)
     if read is None:
         raise PvidError(f"no mechanism is named: use --model, with {listed(names(), 'or')}, or a model file")
     found = []

@@ -180,7 +180,8 @@ class MechanismRig:
         signals = []
         for signal in model.signals:
             given: dict[str, Any] = dict(self.sensor.get(signal.name, {}))
-            signals.append(replace(signal, given=signal.given or "resolution" in given, **given))
+            stated = "resolution" in given or isinstance(self.model, Path)  # an author knows his own sensors
+            signals.append(replace(signal, given=stated, **given))
         unknowns = self._unknowns(replace(model, knowns=knowns))
         following = replace(model.following, **self.identifier)
         clock_sd = model.clock_sd if self.clock_sd is None else self.clock_sd

@@ -1,4 +1,4 @@
-"""Resolution of a sensor, from its recorded values."""
+"""Resolution of an encoder, from its recorded values."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from pvid.model.compiled import CompiledModel
 from pvid.rig.file import RigFile, Unset
-from pvid.rig.run import Run
+from pvid.rig.run import Recording, Run
 
 Float = npt.NDArray[np.float64]
 
@@ -26,6 +27,24 @@ _RARE = 0.05
 _COARSEST = 0.05  # rad: an encoder of 7 bits
 _DIGITS = 4
 _SAME = 0.01
+
+
+def with_resolutions(recording: Recording, model: CompiledModel) -> tuple[Recording, CompiledModel]:
+    """The model of a shipped mechanism with the resolution of each encoder that the recording shows, where the rig file
+    does not state it, and a note on it."""
+    signals, notes = [], list(recording.notes)
+    for one in model.signals:
+        is_open = one.kind == "sensor" and one.unit == "rad" and one.resolution > 0 and not one.given
+        step = resolution_of(recording.signals[one.name]) if is_open else None
+        if step is None or step > _COARSEST or abs(step / one.resolution - 1) < _SAME:
+            signals.append(one)
+            continue
+        resolution = float(f"{step:.{_DIGITS}g}")
+        signals.append(replace(one, resolution=resolution))
+        notes.append(f"{one.name} moves in steps of {resolution:g} rad: taken as its resolution, which is not given")
+    if len(notes) == len(recording.notes):
+        return recording, model
+    return replace(recording, notes=tuple(notes)), replace(model, signals=tuple(signals))
 
 
 def resolved(rig: RigFile, run: Run) -> RigFile:

@@ -105,7 +105,8 @@ def judged(answer: MechanismAnswer) -> MechanismAnswer:
 
 
 def with_prediction(answer: MechanismAnswer) -> MechanismAnswer:
-    """The same answer with how well its equations predict motion that was not fitted: each half of the run the other's.
+    """The same answer with how well its equations predict motion that was not fitted: each half of the run the other's,
+    after a refinement of each where the answer is refined.
 
     Cost: some tenths of a second, where the model's simulation is compiled already.
     """
@@ -113,6 +114,9 @@ def with_prediction(answer: MechanismAnswer) -> MechanismAnswer:
         with np.errstate(all="ignore"):
             found, trial = answer.found, _Trial(answer)
             usual = trial.estimates(_USUAL, found.design, found.fit.start, _WEIGHTS[:1])
+            if usual and answer.refinement is not None and answer.refinement.adopted:
+                again = trial.refined(usual[0])
+                usual = usual if again is None or not again.sensors else [again]
     except FAILURES:  # they cannot be simulated on this run
         return answer
     return replace(answer, prediction=usual[0].sensors) if usual else answer

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,6 @@ from pvid.model.evaluation import numpy_function
 from pvid.model.normalise import with_own_scales
 from pvid.model.together import offsets, with_own
 from pvid.models.mechanisms import compiled_of
-from pvid.models.registry import MODELS
 from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.edges import with_edges
 from pvid.oracle.weak.errors import uncertainty
@@ -34,6 +33,9 @@ from pvid.oracle.weak.words import WIDE, Word, worst
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.sensor_prediction import SensorPrediction
+
+if TYPE_CHECKING:
+    from pvid.run.refined_mechanism import RefinedMechanism
 
 Float = npt.NDArray[np.float64]
 
@@ -77,6 +79,37 @@ class Value:
 
 
 @dataclass(frozen=True, eq=False)
+class Refinement:
+    """What became of a refinement.
+
+    Attributes
+    ----------
+    adopted : the answer's values are the refined ones
+    text : why, in a clause
+    fit : its outcome; None: there is none
+    """
+
+    adopted: bool
+    text: str
+    fit: RefinedMechanism | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """For `identify --json`; parameters that the weak form does not have by name."""
+        out: dict[str, Any] = {"adopted": self.adopted, "text": self.text}
+        if self.fit is None:
+            return out
+        found, made = self.fit.found, self.fit.problem.kernel.made
+        values, errors = self.fit.values, self.fit.errors
+        extras = {
+            one.name: {"value": values[one.name], "se": errors[one.name]}
+            for one in made.parameters
+            if one.place < 0 and 0 < errors[one.name] < math.inf
+        }
+        out |= {"chi2": found.chi2, "slow_chi2": found.slow_chi2, "blocks": len(found.cut.first)}
+        return out | {"parameters": extras}
+
+
+@dataclass(frozen=True, eq=False)
 class MechanismAnswer:
     """An identification of a recording.
 
@@ -90,6 +123,7 @@ class MechanismAnswer:
     advice : sentences with what to type, where a column seems to be wrong
     prediction : how well each sensor's motion is predicted that was not fitted; none: it was not looked at
     predicted : the same in each of several recordings, by name
+    refinement : None: none was tried
     """
 
     model: CompiledModel
@@ -100,6 +134,7 @@ class MechanismAnswer:
     advice: tuple[str, ...] = ()
     prediction: tuple[SensorPrediction, ...] = ()
     predicted: Mapping[str, tuple[SensorPrediction, ...]] = field(default_factory=dict)
+    refinement: Refinement | None = None
 
     @property
     def identified(self) -> bool:
@@ -130,7 +165,6 @@ class MechanismAnswer:
             "advice": list(self.advice),
             "reasons": {one.name: one.text for one in found.verdict.reasons},
             "parameters": parameters,
-            **own_keys(self.model, parameters),
             "missing": missing_of(found),
             "chi2": found.chi2,
             "r2": found.r2,
@@ -144,7 +178,7 @@ class MechanismAnswer:
             "model": self.model.name,
             "core": "f64",
             "form": "weak",
-        }
+        } | ({} if self.refinement is None else {"refinement": self.refinement.as_json()})
 
 
 def recordings_of(answer: MechanismAnswer) -> dict[str, Any]:
@@ -172,12 +206,6 @@ def missing_of(found: Identified) -> dict[str, Any] | None:
     parameters = {name: {"value": float(p), "se": float(se)} for name, p, se in with_it}
     terms = [asdict(one) for one in terms_of(found.fit, named)]
     return {"explained": named.complete, "share": named.share, "terms": terms, "parameters": parameters}
-
-
-def own_keys(model: CompiledModel, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters that are keys of the object of `identify --json` themselves: of the pendulum."""
-    own = MODELS.get(model.name)
-    return {} if own is None else {one.name: parameters[one.name] for one in own.answers if one.name in parameters}
 
 
 def model_of(rig: MechanismRig) -> CompiledModel:
@@ -374,6 +402,8 @@ def values_of(
     judged: Sequence[Judged],
     verdict: Verdict,
     shifts: Float | None = None,
+    *,
+    of_known: bool = True,
 ) -> dict[str, Value]:
     """Outputs of the model, then p, by name.
 
@@ -384,14 +414,14 @@ def values_of(
     judged : of each parameter; an output is identified where all parameters that it depends on are
     verdict : whose word a parameter has; an output has the worst of those that it depends on
     shifts : see shifts_of; None: no terms were tried
+    of_known : the first of the gains are those of constants, in which an output may stand by itself
     """
-    scale = gains.T @ gains
     terms = np.zeros((0, len(p))) if shifts is None else shifts
 
-    def shown(unit: str, value: float, slope: Float, of: Judged, word: Word) -> Value:
+    def shown(unit: str, value: float, slope: Float, of: Judged, word: Word, direct: Float | float = 0.0) -> Value:
         if of.status == "not_identified":
             return Value(unit, None, None, None, of.status, of.reason, word="not_identified")
-        se_noise, se_scale = (float(np.sqrt(slope @ one @ slope)) for one in (covariance, scale))
+        se_noise, se_scale = float(np.sqrt(slope @ covariance @ slope)), float(np.linalg.norm(gains @ slope + direct))
         se_model = float(np.max(np.abs(terms @ slope), initial=0.0))
         se = math.hypot(se_noise, se_scale, se_model)
         return Value(unit, value, se, se_noise, of.status, of.reason, of.below, se_model, se_scale, word)
@@ -402,7 +432,11 @@ def values_of(
         missing = next((of for of in used if of.status == "not_identified"), Judged())
         slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := _output(model, p, one))[1])
         word = worst(verdict.of(name) for name, p_k in zip(model.p_names, model.p, strict=True) if one.value.has(p_k))
-        own = shown(one.unit, found[0], slope, missing, word)
+        direct = np.zeros(len(gains))
+        if of_known:
+            by_known = _of_constants(model, p, one, found[0])
+            direct[: len(by_known)] = by_known
+        own = shown(one.unit, found[0], slope, missing, word, direct)
         if own.value is not None and not (own.se or 0.0) <= WIDE * abs(own.value):
             own = replace(own, word=worst([word, "usable"]))
         values[one.name] = own
@@ -419,6 +453,17 @@ def unless_held(judged: Sequence[Judged], reason: str | None) -> Sequence[Judged
 def outputs_at(model: CompiledModel, p: Float) -> dict[str, float]:
     """Outputs of the model at p [n_p], by name."""
     return {one.name: _output(model, p, one)[0] for one in model.outputs}
+
+
+def _of_constants(model: CompiledModel, p: Float, output: Output, value: float) -> list[float]:
+    """What an output at p is off by for one standard deviation of each constant that has any, beside what p is."""
+    off = []
+    for known in model.knowns:
+        if known.sd > 0:
+            moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in model.knowns)
+            stands = output.value.has(known.symbol)
+            off.append(_output(replace(model, knowns=moved), p, output)[0] - value if stands else 0.0)
+    return off
 
 
 @lru_cache(maxsize=256)

@@ -64,11 +64,19 @@ def analysed(
         from pvid.run.additions import to_type
 
         answer = replace(answer, advice=(*answer.advice, *to_type(answer)))
-    if not predict or not answer.identified and answer.is_explained:
+    return judged_by_prediction(answer) if predict else answer
+
+
+def judged_by_prediction(answer: MechanismAnswer) -> MechanismAnswer:
+    """The answer with how well it predicts motion that was not fitted; where the equations do not explain the recording
+    and no refinement has been adopted, the estimate that predicts it best."""
+    if not answer.identified and answer.is_explained:
         return answer
     from pvid.run.judge import judged, with_prediction  # loads the simulation
 
-    return with_prediction(answer) if answer.is_explained or weights != "residuals" else judged(answer)
+    refined = answer.refinement is not None and answer.refinement.adopted
+    as_it_is = answer.is_explained or answer.weights != "residuals" or refined
+    return with_prediction(answer) if as_it_is else judged(answer)
 
 
 def advised(answer: MechanismAnswer) -> MechanismAnswer:

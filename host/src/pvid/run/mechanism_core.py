@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
@@ -23,8 +24,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.engine_design import config_to_identify, samples_of
 from pvid.run.engine_design_q31 import engine_to_identify
-from pvid.run.identify import Publications, counted
-from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, own_keys, shifts_of, unless_held, values_of
+from pvid.run.mechanism import MechanismAnswer, Value, gains_of, noise_of, shifts_of, unless_held, values_of
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
@@ -33,6 +33,15 @@ from pvid.settings.record import Record
 # Reasons of ticks that end no window.
 _WITHIN = (Outcome.WARMING_UP, Outcome.ACCUMULATED, Outcome.REJECTED_NOT_FINITE, Outcome.REJECTED_SATURATED)
 _CLASH = 3.0  # standard errors of noise by which the core and the analysis disagree
+
+
+@dataclass(frozen=True)
+class Publications:
+    """Every estimate that was published during a run: t [n] in s, p and their standard errors [n, n_p]."""
+
+    t: Float
+    p: Float
+    se: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +93,7 @@ class CoreAnswer:
         correlation = self.oracle.found.covariance / np.outer(sd, sd)
         none, judged, verdict = np.zeros((1, len(sd))), self.oracle.found.judged, self.verdict
         return [
-            (float(t), values_of(model, p, correlation * np.outer(se, se), none, judged, verdict))
+            (float(t), values_of(model, p, correlation * np.outer(se, se), none, judged, verdict, of_known=False))
             for t, p, se in zip(own.t, own.p, own.se, strict=True)
         ]
 
@@ -141,7 +150,6 @@ class CoreAnswer:
         return self.oracle.as_json() | {
             "identified": self.identified,
             "parameters": parameters,
-            **own_keys(self.oracle.model, parameters),
             "verdict": self.verdict.word,
             "status": self.verdict.status,
             "warning": self.verdict.warning,
@@ -276,7 +284,7 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
         windows=int(len(ends)),
         hash=identifier.running_hash,
         publications=_published(answer, run, gains, wider),
-        reasons=counted(record.reason),
+        reasons=_counted(record.reason),
         by_analysis=by_analysis,
     )
     return replace(core, values=values(core.verdict))
@@ -288,5 +296,10 @@ def _published(answer: MechanismAnswer, run: _Run, gains: Float, wider: Float) -
     n_p = len(wider)
     p, own = run.published
     se = np.hypot(own[ticks, :n_p] * wider, np.sqrt(np.sum(gains**2, axis=0)))
-    alarm = np.full(len(ticks), answer.found.verdict.warning is not None)
-    return Publications(answer.recording.t[ticks], p[ticks, :n_p], se, alarm)
+    return Publications(answer.recording.t[ticks], p[ticks, :n_p], se)
+
+
+def _counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:
+    """How many ticks ended with each reason."""
+    codes, counts = np.unique(reasons, return_counts=True)
+    return {Outcome(int(code)).text: int(count) for code, count in zip(codes, counts, strict=True)}

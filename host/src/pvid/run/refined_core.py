@@ -20,7 +20,7 @@ from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
 from pvid.run.compare import Comparison, Difference
 from pvid.run.engine_design import config_to_identify, samples_of
-from pvid.run.mechanism import MechanismAnswer, Value, own_keys, refined_gains_of, refined_shifts_of, values_of
+from pvid.run.mechanism import MechanismAnswer, Value, refined_gains_of, refined_shifts_of, values_of
 from pvid.run.mechanism_compare import compare_samples
 from pvid.run.mechanism_core import CoreAnswer
 from pvid.run.refine_design import refine_design
@@ -152,7 +152,6 @@ class RefinedCoreAnswer:
         return self.weak.as_json() | {
             "identified": self.identified,
             "parameters": parameters,
-            **own_keys(self.weak.oracle.model, parameters),
             "hash": f"{self.hash:08x}",
             "refinement": refinement,
         }

@@ -104,6 +104,12 @@ class RefinedPendulum:
         """Parameters by name."""
         return dict(zip(self.names, map(float, self.found.r), strict=False))
 
+    @property
+    def errors(self) -> dict[str, float]:
+        """Their standard errors."""
+        _, covariance = self.problem.values(self.found, range(self.problem.n))
+        return dict(zip(self.names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+
     def halves_differ(self) -> Float:
         """By how many of their standard errors w, d1, d2 of the two halves of the run differ [3], the extras left as
         they are; inf where a half determines none."""

@@ -32,6 +32,8 @@ _WINDOWS = 8  # that a recording has at least
 _EVERY = 4  # samples from row to row in float64
 _MORE = 4  # degrees of the polynomial above the highest derivative
 _LEAST_DEGREE = 6
+_STIFFER = 2  # degrees more, where the least degree leaves the parameters uncertain: it follows a longer window
+_ENOUGH = 0.05  # largest error, relative
 _FLOOR = 1e-12  # of the residuals of a kind, relative to its Y
 
 
@@ -41,13 +43,14 @@ class Fitted:
 
     Attributes
     ----------
-    taps : of the window
+    taps, degree : of the window
     p : [n_p]
     noise : standard errors from the scatter of the rows [n_p]
     change : largest change of p to a window between half and twice this one [n_p]
     """
 
     taps: int
+    degree: int
     p: Float
     noise: Float
     change: Float
@@ -86,12 +89,17 @@ def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STA
     """
     strong = renamed(strong_functions_of(strong_form(model)))
     oracle = StrongModel(model)
-    degree = min(max(oracle.order + _MORE, _LEAST_DEGREE), MAX_DEGREE)
-    best = _best(_compared(list(_fits(oracle, recording, degree))), oracle.parameters)
+    least = min(max(oracle.order + _MORE, _LEAST_DEGREE), MAX_DEGREE)
+    tried: list[Fitted] = []
+    for degree in range(least, MAX_DEGREE + 1, _STIFFER):
+        tried += _compared(list(_fits(oracle, recording, degree)))
+        best = _best(tried, oracle.parameters)
+        if best is None or _errors(best, oracle.parameters).max() < _ENOUGH:
+            break
     if best is None:
         raise PvidError(f"{len(recording)} samples are too few for derivatives of order {oracle.order}")
     samples = np.stack([np.asarray(recording.signals[one.name], np.float32) for one in strong.signals], axis=1)
-    config = _config(strong, oracle.parameters, recording.sample_rate, best, degree, law)
+    config = _config(strong, oracle.parameters, recording.sample_rate, best, law)
     columns, ready = StrongModelTwin(strong, config).columns(samples)
     sd = _residual_sd(strong, columns[:, ready].astype(np.float64), oracle.parameters.theta(best.p))
     return StrongDesign(strong, replace(config, row_sd=sd), best, samples)
@@ -110,7 +118,7 @@ def _fits(oracle: StrongModel, recording: Recording, degree: int) -> Iterator[Fi
             return
         p, weights = all_rows(oracle.parameters, rows, start)
         noise = standard_errors(oracle.parameters, rows, p, weights, max(1, -(-taps // _EVERY)))
-        yield Fitted(taps, p, noise, np.zeros_like(p))
+        yield Fitted(taps, degree, p, noise, np.zeros_like(p))
         taps = max(round(_STEP * taps), taps + 2) | 1
 
 
@@ -129,18 +137,22 @@ def _best(tried: list[Fitted], parameters: Parameters) -> Fitted | None:
 
     def error(one: Fitted) -> tuple[bool, float]:
         inside = all(unknown.low <= p <= unknown.high for unknown, p in zip(unknowns, one.p, strict=True))
-        relative = one.error / np.where(parameters.positive, np.abs(one.p), parameters.sd)
-        return not inside, float(np.mean(np.log(np.maximum(relative, 1e-300))))
+        return not inside, float(np.mean(np.log(_errors(one, parameters))))
 
     unknowns = parameters.model.unknowns
     return min(tried, key=error, default=None)
 
 
+def _errors(one: Fitted, parameters: Parameters) -> Float:
+    """Relative [n_p]."""
+    return np.maximum(one.error / np.where(parameters.positive, np.abs(one.p), parameters.sd), 1e-300)
+
+
 def _config(
-    strong: StrongFunctions, parameters: Parameters, sample_rate: float, fitted: Fitted, degree: int, law: Law
+    strong: StrongFunctions, parameters: Parameters, sample_rate: float, fitted: Fitted, law: Law
 ) -> StrongModelConfig:
     """With rows of weight 1."""
-    bank = savitzky_golay(fitted.taps, degree)
+    bank = savitzky_golay(fitted.taps, fitted.degree)
     start = parameters.checked(None)
     unknowns = parameters.model.unknowns
     literally = law is Law.PSEUDOVELOCITY

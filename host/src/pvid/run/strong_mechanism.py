@@ -16,7 +16,7 @@ from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Verdict
 from pvid.oracle.weak.verdict import Reason as Doubt
 from pvid.rig.run import Recording
-from pvid.run.mechanism import Value, own_keys, refuse_constant, unless_held, values_of
+from pvid.run.mechanism import Value, refuse_constant, unless_held, values_of
 from pvid.run.strong_design import StrongDesign, strong_design
 from pvid.settings.engine_cores import STRONG_CORES
 from pvid.settings.enums import Law, Reason
@@ -76,7 +76,6 @@ class StrongAnswer:
             "warning": self.verdict.warning,
             "reasons": {one.name: one.text for one in self.verdict.reasons},
             "parameters": parameters,
-            **own_keys(self.model, parameters),
             "window_s": config.window / config.sample_rate,
             "reason": None if self.reason is None else self.reason.text,
             "hash": None if self.hash is None else f"{self.hash:08x}",
@@ -117,7 +116,8 @@ def identify_strong_mechanism(
     judged = unless_held([Judged()] * len(p), held)
     # What another window changes is common to all parameters, as a gain is.
     verdict = Verdict(tuple(_doubts(model, p, design, noise, unknown, held)))
-    values = values_of(model, p, np.diag(noise**2), fitted.change[np.newaxis], judged, verdict)
+    change = fitted.change[np.newaxis]
+    values = values_of(model, p, np.diag(noise**2), change, judged, verdict, of_known=False)
     core = STRONG_CORES[0 if in_c else 1]
     return StrongAnswer(model, design, values, core, reason, running, verdict, unknown, recording)
 

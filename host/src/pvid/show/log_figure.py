@@ -1,4 +1,4 @@
-"""A log of a described mechanism as a figure, under the names that the board gave: estimates, what is said of them, and
+"""A log as a figure, under the names that the board gave: estimates, what is said of them, and
 the last seconds of the samples."""
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
-from pvid.base.errors import PvidError
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
 from pvid.log.history import History
@@ -32,13 +31,13 @@ _LINE = 130  # characters of the title
 _POINTS = 2000  # half of the most estimates that are drawn
 
 
-def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
-    """Draws it; the format follows the suffix of `path` (png, svg, pdf).
+def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> bool:
+    """Draws it; the format follows the suffix of `path` (png, svg, pdf). False: the log has no estimate to draw.
 
     Raises
     ------
     PvidError
-        When the log cannot be read or holds no estimate, or the file cannot be written.
+        When the log cannot be read, or the file cannot be written.
     """
     history, reader = History(mechanism, points=_POINTS), LogReader(log)
     history.know(mechanism)  # whatever the board says later
@@ -46,7 +45,7 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
         history.take(record)
     t = history.estimates("t")
     if not len(t):
-        raise PvidError(f"{log} holds no estimate: there is nothing to plot")
+        return False
     model, extras = history.model, history.extras
     drawn = (*model.published, *extras)
     panels = len(drawn) + 2 + len(model.channels)
@@ -84,6 +83,7 @@ def write_log_figure(log: Path, mechanism: Mechanism, path: Path) -> None:
         save(figure, path, dpi=110)
     finally:
         plt.close(figure)
+    return True
 
 
 def _curve(axis: Axes, t: Float, value: Float, se: Float, colour: str, name: str) -> list[tuple[float, float]]:

@@ -23,7 +23,6 @@ from pvid.run.mechanism import MechanismAnswer
 from pvid.run.mechanism_core import CoreAnswer
 from pvid.run.refined import Problem, Refined
 from pvid.run.refined_mechanism import RefinedMechanism, simulated_at
-from pvid.run.refined_pendulum import RefinedPendulum
 from pvid.show.axis_limits import plain_ticks
 
 _MOST = 4000  # points of a line
@@ -33,25 +32,25 @@ _LINE = 110  # characters of the title
 _PANEL = 1.9  # inches
 
 Answer = MechanismAnswer | CoreAnswer
-Fit = RefinedMechanism | RefinedPendulum
 
 
-def write_figure(answer: Answer, path: Path, fit: Fit | None = None, title: str = "") -> None:
+def write_figure(answer: Answer, path: Path, title: str = "") -> None:
     """Writes the estimates after each window with the answer and +-2 of its standard errors; below them, for each
-    sensor, the measured against the simulated signal and their difference. png, svg or pdf by suffix.
+    sensor, the measured against the simulated signal and their difference: of the refinement where it gave the answer,
+    else at the answer's values, where the model's equations can be simulated. png, svg or pdf by suffix.
 
     Parameters
     ----------
     answer : whose values and errors are drawn
-    fit : the refinement that gave the answer; without it the motion at the answer's values is simulated, where the
-        model's equations can be
 
     Raises
     ------
     PvidError
         When it cannot be written.
     """
-    _write(answer, _motion(answer) if fit is None else fit, path, title)
+    refinement = _oracle(answer).refinement if isinstance(answer, MechanismAnswer) else None
+    fit = refinement.fit if refinement is not None and refinement.adopted else _motion(answer)
+    _write(answer, fit, path, title)
 
 
 def convergence(answer: Answer, path: Path) -> None:
@@ -59,7 +58,7 @@ def convergence(answer: Answer, path: Path) -> None:
     _write(answer, None, path, "")
 
 
-def _motion(answer: Answer) -> Fit | None:
+def _motion(answer: Answer) -> RefinedMechanism | None:
     oracle = _oracle(answer)
     p = [answer.values[name].value for name in oracle.model.p_names]
     if None in p:
@@ -75,7 +74,7 @@ def _oracle(answer: Answer) -> MechanismAnswer:
     return answer.oracle if isinstance(answer, CoreAnswer) else answer
 
 
-def _write(answer: Answer, fit: Fit | None, path: Path, title: str) -> None:
+def _write(answer: Answer, fit: RefinedMechanism | None, path: Path, title: str) -> None:
     oracle = _oracle(answer)
     heights = [_PANEL * -(-len(oracle.model.p_names) // _COLUMNS)]
     if fit is not None:
@@ -88,16 +87,14 @@ def _write(answer: Answer, fit: Fit | None, path: Path, title: str) -> None:
         parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         _converge(answer, oracle, parts[0])
         if fit is not None:
-            of_all = isinstance(fit, RefinedMechanism)  # else of the longest segment
-            recording = oracle.recording if of_all else oracle.recording.whole()
-            _compare(fit.problem, fit.found, float(recording.t[0]), parts[1])
+            _compare(fit.problem, fit.found, float(oracle.recording.t[0]), parts[1])
         figure.suptitle("\n".join(lines), parse_math=False)
         save(figure, path, dpi=110)
     finally:
         plt.close(figure)
 
 
-def write_comparison(fit: Fit, path: Path) -> None:
+def write_comparison(fit: RefinedMechanism, path: Path) -> None:
     """Writes the second part of it alone."""
     figure = plt.figure(figsize=(10, 2 * _PANEL * len(fit.problem.kernel.made.outputs)), layout="constrained")
     try:

@@ -53,7 +53,8 @@ class RigSimulation:
         # A simulation is exact: it has no error of a gain or a clock, and its equations are those of the model.
         exact = tuple(replace(one, gain_sd=0.0, neglected=0.0) for one in model.signals)
         linearised = tuple(one.name for one in model.signals if one.neglected)
-        return cls(replace(model, signals=exact, clock_sd=0.0), rig, Plant(model), linearised)
+        knowns = tuple(replace(one, sd=0.0) for one in model.knowns)
+        return cls(replace(model, signals=exact, knowns=knowns, clock_sd=0.0), rig, Plant(model), linearised)
 
     @property
     def truth(self) -> Float:
@@ -238,5 +239,8 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
     exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven or one.unit != "rad"}
     exact |= {name: {"neglected": 0.0} for name in simulation.linearised}
-    MechanismRig(name or model.name, rate, known=simulation.rig.knowns, sensor=exact, clock_sd=0.0).write(settings)
+    known = {one.name: one.value for one in model.knowns if one.required} | dict(simulation.rig.knowns)
+    known_sd = {one.name: 0.0 for one in simulation.plant.model.knowns if one.sd}
+    rig = MechanismRig(name or model.name, rate, known=known, sensor=exact, known_sd=known_sd, clock_sd=0.0)
+    rig.write(settings)
     return settings

@@ -353,10 +353,10 @@ def _determined(model: CompiledModel, fit: Fit, found: Uncertainty) -> bool:
 def given(
     model: CompiledModel, by_gain: Mapping[str, Float], by_known: Mapping[str, Float], by_clock: Float
 ) -> list[Float]:
-    """Errors of p [n_p] for one standard deviation of each gain, constant and clock that has any."""
-    gains = [one.gain_sd * by_gain[one.name] for one in model.signals if one.gain_sd > 0]
-    gains += [model.clock_sd * by_clock] if model.clock_sd else []
-    return gains + [one.sd * by_known[one.name] for one in model.knowns if one.sd > 0]
+    """Errors of p [n_p] for one standard deviation of each constant, gain and clock that has any, in this order."""
+    errors = [one.sd * by_known[one.name] for one in model.knowns if one.sd > 0]
+    errors += [one.gain_sd * by_gain[one.name] for one in model.signals if one.gain_sd > 0]
+    return errors + ([model.clock_sd * by_clock] if model.clock_sd else [])
 
 
 def neglected(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> float:
