@@ -17,7 +17,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import cast
 
@@ -25,7 +24,6 @@ import pvid
 from pvid.cli.page_table import put_table, with_table
 from pvid.cli.verdict_table import verdict_table
 from pvid.link import frames
-from pvid.rig.file import Identifier, ModelTable, Nominal, Refine, RigFile, Sensor
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -34,89 +32,6 @@ SITE = ROOT / "build" / "site"
 OUTSIDE = ("README.md", "firmware/README.md", "host/README.md", ".github/*.md")
 
 # ---- generated parts
-
-
-def meanings(owner: type) -> dict[str, str]:
-    """The meaning of each field, from the section "Attributes" of the class's docstring."""
-    text = (owner.__doc__ or "").split("Attributes\n", 1)[1].split("\n", 1)[1]
-    entries = re.findall(r"(?m)^    (\w[\w, ]*) : ((?:.*\n?)(?:^        .*\n?)*)", text)
-    return {name.strip(): " ".join(meaning.split()) for names, meaning in entries for name in names.split(",")}
-
-
-def shown_range(key: Field[object]) -> str:
-    """Range of a key as the page shows it."""
-    if "choices" in key.metadata:
-        return ", ".join(f"`{choice}`" for choice in key.metadata["choices"])
-    if key.type == "bool":
-        return "`true`, `false`"
-    return f"{key.metadata['low']:g} to {key.metadata['high']:g}"
-
-
-def shown_default(key: Field[object]) -> str:
-    """Default of a key; what follows from others is explained in its meaning."""
-    if key.default is MISSING:
-        return "required" if key.name == "l1" else "`l1`/3"
-    if key.default is None:
-        return "see the meaning"
-    if isinstance(key.default, bool):
-        return f"`{str(key.default).lower()}`"
-    return f"`{key.default:.4g}`" if isinstance(key.default, float) else f"`{key.default}`"
-
-
-# Of a key: the value that is good for most rigs, where it is not the default.
-GOOD_FOR_MOST = {
-    "l1": "measure it to 0.1 %",
-    "sample_rate": "leave it out",
-    "l1_sd": "your ruler's error / l1",
-    "phi_lsb": "leave it out for a recording; for a board the encoder's step",
-    "y_lsb": "the sensor's step",
-    "y_gain_sd": "its data sheet's",
-    "phi_zero": "0; 3.14 if the encoder hangs at half a turn",
-    "acceleration_range": "twice the largest",
-    "l2": "within a factor of 2",
-    "rho2": "within a factor of 2",
-    "forgetting_s": "0; 10 or more if the mechanism changes",
-    "core": "`f32`; `q31` without a floating-point unit",
-    "stride": "the default",
-    "outlier_gate": "leave it out",
-    "outlier_patience_s": "leave it out",
-    "dry_friction": "`true` for plain bearings, if your board has the time",
-    "slant": "`true`: it costs next to nothing",
-}
-
-
-def good_for_most(key: Field[object]) -> str:
-    """What most rigs need of a key."""
-    return GOOD_FOR_MOST.get(key.name, "the default")
-
-
-def rig_file_tables() -> str:
-    """The tables of rig-file.md."""
-    lines = []
-    tables: tuple[tuple[str, type], ...] = (
-        ("Top level", RigFile),
-        ("[sensor]", Sensor),
-        ("[nominal]", Nominal),
-        ("[identifier]", Identifier),
-        ("[refine]", Refine),
-        ("[model]", ModelTable),
-    )
-    for title, owner in tables:
-        meaning = meanings(owner)
-        lines += ["", f"## {title}", "", "| key | unit | range | default | good for most | meaning |"]
-        lines.append("|---|---|---|---|---|---|")
-        for key in fields(owner):
-            if not key.metadata and key.type != "bool":
-                continue  # one of the tables
-            cells = (
-                f"`{key.name}`",
-                key.metadata.get("unit", ""),
-                shown_range(key),
-                shown_default(key),
-                good_for_most(key),
-            )
-            lines.append(f"| {' | '.join(cells)} | {meaning[key.name].replace('|', '&#124;')} |")
-    return "\n".join(lines[1:])
 
 
 def schema_block() -> str:
@@ -182,7 +97,6 @@ def python_reference() -> str:
 
 # page, marker, text
 GENERATED = (
-    ("rig-file.md", "rig-file", rig_file_tables),
     ("link-and-log.md", "schema", schema_block),
     ("api-python.md", "api", python_reference),
     ("reasons.md", "verdict", verdict_table),

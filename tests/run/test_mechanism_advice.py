@@ -11,11 +11,15 @@ import pytest
 
 from pvid.model import Model, sgn, sin
 from pvid.model.compiled import CompiledModel
+from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import identify
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.mechanism import MechanismAnswer
+from pvid.rig.sensor_steps import with_resolutions
+from pvid.run.mechanism import MechanismAnswer, identify_mechanism
 from pvid.run.mechanism_advice import advice_on
+from pvid.sim.pendulum import simulate
 
 Float = npt.NDArray[np.float64]
 
@@ -155,3 +159,34 @@ def test_input_that_never_changes_is_named() -> None:
     assert advice_of(case, run | {"F": np.full(len(run["F"]), 1.5)}) == (
         "F is 1.5 N in every sample: is it the column of the drive?",
     )
+
+
+STEP = 2 * np.pi / 2**14
+
+
+@pytest.mark.parametrize(
+    ("column", "spoilt", "typed"),
+    [
+        ("phi", np.degrees, "phi=phi:deg"),
+        ("phi", lambda x: np.rint(x / STEP), f"phi=phi:{STEP:.9g}"),
+        ("y", lambda x: 1e3 * x, "y=y:mm"),
+        ("y", np.negative, "y=y:-1"),
+        ("phi", np.negative, None),  # the equations are linear in it
+        ("phi", lambda x: x + np.pi, None),  # an encoder's offset is an unknown
+        ("y", lambda x: x + 0.9, None),
+    ],
+)
+def test_wrong_column_of_a_driven_linearised_mechanism_is_named(
+    column: str, spoilt: Callable[[Float], Float], typed: str | None
+) -> None:
+    run = simulate(duration=20.0, seed=0).run
+    signals = {"phi": run.phi, "y": run.y}
+    recording = Recording(run.t, {**signals, column: spoilt(signals[column])}, run.sample_rate)
+    model = MechanismRig("kapitza", known={"l1": 0.3}).applied(compiled_of("kapitza"))
+    answer = identify_mechanism(*with_resolutions(recording, model))
+    told = advice_on(answer)
+    if typed is None:
+        assert told == () and answer.identified
+    else:
+        assert len(told) == 1 and f"--columns {typed}" in told[0]
+        assert "seems to" in told[0] and f"{column} seems to" in told[0]

@@ -44,7 +44,7 @@ if TYPE_CHECKING:  # it loads SymPy
     from pvid.model.description import Model as Description
 
 _OF_AN_INPUT = ("gain_sd", "reach")
-_OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected", "delay", "reach")
+OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected", "delay", "reach")
 _POSITIVE = ("reach", "sample_rate")
 OF_THE_IDENTIFIER = ("forgetting_s", "outlier_gate", "outlier_patience_s", "dead_zone")  # fields of Following
 
@@ -114,8 +114,8 @@ class MechanismRig:
         }
         for name, keys in sensors.items():
             for key in keys:
-                if key not in _OF_A_SENSOR:
-                    raise PvidError(f"sensor.{name}: {shown(key)} is not a key: {listed(_OF_A_SENSOR)} are")
+                if key not in OF_A_SENSOR:
+                    raise PvidError(f"sensor.{name}: {shown(key)} is not a key: {listed(OF_A_SENSOR)} are")
         identifier = _numbers(_table(document, "identifier"), "identifier")
         for key in identifier:
             if key not in OF_THE_IDENTIFIER:
@@ -266,7 +266,7 @@ def _numbers(table: Mapping[str, Any], place: str) -> dict[str, float]:
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             name = f"{place}.{key}" if place else key
             raise PvidError(f"{name} must be a number, not {shown(str(value))}")
-        least = key in (*_OF_A_SENSOR, "sample_rate") or place in ("known_sd", "identifier")
+        least = key in (*OF_A_SENSOR, "sample_rate") or place in ("known_sd", "identifier")
         if least and key != "delay" and not value >= 0:
             raise PvidError(f"{place}.{key} must not be negative".removeprefix("."))
         if key in _POSITIVE and value == 0:

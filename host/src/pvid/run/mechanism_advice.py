@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from pvid.base.wording import with_unit
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.together import with_own
 from pvid.oracle.weak.choice import score_of
+from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.identify import neglected, ready
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.columns import Columns
 from pvid.rig.mechanism_file import channels_of
@@ -30,6 +32,7 @@ _PART = 1 / 30
 _PART_OF_SIGN, _PART_OF_UNIT = 0.3, 1.5
 _FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: a unit is doubted beyond the one, right within the other
 _ALIKE = 1.05  # times the least part that is left
+_EXPLAINS = 0.9  # R^2 of rows that explain a recording
 _TIMES = ("ms", "us")
 # By unit: what a column may be in instead, and what to type for it.
 _UNITS = {
@@ -60,7 +63,7 @@ def analysed(
     answer = advised(identify_mechanism(recording, model, weights, own))
     if answer.advice and not answer.identified:  # another column, sign or unit: no estimate of this one can help
         return answer
-    if answer.found.named is not None:
+    if answer.found.named is not None and answer.identified:
         from pvid.run.additions import to_type
 
         answer = replace(answer, advice=(*answer.advice, *to_type(answer)))
@@ -94,7 +97,8 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
         return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
     if answer.recording.origins and answer.found.chi2 > _DIFFER and (own := _of_own(answer)) is not None:
         return (own,)
-    if answer.identified and answer.found.chi2 < _MISFIT and _distance(answer, answer.found.p) < _FAR:
+    near = _distance(answer, answer.found.p) < _FAR and not _is_beyond_equations(answer)
+    if answer.identified and answer.found.chi2 < _MISFIT and near:
         return ()
     run = answer.recording.run
     for one in answer.model.signals:
@@ -102,7 +106,7 @@ def advice_on(answer: MechanismAnswer) -> tuple[str, ...]:
             value = float(np.nanmin(run[one.name]))
             shown = with_unit(value, one.unit, 3) if value else "0"
             return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
-    found = list(_tried(answer))
+    found = list(_tried(answer)) or list(_turned(answer))
     least = min((left for left, _, _ in found), default=0.0)
     # A linear mechanism moves alike with the other sign of its input and of its sensor.
     alike = [(said, typed) for left, said, typed in found if left <= _ALIKE * least][:2]
@@ -135,11 +139,32 @@ def _distance(answer: MechanismAnswer, p: Float) -> float:
     return max((max(ratio, 1 / ratio) if ratio > 0 else np.inf for ratio in of), default=1.0)
 
 
+def _is_beyond_equations(answer: MechanismAnswer) -> bool:
+    """Whether a signal is so large that linearised equations mean nothing: they fit it in any unit."""
+    return neglected(answer.model, answer.recording.run) > 1
+
+
+def _turned(answer: MechanismAnswer) -> Iterator[tuple[float, str, str]]:
+    """The same of a drive with the other sign, which makes another mechanism of it: by designs of its own."""
+    if max(answer.found.r2.values(), default=0.0) > _EXPLAINS:
+        return
+    for signal in answer.model.signals:
+        if signal.driven or signal.kind == "input":
+            signals = {**answer.recording.signals, signal.name: -answer.recording.signals[signal.name]}
+            turned = replace(answer.recording, signals=signals)
+            again = attempted(partial(identify_mechanism, turned, answer.model, answer.weights))
+            if again is None or not again.identified or _distance(again, again.found.p) > _NEAR:
+                continue
+            if min(again.found.r2.values()) > _EXPLAINS:
+                said, unit, _ = next(_mistakes(signal, signals[signal.name]))
+                yield again.found.chi2, said, f"{signal.name}={signal.name}:{unit}"
+
+
 def _tried(answer: MechanismAnswer) -> Iterator[tuple[float, str, str]]:
     """Part of the residuals that is left by a mistake which explains the run, its sentence, and what to type."""
     model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
     before = score_of(model, signals, design, None, False)
-    far = before is None or _distance(answer, before.p) > _FAR
+    far = before is None or _distance(answer, before.p) > _FAR or _is_beyond_equations(answer)
     for signal in sorted(answer.model.signals, key=lambda one: one.kind != "input"):
         name = signal.name
         for said, unit, most in _mistakes(signal, signals[name]):
@@ -187,8 +212,8 @@ def _with_noise(model: CompiledModel, name: str, scale: float) -> CompiledModel:
 def _mistakes(signal: Signal, values: Float) -> Iterator[tuple[str, str, float]]:
     """What a signal seems to be, what to type behind its column, and the part of the residuals that may be left."""
     yield f"{signal.name} seems to have the opposite sign", "-1", _PART_OF_SIGN
-    for unit, typed in _UNITS.get(signal.unit, {}).items():
-        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", typed, _PART_OF_UNIT
     if signal.resolution and np.array_equal(values, np.rint(values)):
         typed = f"{signal.resolution:.9g}"
         yield f"{signal.name} seems to be in counts, not {signal.unit or 'the unit 1'}", typed, _PART_OF_UNIT
+    for unit, typed in _UNITS.get(signal.unit, {}).items():
+        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", typed, _PART_OF_UNIT
