@@ -122,6 +122,6 @@ def test_without_drive_the_start_is_held_and_reported(native: Native, core: Core
     start = standard_start(seed)
     result = identify(run, rig, native, start=start)
     assert not result.identified
-    assert result.status == "held not excited"
+    assert result.reason == Reason.HELD_NOT_EXCITED
     np.testing.assert_array_equal([result.value[name] for name in ("w", "d1", "d2")], start.astype(np.float32))
     assert result.se["w"] == pytest.approx(0.5 * start[0], rel=1e-6)
