@@ -12,8 +12,9 @@ from pvid.rig.run import Recording
 from pvid.run import refined_mechanism as refinement
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism
 from pvid.run.refined import Cut, Prior, Problem, Refined, refined
+from pvid.run.refined_answer import refined_answer
 from pvid.run.refined_kernel import kernel_of
-from pvid.run.refined_mechanism import longest_that_fits, problem_of, refined_answer, start_of
+from pvid.run.refined_mechanism import longest_that_fits, problem_of, start_of
 from pvid.sim.simulated_run import simulation_of
 
 
@@ -74,5 +75,5 @@ def test_signs_are_widened_no_further_than_they_explain_the_run(
     monkeypatch.setattr(Problem, "searched", worse)
     monkeypatch.setattr(refinement, "softened", lambda problem, prior, found, use: (found, prior))
     found = replace(outcome(300, 30.0), r=r)
-    refinement._softer(problem, refinement.prior_about(problem, r), found)
+    refinement.softer(problem, refinement.prior_about(problem, r), found)
     assert len(widths) == count

@@ -26,9 +26,10 @@ from pvid.rig.together import joined
 from pvid.run.judge import judged
 from pvid.run.mechanism import MechanismAnswer, identify_mechanism, own_of
 from pvid.run.mechanism_advice import advice_on, analysed
+from pvid.run.refined_answer import refined_answer
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import kernel_of
-from pvid.run.refined_mechanism import problem_of, refined_answer, start_of
+from pvid.run.refined_mechanism import problem_of, start_of
 from pvid.run.validation import predicted
 from pvid.sim.simulated_run import RigSimulation
 

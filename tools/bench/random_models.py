@@ -50,8 +50,8 @@ from pvid.run.mechanism_advice import advised
 from pvid.run.mechanism_compare import compare_recording
 from pvid.run.mechanism_core import identify_in_c
 from pvid.run.refine_design import refine_design
+from pvid.run.refined_answer import refined_answer
 from pvid.run.refined_core import compare_both, refined_in_c
-from pvid.run.refined_mechanism import refined_answer
 from pvid.settings.enums import Core
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig

@@ -310,7 +310,7 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     ----------
     figure : where the measured and the simulated signals are drawn
     """
-    from pvid.run.refined_mechanism import refined_answer
+    from pvid.run.refined_answer import refined_answer
 
     answer, refined, text = refined_answer(identify_mechanism(recording, model))
     write_stderr(f"pvid: {text}")

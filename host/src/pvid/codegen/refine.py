@@ -157,6 +157,14 @@ def has_skew(model: CompiledModel) -> bool:
     return any(jet in model.opaque and not model.opaque[jet].has(Integral) for jet in _inputs(model))
 
 
+def is_driven_by_derivatives(model: CompiledModel) -> bool:
+    """Whether an input is, or contains, a derivative of what a sensor measures."""
+    return has_skew(model) or any(
+        jet.order and any(one.name == jet.of and one.driven and one.kind == "sensor" for one in model.signals)
+        for jet in _inputs(model)
+    )
+
+
 def _inputs(model: CompiledModel) -> set[Jet]:
     return {jet for one in _equations(model) for jet in jets(one)}
 

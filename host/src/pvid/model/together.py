@@ -27,16 +27,21 @@ def offsets(model: CompiledModel) -> tuple[str, ...]:
     return tuple(
         one.name
         for one in model.unknowns
-        if (not one.positive or since_start)
-        and any(_shifts(model, one, signal) for signal in model.signals if signal.kind == "sensor")
+        if (not one.positive or since_start) and shifted_sensor(model, one) is not None
     )
 
 
-def _shifts(model: CompiledModel, unknown: Unknown, signal: Signal) -> bool:
-    if unknown.unit != signal.unit:
-        return False
-    slopes = [(sp.diff(one, unknown.symbol), sp.diff(one, signal.jet)) for one in model.equations]
-    return any(all(sp.expand(a + sign * b) == 0 for a, b in slopes) for sign in (1, -1))
+def shifted_sensor(model: CompiledModel, unknown: Unknown) -> tuple[str, int] | None:
+    """The sensor that an unknown shifts, and 1 where the unknown is its reading at the zero of the equations, -1 where
+    minus that; None where there is none."""
+    for signal in model.signals:
+        if signal.kind != "sensor" or unknown.unit != signal.unit:
+            continue
+        slopes = [(sp.diff(one, unknown.symbol), sp.diff(one, signal.jet)) for one in model.equations]
+        for sign in (1, -1):
+            if all(sp.expand(a + sign * b) == 0 for a, b in slopes):
+                return signal.name, sign
+    return None
 
 
 def with_own(model: CompiledModel, own: Iterable[str], recordings: Sequence[str]) -> CompiledModel:

@@ -41,7 +41,7 @@ def identified(
     weak = analysed(recording, model, weights, predict=not asked, own=own)
     if not asked or (refine is None and weak.advice and not weak.identified):
         return weak
-    from pvid.run.refined_mechanism import refined_answer  # loads the simulation
+    from pvid.run.refined_answer import refined_answer  # loads the simulation
 
     with working("refining"):
         found, fit, text = refined_answer(weak)

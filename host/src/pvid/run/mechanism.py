@@ -98,13 +98,8 @@ class Refinement:
         out: dict[str, Any] = {"adopted": self.adopted, "text": self.text}
         if self.fit is None:
             return out
-        found, made = self.fit.found, self.fit.problem.kernel.made
-        values, errors = self.fit.values, self.fit.errors
-        extras = {
-            one.name: {"value": values[one.name], "se": errors[one.name]}
-            for one in made.parameters
-            if one.place < 0 and 0 < errors[one.name] < math.inf
-        }
+        found = self.fit.found
+        extras = {name: {"value": value, "se": se} for name, (value, se) in self.fit.extras.items()}
         out |= {"chi2": found.chi2, "slow_chi2": found.slow_chi2, "blocks": len(found.cut.first)}
         return out | {"parameters": extras}
 
@@ -430,7 +425,7 @@ def values_of(
     for one in model.outputs:
         used = [of for symbol, of in zip(model.p, judged, strict=True) if one.value.has(symbol)]
         missing = next((of for of in used if of.status == "not_identified"), Judged())
-        slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := _output(model, p, one))[1])
+        slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := output_at(model, p, one))[1])
         word = worst(verdict.of(name) for name, p_k in zip(model.p_names, model.p, strict=True) if one.value.has(p_k))
         direct = np.zeros(len(gains))
         if of_known:
@@ -452,7 +447,7 @@ def unless_held(judged: Sequence[Judged], reason: str | None) -> Sequence[Judged
 
 def outputs_at(model: CompiledModel, p: Float) -> dict[str, float]:
     """Outputs of the model at p [n_p], by name."""
-    return {one.name: _output(model, p, one)[0] for one in model.outputs}
+    return {one.name: output_at(model, p, one)[0] for one in model.outputs}
 
 
 def _of_constants(model: CompiledModel, p: Float, output: Output, value: float) -> list[float]:
@@ -462,7 +457,7 @@ def _of_constants(model: CompiledModel, p: Float, output: Output, value: float) 
         if known.sd > 0:
             moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in model.knowns)
             stands = output.value.has(known.symbol)
-            off.append(_output(replace(model, knowns=moved), p, output)[0] - value if stands else 0.0)
+            off.append(output_at(replace(model, knowns=moved), p, output)[0] - value if stands else 0.0)
     return off
 
 
@@ -472,7 +467,7 @@ def _gradient(value: sp.Expr, p: tuple[sp.Symbol, ...]) -> Any:
     return numpy_function(p, [value, *(value.diff(symbol) for symbol in p)])
 
 
-def _output(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:
+def output_at(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:
     """Value at p and its gradient [n_p]; NaN where it does not exist at p."""
     value = model.with_knowns(output.value)
     with np.errstate(all="ignore"):

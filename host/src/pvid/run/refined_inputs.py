@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +15,8 @@ from pvid.design.second_derivative import second_derivative
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Integral, Jet, jets, sgn
 from pvid.oracle.weak.channels import broadcast, evaluated
-from pvid.rig.gaps import longest_stretch, stretches
+from pvid.rig.breaks import breaks
+from pvid.rig.gaps import bridge, longest_stretch, stretches
 from pvid.rig.run import NUMBER
 
 Float = npt.NDArray[np.float64]
@@ -23,6 +24,8 @@ Float = npt.NDArray[np.float64]
 EDGE = 1.25  # times the drive's: the pass band
 HIGHEST = 0.25  # of the sample rate: a pass band that its filter is exact in to 1e-5
 _FEWEST = 12  # values of a second derivative: its spline is of order five
+_ORDER = 5  # of splines
+_ROUNDING = 1e-9  # [s]: of times
 
 
 def held(values: Float, sub: int) -> Float:
@@ -65,20 +68,140 @@ def second_derivative_of(x: Float, rate: float, noise: float) -> Float:
     x : [n], NaN where there is no sample
     noise : standard deviation of a sample
     """
-    from scipy.interpolate import make_interp_spline  # takes a quarter of a second
+    return Curve.second_derivative(x, rate, noise)(np.arange(len(x)) / rate)
 
-    out = np.full(len(x), np.nan)
-    edge = min(EDGE * drive_edge_hz(x, rate, noise), HIGHEST * rate)
-    if edge <= 0:
+
+class Curve:
+    """A signal between its samples: splines of order five, one for each stretch without a gap.
+
+    Parameters
+    ----------
+    pieces : times [s] since the first sample, and values there, of each stretch
+    """
+
+    def __init__(self, pieces: Iterable[tuple[Float, Float]]) -> None:
+        from scipy.interpolate import PPoly, make_interp_spline  # takes a quarter of a second
+
+        # as polynomials four times faster
+        splines = [(times, PPoly.from_spline(make_interp_spline(times, values, k=5))) for times, values in pieces]
+        self._pieces = [(times[0], times[-1], one, one.derivative()) for times, one in splines]
+
+    @classmethod
+    def of(cls, x: Float, rate: float) -> Curve:
+        """Through the samples x [n], NaN where there is none."""
+        there = [(first, end) for first, end in zip(*stretches(np.isfinite(x)), strict=True) if end - first > _ORDER]
+        return cls((np.arange(first, end) / rate, x[first:end]) for first, end in there)
+
+    @classmethod
+    def second_derivative(cls, x: Float, rate: float, noise: float, least_hz: float = 0.0) -> Curve:
+        """x'', see second_derivative_of.
+
+        Parameters
+        ----------
+        least_hz : the band reaches at least so far
+        """
+        edge = min(max(EDGE * drive_edge_hz(x, rate, noise), least_hz), HIGHEST * rate)
+        if edge <= 0:
+            return cls(())
+        front = second_derivative(rate, edge)
+        pieces = []
+        for first, end in zip(*stretches(np.isfinite(x)), strict=True):
+            if end - first >= front.mean * (2 * front.half + _FEWEST):
+                times, found = front.apply(x[first:end], rate)
+                pieces.append((times + first / rate, found))
+        return cls(pieces)
+
+    def __call__(self, t: Float, late: float = 0.0, slope: bool = False) -> Float:
+        """Values, or slopes, at rising times t + late [s]; NaN where t is beyond its stretches."""
+        out = np.full(t.shape, np.nan)
+        for begin, end, value, derivative in self._pieces:
+            part = slice(*np.searchsorted(t, [begin - _ROUNDING, end + _ROUNDING]))
+            out[part] = (derivative if slope else value)(np.clip(t[part] + late, begin, end))
         return out
-    front = second_derivative(rate, edge)
-    for first, end in zip(*stretches(np.isfinite(x)), strict=True):
-        if end - first < front.mean * (2 * front.half + _FEWEST):
-            continue
-        times, found = front.apply(x[first:end], rate)
-        at = np.arange(int(np.ceil(times[0] * rate)), int(times[-1] * rate) + 1)
-        out[first + at] = make_interp_spline(times, found, k=5)(at / rate)
-    return out
+
+
+class LateInputs:
+    """Inputs at the steps that come as late as the sensors which measure them: those that are held do not.
+
+    Parameters
+    ----------
+    mean : samples in an average, which is a sample of the motion
+    least_hz : of the bands of second derivatives
+    """
+
+    def __init__(
+        self,
+        model: CompiledModel,
+        made: RefineFunctions,
+        signals: Mapping[str, Float],
+        rate: float,
+        sub: int,
+        mean: int = 1,
+        least_hz: float = 0.0,
+    ) -> None:
+        samples = len(signals[made.outputs[0]]) // mean
+        steps = np.arange(2 * sub * samples + 1, dtype=np.float64)
+        self._at: Float = (steps * (mean / (2 * sub)) + (mean - 1) / 2) / rate
+        self._shape = sub * samples, 3, len(made.inputs)
+        self._fixed: dict[int, Float] = {}
+        self._moved: dict[int, tuple[sp.Expr, dict[Jet, Curve]]] = {}
+        self._kept: dict[float, tuple[Float, Float]] = {}
+        for k, jet in enumerate(made.inputs):
+            value = model.with_knowns(model.opaque.get(jet, jet))
+            parts = sorted(jets(value), key=str)
+            if is_late(model, jet):
+                self._moved[k] = value, {one: _curve(model, one, signals, rate, least_hz) for one in parts}
+            else:
+                self._fixed[k] = _input(model, jet, signals, rate, sub)
+
+    def __call__(self, late: float) -> tuple[Float, Float]:
+        """u and du [steps, 3, inputs], `late` [s] later than at the sensors; NaN where they are not known."""
+        if late not in self._kept:
+            if len(self._kept) > 4:
+                self._kept.pop(next(iter(self._kept)))
+            u, du = np.zeros(self._shape), np.zeros(self._shape)
+            for k, fixed in self._fixed.items():
+                u[..., k] = fixed
+            for k, (value, curves) in self._moved.items():
+                now = {jet: curve(self._at, late) for jet, curve in curves.items()}
+                slopes = {jet: curve(self._at, late, slope=True) for jet, curve in curves.items()}
+                rate = sum(broadcast(evaluated(value.diff(jet), now), len(self._at)) * slopes[jet] for jet in curves)
+                for out, fine in ((u, broadcast(evaluated(value, now), len(self._at))), (du, np.asarray(rate))):
+                    out[..., k] = np.stack([fine[0:-2:2], fine[1:-1:2], fine[2::2]], 1)
+            self._kept[late] = u, du
+        return self._kept[late]
+
+
+def is_late(model: CompiledModel, jet: Jet) -> bool:
+    """Whether an input follows from samples alone that sensors take: all of it comes as late as they do."""
+    value = model.opaque.get(jet, jet)
+    return not value.has(Integral, sgn, sp.Abs) and all(model.signal(one.of).hold != "zoh" for one in jets(value))
+
+
+def _curve(model: CompiledModel, jet: Jet, signals: Mapping[str, Float], rate: float, least_hz: float) -> Curve:
+    if jet.order == 2:
+        return Curve.second_derivative(signals[jet.of], rate, model.signal(jet.of).sd, least_hz)
+    if jet.order == 0:
+        return Curve.of(signals[jet.of], rate)
+    raise _refused(model, jet)
+
+
+def without_jumps(
+    model: CompiledModel, made: RefineFunctions, signals: Mapping[str, Float], rate: float, slow_hz: float
+) -> tuple[dict[str, Float], list[int]]:
+    """Signals whose second derivative is an input are NaN about jumps, and wild samples of theirs are interpolated; and
+    the samples of the jumps. Jumps in most periods of a motion are those of the drive, and stay."""
+    out, found = dict(signals), set[int]()
+    moved = {one.of for jet in made.inputs for one in jets(model.opaque.get(jet, jet)) if one.order == 2}
+    for name in sorted(moved):
+        x, missing = signals[name], np.isnan(signals[name])
+        whole = np.where(breaks(x, max(8, round(rate / slow_hz)), model.signal(name).sd), np.nan, x)
+        bridge(whole, rate)
+        firsts, _ = stretches(np.isnan(whole) & ~missing)
+        if len(firsts) <= len(x) / rate * slow_hz / 2:
+            out[name] = whole
+            found |= set(firsts.tolist())
+    return out, sorted(found)
 
 
 def drive_edge_hz(y: Float, rate: float, noise: float) -> float:
@@ -125,11 +248,17 @@ def _input(model: CompiledModel, jet: Jet, signals: Mapping[str, Float], rate: f
         value = model.with_knowns(model.opaque[jet])
         through = smooth if any(one.order for one in jets(value)) else straight
         return through(_computed(model, value, signals, rate), sub)
+    if jet.order == 2 and model.signal(jet.of).hold != "zoh":
+        return smooth(second_derivative_of(signals[jet.of], rate, model.signal(jet.of).sd), sub)
     if jet.order > 0:
-        raise PvidError(f"the second stage needs recorded inputs; {model.name} has the derivative of {jet.of} as one")
+        raise _refused(model, jet)
     if model.signal(jet.of).hold == "zoh":
         return held(signals[jet.of], sub)
     return smooth(signals[jet.of], sub)
+
+
+def _refused(model: CompiledModel, jet: Jet) -> PvidError:
+    return PvidError(f"the second stage needs recorded inputs; {model.name} has the derivative of {jet.of} as one")
 
 
 def _running(x: Float, is_held: bool) -> Float:

@@ -15,7 +15,7 @@ from pvid.codegen.files_refine import DOUBLE, function
 from pvid.codegen.refine import (
     RefinedParameter,
     RefineFunctions,
-    has_skew,
+    is_driven_by_derivatives,
     refine_functions_of,
     signs_of,
     width_of,
@@ -26,8 +26,13 @@ from pvid.sim.compiled_plant import loaded
 
 Float = npt.NDArray[np.float64]
 
-PLAY = "play"  # the parameter of PlayedKernel
 _MOVED = 0.1  # of the logarithm of a sign's width: its derivative is a difference
+
+
+def play_of(model: CompiledModel, sensor: str) -> str:
+    """Name of the play of a sensor: play, and where several are fitted the sensor's behind it."""
+    several = sum(one.kind == "sensor" and not one.driven for one in model.signals) > 1
+    return f"play_{sensor}" if several else "play"
 
 
 class RefinedKernel:
@@ -42,13 +47,22 @@ class RefinedKernel:
     """
 
     def __init__(self, model: CompiledModel) -> None:
-        made = refine_functions_of(model, None, has_skew(model))
+        made = refine_functions_of(model, None, is_driven_by_derivatives(model))
         self._library = loaded(_code(made, any(one.edge == "before" for one in model.signals)))
         widths = tuple(width_of(model, one) for one in signs_of(model))
         self.widths = list(range(len(made.parameters), len(made.parameters) + len(widths)))
         self.made = replace(made, parameters=(*made.parameters, *widths), settings=made.settings[len(widths) :])
         self.states = self.made.order * len(self.made.coordinates)
         self.columns = self.states + len(self.made.parameters)
+
+    @property
+    def at_zero(self) -> tuple[Float, Float]:
+        """A state and inputs of 0."""
+        return np.zeros(self.states), np.zeros(len(self.made.inputs))
+
+    def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
+        """Of the recording that holds each block, 0 where there is one."""
+        return np.zeros(len(first), np.intp)
 
     def blocks(
         self,
@@ -142,12 +156,25 @@ class RefinedKernel:
 
 
 class PlayedKernel(RefinedKernel):
-    """A kernel with one more parameter behind the others: half the play between the mechanism and its sensor, or half
-    the sensor's hysteresis."""
+    """A kernel with one more parameter behind the others: half the play between the mechanism and a sensor of it, or
+    half the sensor's hysteresis.
 
-    def __init__(self, inner: RefinedKernel, unit: str) -> None:
-        self._inner, self._library, self.states = inner, inner._library, inner.states
-        own = RefinedParameter(PLAY, unit, False, -1, 1.0)
+    Parameters
+    ----------
+    inner : without it
+    output : number of the sensor among the outputs
+    prior_sd : how large it may be, in the sensor's unit
+    """
+
+    def __init__(self, inner: RefinedKernel, output: int = 0, prior_sd: float = 1.0) -> None:
+        self._inner, self._library, self.states, self._output = inner, inner._library, inner.states, output
+        own = RefinedParameter(
+            play_of(inner.made.model, inner.made.outputs[output]),
+            inner.made.model.signal(inner.made.outputs[output]).unit,
+            False,
+            -1,
+            prior_sd,
+        )
         self.made = replace(inner.made, parameters=(*inner.made.parameters, own))
         self._place, self.widths = len(inner.made.parameters), inner.widths
         self.columns = inner.columns + 1
@@ -173,6 +200,7 @@ class PlayedKernel(RefinedKernel):
         self._library.refine_play(
             len(first),
             samples,
+            self._output,
             ctypes.c_double(float(r[self._place])),
             _pointer(z),
             None if jacobian is None else _pointer(jacobian),
@@ -180,6 +208,10 @@ class PlayedKernel(RefinedKernel):
             self.columns - 1,
         )
         return z, jacobian, ends
+
+    def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
+        """As of RefinedKernel."""
+        return self._inner.number_of(first)
 
     def _without(self, r: Float) -> Float:
         return np.delete(r, self._place)
@@ -208,7 +240,7 @@ class TogetherKernel(RefinedKernel):
     """
 
     def __init__(self, inner: RefinedKernel, model: CompiledModel, begins: Sequence[int]) -> None:
-        self._inner, self._begins, self.states = inner, begins, inner.states
+        self._inner, self._library, self._begins, self.states = inner, inner._library, begins, inner.states
         own = inner.made
         parameters: list[RefinedParameter] = []
         self._places: list[list[int]] = [[] for _ in model.places]  # of each recording, in `parameters`
@@ -245,7 +277,7 @@ class TogetherKernel(RefinedKernel):
         z = np.empty((len(first), samples, len(self.made.outputs)))
         jacobian = np.zeros((*z.shape, self.columns)) if derivatives else None
         ends = np.empty((len(first), self.states))
-        number = np.searchsorted(self._begins, first, side="right") - 1
+        number = self.number_of(first)
         for k in np.unique(number).tolist():
             own = np.flatnonzero(number == k)
             begun = np.ascontiguousarray(starts[own])
@@ -256,6 +288,10 @@ class TogetherKernel(RefinedKernel):
                 columns = np.array([*range(self.states), *(self.states + place for place in self._places[k])])
                 jacobian[own[:, None], :, :, columns] = np.moveaxis(inner, 3, 1)
         return z, jacobian, ends
+
+    def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
+        """As of RefinedKernel."""
+        return np.asarray(np.searchsorted(self._begins, first, side="right") - 1)
 
     def _of(self, r: Float, k: int) -> Float:
         """Parameters and settings of one recording."""

@@ -1,39 +1,34 @@
-"""Refinement of a described mechanism from a recording, with the weak form's answer as its start."""
+"""A refinement of a mechanism: its problem from a recording, its first fit, and its outcome."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.refine import LOG_SD, has_skew
+from pvid.codegen.refine import LOG_SD
 from pvid.model.compiled import CompiledModel
-from pvid.models.model import Mechanism
-from pvid.models.registry import DEFAULT, MODELS
-from pvid.oracle.weak import verdict
-from pvid.oracle.weak.identify import Identified
-from pvid.rig.file import Nominal, RigFile, Sensor
 from pvid.rig.gaps import stretches
-from pvid.rig.run import NUMBER, Run
-from pvid.run.mechanism import MechanismAnswer, refined_gains_of, refined_shifts_of, values_of
+from pvid.rig.run import NUMBER
+from pvid.run.mechanism import MechanismAnswer
 from pvid.run.refined import (
-    GOOD,
     NOISE,
+    Cut,
     Measured,
     Prior,
     Problem,
     Refined,
     Stretch,
+    gated,
     refined,
     softened,
     without_outliers,
 )
 from pvid.run.refined_inputs import inputs_of
 from pvid.run.refined_kernel import RefinedKernel, kernel_of
-from pvid.run.refined_pendulum import RefinedPendulum, refine_pendulum
 
 Float = npt.NDArray[np.float64]
 
@@ -44,27 +39,86 @@ _STEPS = 1e6  # of the run: inputs at each are kept
 _WIDER = (8.0, 64.0, 512.0, 4096.0)  # times the sharp width
 _WIDENING_PASSES = 10
 _WORSE = 3.0  # times the least sum of squares: signs that are wider still explain less
+_FREE_SD = 10.0  # of a step of a half: the half alone determines it
 
 
 @dataclass(frozen=True, eq=False)
 class RefinedMechanism:
-    """Outcome: `found` and the problem that it solves."""
+    """Outcome.
+
+    Attributes
+    ----------
+    problem, found : the fit and the problem that it solves
+    main : places in r of the parameters that the search is judged by: the positive unknowns that are not near 0
+    rivals : other fits that explain the recording about as well
+    breaks : times at which a differentiated signal jumps, between the blocks [s]
+    is_searched : its length of a block is one of several that were searched
+    """
 
     problem: Problem
     found: Refined
+    main: tuple[int, ...] = ()
+    rivals: tuple[Refined, ...] = ()
+    breaks: tuple[float, ...] = ()
+    is_searched: bool = False
+
+    @property
+    def names(self) -> list[str]:
+        """Of the refined parameters."""
+        return [one.name for one in self.problem.kernel.made.parameters]
 
     @property
     def values(self) -> dict[str, float]:
         """Parameters by name."""
-        names = [one.name for one in self.problem.kernel.made.parameters]
-        return dict(zip(names, map(float, self.found.r), strict=False))
+        return dict(zip(self.names, map(float, self.found.r), strict=False))
 
     @property
     def errors(self) -> dict[str, float]:
         """Their standard errors, in their units."""
-        made, problem = self.problem.kernel.made, self.problem
-        _, covariance = problem.values(self.found, range(problem.n))
-        return {one.name: float(sd) for one, sd in zip(made.parameters, np.sqrt(np.diag(covariance)), strict=True)}
+        _, covariance = self.problem.values(self.found, range(self.problem.n))
+        return {name: float(sd) for name, sd in zip(self.names, np.sqrt(np.diag(covariance)), strict=True)}
+
+    @property
+    def extras(self) -> dict[str, tuple[float, float]]:
+        """Those that the weak form does not have, and that were searched and determined: value and standard error."""
+        values, errors = self.values, self.errors
+        own = [one.name for one in self.problem.kernel.made.parameters if one.place < 0]
+        return {name: (values[name], errors[name]) for name in own if 0 < errors[name] < np.inf}
+
+    def halves_differ(self) -> float:
+        """By how many of their standard errors the main parameters of two halves of the recording, or of all its
+        recordings, differ, the extras left as they are; inf where a half does not determine one."""
+        problem, found = self.problem, self.found
+        of_p = np.array([one.place >= 0 for one in problem.kernel.made.parameters])
+        prior = Prior(found.r, np.full(problem.n, _FREE_SD), of_p)
+        numbers = problem.kernel.number_of(found.cut.first)
+        own = found.cut if np.bincount(numbers).min() > 1 else problem.cut(found.cut.samples // 2)
+        starts = problem.starts_along(found.r, found, own)
+        use = gated(problem, found) & problem.used(found.cut) if own is found.cut else problem.used(own)
+        numbers = problem.kernel.number_of(own.first)
+        count = np.bincount(numbers)
+        rank = np.arange(len(numbers)) - np.searchsorted(numbers, numbers)
+        late = rank >= count[numbers] // 2
+        halves = [
+            problem.searched(found.r, prior, Cut(own.first[half], own.samples), starts[half], use[half])
+            for half in (~late, late)
+        ]
+        if not all(np.isfinite(one.chi2) and one.converged for one in halves):
+            return np.inf
+        both = np.sqrt(sum(np.diag(one.covariance) for one in halves))[list(self.main)]
+        if not np.isfinite(both).all():
+            return np.inf
+        apart = np.abs(problem.step_between(halves[0].r, halves[1].r)[list(self.main)])
+        return float(np.max(apart / both, initial=0.0))
+
+    def rivals_differ(self) -> float:
+        """By how many standard errors a main parameter of the farthest rival differs; 0 where there is none."""
+        main, apart = list(self.main), 0.0
+        own = np.diag(self.found.covariance)[main]
+        for one in self.rivals:
+            far = np.abs(self.problem.step_between(self.found.r, one.r)[main])
+            apart = max(apart, float(np.max(far / np.sqrt(own + np.diag(one.covariance)[main]), initial=0.0)))
+        return apart
 
 
 def start_of(kernel: RefinedKernel, p: Float) -> Float:
@@ -76,25 +130,19 @@ def start_of(kernel: RefinedKernel, p: Float) -> Float:
     return np.array(r + [known.get(name, 1.0) for name in made.settings])
 
 
+def begins_of(signals: Mapping[str, Float], mean: int = 1) -> list[int]:
+    """First sample of each of several recordings, of averages over so many samples; [0] of one."""
+    number = signals.get(NUMBER, np.zeros(1))
+    return [-(-int(first) // mean) for first in np.flatnonzero(np.diff(number, prepend=-1.0))]
+
+
 def problem_of(
     model: CompiledModel, signals: Mapping[str, Float], rate: float, r: Float, widths: Mapping[str, float] | None = None
 ) -> tuple[Problem, Float]:
     """The problem, and r with widths of the signs."""
-    number = signals.get(NUMBER, np.zeros(1))
-    kernel = kernel_of(model, begins=np.flatnonzero(np.diff(number, prepend=-1.0)).tolist())
+    kernel = kernel_of(model, begins=begins_of(signals))
     made = kernel.made
-    r = r.copy()
-    zero = np.zeros(kernel.states)
-    u = np.zeros(len(made.inputs))
-    r[kernel.widths] = 1e6  # out of the way
-    fastest = float(np.abs(np.linalg.eigvals(kernel.slopes(r, zero, u))).max())
-    smooth = min(max(1, int(np.ceil(fastest / rate / _STEP))), _MOST_SUB)
-    samples = len(signals[made.outputs[0]])
-    fine = int(np.clip(_STEPS / samples, *_SIGN_SUB))
-    coarse = max(2, fine // smooth // 2 * 2) if kernel.widths else 1
-    sub = smooth * coarse
-    for place in kernel.widths:
-        r[place] = (widths or {}).get(made.parameters[place].sign) or _width(kernel, r, place, sub, rate)
+    sub, coarse, r = steps_of(kernel, len(signals[made.outputs[0]]), rate, r, widths)
     inputs = inputs_of(model, made, signals, rate, sub)
     measured = Measured(
         np.stack([signals[name] for name in made.outputs], -1),
@@ -103,16 +151,51 @@ def problem_of(
         rate,
         sub,
         coarse=coarse,
-        stretches=_known_stretches(inputs[0], sub),
+        stretches=known_stretches(inputs[0], sub),
     )
     return Problem(kernel, measured), r
 
 
-def _known_stretches(u: Float, sub: int) -> list[Stretch]:
-    """In which the inputs [steps, 3, inputs] are known; none: everywhere."""
+def steps_of(
+    kernel: RefinedKernel,
+    samples: int,
+    rate: float,
+    r: Float,
+    widths: Mapping[str, float] | None = None,
+    coarse: int | None = None,
+) -> tuple[int, int, Float]:
+    """Steps a sample, those of them that are one where no friction reverses, and r with widths of the signs.
+
+    Parameters
+    ----------
+    widths : by argument; from the steps by default
+    coarse : where there are signs; from the number of samples by default
+    """
+    r = r.copy()
+    r[kernel.widths] = 1e6  # out of the way
+    fastest = float(np.abs(np.linalg.eigvals(kernel.slopes(r, *kernel.at_zero))).max())
+    smooth = min(max(1, int(np.ceil(fastest / rate / _STEP))), _MOST_SUB)
+    fine = int(np.clip(_STEPS / samples, *_SIGN_SUB))
+    coarse = (coarse or max(2, fine // smooth // 2 * 2)) if kernel.widths else 1
+    sub = smooth * coarse
+    for place in kernel.widths:
+        r[place] = (widths or {}).get(kernel.made.parameters[place].sign) or _width(kernel, r, place, sub, rate)
+    return sub, coarse, r
+
+
+def known_stretches(u: Float, sub: int) -> list[Stretch]:
+    """In which the inputs [steps, 3, inputs] are known; none: everywhere.
+
+    Raises
+    ------
+    PvidError
+        Where they are known nowhere.
+    """
     there = np.asarray(np.isfinite(u).all((1, 2)).reshape(-1, sub).all(1))
     if there.all():
         return []
+    if not there.any():
+        raise PvidError("the recording is too short for the refinement, or its gaps leave nothing between them")
     return [(int(first), int(end)) for first, end in zip(*stretches(there), strict=True)]
 
 
@@ -120,8 +203,7 @@ def _width(kernel: RefinedKernel, r: Float, place: int, sub: int, rate: float) -
     """The jump of the rate within a step that a friction's reversal makes: RK4 stays stable and smooth."""
     sharp = r.copy()
     sharp[place] = 1e-9
-    zero, u = np.zeros(kernel.states), np.zeros(len(kernel.made.inputs))
-    steepest = float(np.abs(np.linalg.eigvals(kernel.slopes(sharp, zero, u))).max()) * 1e-9
+    steepest = float(np.abs(np.linalg.eigvals(kernel.slopes(sharp, *kernel.at_zero))).max()) * 1e-9
     return max(steepest / rate / sub, 1e-9)
 
 
@@ -145,8 +227,7 @@ def refine_mechanism(
     samples = max(8, round(block_s * rate))
     shorter = refined(problem, prior, (max(8, samples // 3),))
     found = longest_that_fits((shorter, refined(problem, prior, (samples,), before=shorter)))
-    if problem.kernel.widths and found.slow_chi2 > NOISE:
-        found, prior = _softer(problem, prior, found)
+    found, prior = softer(problem, prior, found)
     return RefinedMechanism(problem, without_outliers(problem, prior, found))
 
 
@@ -178,8 +259,11 @@ def simulated_at(answer: MechanismAnswer, p: Float) -> RefinedMechanism:
     return RefinedMechanism(problem, problem.with_starts(prior_about(problem, r), cut))
 
 
-def _softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:
-    """With the wider signs of the frictions that explain most, and then with their widths free."""
+def softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Prior]:
+    """With the wider signs of the frictions that explain most, and then with their widths free; the same where there
+    are none, or residuals are noise."""
+    if not problem.kernel.widths or found.slow_chi2 <= NOISE:
+        return found, prior
     use, sharp = problem.used(found.cut), found.r[problem.kernel.widths]
     again = found
     for wider in _WIDER if np.isfinite(found.sum_of_squares) else ():
@@ -190,104 +274,3 @@ def _softer(problem: Problem, prior: Prior, found: Refined) -> tuple[Refined, Pr
         if not again.sum_of_squares < _WORSE * found.sum_of_squares:
             break
     return softened(problem, prior, found, use)
-
-
-def _as_pendulum(answer: MechanismAnswer) -> RefinedPendulum:
-    """By the pendulum's own refinement, whose input is the second derivative of a sample.
-
-    Raises
-    ------
-    PvidError
-        For another mechanism with such an input.
-    """
-    model, recording = answer.model, answer.recording.whole()
-    if model.name != DEFAULT:
-        raise PvidError(
-            f"an input of {model.name} is the derivative of a sample, which the refinement in float64 has for the "
-            "pendulum alone: use --core f32"
-        )
-    p, known = (
-        dict(zip(model.p_names, map(float, answer.found.p), strict=True)),
-        {x.name: x.value for x in model.knowns},
-    )
-    pendulum = MODELS[DEFAULT]
-    own = Mechanism(pendulum, {one.name: known[one.name] for one in pendulum.constants})
-    lengths = own.physical([p[name] for name in pendulum.mapped_names])
-    rig = RigFile(
-        l1=known["l1"],
-        nominal=Nominal(**dict(zip(pendulum.physical_names, map(float, lengths), strict=True))),
-        sensor=Sensor(phi_lsb=model.signal("phi").resolution, y_lsb=model.signal("y").resolution),
-        sample_rate=recording.sample_rate,
-    )
-    run = Run(recording.t, recording.signals["phi"], recording.signals["y"], recording.sample_rate)
-    return refine_pendulum(run, rig, [p], sure=answer.identified)
-
-
-def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMechanism | RefinedPendulum | None, str]:
-    """The answer after a refinement that starts from it, the refinement, and what became of it in a clause."""
-    weak, model, recording = answer.found, answer.model, answer.recording
-    refined: RefinedMechanism | RefinedPendulum
-    try:
-        if has_skew(model):
-            refined = _as_pendulum(answer)
-        else:
-            refined = refine_mechanism(
-                model, recording.run, recording.sample_rate, _start(weak), 2 * weak.design.window_s
-            )
-    except PvidError as error:
-        return answer, None, f"not refined: {error}"
-    found = refined.found
-    if not found.converged:
-        return answer, refined, "the refinement did not converge: the weak form's answer stands"
-    if isinstance(refined, RefinedPendulum) and (rivalry := refined.rivalry) is not None:
-        return answer, refined, f"{rivalry}: the weak form's answer stands"
-    asked = 2 * weak.design.window_s
-    length = found.cut.samples / recording.sample_rate
-    if isinstance(refined, RefinedMechanism) and length < asked / 2 and _spread(refined, weak.se) > 1:
-        text = f"blocks above {length:.2g} s do not fit, and shorter ones have larger standard errors"
-        return answer, refined, f"{text}: the weak form's answer stands"
-    better = isinstance(refined, RefinedMechanism) and _better(refined, weak.p, weak.se)
-    if found.slow_chi2 > GOOD and not better:
-        text = (
-            f"slow residuals have {found.slow_chi2:.2g} times the variance of the noise: the weak form's answer stands"
-        )
-        return answer, refined, text
-    made = refined.problem.kernel.made
-    p, covariance = refined.problem.values(found, made.places_of_p)
-    shifts = refined_shifts_of(model, weak)
-    judged = verdict.judged_again(model, weak.judged, p, np.sqrt(np.diag(covariance)))
-    kept = [one for one in weak.verdict.reasons if one.name != "near_zero"]
-    told = verdict.sorted_by_gravity([*kept, *verdict.of_bounds(model, judged, min(weak.r2.values()))])
-    weak = replace(weak, judged=judged, verdict=verdict.Verdict(told))
-    values = values_of(model, p, covariance, refined_gains_of(model, weak), judged, weak.verdict, shifts)
-    text = f"refined over {len(found.cut.first)} blocks; chi2 {found.chi2:.2g}, of slow residuals {found.slow_chi2:.2g}"
-    if isinstance(refined, RefinedPendulum) and len(recording.segments) > 1:
-        t = recording.whole().t
-        text += f"; of the longest segment alone, {t[0]:.6g} s to {t[-1]:.6g} s"
-    for place in refined.problem.kernel.widths:
-        if found.covariance[place, place] > 0:
-            text += (
-                f"; sgn({made.parameters[place].sign}) changes over {found.r[place]:.2g} {made.parameters[place].unit}"
-            )
-    return replace(answer, found=weak, values=values), refined, text
-
-
-def _start(weak: Identified) -> Float:
-    """p, but half of its bound for what may be 0: its logarithm has run down, where nothing moves it."""
-    half = [p if one.below is None else max(p, one.below / 2) for p, one in zip(weak.p, weak.judged, strict=True)]
-    return np.array(half, np.float64)
-
-
-def _spread(refined: RefinedMechanism, se: Float) -> float:
-    """Geometric mean of the refined standard errors over those of the weak form, of parameters that both have."""
-    ratio = np.array([refined.errors[name] for name in refined.problem.kernel.made.model.p_names]) / se
-    there = np.isfinite(ratio) & (ratio > 0)
-    return float(np.exp(np.mean(np.log(ratio[there])))) if there.any() else np.inf
-
-
-def _better(refined: RefinedMechanism, p: Float, se: Float) -> bool:
-    """Whether the refined answer agrees with the weak one and its standard errors are smaller."""
-    names = refined.problem.kernel.made.model.p_names
-    value = np.array([refined.values[name] for name in names])
-    error = np.array([refined.errors[name] for name in names])
-    return bool((np.abs(value - p) <= 3 * np.hypot(error, se)).all() and (error <= se).all())

@@ -184,30 +184,30 @@ void refine_blocks(const double *r, int blocks, const int *first, int samples, i
     }
 }
 
-/* Readings behind a play of +-half: each stands still until the angle has taken up the play. z [blocks][samples][NZ]; J
- * [blocks][samples][NZ][columns] or NULL, whose column `place` becomes the derivative by `half` */
-void refine_play(int blocks, int samples, double half, double *z, double *J, int columns, int place)
+/* Readings of an output behind a play of +-half: each stands still until the sensor's motion has taken up the play. z
+ * [blocks][samples][NZ]; J [blocks][samples][NZ][columns] or NULL, whose column `place` becomes the derivative by
+ * `half` */
+void refine_play(int blocks, int samples, int output, double half, double *z, double *J, int columns, int place)
 {
-    for (int b = 0; b < blocks; b++)
-        for (int o = 0; o < NZ; o++) {
-            double held = 0;
-            long from = -1; /* row at which the reading moved last */
-            for (int k = 0; k < samples; k++) {
-                const long row = ((long)b * samples + k) * NZ + o;
-                const double up = z[row] - half, down = z[row] + half;
-                int moves = up > held ? 1 : down < held ? -1 : 0;
-                if (k == 0) /* the motion goes on as it begins */
-                    moves = samples > 1 && z[row + NZ] < z[row] ? -1 : 1;
-                if (moves) {
-                    held = moves > 0 ? up : down;
-                    from = row;
-                    if (J)
-                        J[row * columns + place] = -moves;
-                } else if (J) {
-                    for (int c = 0; c < columns; c++)
-                        J[row * columns + c] = J[from * columns + c];
-                }
-                z[row] = held;
+    for (int b = 0; b < blocks; b++) {
+        double held = 0;
+        long from = -1; /* row at which the reading moved last */
+        for (int k = 0; k < samples; k++) {
+            const long row = ((long)b * samples + k) * NZ + output;
+            const double up = z[row] - half, down = z[row] + half;
+            int moves = up > held ? 1 : down < held ? -1 : 0;
+            if (k == 0) /* the motion goes on as it begins */
+                moves = samples > 1 && z[row + NZ] < z[row] ? -1 : 1;
+            if (moves) {
+                held = moves > 0 ? up : down;
+                from = row;
+                if (J)
+                    J[row * columns + place] = -moves;
+            } else if (J) {
+                for (int c = 0; c < columns; c++)
+                    J[row * columns + c] = J[from * columns + c];
             }
+            z[row] = held;
         }
+    }
 }

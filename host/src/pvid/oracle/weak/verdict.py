@@ -54,6 +54,8 @@ Name = Literal[
     "unpredicted",
     "unchecked",
     "noise",
+    "refined",
+    "skew",
 ]
 Status = Literal["good", "warning", "not_identified"]
 ParameterStatus = Literal["identified", "near_zero", "not_identified"]
