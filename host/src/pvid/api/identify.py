@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from pvid.api.data import Data, named
 from pvid.api.result import Result, of_core, of_mechanism
 from pvid.base.errors import PvidError
+from pvid.log.rig import source_of
 from pvid.log.rig_choice import common_rig, rig_of
 from pvid.rig.run import recording_of_arrays
 from pvid.rig.together import names_of
@@ -105,7 +106,7 @@ def _identify(
     else:
         found = rig_of(None, rig_path, texts, asked, columns, partial(recording_of_arrays, named(several[0]), None))
     sources = [
-        partial(recording_of_arrays, named(one), found.sample_rate) if path is None else path
+        partial(recording_of_arrays, named(one), found.sample_rate) if path is None else source_of(path)
         for one, path in zip(several, paths, strict=True)
     ]
     recording, compiled = read_all(found, sources, _names(paths), columns)

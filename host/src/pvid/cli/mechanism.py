@@ -18,6 +18,7 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.base.wording import listed
 from pvid.cli.input import print_notes
+from pvid.log.rig import source_of
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
@@ -62,7 +63,7 @@ def recordings_of(
 ) -> tuple[Recording, CompiledModel]:
     """Several recordings of one mechanism as one, likewise."""
     names = names_of(paths) if len(paths) > 1 else ()
-    recording, model = read_all(rig, paths, names, columns, whole=whole)
+    recording, model = read_all(rig, [source_of(one) for one in paths], names, columns, whole=whole)
     print_notes(recording.notes)
     return recording, model
 

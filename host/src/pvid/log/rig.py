@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -196,6 +197,17 @@ def run_of_log(path: Path) -> Run:
     if (there := int(np.isfinite(phi).sum())) < MIN_ROWS:
         raise PvidError(f"{path} holds {there} samples in a row; a run needs at least {MIN_ROWS}")
     return Run(t=t, phi=phi, y=y, sample_rate=rate)
+
+
+def source_of(path: Path) -> Path | Callable[[Columns], Recording]:
+    """A file as pvid.run.reading takes it: of a log what reads it."""
+    return partial(_read, path) if path.suffix == LOG_SUFFIX else path
+
+
+def _read(path: Path, columns: Columns) -> Recording:
+    if columns.named:
+        raise PvidError(f"{path} is a log with known columns: omit --columns")
+    return recording_of_log(path, [one.name for one in columns.channels])
 
 
 def recording_of_log(path: Path, names: Sequence[str]) -> Recording:

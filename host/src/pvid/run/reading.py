@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pvid.base.errors import PvidError
-from pvid.log.rig import LOG_SUFFIX, recording_of_log
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.columns import Columns, parsed
@@ -34,7 +32,7 @@ def read_all(
 
     Parameters
     ----------
-    sources : a file or a log, or what reads a recording with given columns
+    sources : a file, or what reads a recording with given columns
     names : of the recordings, where there are several
     columns : the text of --columns
     whole : the longest stretch without a missing sample alone
@@ -46,22 +44,13 @@ def read_all(
     """
     model = rig.applied(compiled_of(rig.model))
     given = parsed(columns, channels_of(model))
-    parts = [_read(one, rig, model, given, columns) for one in sources]
+    parts = [_read(one, rig, model, given) for one in sources]
     recording = parts[0] if len(parts) == 1 else joined(parts, names, given)
     return with_resolutions(recording.whole() if whole else recording, model)
 
 
-def _read(
-    source: Path | Reader, rig: MechanismRig, model: CompiledModel, given: Columns, columns: str | None
-) -> Recording:
-    if not isinstance(source, Path):
-        recording = source(given)
-    elif source.suffix == LOG_SUFFIX:
-        if columns is not None:
-            raise PvidError(f"{source} is a log with known columns: omit --columns")
-        recording = recording_of_log(source, [one.name for one in model.signals])
-    else:
-        recording = read_recording(source, rig.sample_rate, given)
+def _read(source: Path | Reader, rig: MechanismRig, model: CompiledModel, given: Columns) -> Recording:
+    recording = read_recording(source, rig.sample_rate, given) if isinstance(source, Path) else source(given)
     recording.refuse_damaged()
     return without_wild_samples(aligned(recording, model), model)
 
