@@ -24,7 +24,7 @@ from pvid.board.stream_image import settings_number
 from pvid.codegen.weak_library import weak_native
 from pvid.core.weak_native import WeakIdentifier
 from pvid.link import frames as link
-from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Run
 from pvid.settings.enums import Reason
 from pvid.sim.pendulum import simulate, standard_sensors
@@ -52,20 +52,26 @@ class Field:
         return simulate(sensors=standard_sensors(14), truth="linear", duration=duration, seed=self.seed).run
 
 
-def rig() -> RigFile:
-    """The rig file that goes with it."""
-    sensors, standard = standard_sensors(14), RigFile.standard()
-    return replace(
-        standard,
-        sample_rate=1000.0,
-        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+def rig(l1: float = 0.3) -> MechanismRig:
+    """The rig that goes with it."""
+    sensors = standard_sensors(14)
+    return MechanismRig(
+        "kapitza",
+        1000.0,
+        known={"l1": l1},
+        sensor={
+            "phi": {"resolution": sensors.phi_lsb, "reach": 0.5},
+            "y": {"resolution": sensors.y_lsb, "gain_sd": 0.0},
+        },
+        nominal={"g": 9.8, "l2": 0.1, "rho2": 0.1},
+        known_sd={"l1": 0.0},
     )
 
 
 @cache
 def board() -> MechanismBoard:
     """The board for it, with the weak engine."""
-    return MechanismBoard.of_rig_file(rig())
+    return MechanismBoard.of_guess(rig())
 
 
 @cache
@@ -81,7 +87,7 @@ def _settings() -> int:
 
 def hello(session: int = 7, **values: Any) -> link.Hello:
     """Who it is."""
-    own, n_p = rig().sensor, len(board().p_names)
+    sensors, n_p = standard_sensors(14), len(board().p_names)
     said: dict[str, Any] = {
         "form": int(link.Form.WEAK),
         "core": int(link.Core.F32),
@@ -90,8 +96,8 @@ def hello(session: int = 7, **values: Any) -> link.Hello:
         "settings": _settings(),
         "session": session,
         "sample_rate": board().sample_rate,
-        "phi_lsb": own.phi_lsb,
-        "y_lsb": own.y_lsb,
+        "phi_lsb": sensors.phi_lsb,
+        "y_lsb": sensors.y_lsb,
         "p_unit": (*[1.0] * n_p, *[0.0] * (link.MAX_P - n_p)),
         "board": "field",
     }

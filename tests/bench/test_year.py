@@ -18,7 +18,7 @@ SAMPLES = 2500  # more than a window
 def test_passages_of_2_to_the_32_ticks_are_recorded_verified_exported_and_drawn(tmp_path: Path, core: str) -> None:
     passages = (1, 2, passages_of_a_year(1000.0)) if core == "f32" else (700,)
     log = tmp_path / "a.pvlog"
-    year = emulated_year(HOST_TARGET, passages, SAMPLES, log, rig_of(core, "weak"))
+    year = emulated_year(HOST_TARGET, passages, SAMPLES, log, rig_of(core, "weak"), core)
     assert year.faults == ()
     assert year.passages == len(passages) == len(year.account.segments)
     assert year.verdict.verified > 0.9 * SAMPLES * len(passages)

@@ -16,7 +16,7 @@ from test_stream import KINDS, SHORT, rig_of
 
 from pvid.base.errors import PvidError
 from pvid.board.field import FieldRecord, collect
-from pvid.board.mechanism_board import MechanismBoard, board_of_rig_file
+from pvid.board.mechanism_board import MechanismBoard, board_of_guess
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.replay_image import standard_run
 from pvid.board.stream_image import settings_number
@@ -37,32 +37,24 @@ Simulated = StreamRig | MechanismBoard | MechanismBoardQ31
 
 @cache
 def standard_rig(form: str, core: str = "f32") -> Simulated:
-    """Of a board that simulates a sensor."""
+    """Of a board that simulates a sensor, or reads a simulation of a rig's guess."""
     if form == "strong":
         return rig_of(standard_run(5000, core))
-    rig = RigFile.standard()
-    return board_of_rig_file(replace(rig, identifier=replace(rig.identifier, core=core)))  # type: ignore[arg-type]
+    board = board_of_guess(field_board.rig(), core)
+    return replace(board, recording=board.recording[:TICKS])  # type: ignore[arg-type]
 
 
-@cache
-def sensed(form: str) -> npt.NDArray[np.int32]:
-    """Counts of phi and y."""
-    rig = standard_rig(form)
-    if isinstance(rig, StreamRig):
-        constants = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
-    else:
-        constants = SensorConstants.standard(RIG.l1, rig.sample_rate, RIG.sensor.phi_lsb, RIG.sensor.y_lsb)
-    return counts(constants, TICKS)
+def sensed(rig: Simulated) -> tuple[npt.NDArray[Any], ...]:
+    """The samples as the identifier takes them, in its order."""
+    if not isinstance(rig, StreamRig):
+        return tuple(rig.recording.T)
+    constants = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
+    return rig.from_counts(counts(constants, TICKS))
 
 
-def from_counts(rig: Simulated, read: npt.NDArray[np.int32]) -> tuple[npt.NDArray[Any], ...]:
-    """The samples as the identifier takes them, in its order, from counts of phi and y."""
-    if isinstance(rig, StreamRig):
-        return rig.from_counts(read)
-    if isinstance(rig, MechanismBoardQ31):
-        return read[:, 1], read[:, 0]
-    values = read.astype(np.float32) * np.array([RIG.sensor.phi_lsb, RIG.sensor.y_lsb], np.float32)
-    return values[:, 1], values[:, 0]
+def expected(rig: Simulated, first: int, last: int) -> tuple[npt.NDArray[Any], ...]:
+    """Those of some ticks."""
+    return tuple(one[first:last] for one in sensed(rig))
 
 
 @pytest.fixture
@@ -71,11 +63,11 @@ def host_target() -> Iterator[Target]:
         yield target
 
 
-def assert_replays(record: FieldRecord, rig: Simulated, form: str, native: Native) -> None:
+def assert_replays(record: FieldRecord, rig: Simulated, native: Native) -> None:
     """The samples are the twin's, the hashes and estimates those of the host's core on them."""
     samples = record.samples(0, record.ticks)
-    expected = from_counts(rig, sensed(form)[: record.ticks])
-    assert all(np.array_equal(a.view(np.uint32), b.view(np.uint32)) for a, b in zip(samples, expected, strict=True))
+    right = expected(rig, 0, record.ticks)
+    assert all(np.array_equal(a, b) for a, b in zip(samples, right, strict=True))
     hashes = rig.hashes(native, *samples)
     assert len(record.hashes) >= record.ticks // 500 - 1
     assert all(hashes[tick - 1] == value for tick, value in record.hashes.items())
@@ -95,7 +87,7 @@ def test_a_board_samples_by_itself(name: str, form: str, core: str, native: Nati
     with open_target(name, rig) as target:
         record = collect(target, ticks, begin=rig)
     assert record.gaps == [] and record.received.missing == 0 and record.first == 0
-    assert_replays(record, rig, form, native)
+    assert_replays(record, rig, native)
     assert record.schema == SCHEMA_TEXT
     assert record.configuration is not None and record.configuration.settings == settings_number(rig)
     assert record.hello is not None and record.status is not None
@@ -116,8 +108,8 @@ def test_the_last_estimate_comes_with_the_bits_of_the_core(host_target: Target) 
     last, estimate = identifier.published, record.estimates[tick]
     assert last is not None
     assert np.array_equal(np.array(estimate.p[: len(last["p"])], np.float32), last["p"])
-    truth = np.array([31.6667, 8.875, 5.625])
-    assert np.abs(last["p"][:3] / truth - 1).max() < 0.02  # a plausible run of the rig
+    truth = np.array([one.guess for one in board.compiled.unknowns])
+    assert np.abs(last["p"][:3] / truth[:3] - 1).max() < 0.02  # the simulated rig is that of the guess
 
 
 def test_late_client_receives_the_current_state(host_target: Target, native: Native) -> None:
@@ -127,8 +119,7 @@ def test_late_client_receives_the_current_state(host_target: Target, native: Nat
     assert late.first >= 600
     assert late.hello is not None and late.schema == SCHEMA_TEXT and late.configuration is not None
     assert late.hello.session == late.configuration.session
-    expected = from_counts(rig, sensed("weak")[late.first : late.ticks])
-    assert np.array_equal(late.samples(late.first, late.ticks), expected)
+    assert np.array_equal(late.samples(late.first, late.ticks), expected(rig, late.first, late.ticks))
 
 
 def test_in_time_a_sample_takes_its_time(host_target: Target, native: Native) -> None:
@@ -171,8 +162,8 @@ def test_losses_of_the_line_are_named(native: Native) -> None:
     assert 64 <= gap[1] - gap[0] <= 160
     with pytest.raises(PvidError, match=f"ticks {gap[0]} to {gap[1] - 1} are missing"):
         record.samples(0, record.ticks)
-    expected = from_counts(rig, sensed("weak")[gap[1] : record.ticks])
-    assert np.array_equal(record.samples(gap[1], record.ticks), expected)  # what came after it is good
+    after = expected(rig, gap[1], record.ticks)
+    assert np.array_equal(record.samples(gap[1], record.ticks), after)  # what came after it is good
 
 
 def test_an_unknown_source_is_refused(host_target: Target) -> None:
@@ -186,8 +177,16 @@ def test_samples_from_the_pc_are_not_mixed_in(host_target: Target, native: Nativ
     collect(host_target, 100, begin=rig)
     host_target.port.write(encode(rig.frame(np.ones((64, 2), np.float32)), 9, tick=0))
     record = collect(host_target, 3000)
-    expected = from_counts(rig, sensed("weak")[record.first : record.ticks])
-    assert np.array_equal(record.samples(record.first, record.ticks), expected)
+    assert np.array_equal(record.samples(record.first, record.ticks), expected(rig, record.first, record.ticks))
+
+
+def test_sensors_read_a_recording_over_and_over_where_it_is_wanted() -> None:
+    board = standard_rig("weak")
+    assert isinstance(board, MechanismBoard)
+    board = replace(board, recording=board.recording[:700], repeats=True)
+    with open_target(HOST_TARGET, board) as target:
+        record = collect(target, 2000, begin=board)
+    assert np.array_equal(np.stack(record.samples(0, 2000), axis=1), np.tile(board.recording, (3, 1))[:2000])
 
 
 def test_the_sensors_motion_stays_what_it_was() -> None:
@@ -201,9 +200,9 @@ def test_the_sensors_motion_stays_what_it_was() -> None:
 def test_errors_of_a_board_without_a_recording_contain_what_small_angles_neglect() -> None:
     """The square of the largest angle of the guess, as of a recorded one."""
     made = nominal_run(field_board.rig())
-    phi = np.asarray(made.run["phi"])
+    phi = np.asarray(made.recording.signals["phi"])
     part = float(np.max(np.abs(phi - phi.mean()))) ** 2
     assert 1e-3 < part < 0.1
-    assert MechanismBoard.of_rig_file(field_board.rig()).config.trust.neglected == pytest.approx(part)
-    fixed = MechanismBoardQ31.of_rig_file(field_board.rig()).config.trust.neglected
+    assert MechanismBoard.of_guess(field_board.rig()).config.trust.neglected == pytest.approx(part)
+    fixed = MechanismBoardQ31.of_guess(field_board.rig()).config.trust.neglected
     assert fixed / 2**30 == pytest.approx(part, rel=1e-6)

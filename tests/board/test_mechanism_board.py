@@ -192,10 +192,10 @@ def test_log_of_a_mechanism_is_plotted(log: Path, tmp_path: Path) -> None:
 
 
 def test_options_that_do_not_fit_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "run.csv").write_text("t,phi,y\n")
-    done = pvid(tmp_path, "log", HOST_TARGET, "a.pvlog", "--run", "run.csv")
-    assert done.returncode == 2 and "--run is for a described mechanism" in done.stderr
+    for given, why in ((["--paced"], "an emulated board needs a mechanism"), (["--refine"], "needs a mechanism")):
+        done = pvid(tmp_path, "log", HOST_TARGET, "a.pvlog", *given)
+        assert done.returncode == 2 and why in done.stderr
     (tmp_path / "rig.toml").write_text('[model]\nname = "dc_motor"\n')
     done = pvid(tmp_path, "log", HOST_TARGET, "a.pvlog", "--rig", "rig.toml")
-    assert done.returncode == 2 and "name a recording of it with --run" in done.stderr
+    assert done.returncode == 2 and "sample_rate is required" in done.stderr
     assert not (tmp_path / "a.pvlog").exists()

@@ -17,7 +17,6 @@ import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -32,6 +31,7 @@ from conftest import ROOT
 from bench.field import field_log, throughput
 from pvid.base import file_lock
 from pvid.base.errors import PvidError
+from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.target import HOST_TARGET, open_target
 from pvid.cli.main import commands
 from pvid.link import frames as link
@@ -563,13 +563,12 @@ def test_a_port_that_is_no_usb_device_is_found_again_by_its_name(plugged: Plugge
 
 def test_refusal_of_the_board_is_reported(tmp_path: Path) -> None:
     """Its image was made for another rig than the logger's."""
-    rig = field_board.rig()
     target = open_target(HOST_TARGET, field_board.board())
     assert target.process is not None
     try:
         (tmp_path / "board").symlink_to(str(getattr(target.port, "port", "")))
         target.port.close()
-        replace(rig, l1=0.31).write(tmp_path / "rig.toml")
+        field_board.rig(0.31).write(tmp_path / "rig.toml")
         command = [sys.executable, "-m", "pvid", "log", "board", "out.pvlog", "--rig", "rig.toml", "--duration", "20"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
     finally:
@@ -617,8 +616,8 @@ def test_a_log_that_cannot_be_written_ends_with_its_error(tmp_path: Path, monkey
 
 
 def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -> None:
-    rig = field_board.rig()
-    writer = LogWriter(tmp_path / "a.pvlog", rig=rig.text())
+    rig = field_board.text()
+    writer = LogWriter(tmp_path / "a.pvlog", rig=rig)
     writer.begin("a port", None)
     writer.take(sent[0])
     writer.close()
@@ -628,7 +627,7 @@ def test_appended_log_has_the_same_rig_file(tmp_path: Path, sent: list[bytes]) -
     (tmp_path / "empty.pvlog").write_bytes(b"")
     refuse_to_append(tmp_path / "empty.pvlog", rig)
     with pytest.raises(PvidError, match="a.pvlog was recorded with another rig file: record to a new log"):
-        refuse_to_append(tmp_path / "a.pvlog", replace(rig, l1=0.31))
+        refuse_to_append(tmp_path / "a.pvlog", MechanismBoard.of_guess(field_board.rig(0.31)).text())
     (tmp_path / "run.csv").write_text("t,phi,y\n" + 100 * "0,0,0\n")
     with pytest.raises(PvidError, match="run.csv is not a log of pvid: nothing is appended"):
         refuse_to_append(tmp_path / "run.csv", rig)
@@ -709,7 +708,7 @@ def test_full_disk_is_reported_with_the_content_of_the_log(tmp_path: Path, board
 
 def test_a_board_that_sends_faster_than_its_frames_are_decoded_ends_at_the_samples_asked_for(tmp_path: Path) -> None:
     out = tmp_path / "out.pvlog"
-    arguments = ["log", HOST_TARGET, str(out), "--paced", "--samples", "3000", "-q"]
+    arguments = ["log", HOST_TARGET, str(out), "--model", "kapitza", "--paced", "--samples", "3000", "-q"]
     CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
     _, account = read(out)
     assert 3000 <= account.samples <= 3100  # some frames more were under way

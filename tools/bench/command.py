@@ -690,7 +690,7 @@ def bench_year(target: str, core: str, form: str, samples: int, out: Path) -> in
     rig = rig_of(core, form)
     passages = tuple(range(1, 1 + passages_of_a_year(rig.sample_rate or 0.0)))
     with progress_bar("verifying", None) as advance:
-        year = emulated_year(target, passages, samples, out, rig, advance)
+        year = emulated_year(target, passages, samples, out, rig, core, advance)
     click.echo(f"{year.passages} passages of 2^32 ticks; {year.verdict.text}")
     click.echo(year.account.text)
     for sentence in year.faults:

@@ -10,7 +10,7 @@ import tempfile
 import time
 import tty
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,7 @@ from pvid.log.file import Segment
 from pvid.log.reader import Account, LogReader, Record
 from pvid.log.recorder import Logger
 from pvid.log.verify import Stretch, Verifier
-from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 
 _SAMPLES_A_FRAME = 16
 
@@ -244,8 +244,7 @@ def field_log(
     The board starts over whenever the link comes up, so that every segment can be verified; a quarter of `samples`, at
     least, is recorded before and after each accident: it is killed, its line is closed, it is killed again.
     """
-    rig = RigFile.standard()
-    board = MechanismBoard.of_rig_file(rig)
+    board = replace(MechanismBoard.of_guess(MechanismRig("kapitza", 1000.0, known={"l1": 0.3})), repeats=True)
     settings = settings_number(board)
     every = round(board.sample_rate)
     source = ShakyEmulator(name, board)

@@ -28,7 +28,7 @@ import numpy as np
 import serial
 from rich.console import Console
 
-from bench.liar_board import TICKS, Flood, HangUp, LyingBoard, Pause, Step, honest_samples, rig
+from bench.liar_board import TICKS, Flood, HangUp, LyingBoard, Pause, Step, honest_samples, mechanism, rig
 from bench.liar_board import board as honest_board
 from bench.lies import BEHAVIOURS, Behaviour
 from pvid.base.errors import PvidError
@@ -109,7 +109,7 @@ def rehearse(behaviour: Behaviour, folder: Path, commands: Sequence[str]) -> lis
     source = RehearsedSource(behaviour)
     console = Console(file=screen, force_terminal=True, width=100)
     views: list[Observer] = [
-        LiveView(console, "title", rig().mechanism),
+        LiveView(console, "title", mechanism()),
         StatusLine(line),
         live_stream("udp://127.0.0.1:9"),
         live_stream("teleplot://[::1]:9"),

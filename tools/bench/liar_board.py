@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number
 from pvid.codegen.weak_library import weak_native
@@ -30,7 +31,9 @@ from pvid.link.frames import (
     Schema,
     Status,
 )
-from pvid.rig.file import RigFile
+from pvid.log.rig import mechanism_in
+from pvid.models.model import Mechanism
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.twin import fnv
 
 SESSION = 7
@@ -77,15 +80,23 @@ def message(kind: type[Kind], **values: Any) -> Kind:
 
 
 @cache
-def rig() -> RigFile:
-    """The rig file that the logger is given."""
-    return RigFile.standard()
+def rig() -> MechanismRig:
+    """The rig that the logger is given."""
+    return MechanismRig("kapitza", RATE, known={"l1": 0.3})
+
+
+@cache
+def mechanism() -> Mechanism:
+    """Of the rig."""
+    found = mechanism_in(toml_document(rig().text()))
+    assert found is not None
+    return found
 
 
 @cache
 def board() -> MechanismBoard:
     """The honest board."""
-    return MechanismBoard.of_rig_file(rig())
+    return MechanismBoard.of_guess(rig())
 
 
 @cache
@@ -168,8 +179,8 @@ class LyingBoard:
             "settings": _settings(),
             "session": SESSION,
             "sample_rate": own.sample_rate,
-            "phi_lsb": float(rig().sensor.phi_lsb),
-            "y_lsb": rig().sensor.y_lsb,
+            "phi_lsb": board().compiled.signal("phi").resolution,
+            "y_lsb": board().compiled.signal("y").resolution,
             "p_unit": (*[1.0] * n_p, *[0.0] * (MAX_P - n_p)),
             "board": "liar",
             "samples": 2,

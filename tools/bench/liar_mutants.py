@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bench.liar_board import LyingBoard, board, rig
+from bench.liar_board import LyingBoard, board, mechanism
 from pvid.link import frames as link
 from pvid.link.frames import LAYOUTS, MAX_PAYLOAD, Frame
 from pvid.log.file import LOG_SCHEMA, LogWriter
@@ -124,11 +124,11 @@ def _read(log: Path) -> Iterator[str]:
     """What goes wrong."""
     screen = io.StringIO()
     views: list[Observer] = [
-        LiveView(Console(file=screen, force_terminal=True, width=100), "title", rig().mechanism),
+        LiveView(Console(file=screen, force_terminal=True, width=100), "title", mechanism()),
         StatusLine(io.StringIO()),
-        live_stream("udp://127.0.0.1:9", rig().mechanism),
+        live_stream("udp://127.0.0.1:9", mechanism()),
     ]
-    values, reader = Values(rig().mechanism), LogReader(log)
+    values, reader = Values(mechanism()), LogReader(log)
     try:
         for record in reader:
             for view in views:

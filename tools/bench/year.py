@@ -16,18 +16,23 @@ from typing import Any
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.board.mechanism_board import board_of_rig_file
+from pvid.base.toml_text import toml_document
+from pvid.board.mechanism_board import board_of_guess
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import StreamRig, stream_rig
+from pvid.board.stream_rig import stream_rig
 from pvid.board.target import HOST_TARGET, open_target
 from pvid.link.frames import Configuration, Raw, RawCount, Source
 from pvid.log.export import FORMATS, export_log
 from pvid.log.file import Segment
 from pvid.log.reader import Account, LogReader
 from pvid.log.recorder import EmulatorSource, Logger
+from pvid.log.rig import mechanism_in
 from pvid.log.values import Rows, Values
 from pvid.log.verify import Verdict, Verifier
+from pvid.models.model import Mechanism
 from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.settings.enums import Core
 from pvid.show.log_figure import write_log_figure
 from pvid.show.page_state import LiveState
 
@@ -56,7 +61,8 @@ def emulated_year(
     passages: tuple[int, ...],
     samples: int,
     log: Path,
-    rig: RigFile,
+    rig: RigFile | MechanismRig,
+    core: Core,
     progress: Callable[[int], None] | None = None,
 ) -> Year:
     """Records, verifies, exports and draws passages of 2^32 ticks.
@@ -67,6 +73,8 @@ def emulated_year(
         Of the emulator, or stream-host.
     passages
         Which of them, from 1: the tick passes that many times 2^32.
+    rig, core
+        Of the strong form a rig file, which has a core of its own.
     samples
         At least so many at each passage; the counter starts half of them before it.
     log
@@ -81,8 +89,10 @@ def emulated_year(
     """
     if rig.sample_rate is None:
         raise PvidError("the rig file has no sample_rate")
-    board = board_of_rig_file(rig) if rig.identifier.form_traits.publishes else stream_rig(rig, rig.sample_rate)
-    kept = rig if isinstance(board, StreamRig) else board
+    board = stream_rig(rig, rig.sample_rate) if isinstance(rig, RigFile) else board_of_guess(rig, core)
+    kept = rig if isinstance(rig, RigFile) else board
+    mechanism = mechanism_in(toml_document(kept.text()))
+    assert mechanism is not None
     settings = settings_number(board)
     every = max(1, round(rig.sample_rate / 10))
     source = Source.SENSOR if name == HOST_TARGET else Source.SENSOR_PACED  # this machine sends a hundred times as many
@@ -111,10 +121,10 @@ def emulated_year(
     if reader.account.missing_samples or reader.account.restarts:
         faults.append(reader.account.text)
     faults += _faults_of_board(log)
-    faults += _faults_of_times(log, rig)
-    faults += _faults_of_exports(log, rig)
+    faults += _faults_of_times(log, mechanism, rig.sample_rate)
+    faults += _faults_of_exports(log, mechanism)
     faults += _faults_of_page(log)
-    write_log_figure(log, rig.mechanism, log.with_suffix(".png"))
+    write_log_figure(log, mechanism, log.with_suffix(".png"))
     return Year(reader.account, verdict, len(crossed), tuple(faults))
 
 
@@ -129,8 +139,8 @@ def _crossed(log: Path) -> Iterator[int]:
                 yield (before[1] - 1) // TURN
 
 
-def _samples(log: Path, rig: RigFile) -> Iterator[Rows]:
-    values = Values(rig.mechanism)
+def _samples(log: Path, mechanism: Mechanism) -> Iterator[Rows]:
+    values = Values(mechanism)
     for record in LogReader(log):
         for rows in values.rows(record):
             if rows.table == "samples":
@@ -151,16 +161,15 @@ def _began(log: Path, number: int) -> int:
     return next(record.unix_ns for record in found if record.segment == number)
 
 
-def _faults_of_times(log: Path, rig: RigFile) -> Iterator[str]:
+def _faults_of_times(log: Path, mechanism: Mechanism, rate: float) -> Iterator[str]:
     """Of the columns that exports, views and tee share: a step of a tick in t and in log_time, within a segment."""
-    assert rig.sample_rate is not None
     latest: dict[str, int | float] = {}
-    for rows in _samples(log, rig):
+    for rows in _samples(log, mechanism):
         columns = rows.columns
-        if not np.array_equal(columns["t"], columns["tick"] / rig.sample_rate):
+        if not np.array_equal(columns["t"], columns["tick"] / rate):
             yield f"t is no multiple of a tick at tick {columns['tick'][0]}"
         same = latest.get("segment") == columns["segment"][0]
-        for name, step in (("tick", 1), ("t", 1 / rig.sample_rate), ("log_time", 1e9 / rig.sample_rate)):
+        for name, step in (("tick", 1), ("t", 1 / rate), ("log_time", 1e9 / rate)):
             column = columns[name] if not same else np.concatenate([[latest[name]], columns[name]])
             if np.any(np.abs(np.diff(column) - step) > 0.01 * step):
                 yield f"{name} does not go on by a tick at tick {columns['tick'][0]}"
@@ -170,11 +179,11 @@ def _faults_of_times(log: Path, rig: RigFile) -> Iterator[str]:
         latest["segment"] = columns["segment"][-1]
 
 
-def _faults_of_exports(log: Path, rig: RigFile) -> Iterator[str]:
+def _faults_of_exports(log: Path, mechanism: Mechanism) -> Iterator[str]:
     """Of every format: the ticks of the samples that stand in it."""
-    expected = np.concatenate([rows.columns["tick"] for rows in _samples(log, rig)])
+    expected = np.concatenate([rows.columns["tick"] for rows in _samples(log, mechanism)])
     for form, read in {"csv": _ticks_of_csv, "npz": _ticks_of_npz, "parquet": _ticks_of_parquet, "mcap": _mcap}.items():
-        files = export_log(log, form, log.with_suffix(""), rig.mechanism)
+        files = export_log(log, form, log.with_suffix(""), mechanism)
         if not np.array_equal(read(files), expected):
             yield f"{form} has other ticks than the log"
     if set(FORMATS) != {"csv", "npz", "parquet", "mcap"}:
@@ -219,8 +228,10 @@ def _faults_of_page(log: Path) -> Iterator[str]:
             yield f"the page's time axis of {curve['label']} does not go on"
 
 
-def rig_of(core: str, form: str) -> RigFile:
+def rig_of(core: str, form: str) -> RigFile | MechanismRig:
     """The standard rig with that core and form."""
+    if form == "weak":
+        return MechanismRig("kapitza", 1000.0, known={"l1": 0.3})
     rig = RigFile.standard()
     settings: dict[str, Any] = {"core": core, "form": form}
     return replace(rig, identifier=replace(rig.identifier, **settings))

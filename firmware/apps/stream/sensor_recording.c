@@ -1,4 +1,5 @@
-/* Sensors that read what another board, or a simulation, has recorded: the table of stream_recording.h, once. */
+/* Sensors that read what another board, or a simulation, has recorded: the table of stream_recording.h, once, or with
+ * STREAM_REPEATS over and over. */
 #include "sensor.h"
 
 #include "pvid/little_endian.h"
@@ -14,7 +15,11 @@ void sensor_start(void)
 bool sensor_read(uint8_t sample[SAMPLE_BYTES])
 {
     if (next == RECORDED_TICKS) {
+#ifdef STREAM_REPEATS
+        next = 0;
+#else
         return false;
+#endif
     }
     for (uint32_t i = 0; i < STREAM_SAMPLES; i++) {
         STREAM_PUT(&sample[4u * i], recorded[next][i]);

@@ -1,4 +1,5 @@
-"""One row of `pvid compare`: a core on this machine against its twin, or on a target against this machine."""
+"""One row of `pvid compare`; the pendulum's strong form on this machine against its twin, and on a target against this
+machine."""
 
 from __future__ import annotations
 
@@ -8,7 +9,6 @@ from dataclasses import dataclass
 from pvid.board.stream_rig import played_samples, stream_rig
 from pvid.board.target import Verdict, verify
 from pvid.core.native import Native
-from pvid.rig.described import described
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
 from pvid.run.compare import compare_rig
@@ -37,18 +37,13 @@ class Outcome:
 
 
 def verify_run(target: str, rig: RigFile, run: Run, native: Native, progress: Progress | None = None) -> Verdict:
-    """Plays a run on a target by the rig file's form, in its core; every hash is compared with that of this machine.
+    """Plays a run on a target by the strong form, in the rig file's core; every hash is compared with this machine's.
 
     Raises
     ------
     PvidError
         When the target cannot be started or refuses.
     """
-    if rig.identifier.form_traits.publishes:
-        from pvid.board.engine_board import verify_recording  # loads SymPy
-
-        core = rig.identifier.core_traits.in_c
-        return verify_recording(target, described(rig), run.whole().recording, core, progress)
     image = stream_rig(rig, run.sample_rate, run)
     return verify(target, image, native, *played_samples(rig, run), progress=progress)
 

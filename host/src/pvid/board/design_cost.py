@@ -137,21 +137,15 @@ class CostedDesign:
     no_refinement: str | None = None
 
     @classmethod
-    def of_recording(
-        cls, asked: Asked, compiled: CompiledModel, recording: Recording, motion: Run | None = None
-    ) -> CostedDesign:
+    def of_recording(cls, asked: Asked, compiled: CompiledModel, recording: Recording) -> CostedDesign:
         """That which `model build --run` prints.
-
-        Parameters
-        ----------
-        motion : that is replayed, where it is not that of the recording
 
         Raises
         ------
         PvidError
             Where the engine does not have what the model needs.
         """
-        run = recording.signals if motion is None else motion
+        run = recording.signals
         if asked.core != FLOAT.name:
             return cls(compiled, engine_for_recording(compiled, recording), run)
         config = config_for_recording(compiled, recording)

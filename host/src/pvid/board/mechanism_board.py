@@ -17,9 +17,8 @@ from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import printable
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
-from pvid.board.simulated_sensors import sensor_macros
-from pvid.board.stream_image import StreamImage, c_string
-from pvid.board.stream_rig import SLOWEST
+from pvid.board.stream_image import UNNAMED, StreamImage, c_string
+from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
 from pvid.codegen.build import refine_functions
 from pvid.codegen.refine import RefineFunctions
@@ -31,17 +30,14 @@ from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.design.c_tables import float_literal
-from pvid.design.refine import refine_config
 from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames, shown_of_refined
 from pvid.model.compiled import CompiledModel
-from pvid.models.kapitza.refinement import refine_rig
-from pvid.models.registry import DEFAULT, asked_for, is_named, shipped
+from pvid.models.registry import asked_for, is_named, shipped
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.edges import with_edges
-from pvid.rig.described import rig_of_document
-from pvid.rig.file import RigFile
+from pvid.rig.former import mechanism_of_former, translated
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.engine_design import (
@@ -54,8 +50,8 @@ from pvid.run.engine_design import (
     with_neglected,
 )
 from pvid.run.mechanism import model_of
-from pvid.run.nominal_run import model_of_rig_file, nominal_run
-from pvid.run.refine_design import refine_design, rig_with_options
+from pvid.run.nominal_run import nominal_run
+from pvid.run.refine_design import full_motion_of, refine_design
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
@@ -63,7 +59,6 @@ from pvid.settings.refine import RefineConfig, RefineSignal
 from pvid.settings.weak import Source as SignalSource
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
-from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.both_stages import BothStagesTwin
 from pvid.twin.refine import RefineTwin
@@ -83,22 +78,25 @@ class MechanismBoard:
 
     Attributes
     ----------
-    rig : of the mechanism; the pendulum has a rig file of its own
+    rig : of the mechanism
     compiled : the model with the values of the rig
     config : settings and tables of the engine
     recording
-        what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own, or
-        simulates those of a pendulum's rig file
+        what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
     refine : settings of the second stage; None: without
+    repeats : the sensors read the recording over and over
+    logged : number of the settings that the log of the board names, UNNAMED where it names none; None: of no log
     """
 
     configure_frame = Configure
     matrix = "covariance"  # of an estimate
-    rig: MechanismRig | RigFile
+    rig: MechanismRig
     compiled: CompiledModel
     config: WeakConfig
     recording: npt.NDArray[np.float32]
     refine: RefineConfig | None = None
+    repeats: bool = False
+    logged: int | None = None
 
     @classmethod
     def of_recording(
@@ -136,7 +134,7 @@ class MechanismBoard:
         Parameters
         ----------
         refined
-            With the second stage; the pendulum's simulation is then one of the full equations.
+            With the second stage; the simulation is then one of the equations of the refinement.
 
         Raises
         ------
@@ -149,36 +147,33 @@ class MechanismBoard:
         config = config_for_simulated_rig(compiled)
         if not refined:
             return cls(rig, compiled, config, samples_of(config, RigSimulation.of(compiled, simulated).run()))
-        if name == DEFAULT:
-            found = simulate(sensors=standard_sensors(), truth="full", duration=simulated.duration, seed=1).run
-            run = {"phi": found.phi, "y": found.y}
-        else:
-            run = RigSimulation.of(compiled, simulated).run()
+        run = full_motion_of(compiled)
         refine = refine_design(compiled, config, run, [simulated.truth[one] for one in compiled.p_names])
         return cls(rig, compiled, config, samples_of(config, run), refine)
 
     @classmethod
-    def of_rig_file(cls, rig: RigFile, refined: bool = False) -> MechanismBoard:
-        """With a design for the guess of a pendulum's rig file; the board simulates the sensors.
+    def of_guess(cls, rig: MechanismRig, refined: bool = False) -> MechanismBoard:
+        """With a design for the guess of a rig; the sensors of an emulated board read a simulation of it.
 
         Parameters
         ----------
         refined
-            With the second stage; the simulated sensors of an emulated board follow the small-angle equations, which
-            contradict it.
+            With the second stage. The simulation follows the equations of the weak form: where those of the refinement
+            are others, as the pendulum's, they contradict it.
 
         Raises
         ------
         PvidError
-            Where the rig file has no sample rate, a guess without modes below it, or another law than the weak form's.
+            Where there is no such simulation (see `nominal_run`), or the engine does not have what the model needs.
         """
         made = nominal_run(rig)
-        config = engine_config(made.compiled, made.run, made.design, made.p)
-        config = with_neglected(config, neglected_part(made.compiled, made.run))
+        run = made.recording.signals
+        config = engine_config(made.compiled, run, made.chosen.design, made.p)
+        config = with_neglected(config, neglected_part(made.compiled, run))
         # What the rig really reads is not known: a height from the floor is no fault.
         config = replace(config, range=None)
-        refine = _refine_of_rig_file(rig, made.compiled, config) if refined else None
-        return cls(rig, made.compiled, config, _nothing(config), refine)
+        refine = refine_design(made.compiled, config, run, made.p) if refined else None
+        return cls(rig, made.compiled, config, samples_of(config, run)[:MOST_TICKS], refine)
 
     def __post_init__(self) -> None:
         if not self.config.sample_rate >= SLOWEST:
@@ -220,11 +215,6 @@ class MechanismBoard:
         return self.config.sample_rate
 
     @property
-    def _lsb(self) -> dict[str, float]:
-        """Value of a count of each sample."""
-        return {name: self.compiled.signal(name).resolution for name in self.config.design.model.sample_names}
-
-    @property
     def _shared(self) -> WeakConfig:
         """The settings of an image: neutral values for what a Configure frame brings."""
         ones = np.ones(len(self.compiled.unknowns), np.float32)
@@ -252,7 +242,6 @@ class MechanismBoard:
                 "stream_refine.h": _refine_header(self.refine, self._shown),
             }
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
-        simulated = isinstance(self.rig, RigFile) and not len(self.recording)
         macros = [
             f"#define STREAM_CORE {int(Core.F32)}",
             f"#define STREAM_FORM {int(Form.WEAK)}",
@@ -260,19 +249,21 @@ class MechanismBoard:
             f"#define STREAM_N_P {len(self.compiled.unknowns)}u",
             f"#define STREAM_SAMPLES {model.samples}u",
             f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
-            *sensor_macros(self.rig, self._lsb, self.sample_rate),
+            *[f"#define {one} 0.0f" for one in ("STREAM_PHI_LSB", "STREAM_Y_LSB")],
+            f"#define STREAM_LSB {{{', '.join(['0.0f'] * model.samples)}}}",
             f"#define STREAM_P_UNIT {{{units}}}",
             f"#define STREAM_NAMES {c_string(self.names.text)}",
             *([] if self.refine is None else ["#define STREAM_REFINED"]),
+            *(["#define STREAM_REPEATS"] if self.repeats else []),
         ]
         return StreamImage(
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
             macros=macros,
-            files={**code, **({} if simulated else {"stream_recording.h": _recording(self.recording)})},
+            files={**code, "stream_recording.h": _recording(self.recording)},
             form="weak",
             core="f32",
             identifier="weak_f32",
-            sensor="sensor.c" if simulated else "sensor_recording.c",
+            sensor="sensor_recording.c",
             sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
             refined=self.refine is not None,
         )
@@ -354,10 +345,15 @@ class MechanismBoard:
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
         lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config, self.refine).items()]
-        return "\n".join([self.rig.text(), f"[{_TABLE}]", *lines, ""])
+        return "\n".join([self.rig.text(), f"[{_TABLE}]", f"settings = {self.stream_image.number}", *lines, ""])
+
+    @property
+    def settings(self) -> int:
+        """Number of the settings of its image; UNNAMED: its log does not name it."""
+        return self.stream_image.number if self.logged is None else self.logged
 
     @classmethod
-    def of_tables(cls, rig: MechanismRig | RigFile, engine: Mapping[str, Any]) -> MechanismBoard:
+    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoard:
         """From the rig and the table `engine` of the text of a log.
 
         Raises
@@ -365,24 +361,10 @@ class MechanismBoard:
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
-        compiled = model_of_rig_file(rig) if isinstance(rig, RigFile) else model_of(rig)
+        compiled = model_of(rig)
         config = _config(compiled, engine)
-        return cls(rig, compiled, config, _nothing(config), _refine(engine))
-
-
-def _refine_of_rig_file(rig: RigFile, compiled: CompiledModel, config: WeakConfig) -> RefineConfig:
-    """Settings of the second stage for the guess of a pendulum's rig file."""
-    guess = [one.guess for one in compiled.unknowns]
-    about = refine_rig(
-        config.sample_rate,
-        rig.l1,
-        guess[:3],
-        compiled.signal("phi").sd,
-        y_gain_sd=rig.sensor.y_gain_sd,
-        samples=("y", "phi"),
-    )
-    about = rig_with_options(refine_functions(compiled), about, guess)
-    return refine_config(about, compiled.following.forgetting_s, compiled.following.outlier_gate)
+        nothing = np.zeros((0, config.design.model.samples), np.float32)
+        return cls(rig, compiled, config, nothing, _refine(engine), logged=engine.get("settings", UNNAMED))
 
 
 def _refine_header(settings: RefineConfig, shown: Sequence[int]) -> str:
@@ -393,20 +375,12 @@ def _refine_header(settings: RefineConfig, shown: Sequence[int]) -> str:
     return "\n".join(["#ifndef STREAM_REFINE_H", "#define STREAM_REFINE_H", "", *lines, "", "#endif", ""])
 
 
-def _nothing(config: WeakConfig) -> npt.NDArray[np.float32]:
-    """No recording."""
-    return np.zeros((0, config.design.model.samples), np.float32)
-
-
-def board_of_rig_file(rig: RigFile, refined: bool = False) -> MechanismBoard | MechanismBoardQ31:
-    """In the arithmetic of a pendulum's rig file; raises as MechanismBoard.of_rig_file, and for core f64."""
-    made = BOARDS.get(rig.identifier.core)
-    if made is None:
-        raise PvidError(f"targets hold the cores f32 and q31, not {rig.identifier.core}")
+def board_of_guess(rig: MechanismRig, core: str, refined: bool = False) -> MechanismBoard | MechanismBoardQ31:
+    """In one arithmetic; raises as MechanismBoard.of_guess, and for a second stage in fixed point."""
     if not refined:
-        return made.of_rig_file(rig)
-    refuse_unrefined(rig.identifier.core)
-    return MechanismBoard.of_rig_file(rig, refined)
+        return BOARDS[core].of_guess(rig)
+    refuse_unrefined(core)
+    return MechanismBoard.of_guess(rig, refined=True)
 
 
 def refuse_unrefined(core: str) -> None:
@@ -435,13 +409,14 @@ def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismB
     engine = document.pop(_TABLE, None)
     if not isinstance(engine, dict):
         return None
-    rig = rig_of_document(document)
-    named = str(rig.model) if isinstance(rig, MechanismRig) else rig.model.name
+    former = mechanism_of_former(document)
+    rig = MechanismRig.of_document(document if former is None else translated(document, former), former)
+    named = str(rig.model)
     if model is None:
         shipped(named)
     elif not is_named(asked_for(model), named):
         raise PvidError(f"the log is of the mechanism {printable(named)}, and not of --model {model}")
-    elif isinstance(rig, MechanismRig):
+    else:
         rig = replace(rig, model=asked_for(model))
     try:
         return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)

@@ -12,9 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.simulated_sensors import sensor_macros
-from pvid.board.stream_image import StreamImage, c_string
-from pvid.board.stream_rig import SLOWEST
+from pvid.board.stream_image import UNNAMED, StreamImage, c_string
+from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library_q31 import weak_native_q31
@@ -28,7 +27,6 @@ from pvid.link.names import BoardNames
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.edges import with_edges
-from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.run.engine_design import neglected_part
@@ -42,7 +40,7 @@ from pvid.run.engine_design_q31 import (
     with_neglected,
 )
 from pvid.run.mechanism import model_of
-from pvid.run.nominal_run import model_of_rig_file, nominal_run
+from pvid.run.nominal_run import nominal_run
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak_q31 import Rescale, WeakConfigQ31, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakNoiseQ31
 from pvid.setup.weak_sizes import sizes_of_q31
@@ -62,16 +60,18 @@ class MechanismBoardQ31:
 
     Attributes
     ----------
-    rig : of the mechanism; the pendulum has a rig file of its own
+    rig : of the mechanism
     engine : functions, settings and tables
     recording : what the board's sensors count, int32 [ticks, samples]; empty as of MechanismBoard
+    logged : as of MechanismBoard
     """
 
     configure_frame = ConfigureQ31
     matrix = "correlation"  # of an estimate
-    rig: MechanismRig | RigFile
+    rig: MechanismRig
     engine: FixedEngine
     recording: npt.NDArray[np.int32]
+    logged: int | None = None
 
     @classmethod
     def of_recording(
@@ -94,12 +94,13 @@ class MechanismBoardQ31:
         return cls(rig, engine, engine.counts_of(RigSimulation.of(compiled, simulated).run()))
 
     @classmethod
-    def of_rig_file(cls, rig: RigFile) -> MechanismBoardQ31:
-        """As MechanismBoard.of_rig_file."""
+    def of_guess(cls, rig: MechanismRig) -> MechanismBoardQ31:
+        """As MechanismBoard.of_guess."""
         made = nominal_run(rig)
-        engine = fixed_engine(made.compiled, made.run, made.design, made.p)
-        engine = with_neglected(engine, neglected_part(made.compiled, made.run))
-        return cls(rig, engine, _nothing(len(engine.lsb)))
+        run = made.recording.signals
+        engine = fixed_engine(made.compiled, run, made.chosen.design, made.p)
+        engine = with_neglected(engine, neglected_part(made.compiled, run))
+        return cls(rig, engine, engine.counts_of(run)[:MOST_TICKS])
 
     def __post_init__(self) -> None:
         if not self.engine.sample_rate >= SLOWEST:
@@ -159,7 +160,6 @@ class MechanismBoardQ31:
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         engine, name, sizes = self.engine, self.engine.name, self._sizes
-        simulated = isinstance(self.rig, RigFile) and not len(self.recording)
         code = {
             f"{name}_weak_q31.h": files_weak_q31.header(engine.made, sizes, _COMMAND),
             f"{name}_weak_q31.c": files_weak_q31.source(engine.made, engine.parameters, _COMMAND),
@@ -173,18 +173,19 @@ class MechanismBoardQ31:
             f"#define STREAM_N_P {len(engine.parameters.p_bits)}u",
             f"#define STREAM_SAMPLES {self.config.design.model.samples}u",
             f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
-            *sensor_macros(self.rig, dict(zip(engine.sample_names, engine.lsb, strict=True)), self.sample_rate),
+            *[f"#define {one} 0.0f" for one in ("STREAM_PHI_LSB", "STREAM_Y_LSB")],
+            f"#define STREAM_LSB {{{', '.join(['0.0f'] * len(engine.lsb))}}}",
             f"#define STREAM_P_UNIT {{{units}}}",
             f"#define STREAM_NAMES {c_string(self.names.text)}",
         ]
         return StreamImage(
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
             macros=macros,
-            files={**code, **({} if simulated else {"stream_recording.h": _recording(self.recording)})},
+            files={**code, "stream_recording.h": _recording(self.recording)},
             core="q31",
             form="weak",
             identifier="weak_q31",
-            sensor="sensor.c" if simulated else "sensor_recording.c",
+            sensor="sensor_recording.c",
             sizes={macro: str(value) for macro, value in raised(sizes).items()},
         )
 
@@ -229,10 +230,15 @@ class MechanismBoardQ31:
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `of_tables` gives the same board back."""
         lines = [f"{name} = {_written(value)}" for name, value in _flat(self.engine).items()]
-        return "\n".join([self.rig.text(), "[engine]", *lines, ""])
+        return "\n".join([self.rig.text(), "[engine]", f"settings = {self.stream_image.number}", *lines, ""])
+
+    @property
+    def settings(self) -> int:
+        """As of MechanismBoard."""
+        return self.stream_image.number if self.logged is None else self.logged
 
     @classmethod
-    def of_tables(cls, rig: MechanismRig | RigFile, engine: Mapping[str, Any]) -> MechanismBoardQ31:
+    def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoardQ31:
         """From the rig and the table `engine` of the text of a log.
 
         Raises
@@ -240,7 +246,7 @@ class MechanismBoardQ31:
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
-        compiled = model_of_rig_file(rig) if isinstance(rig, RigFile) else model_of(rig)
+        compiled = model_of(rig)
         functions = weak_functions_of(compiled)
         of_jets = dict(zip(functions.jet_names, map(float, engine["jet_reach"]), strict=True))
         made = fixed_weak(functions, JetReaches(run_s=float(engine["run_s"]), of=of_jets))
@@ -267,12 +273,7 @@ class MechanismBoardQ31:
             },
         )
         own = engine_of_parts(compiled, made, config, float(engine["sample_rate"]))
-        return cls(rig, own, _nothing(tables.model.samples))
-
-
-def _nothing(samples: int) -> npt.NDArray[np.int32]:
-    """No recording."""
-    return np.zeros((0, samples), np.int32)
+        return cls(rig, own, np.zeros((0, tables.model.samples), np.int32), engine.get("settings", UNNAMED))
 
 
 def _recording(counts: npt.NDArray[np.int32]) -> str:

@@ -18,6 +18,7 @@ from pvid.settings.kinds import Settings
 from pvid.sim.pendulum import standard_sensors
 
 SLOWEST = 1.0  # ticks a second: the image counts the time between two samples in 32 bits of nanoseconds
+MOST_TICKS = 40_000  # of a simulation that an image contains
 
 
 @dataclass(frozen=True)

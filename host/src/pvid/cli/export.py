@@ -9,7 +9,6 @@ import click
 from pvid.base.console import DONE
 from pvid.cli.input import force_option, log_argument, log_rig
 from pvid.log.rig import mechanism_of_log
-from pvid.rig.file import load
 
 
 @click.command(name="export")
@@ -27,7 +26,7 @@ def command(log: Path, rig_path: Path | None, form: str, out: Path | None) -> in
     """
     from pvid.log.export import export_log
 
-    mechanism = load(rig_path).mechanism if rig_path is not None else mechanism_of_log(log)
+    mechanism = mechanism_of_log(log, rig_path)
     for path in export_log(log, form, out or log.with_suffix(""), mechanism):
         click.echo(path)
     return DONE

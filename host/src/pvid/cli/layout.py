@@ -10,7 +10,6 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.console import DONE
 from pvid.cli.input import NewFile, force_option, log_argument, log_rig
 from pvid.log.rig import mechanism_of_log
-from pvid.rig.file import load
 
 
 @click.command(name="layout")
@@ -28,7 +27,7 @@ def command(log: Path, rig_path: Path | None, program: str, out: Path | None) ->
     """
     from pvid.log.layout import LAYOUTS
 
-    mechanism = load(rig_path).mechanism if rig_path is not None else mechanism_of_log(log)
+    mechanism = mechanism_of_log(log, rig_path)
     text = LAYOUTS[program](mechanism)
     if out is None:
         click.echo(text, nl=False)

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
+from pvid.base.toml_text import toml_document
 from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig, stream_rig
 from pvid.board.target import EMULATORS, HOST_TARGET, open_target
@@ -20,15 +21,16 @@ from pvid.cli.log_text import record_text
 from pvid.link.frames import Configuration, Source
 from pvid.link.port import BAUD
 from pvid.log.live_stream import live_stream
-from pvid.log.mechanism_settings import mechanism_rig
 from pvid.log.reader import Account, Observer
 from pvid.log.recorder import EmulatorSource, Logger, PortSource, TextError
-from pvid.log.rig import LOG_SUFFIX, refuse_to_append
+from pvid.log.rig import LOG_SUFFIX, mechanism_in, refuse_to_append
+from pvid.log.rig_choice import rig_of
 from pvid.log.status import StatusLine
 from pvid.log.values import UNKNOWN_RIG
 from pvid.models.model import Mechanism
+from pvid.models.registry import names
 from pvid.rig.columns import parsed
-from pvid.rig.file import RigFile, load
+from pvid.rig.file import RigFile, is_strong, load, parsed_file
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import is_run, read_recording
 from pvid.show.page import DEFAULT as LIVE_PAGE
@@ -46,18 +48,21 @@ if TYPE_CHECKING:
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file; copied into the log, for verify.")
 @click.option(
     "--model",
-    help="A mechanism of `pvid models`; its shipped rig without --run.  [default: that of the rig file, kapitza]",
+    help="A mechanism of `pvid models`, or a model file.  [default: that of the rig file]",
 )
 @click.option(
     "--run",
     "run_path",
     type=click.Path(path_type=Path),
-    help="Recording of the mechanism: the board's design is made from it, and an emulated board's sensors read it.",
+    help="Recording of the mechanism: the board's design is made from it, and an emulated board's sensors read it.  "
+    "[default: a simulation of the guess in the rig file]",
 )
 @click.option(
     "--core",
     type=click.Choice(("f32", "q31")),
-    help="Arithmetic of a described mechanism's board.  [default: f32]",
+    default="f32",
+    show_default=True,
+    help="Arithmetic of the weak form.",
 )
 @click.option(
     "--refine",
@@ -98,7 +103,7 @@ def command(
     rig_path: Path | None,
     model: str | None,
     run_path: Path | None,
-    core: str | None,
+    core: str,
     refine: bool,
     append: bool,
     restart: bool,
@@ -119,15 +124,16 @@ def command(
     A board that prints lines of numbers instead, as a sketch of Arduino does, is recorded with an OUT that ends in
     .csv: the table of its rows, which `identify` reads. Its line of names is the header.
 
-    A mechanism other than kapitza is named by --model or in the rig file, with a recording of it: --run RUN.csv, and
-    RUN.toml beside it by default. With --model alone it is a shipped one, whose simulated rig the board reads.
+    The board's design is made for a recording, --run RUN.csv, with RUN.toml beside it by default, else for a simulation
+    of the guess in the rig file, as is a shipped mechanism. With --model alone it is that of the mechanism's simulated
+    rig. An emulated board's sensors read the recording or the simulation.
 
     On a terminal the estimates are shown as they arrive; otherwise a status line is printed every 10 s.
     """
     emulated = port in (HOST_TARGET, *EMULATORS)
     if is_run(out):
         frames_only = {
-            "--rig": rig_path, "--model": model, "--run": run_path, "--core": core, "--refine": refine,
+            "--rig": rig_path, "--model": model, "--run": run_path, "--core": core != "f32", "--refine": refine,
             "--append": append, "--restart": restart, "--paced": paced, "--live": live, "--web": web,
             port: emulated,
         }  # fmt: skip
@@ -137,24 +143,25 @@ def command(
                     f"{name} is for frames, whose log is named {out.with_suffix(LOG_SUFFIX)}: {out} is for text"
                 )
         return record_text(port, out, duration, samples, allow_loss, quiet=quiet)
-    described = _described(rig_path, model, run_path, core, refine)
-    rig = None if rig_path is None or described is not None else load(rig_path)
-    if emulated and rig is None and described is None:
-        rig = RigFile.standard()
-    if restart and rig is None and described is None:
-        raise PvidError("--restart needs --rig: the board is restarted with its settings")
-    if refine and rig is None and described is None:
-        raise PvidError("--refine is for a board that is started here: name its rig file with --rig")
-    board = described or (None if rig is None else _board(rig, refine))
-    kept = rig if board is None or isinstance(board, StreamRig) else board
-    text = None if kept is None else kept.text()
+    if rig_path is None and model is None and run_path is None:
+        for needed, given in (("an emulated board", emulated), ("--restart", restart), ("--refine", refine)):
+            if given:
+                raise PvidError(f"{needed} needs a mechanism: name it with --model, or its rig file with --rig")
+    strong = load(rig_path) if rig_path is not None and is_strong(parsed_file(rig_path, toml_document)) else None
+    board: StreamRig | MechanismBoard | MechanismBoardQ31 | None
+    text: str | None
+    if strong is not None:
+        board, text = _strong_board(strong, refine), strong.text()
+    else:
+        board = own = _board(rig_path, model, run_path, core, refine)
+        text = None if own is None else own.text()
+        if own is not None and emulated and samples is None:
+            samples = len(own.recording)
     if append:
-        refuse_to_append(out, rig if kept is rig else text)
-    if described is not None and emulated and samples is None:
-        samples = len(described.recording)
+        refuse_to_append(out, text)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
     begin = None if board is None else _configurations(board, source)
-    mechanism = UNKNOWN_RIG if rig is None else rig.mechanism
+    mechanism = UNKNOWN_RIG if text is None else mechanism_in(toml_document(text)) or UNKNOWN_RIG
     title = f"{port} -> {out}"
     with page(web, out, title) if web is not None else nullcontext("") as address:
         observers: list[Observer] = [live_stream(one, mechanism) for one in live]
@@ -195,44 +202,30 @@ def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
     return StatusLine(sys.stderr, mechanism.model)
 
 
-def _described(
-    rig_path: Path | None, model: str | None, run_path: Path | None, core: str | None, refine: bool
+def _board(
+    rig_path: Path | None, model: str | None, run_path: Path | None, core: str, refine: bool
 ) -> MechanismBoard | MechanismBoardQ31 | None:
-    """The board of a described mechanism; None: it is one of the library's."""
-    described = mechanism_rig(run_path, rig_path, (), model)
-    if described is None:
-        if run_path is not None:
-            raise PvidError("--run is for a described mechanism: name it with --model, or in the rig file")
-        if core is None and (model is None or not refine):
-            return None
-        if core is not None and (model is None or rig_path is not None):
-            raise PvidError("--core is for a mechanism that --model names: a rig file sets that of the pendulum")
-    from pvid.board.mechanism_board import BOARDS, MechanismBoard, refuse_unrefined  # loads SymPy
+    """The board of a mechanism by the weak form; None: none is named."""
+    if rig_path is None and model is None and run_path is None:
+        return None
+    from pvid.board.mechanism_board import BOARDS, MechanismBoard, board_of_guess, refuse_unrefined  # loads SymPy
     from pvid.run.mechanism import model_of
 
-    made = BOARDS[core or "f32"]
     if refine:
-        refuse_unrefined(core or "f32")
-    name = model or "" if described is None else described.model
-    if run_path is None and rig_path is None and isinstance(name, str):
-        return MechanismBoard.of_shipped_rig(name, refined=True) if refine else made.of_shipped_rig(name)
-    if described is None:
-        return None
+        refuse_unrefined(core)
+    if rig_path is None and run_path is None and model in names():
+        return MechanismBoard.of_shipped_rig(model, refined=True) if refine else BOARDS[core].of_shipped_rig(model)
+    rig = rig_of(run_path, rig_path, (), model)
     if run_path is None:
-        raise PvidError(f"{described.model}: name a recording of it with --run, from which the board's design is made")
-    columns = parsed(None, channels_of(model_of(described)))
-    recording = read_recording(run_path, described.sample_rate, columns)
+        return board_of_guess(rig, core, refine)
+    recording = read_recording(run_path, rig.sample_rate, parsed(None, channels_of(model_of(rig))))
     if refine:
-        return MechanismBoard.of_recording(described, recording, refined=True)
-    return made.of_recording(described, recording)
+        return MechanismBoard.of_recording(rig, recording, refined=True)
+    return BOARDS[core].of_recording(rig, recording)
 
 
-def _board(rig: RigFile, refine: bool) -> StreamRig | MechanismBoard | MechanismBoardQ31:
-    """Of the weak form by the engine, whose design is made for the guess of the rig file."""
-    if rig.identifier.form_traits.publishes:
-        from pvid.board.mechanism_board import board_of_rig_file  # loads SymPy
-
-        return board_of_rig_file(rig, refine)
+def _strong_board(rig: RigFile, refine: bool) -> StreamRig:
+    """The board of a rig file that asks for the pendulum's strong form."""
     if refine:
         raise PvidError("--refine is behind the weak form: the rig file has form strong")
     if rig.sample_rate is None:

@@ -18,7 +18,6 @@ from pvid.base.rounding import with_error
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
-from pvid.run.engine_design import Run
 from pvid.run.mechanism import MechanismAnswer
 from pvid.run.mechanism_design import EngineReport, designs_tried, report_for_recording, report_for_rig
 from pvid.settings.engine_cores import ENGINE_CORES
@@ -31,19 +30,13 @@ _SHOWN = 12  # designs of a table
 
 
 def print_design(
-    model: CompiledModel,
-    recording: Recording | None,
-    asked: Asked | None = None,
-    motion: Run | None = None,
-    *,
-    as_json: bool,
+    model: CompiledModel, recording: Recording | None, asked: Asked | None = None, *, as_json: bool
 ) -> int:
     """The engine's design for a recording, or for the simulated rig, its predicted errors, and its cost on a board.
 
     Parameters
     ----------
     asked : the costs to measure; None: none
-    motion : that the board replays, where it is not that of the recording
 
     Returns
     -------
@@ -52,7 +45,7 @@ def print_design(
     report = report_for_rig(model) if recording is None else report_for_recording(model, recording)
     if not as_json:
         _print_report(report)
-    costs = [] if asked is None else _measured(asked, model, recording, motion)
+    costs = [] if asked is None else _measured(asked, model, recording)
     if not all(one.equal for one in costs):
         write_stderr(f"pvid: {costs[0].asked.board.name}: its hashes are not those of this computer")
         return DIFFERENT
@@ -63,14 +56,14 @@ def print_design(
     return DONE if report.chosen.known else NOTHING_IDENTIFIED
 
 
-def _measured(asked: Asked, model: CompiledModel, recording: Recording | None, motion: Run | None) -> list[Cost]:
+def _measured(asked: Asked, model: CompiledModel, recording: Recording | None) -> list[Cost]:
     """The costs on a board; why there is no second stage, and what is wrong with a cost, on standard error."""
     from pvid.board.design_cost import CostedDesign
 
     if recording is None:
         design = CostedDesign.of_shipped_rig(asked, model)
     else:
-        design = CostedDesign.of_recording(asked, model, recording, motion)
+        design = CostedDesign.of_recording(asked, model, recording)
     if design.no_refinement is not None:
         write_stderr(f"pvid: no refinement in C: {design.no_refinement}")
     images: list[RefineConfig | None] = design.images(asked)

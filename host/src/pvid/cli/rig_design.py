@@ -7,34 +7,24 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.model.compiled import CompiledModel
-    from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import MechanismRig
     from pvid.rig.run import Recording
 
 
-def model_of_rig(
-    model: str, rig_path: Path | None, run_path: Path | None
-) -> tuple[CompiledModel, MechanismRig | RigFile | None]:
+def model_of_rig(model: str, rig_path: Path | None, run_path: Path | None) -> tuple[CompiledModel, MechanismRig | None]:
     """The model with the values of a rig file, and that file; the one beside a run counts."""
-    from pvid.log.mechanism_settings import mechanism_rig
-    from pvid.log.rig_settings import rig_for
+    from pvid.log.rig_choice import rig_of
     from pvid.models.mechanisms import compiled_of
     from pvid.models.registry import asked_for
-    from pvid.rig.described import described
 
     compiled = compiled_of(asked_for(model))
     if rig_path is None and run_path is None:
         return compiled, None
-    rig = mechanism_rig(run_path, rig_path, (), model)
-    if rig is not None:
-        return rig.applied(compiled), rig
-    own = rig_for(run_path, rig_path)
-    return described(own).applied(compiled), own
+    rig = rig_of(run_path, rig_path, (), model)
+    return rig.applied(compiled), rig
 
 
-def recorded(
-    compiled: CompiledModel, rig: MechanismRig | RigFile | None, run_path: Path, columns: str | None
-) -> Recording:
+def recorded(compiled: CompiledModel, rig: MechanismRig | None, run_path: Path, columns: str | None) -> Recording:
     """All of a recording in the units of the model.
 
     Raises
@@ -42,15 +32,10 @@ def recorded(
     PvidError
         Where it cannot be read or is damaged.
     """
-    from pvid.cli.mechanism import recording_of
     from pvid.rig.columns import parsed
-    from pvid.rig.described import described
-    from pvid.rig.file import RigFile
     from pvid.rig.mechanism_file import channels_of
     from pvid.rig.run import read_recording
 
-    if isinstance(rig, RigFile):
-        return recording_of(run_path, described(rig), columns)[0]
     rate = None if rig is None else rig.sample_rate
     recording = read_recording(run_path, rate, parsed(columns, channels_of(compiled)))
     recording.refuse_damaged()

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 import click
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar
+from pvid.base.toml_text import toml_document
 from pvid.cli.input import log_argument, log_rig
+from pvid.link.frames import Core
 from pvid.log.reader import LogReader
 from pvid.log.rig import engine_text_of_log, hello_of_log, rig_of_log
-from pvid.rig.file import RigFile, load
+from pvid.log.rig_choice import rig_of
+from pvid.rig.file import RigFile, is_strong, load, parsed_file
 
 if TYPE_CHECKING:
     from pvid.log.verify import EngineBoard
@@ -24,20 +27,18 @@ def _rig_of(log: Path, rig_path: Path | None, model: str | None) -> RigFile | En
     """Of the strong form the rig file; of the weak form the board, whose settings are in the log or follow from the
     rig file."""
     text = None if rig_path is not None else engine_text_of_log(log)
-    if text is not None:
-        from pvid.board.mechanism_board import board_of  # loads SymPy
-
-        return board_of(text, model)
-    if rig_path is None:
+    if text is None and rig_path is None:
         return rig_of_log(log)
-    rig = load(rig_path)
-    if not rig.identifier.form_traits.publishes:
-        return rig
-    from pvid.board.mechanism_board import board_of_rig_file
+    if rig_path is not None and is_strong(parsed_file(rig_path, toml_document)):
+        return load(rig_path)
+    from pvid.board.mechanism_board import board_of, board_of_guess  # loads SymPy
 
-    hello = hello_of_log(log)
+    if text is not None:
+        return board_of(text, model)
+    rig, hello = rig_of(None, rig_path, (), model), hello_of_log(log)
     rate = rig.sample_rate or (None if hello is None else hello.sample_rate)
-    return board_of_rig_file(replace(rig, sample_rate=rate))
+    core = "q31" if hello is not None and hello.core == Core.Q31 else "f32"
+    return board_of_guess(replace(rig, sample_rate=rate), core)
 
 
 @click.command(name="verify")

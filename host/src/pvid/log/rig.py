@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -20,9 +20,10 @@ from pvid.log.board_model import mechanism_of
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.values import UNKNOWN_RIG, Values, is_rate
 from pvid.models.model import Mechanism
+from pvid.models.registry import MODELS
 from pvid.rig.columns import Columns
-from pvid.rig.described import rig_of_document
-from pvid.rig.file import RigFile, without_former_keys
+from pvid.rig.file import RigFile, parsed_file, without_former_keys
+from pvid.rig.former import mechanism_of_former
 from pvid.rig.run import MIN_ROWS, Recording, Run
 
 LOG_SUFFIX = ".pvlog"
@@ -83,9 +84,8 @@ def rig_in(text: str) -> RigFile | None:
         Where it is none.
     """
     document = without_former_keys(toml_document(text))
-    engine = document.pop("engine", None)
-    rig = rig_of_document(document) if isinstance(engine, dict) else RigFile.of_document(document)
-    return rig if isinstance(rig, RigFile) else None
+    is_former = mechanism_of_former(document) is not None
+    return None if "engine" in document and not is_former else RigFile.of_document(_without_engine(document))
 
 
 def described_document_of_log(path: Path) -> dict[str, Any] | None:
@@ -100,9 +100,7 @@ def described_document_of_log(path: Path) -> dict[str, Any] | None:
     text = _text_of_log(path)
     if text is None or rig_in(text) is not None:
         return None
-    document = toml_document(text)
-    del document["engine"]
-    return document
+    return _without_engine(toml_document(text))
 
 
 def document_of_log(path: Path) -> dict[str, Any] | None:
@@ -116,25 +114,44 @@ def document_of_log(path: Path) -> dict[str, Any] | None:
     text = _text_of_log(path)
     if text is None:
         return None
-    return {key: value for key, value in toml_document(text).items() if key != "engine"}
+    return _without_engine(toml_document(text))
 
 
-def mechanism_of_log(path: Path) -> Mechanism:
-    """The mechanism of a log: that of its rig file, else the first one that the board named; UNKNOWN_RIG if none did.
+def _without_engine(document: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in document.items() if key != "engine"}
+
+
+def mechanism_of_log(path: Path, rig_path: Path | None = None) -> Mechanism:
+    """The mechanism of a log: that of its rig, or of a rig file, with the constants in it, else the first one that the
+    board named; UNKNOWN_RIG if none did.
 
     Raises
     ------
     PvidError
-        When the log cannot be read, or the rig file in it is none.
+        When the log or the rig file cannot be read, or is none.
     """
     text = _text_of_log(path)
-    rig = None if text is None else rig_in(text)
-    if rig is not None:
-        return rig.mechanism
+    logged = {} if text is None else toml_document(text)
+    found = mechanism_in(logged if rig_path is None else parsed_file(rig_path, toml_document))
+    if found is not None:
+        return found
     for names in _names_of_log(path):
         with suppress(PvidError):
             return mechanism_of(names.text)
     return UNKNOWN_RIG
+
+
+def mechanism_in(document: Mapping[str, Any]) -> Mechanism | None:
+    """The mechanism of a rig file, of today or of a former version, with the constants in it; None: the file does not
+    name one that has outputs of its own."""
+    table, known = document.get("model"), document.get("known")
+    named = table.get("name") if isinstance(table, Mapping) else mechanism_of_former(document)
+    model = MODELS.get(named) if isinstance(named, str) else None
+    if model is None:
+        return None
+    given = {**(known if isinstance(known, Mapping) else {}), **document}
+    constants = {one.name: given[one.name] for one in model.constants if isinstance(given.get(one.name), int | float)}
+    return Mechanism(model, constants if len(constants) == len(model.constants) else None)
 
 
 def _names_of_log(path: Path) -> Iterator[Names]:
@@ -149,9 +166,8 @@ def names_of_log(path: Path) -> BoardNames | None:
     return None
 
 
-def refuse_to_append(path: Path, rig: RigFile | str | None) -> None:
-    """A log has one rig file: verify, identify and export take it for all of its segments. `rig` of the weak engine is
-    the text.
+def refuse_to_append(path: Path, rig: str | None) -> None:
+    """A log has one rig file, `rig`: verify, identify and export take it for all of its segments.
 
     Raises
     ------
@@ -170,10 +186,7 @@ def refuse_to_append(path: Path, rig: RigFile | str | None) -> None:
         raise PvidError(f"cannot read {path}: {error.strerror}") from error
     if stream.account.bytes and not stream.is_log and not stream.account.frames:
         raise PvidError(f"{path} is not a log of pvid: nothing is appended")
-    if rig is None or stream.rig is None:
-        return
-    of_engine = isinstance(rig, str) or is_engine_text(stream.rig)
-    if stream.rig != rig if of_engine else rig_in(stream.rig) != rig:
+    if rig is not None and stream.rig is not None and stream.rig != rig:
         raise PvidError(f"{path} was recorded with another rig file: record to a new log")
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import key_and_value
-from pvid.log.rig import rig_of_log
+from pvid.log.rig import described_document_of_log, rig_of_log
+from pvid.log.rig_choice import document_for
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.file import RigFile, check_setting, load, rig_path_of
+from pvid.rig.file import RigFile, check_setting, is_strong, load, rig_path_of
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import is_run
 
 
@@ -35,7 +38,7 @@ def rig_for(run_path: Path | None, rig_path: Path | None, settings: Iterable[str
     if rig_path is not None:
         return load(rig_path, given)
     if run_path is not None and not is_run(run_path):
-        rig = rig_of_log(run_path)
+        rig = _of_description(run_path) or rig_of_log(run_path)
         if rig is not None:
             return RigFile.parse(rig.text(), given) if given else rig
     elif run_path is not None and (beside := rig_path_of(run_path)).is_file():
@@ -52,6 +55,32 @@ def rig_for(run_path: Path | None, rig_path: Path | None, settings: Iterable[str
             f"another mechanism is named by --model"
         )
     return RigFile.parse("", given)
+
+
+def _of_description(log: Path) -> RigFile | None:
+    """Of a log of the weak form, whose rig is that of the description."""
+    document = described_document_of_log(log) or {}
+    if document.get("model", {}).get("name") != DEFAULT:
+        return None
+    rig = MechanismRig.of_document(document)
+    sensor = {f"{name}_lsb": keys["resolution"] for name, keys in rig.sensor.items() if "resolution" in keys}
+    nominal = {name: rig.nominal[name] for name in ("g", "l2", "rho2") if name in rig.nominal}
+    tables: dict[str, Any] = {"sensor": sensor, "nominal": nominal}
+    return RigFile.of_document({"l1": rig.known["l1"], "sample_rate": rig.sample_rate, **tables})
+
+
+def strong_rig(
+    run_path: Path, rig_path: Path | None, settings: Iterable[str], model: str | None, form: str | None
+) -> RigFile | None:
+    """The pendulum's rig file, where the file or `form` asks for the strong form that is written for it by hand."""
+    document = document_for(run_path, rig_path, None) if model in (None, DEFAULT) else {}
+    given = list(settings)
+    chosen = form or ("strong" if is_strong(document) or "identifier.form=strong" in given else None)
+    is_described = "known" in document or any(isinstance(one, dict) for one in document.get("sensor", {}).values())
+    if chosen != "strong" or is_described or model not in (None, DEFAULT):
+        return None
+    rig = rig_for(run_path, rig_path, given)
+    return replace(rig, identifier=replace(rig.identifier, form="strong"))
 
 
 def parse_settings(settings: Iterable[str]) -> dict[str, Any]:

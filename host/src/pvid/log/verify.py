@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import StreamImage, settings_number
+from pvid.board.stream_image import UNNAMED, settings_number
 from pvid.board.stream_rig import stream_rig
 from pvid.cases import case_of
 from pvid.link.frames import (
@@ -59,7 +59,7 @@ class EngineBoard(Protocol):
     """A board that identifies by the weak engine: MechanismBoard of pvid.board, and that in fixed point."""
 
     @property
-    def stream_image(self) -> StreamImage: ...
+    def settings(self) -> int: ...
 
     @property
     def p_names(self) -> tuple[str, ...]: ...
@@ -340,8 +340,8 @@ class Verifier:
         if isinstance(self.rig, RigFile):
             return _StrongTwin(self._config(self.rig, configuration)), P_NAMES
         if self._number is None:
-            self._number = self.rig.stream_image.number
-        if configuration.settings != self._number:
+            self._number = self.rig.settings
+        if self._number not in (configuration.settings, UNNAMED):
             raise PvidError(
                 "the board's image was made for other settings or another model than the log's, or by another version"
             )

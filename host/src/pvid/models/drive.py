@@ -134,6 +134,19 @@ class Sum:
         return np.asarray(np.sum([part.values(t, order) for part in self.parts], axis=0))
 
 
+@dataclass(frozen=True)
+class Scaled:
+    """A drive that is `gain` times as large and `faster` times as fast."""
+
+    drive: Drive
+    gain: float
+    faster: float
+
+    def values(self, t: Times, order: int = 0) -> Float:
+        """Derivative of this order."""
+        return self.gain * self.faster**order * self.drive.values(self.faster * np.asarray(t), order)
+
+
 def _refuse_derivative(what: str, order: int) -> None:
     if order:
         has_none = f"the equations need derivative {order} of a driven signal, and {what} has none"

@@ -330,6 +330,12 @@ def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile
     return parsed_file(path, lambda text: RigFile.parse(text, settings))
 
 
+def is_strong(document: Mapping[str, Any]) -> bool:
+    """Whether a file asks for the pendulum's strong form."""
+    identifier = document.get("identifier")
+    return isinstance(identifier, Mapping) and identifier.get("form") == "strong"
+
+
 def parsed_file(path: str | Path, parse: Callable[[str], _Parsed]) -> _Parsed:
     """What `parse` makes of a file's text; PvidError names the file, and what `parse` names."""
     try:

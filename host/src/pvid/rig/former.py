@@ -38,7 +38,7 @@ def translated(document: Mapping[str, Any], name: str) -> dict[str, Any]:
         return out
     for key, place in former.MOVED.items():
         value = _taken(out, key)
-        if value is not None and not (place.endswith(".reach") and value == 0):
+        if value is not None and not (place.endswith((".reach", ".resolution")) and value == 0):
             _put(out, place, value)
     for key, (place, whole) in former.RELATIVE.items():
         share, of = _taken(out, key), _get(out, whole)

@@ -15,9 +15,10 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
+from pvid.base.toml_text import toml_document
 from pvid.log.history import History, Rates, envelope
 from pvid.log.reader import LogStream
-from pvid.log.rig import rig_in
+from pvid.log.rig import mechanism_in
 from pvid.log.tail import LogTail
 from pvid.log.words import (
     board_words,
@@ -86,9 +87,9 @@ class LiveState(threading.Thread):
     def _load_rig(self) -> None:
         """Of another version, or a described mechanism: the page does without physical parameters."""
         with suppress(PvidError):
-            rig = None if self._rig is None else rig_in(self._rig)
-            if rig is not None:
-                self._history.know(rig.mechanism)
+            mechanism = None if self._rig is None else mechanism_in(toml_document(self._rig))
+            if mechanism is not None:
+                self._history.know(mechanism)
 
     def as_json(self) -> bytes:
         """The present state; page.js draws it."""

@@ -10,7 +10,7 @@ MOVED = {
     "sensor.y_delay": "sensor.y.delay",
     "sensor.y_gain_sd": "sensor.y.gain_sd",
 }
-"""Key -> key; a range of 0 was none."""
+"""Key -> key; a range or a resolution of 0 was none."""
 
 RELATIVE = {"l1_sd": ("known_sd.l1", "known.l1")}
 """Key -> key of a value that is no longer relative, and what it was relative to."""
