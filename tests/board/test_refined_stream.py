@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import field_board
 import numpy as np
 import pytest
 from program import pvid
@@ -42,8 +43,8 @@ EVERY = 400  # ticks between estimates where all of them are compared
 
 @pytest.fixture(scope="module")
 def pendulum() -> MechanismBoard:
-    """The board of a rig file; its sensors read a simulation of the full equations."""
-    board = MechanismBoard.of_rig_file(RigFile.standard(), refined=True)
+    """The board of a rig; its sensors read a simulation of the full equations."""
+    board = MechanismBoard.of_guess(field_board.rig(), refined=True)
     found = simulate(sensors=standard_sensors(), truth="full", duration=TICKS / 1000 + 1, seed=1).run
     return replace(board, recording=board.readings(found.y, found.phi)[:TICKS])
 
@@ -149,12 +150,13 @@ def test_what_has_no_second_stage_is_refused(tmp_path: Path) -> None:
         assert done.returncode == 2, done.stderr
         return done.stderr
 
-    assert "float32 alone" in refusal("--model", "kapitza", "--core", "q31")
     rig = tmp_path / "rig.toml"
-    for changes, why in (({"core": "q31"}, "float32 alone"), ({"form": "strong"}, "behind the weak form")):
-        own = RigFile.standard()
-        replace(own, identifier=replace(own.identifier, **changes)).write(rig)  # type: ignore[arg-type]
-        assert why in refusal("--rig", str(rig))
+    field_board.rig().write(rig)
+    for given in (("--model", "kapitza"), ("--rig", str(rig))):
+        assert "float32 alone" in refusal(*given, "--core", "q31")
+    own = RigFile.standard()
+    replace(own, identifier=replace(own.identifier, form="strong")).write(rig)
+    assert "behind the weak form" in refusal("--rig", str(rig))
 
 
 def test_a_shipped_rig_has_both_stages_of_its_full_equations() -> None:

@@ -16,7 +16,7 @@ from pvid.board import design_cost, sizes
 from pvid.board.boards import BOARDS, Board
 from pvid.board.replay_image import ReplayReport
 from pvid.cli.main import commands
-from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.run import refine_design
 from pvid.settings.refine import RefineConfig
 
@@ -40,7 +40,7 @@ def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rig") / "rig.toml"
-    RigFile.standard().write(path)
+    MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(path)
     return path
 
 
@@ -79,10 +79,10 @@ def test_the_table_shows_fixed_point_and_warns_of_a_tick_that_is_too_long(pendul
     assert "weak form: the longest tick takes longer than from sample to sample" in done.stderr
 
 
-def test_the_drive_of_a_rig_file_is_replayed_in_the_core_of_the_file(rig: Path) -> None:
+def test_a_simulation_of_the_guess_is_replayed_in_the_core_that_is_asked_for(rig: Path) -> None:
     """Without a recording."""
     given = ("design", "--rig", rig, "--duration", "10", "--on", BOARD, "--json")
-    (found,) = json.loads(pvid(*given, "--set", "identifier.core=q31").stdout)["cost"]
+    (found,) = json.loads(pvid(*given, "--core", "q31").stdout)["cost"]
     assert found["core"] == "q31" and 0 < found["mean"] < found["longest"] and 0 < found["ticks"] <= 10_000
 
 

@@ -43,9 +43,9 @@ def test_log_of_a_former_version_is_read_as_before(
     if truth is None:
         return
     found = json.loads(pvid("identify", log, "--json").stdout)
-    assert found["identified"] and found["samples"] >= samples
+    assert found["verdict"] == "good" and found["samples"] >= samples
     for parameter, value in truth.items():
         one = found["parameters"][parameter]
         assert abs(one["value"] - value) < 4 * one["se"], parameter
-    if name.startswith("pendulum"):  # y_gain_sd = 0.002, l1_sd = 0.001
-        assert found["parameters"]["w"]["se_scale"] == pytest.approx(0.002 * PENDULUM["w"], rel=0.2)
+    if name.startswith("pendulum"):  # that of the former version, which contains what small angles neglect
+        assert found["parameters"]["w"]["se"] == pytest.approx(0.52, rel=0.1)

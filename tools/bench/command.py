@@ -19,6 +19,7 @@ from pvid.board.boards import BOARDS
 from pvid.cli.page_table import UPDATE, markdown, put_table
 from pvid.core.native import Native
 from pvid.core.sources import build_folder
+from pvid.settings.enums import Core
 
 if TYPE_CHECKING:
     from bench.recorded_rigs import Rig
@@ -681,7 +682,7 @@ def bench_field_log(target: str, samples: int, out: Path) -> int:
 @click.option("--form", default="weak", show_default=True, type=click.Choice(["weak", "strong"]))
 @click.option("--samples", default=20_000, show_default=True, help="At each passage.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("year.pvlog"), show_default=True)
-def bench_year(target: str, core: str, form: str, samples: int, out: Path) -> int:
+def bench_year(target: str, core: Core, form: str, samples: int, out: Path) -> int:
     """A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page."""
     from bench.year import emulated_year, passages_of_a_year, rig_of
 

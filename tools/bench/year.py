@@ -17,9 +17,10 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
-from pvid.board.mechanism_board import board_of_guess
+from pvid.board.mechanism_board import MechanismBoard, board_of_guess
+from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import stream_rig
+from pvid.board.stream_rig import StreamRig, stream_rig
 from pvid.board.target import HOST_TARGET, open_target
 from pvid.link.frames import Configuration, Raw, RawCount, Source
 from pvid.log.export import FORMATS, export_log
@@ -89,8 +90,12 @@ def emulated_year(
     """
     if rig.sample_rate is None:
         raise PvidError("the rig file has no sample_rate")
-    board = stream_rig(rig, rig.sample_rate) if isinstance(rig, RigFile) else board_of_guess(rig, core)
-    kept = rig if isinstance(rig, RigFile) else board
+    board: StreamRig | MechanismBoard | MechanismBoardQ31
+    kept: RigFile | MechanismBoard | MechanismBoardQ31
+    if isinstance(rig, RigFile):
+        board, kept = stream_rig(rig, rig.sample_rate), rig
+    else:
+        board = kept = board_of_guess(rig, core)
     mechanism = mechanism_in(toml_document(kept.text()))
     assert mechanism is not None
     settings = settings_number(board)
@@ -228,7 +233,7 @@ def _faults_of_page(log: Path) -> Iterator[str]:
             yield f"the page's time axis of {curve['label']} does not go on"
 
 
-def rig_of(core: str, form: str) -> RigFile | MechanismRig:
+def rig_of(core: Core, form: str) -> RigFile | MechanismRig:
     """The standard rig with that core and form."""
     if form == "weak":
         return MechanismRig("kapitza", 1000.0, known={"l1": 0.3})

@@ -84,7 +84,7 @@ def command(
         return print_design(compiled_of(model), None, asked, as_json=as_json)
     rig = rig_of(run_path, rig_path, settings, model, columns)
     if run_path is not None:
-        recording, compiled = recording_of(run_path, of_pendulum(rig), columns)
+        recording, compiled = recording_of(run_path, rig, columns)
         return print_design(compiled, recording, asked, as_json=as_json)
     if rig.sample_rate is None and rig.model in names():
         rig = replace(rig, sample_rate=simulated_rig(str(rig.model)).sample_rate)
