@@ -6,10 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from refinements import PENDULUM, answer_of, changed, errors_of, refined_of, refined_small, run_of, shaken, subject
+from refinements import (
+    PENDULUM,
+    answer_of,
+    changed,
+    errors_of,
+    played,
+    refined_of,
+    refined_small,
+    run_of,
+    shaken,
+    subject,
+)
 
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.mechanism import MechanismAnswer, Refinement
+from pvid.run.mechanism_advice import judged_by_prediction
 from pvid.run.refined import GOOD
 from pvid.run.refined_answer import (
     AGREE,
@@ -151,3 +163,13 @@ def test_a_scale_moves_a_refined_estimate_by_what_a_refinement_of_scaled_samples
     np.testing.assert_allclose(found[0, :2], apart, rtol=0.15)
     truth = subject("isolator").truth
     np.testing.assert_allclose(found[-1, :2], [0.01 * truth["c"], 0.02 * truth["k"]], rtol=0.05)  # of the clock
+
+
+def test_a_refined_answer_predicts_with_the_extras_that_it_needs() -> None:
+    """A play of the sensor: the equations of the weak form alone predict its readings to fifty times the noise."""
+    run = run_of("isolator")
+    late = changed(run, x=played(run.signals["x"], 5e-4))
+    answer, refined, text = refined_answer(answer_of("isolator", late))
+    assert refined is not None and "play" in refined.extras
+    (sensor,) = judged_by_prediction(replace(answer, refinement=Refinement(True, text, refined))).prediction
+    assert sensor.of_noise is not None and sensor.of_noise < 5

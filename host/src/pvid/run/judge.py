@@ -32,7 +32,7 @@ from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
 from pvid.run.mechanism import MechanismAnswer, gains_of, noise_of, shifts_of, values_of_found
 from pvid.run.refined import Problem, Refined, Stretch, refined
-from pvid.run.refined_mechanism import prior_about
+from pvid.run.refined_mechanism import RefinedMechanism, prior_about
 from pvid.run.sensor_prediction import SensorPrediction
 from pvid.run.validation import Motion
 
@@ -113,10 +113,10 @@ def with_prediction(answer: MechanismAnswer) -> MechanismAnswer:
     try:
         with np.errstate(all="ignore"):
             found, trial = answer.found, _Trial(answer)
-            usual = trial.estimates(_USUAL, found.design, found.fit.start, _WEIGHTS[:1])
-            if usual and answer.refinement is not None and answer.refinement.adopted:
-                again = trial.refined(usual[0])
-                usual = usual if again is None or not again.sensors else [again]
+            if trial.fit is not None:
+                usual = [trial.of_fit(trial.fit)]
+            else:
+                usual = trial.estimates(_USUAL, found.design, found.fit.start, _WEIGHTS[:1])
     except FAILURES:  # they cannot be simulated on this run
         return answer
     return replace(answer, prediction=usual[0].sensors) if usual else answer
@@ -182,9 +182,18 @@ class _Trial:
     def __init__(self, answer: MechanismAnswer) -> None:
         self._answer, self._compiled = answer, ready(answer.model)
         self._parts = _parts(answer.recording)
+        refinement, rate = answer.refinement, answer.recording.sample_rate
+        self.fit = refinement.fit if refinement is not None and refinement.adopted else None
+        self._every = 1 if self.fit is None else round(rate / self.fit.problem.measured.rate)
+        if self.fit is not None:
+            early, late = ([(a // self._every, b // self._every) for a, b in part] for part in self._parts)
+            self._parts = early, late
+            self._motion = Motion(self.fit.problem, self.fit.found.r)
+            self._block = self._motion.block(answer.found.design.window_s, _PARTS)
+            return
         known = all(one.status == "identified" for one in answer.found.judged)
         p = answer.found.p if known else np.array([one.guess for one in answer.model.unknowns])
-        self._motion = Motion(answer.model, answer.recording.run, answer.recording.sample_rate, p)
+        self._motion = Motion.near(answer.model, answer.recording.run, rate, p)
         self._block = self._motion.block(answer.found.design.window_s, _PARTS)
 
     def estimates(
@@ -231,11 +240,24 @@ class _Trial:
         of_recordings = {
             own.name: motion.compared(z[inside], x[inside])
             for own in self._answer.recording.origins
-            if (inside := (own.first <= first) & (first < own.end)).any()
+            if (inside := (own.first <= self._every * first) & (self._every * first < own.end)).any()
         }
         return replace(
             one, sensors=sensors, of_recordings=of_recordings, score=float(np.mean(np.log(np.maximum(rms, motion.sd))))
         )
+
+    def of_fit(self, fit: RefinedMechanism) -> Candidate:
+        """The refinement that gave the answer, with one of each half from there on, scored."""
+        problem, found = fit.problem, fit.found
+        prior = replace(prior_about(problem, found.r), free=np.diag(found.covariance) > 0)
+        halves = []
+        for parts in self._parts:
+            half = self._motion.within(parts, problem.measured.sd)
+            samples = min(found.cut.samples, half.longest)
+            halves.append(refined(half, prior, (samples,), most=_PASSES).r)
+        p, covariance = problem.values(found, problem.kernel.made.places_of_p)
+        usual = self._answer.found.fit
+        return self._scored(Candidate(_USUAL, p, np.sqrt(np.diag(covariance)), (halves[0], halves[1]), usual))
 
     def refined(self, best: Candidate) -> Candidate | None:
         """The refinement from an estimate on: it is weighted by what that reaches, not by the sensors' noise."""

@@ -69,20 +69,29 @@ class Motion:
 
     Parameters
     ----------
-    signals : by name [n]; NaN where a sample is missing
-    rate : of the samples [Hz]
-    p : parameters near those that will be simulated [n_p]: the integration's step and the width of the signs are theirs
-
-    Raises
-    ------
-    PvidError
-        Where the equations cannot be simulated: an input is a derivative that no recorded signal gives, or the
-        recording is too short.
+    problem : of the recording
+    r : parameters and settings; those that p does not have stay
     """
 
-    def __init__(self, model: CompiledModel, signals: Mapping[str, Float], rate: float, p: Float) -> None:
-        self.model = model
-        self.problem, self._r = problem_of(model, signals, rate, start_of(kernel_of(model), p))
+    def __init__(self, problem: Problem, r: Float) -> None:
+        self.model, self.problem, self._r = problem.kernel.made.model, problem, r
+
+    @classmethod
+    def near(cls, model: CompiledModel, signals: Mapping[str, Float], rate: float, p: Float) -> Motion:
+        """From signals by name [n], NaN where a sample is missing, sampled at `rate` [Hz].
+
+        Parameters
+        ----------
+        p : parameters near those that will be simulated [n_p]: the integration's step and the width of the signs are
+            theirs
+
+        Raises
+        ------
+        PvidError
+            Where the equations cannot be simulated: an input is a derivative that no recorded signal gives, or the
+            recording is too short.
+        """
+        return cls(*problem_of(model, signals, rate, start_of(kernel_of(model), p)))
 
     @property
     def sd(self) -> Float:
@@ -161,7 +170,7 @@ def validated(
     """
     rate = recording.sample_rate
     with np.errstate(all="ignore"):
-        motion = Motion(model, recording.run, rate, p)
+        motion = Motion.near(model, recording.run, rate, p)
         problem = motion.within([(0, len(recording))])
         if not problem.measured.stretches or problem.longest < _BLOCKS * SHORTEST:
             raise PvidError(f"the recording is too short to predict it in {_BLOCKS} blocks of {SHORTEST} samples")
@@ -201,7 +210,7 @@ def simulation_of(model: CompiledModel, recording: Recording, p: Float) -> dict[
     """
     recording = recording.whole()
     with np.errstate(all="ignore"):
-        motion = Motion(model, recording.signals, recording.sample_rate, p)
+        motion = Motion.near(model, recording.signals, recording.sample_rate, p)
         problem = motion.within([(0, len(recording))])
         cut, simulated = motion.simulated(motion.r_of(p), problem, problem.longest)
     if not np.isfinite(simulated).all():
