@@ -9,10 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pvid.base.errors import PvidError
-from pvid.models.mechanisms import compiled_of
-from pvid.rig.described import described
 from pvid.rig.file import Identifier, Nominal, Refine, RigFile, Sensor, load
-from pvid.run.mechanism import model_of
 from pvid.setup.f32 import strong_config
 
 
@@ -292,27 +289,6 @@ def test_an_unknown_model_is_refused_with_those_that_are_known() -> None:
         assert str(told.value).startswith('[model] name must be "kapitza", not ')
     with pytest.raises(PvidError, match=r"\[model\] 'kind' is not a key of a rig file"):
         RigFile.parse('l1 = 0.3\n[model]\nkind = "kapitza"')
-
-
-def test_a_rig_file_in_the_terms_of_the_description() -> None:
-    own = RigFile.parse(
-        "l1 = 0.25\nl1_sd = 0.002\nsample_rate = 500\n[sensor]\nphi_lsb = 1e-3\ny_gain_sd = 0.004\nphi_zero = 0.1\n"
-        "[nominal]\nl2 = 0.1\nrho2 = 0.08\ng = 9.5"
-    )
-    found = described(own)
-    assert (found.model, found.sample_rate) == ("kapitza", 500.0)
-    assert found.known == {"l1": 0.25} and found.known_sd == {"l1": pytest.approx(0.0005)}
-    assert found.sensor == {"phi": {"resolution": 1e-3}, "y": {"resolution": 5e-6, "gain_sd": 0.004}}
-    ratio = (0.1 / 0.08) ** 2
-    expected = {"w": 38.0, "d1": 1 + ratio * (1 + 0.25 / 0.1), "d2": 2.5 * ratio, "c": 0.1}
-    assert found.nominal == pytest.approx(expected)
-    assert found.refine == {"dry_friction": False, "slant": False}
-
-
-def test_the_options_of_the_refinement_reach_the_description() -> None:
-    own = RigFile.parse("l1 = 0.25\n[refine]\nslant = true")
-    assert model_of(described(own)).options == ("dry_friction",)
-    assert [one.name for one in fields(own.refine)] == list(compiled_of("kapitza").options)
 
 
 def test_a_block_makes_points_of_means_in_the_strong_form() -> None:

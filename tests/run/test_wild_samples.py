@@ -10,7 +10,7 @@ from conftest import ROOT
 
 from pvid.base.errors import PvidError
 from pvid.cli.mechanism import recording_of
-from pvid.log.mechanism_settings import mechanism_rig
+from pvid.log.rig_choice import rig_of
 from pvid.models.mechanisms import compiled_of, names
 from pvid.rig.run import Recording
 from pvid.run.mechanism import identify_mechanism
@@ -40,7 +40,7 @@ def test_a_mechanism_has_none(name: str, imperfections: Imperfections) -> None:
 @pytest.mark.parametrize("name", ["bicycle_fork", "motor_generator", "torso_lift"])
 def test_a_real_recording_has_none(name: str) -> None:
     path = RECORDINGS / name / "identify.csv.gz"
-    rig = mechanism_rig(path, None, (), str(RECORDINGS / f"{name}.py"))
+    rig = rig_of(path, None, (), str(RECORDINGS / f"{name}.py"))
     assert rig is not None
     recording, _ = recording_of(path, rig, None)
     assert not [note for note in recording.notes if "wild" in note]

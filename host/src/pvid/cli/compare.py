@@ -13,11 +13,13 @@ from rich.console import Console
 from rich.table import Table
 
 from pvid.base.console import DIFFERENT, DONE, progress_bar
-from pvid.cli.input import form_options, read_input
+from pvid.cli.input import form_options, print_notes
 from pvid.core.native import Native
+from pvid.log.rig import LOG_SUFFIX, run_of_log
 from pvid.log.rig_choice import rig_of
 from pvid.log.rig_settings import strong_rig
-from pvid.rig.sensor_steps import resolved
+from pvid.rig.columns import parsed
+from pvid.rig.run import read_run
 
 if TYPE_CHECKING:
     from pvid.board.compare_on import Outcome
@@ -64,8 +66,12 @@ def command(
         law = None if law == "stationary" and form != "strong" else law
         given = {"core": core, "form": form, "law": law}
         return _shown(compare_recording(run_path, rig, columns, targets_of(targets), **given))
-    run = read_input(run_path, strong, columns)
-    strong = resolved(strong, run)
+    run = (
+        run_of_log(run_path)
+        if run_path.suffix == LOG_SUFFIX
+        else read_run(run_path, strong.sample_rate, parsed(columns))
+    )
+    print_notes(run.notes)
     native = Native()
     outcomes: list[Outcome] = []
     for arithmetic in ["f32", "q31"] if core == "all" else [core or strong.identifier.core_traits.in_c]:

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from pvid.base.console import write_stderr
-from pvid.base.errors import PvidError
 from pvid.base.figure_file import format_of
 from pvid.base.replacing import refuse_foreign, replacing
-from pvid.log.rig import LOG_SUFFIX, run_of_log
-from pvid.rig.columns import parsed
-from pvid.rig.file import RigFile
-from pvid.rig.run import Run, read_run
 
 Command = Callable[..., Any]
 
@@ -80,11 +74,6 @@ def form_options(function: Command) -> Command:
     return function
 
 
-def with_overrides(rig: RigFile, **overrides: str | None) -> RigFile:
-    given = {name: value for name, value in overrides.items() if value is not None}
-    return replace(rig, identifier=replace(rig.identifier, **given)) if given else rig  # type: ignore[arg-type]
-
-
 def listed_names(given: Iterable[str]) -> list[str]:
     """Names of a repeated option with lists of names, each once."""
     return list(dict.fromkeys(name.strip() for one in given for name in one.split(",") if name.strip()))
@@ -126,37 +115,6 @@ class FigurePath(NewFile):
         """See click."""
         format_of(Path(os.fsdecode(value)))
         return super().convert(value, param, ctx)
-
-
-def read_input(path: Path, rig: RigFile, columns: str | None = None, *, whole: bool = False) -> Run:
-    """The run in a file or a log; prints what was done to it. See `run_of`."""
-    run = run_of(path, rig, columns, whole=whole)
-    print_notes(run.notes)
-    return run
-
-
-def run_of(path: Path, rig: RigFile, columns: str | None, *, whole: bool) -> Run:
-    """The run in a file or a log.
-
-    Parameters
-    ----------
-    whole
-        Only the longest stretch without a missing tick.
-
-    Raises
-    ------
-    PvidError
-        When it cannot be read.
-    """
-    from pvid.run.skew import aligned  # SciPy, whose 40 MB a logger does without
-
-    if path.suffix == LOG_SUFFIX:
-        if columns is not None:
-            raise PvidError(f"{path} is a log with known columns: omit --columns")
-        return aligned(run_of_log(path), rig.sensor.y_delay)
-    run = aligned(read_run(path, rig.sample_rate, parsed(columns)), rig.sensor.y_delay)
-    run.refuse_damaged()
-    return run.whole() if whole else run
 
 
 def print_notes(notes: Iterable[str]) -> None:

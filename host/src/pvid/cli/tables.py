@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,6 @@ import click
 from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cases import CASES
-from pvid.cli.input import with_overrides
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
 from pvid.rig.file import load
@@ -64,7 +64,8 @@ def command(
     if rig_path is None:
         raise PvidError(f"--form {form} needs --rig FILE")
     core = core or "f32"
-    rig = with_overrides(load(rig_path), form=form, core=core)
+    rig = load(rig_path)
+    rig = replace(rig, identifier=replace(rig.identifier, form=form, core=core))  # type: ignore[arg-type]
     made_by = f"pvid tables --form {form} --core {core} --rig {rig_path.name}"
     if rig.sample_rate is None:
         raise PvidError(f"{rig_path}: sample_rate is required to compute the tables")

@@ -64,7 +64,7 @@ def _of_description(log: Path) -> RigFile | None:
         return None
     rig = MechanismRig.of_document(document)
     sensor = {f"{name}_lsb": keys["resolution"] for name, keys in rig.sensor.items() if "resolution" in keys}
-    nominal = {name: rig.nominal[name] for name in ("g", "l2", "rho2") if name in rig.nominal}
+    nominal = {name: rig.nominal[name] for name in MODELS[DEFAULT].physical_names if name in rig.nominal}
     tables: dict[str, Any] = {"sensor": sensor, "nominal": nominal}
     return RigFile.of_document({"l1": rig.known["l1"], "sample_rate": rig.sample_rate, **tables})
 

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.model.compiled import CompiledModel
-from pvid.rig.file import RigFile, Unset
-from pvid.rig.run import Recording, Run
+from pvid.rig.run import Recording
 
 Float = npt.NDArray[np.float64]
 
@@ -45,26 +44,6 @@ def with_resolutions(recording: Recording, model: CompiledModel) -> tuple[Record
     if len(notes) == len(recording.notes):
         return recording, model
     return replace(recording, notes=tuple(notes)), replace(model, signals=tuple(signals))
-
-
-def resolved(rig: RigFile, run: Run) -> RigFile:
-    """The rig with the encoder's resolution that the run shows, where the rig file does not give it.
-
-    It still counts as not given, so that the same run in another unit shows another.
-    """
-    if not isinstance(rig.sensor.phi_lsb, Unset):
-        return rig
-    step = resolution_of(run.phi)
-    if step is None or step > _COARSEST or abs(step / rig.sensor.phi_lsb - 1) < _SAME:
-        return rig
-    return replace(rig, sensor=replace(rig.sensor, phi_lsb=Unset(f"{step:.{_DIGITS}g}")))
-
-
-def resolution_note(given: RigFile, rig: RigFile) -> tuple[str, ...]:
-    """What `resolved` made of the rig that was given, as a sentence."""
-    if rig.sensor.phi_lsb == given.sensor.phi_lsb:
-        return ()
-    return (f"phi moves in steps of {rig.sensor.phi_lsb:g} rad: taken as phi_lsb, which is not given",)
 
 
 def resolution_of(values: npt.ArrayLike) -> float | None:

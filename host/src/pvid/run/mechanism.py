@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +35,7 @@ from pvid.rig.run import Recording
 from pvid.run.sensor_prediction import SensorPrediction
 
 if TYPE_CHECKING:
-    from pvid.run.refined_mechanism import RefinedMechanism
+    from pvid.run.refined import Problem, Refined
 
 Float = npt.NDArray[np.float64]
 
@@ -78,6 +78,19 @@ class Value:
         return out | ({} if self.below is None else {"below": self.below})
 
 
+class Fit(Protocol):
+    """An outcome of a refinement, as pvid.run.refined_mechanism makes it."""
+
+    @property
+    def problem(self) -> Problem: ...
+
+    @property
+    def found(self) -> Refined: ...
+
+    @property
+    def extras(self) -> Mapping[str, tuple[float, float]]: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Refinement:
     """What became of a refinement.
@@ -91,7 +104,7 @@ class Refinement:
 
     adopted: bool
     text: str
-    fit: RefinedMechanism | None = None
+    fit: Fit | None = None
 
     def as_json(self) -> dict[str, Any]:
         """For `identify --json`; parameters that the weak form does not have by name."""
