@@ -30,7 +30,7 @@ from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
-from pvid.run.mechanism import Fit, MechanismAnswer, gains_of, noise_of, shifts_of, values_of_found
+from pvid.run.mechanism import MechanismAnswer, RefinedFit, gains_of, noise_of, shifts_of, values_of_found
 from pvid.run.refined import Problem, Refined, Stretch, refined
 from pvid.run.refined_mechanism import prior_about
 from pvid.run.sensor_prediction import SensorPrediction
@@ -246,7 +246,7 @@ class _Trial:
             one, sensors=sensors, of_recordings=of_recordings, score=float(np.mean(np.log(np.maximum(rms, motion.sd))))
         )
 
-    def of_fit(self, fit: Fit) -> Candidate:
+    def of_fit(self, fit: RefinedFit) -> Candidate:
         """The refinement that gave the answer, with one of each half from there on, scored."""
         problem, found = fit.problem, fit.found
         prior = replace(prior_about(problem, found.r), free=np.diag(found.covariance) > 0)

@@ -78,7 +78,7 @@ class Value:
         return out | ({} if self.below is None else {"below": self.below})
 
 
-class Fit(Protocol):
+class RefinedFit(Protocol):
     """An outcome of a refinement, as pvid.run.refined_mechanism makes it."""
 
     @property
@@ -104,7 +104,7 @@ class Refinement:
 
     adopted: bool
     text: str
-    fit: Fit | None = None
+    fit: RefinedFit | None = None
 
     def as_json(self) -> dict[str, Any]:
         """For `identify --json`; parameters that the weak form does not have by name."""

@@ -19,7 +19,7 @@ from matplotlib.figure import SubFigure
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
-from pvid.run.mechanism import Fit, MechanismAnswer
+from pvid.run.mechanism import MechanismAnswer, RefinedFit
 from pvid.run.mechanism_core import CoreAnswer
 from pvid.run.refined import Problem, Refined
 from pvid.run.refined_mechanism import simulated_at
@@ -58,7 +58,7 @@ def convergence(answer: Answer, path: Path) -> None:
     _write(answer, None, path, "")
 
 
-def _motion(answer: Answer) -> Fit | None:
+def _motion(answer: Answer) -> RefinedFit | None:
     oracle = _oracle(answer)
     p = [answer.values[name].value for name in oracle.model.p_names]
     if None in p:
@@ -74,7 +74,7 @@ def _oracle(answer: Answer) -> MechanismAnswer:
     return answer.oracle if isinstance(answer, CoreAnswer) else answer
 
 
-def _write(answer: Answer, fit: Fit | None, path: Path, title: str) -> None:
+def _write(answer: Answer, fit: RefinedFit | None, path: Path, title: str) -> None:
     oracle = _oracle(answer)
     heights = [_PANEL * -(-len(oracle.model.p_names) // _COLUMNS)]
     if fit is not None:
@@ -94,7 +94,7 @@ def _write(answer: Answer, fit: Fit | None, path: Path, title: str) -> None:
         plt.close(figure)
 
 
-def write_comparison(fit: Fit, path: Path) -> None:
+def write_comparison(fit: RefinedFit, path: Path) -> None:
     """Writes the second part of it alone."""
     figure = plt.figure(figsize=(10, 2 * _PANEL * len(fit.problem.kernel.made.outputs)), layout="constrained")
     try:
