@@ -94,7 +94,8 @@ def _not_adopted(answer: MechanismAnswer, refined: RefinedMechanism) -> str | No
     if apart > RIVAL:
         return f"other parameters explain the recording about as well, and differ by {apart:.2g} standard errors"
     asked, length = 2 * weak.design.window_s, found.cut.samples / answer.recording.sample_rate
-    if not lacks.any() and not refined.is_searched and length < asked / 2 and _spread(refined, weak.se) > 1:
+    alike = not lacks.any() and not answer.model.refinement.equations
+    if alike and length < asked / 2 and _spread(refined, weak.se) > 1:
         return f"blocks above {length:.2g} s do not fit, and shorter ones have larger standard errors"
     if found.slow_chi2 <= GOOD or _better(answer, refined):
         return None

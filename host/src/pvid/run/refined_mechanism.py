@@ -52,7 +52,6 @@ class RefinedMechanism:
     main : places in r of the parameters that the search is judged by: the positive unknowns that are not near 0
     rivals : other fits that explain the recording about as well
     breaks : times at which a differentiated signal jumps, between the blocks [s]
-    is_searched : its length of a block is one of several that were searched
     """
 
     problem: Problem
@@ -60,7 +59,6 @@ class RefinedMechanism:
     main: tuple[int, ...] = ()
     rivals: tuple[Refined, ...] = ()
     breaks: tuple[float, ...] = ()
-    is_searched: bool = False
 
     @property
     def names(self) -> list[str]:

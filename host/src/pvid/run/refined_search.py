@@ -110,7 +110,7 @@ class _Search:
         if problem is not base:  # other parameters were freed since
             rivals = ()
         main = tuple(_main(problem, self._small))
-        return RefinedMechanism(problem, found, main, (*rivals, *rubbing), every.breaks, not settled)
+        return RefinedMechanism(problem, found, main, (*rivals, *rubbing), every.breaks)
 
     # ---- starts
 
