@@ -214,6 +214,8 @@ def test_starts_scale_what_a_user_guesses() -> None:
     for name in ("l2", "rho2"):
         scales = sorted(one[name] / lengths[0][name] for one in lengths)
         assert scales == pytest.approx([0.45] * 3 + [1.0] * 3 + [2.2] * 3, rel=1e-6)
+    assert len({(round(one["l2"], 6), round(one["rho2"], 6)) for one in lengths}) == 9
+    assert all(one["g"] == pytest.approx(lengths[0]["g"]) for one in lengths)
     assert guesses[0][3] == pytest.approx(float(np.median(weak.recording.signals["phi"])))
     motor = compiled_of("dc_motor")
     simulation = simulation_of("dc_motor")

@@ -33,7 +33,8 @@ def weak_start(weak: Identified) -> Float:
 def starts_of(model: CompiledModel, weak: Identified, signals: Mapping[str, Float]) -> Iterator[Float]:
     """p to start from, the likeliest first: that of the weak form, then guesses [n_p each].
 
-    Scaled are the outputs of the model where they determine its positive unknowns, else these unknowns.
+    Scaled are the outputs of the model where they determine its positive unknowns, else these unknowns. Of the outputs
+    those stay that follow from one unknown alone, unless all do: a search finds that unknown from any guess.
     """
     first = weak_start(weak)
     if np.isfinite(first).all():
@@ -77,7 +78,10 @@ def _scaled(model: CompiledModel, guess: Float, levels: str) -> Float | None:
         out = guess.copy()
         out[positive] *= [_factor(k, levels) for k in range(int(positive.sum()))]
         return out
-    factors = np.log([_factor(k, levels) for k in range(len(model.outputs))])
+    mixed = [len(one.value.free_symbols & set(model.p)) > 1 for one in model.outputs]
+    mixed = mixed if any(mixed) else [True] * len(mixed)
+    scales = iter(_factor(k, levels) for k in range(len(mixed)))
+    factors = np.log([next(scales) if one else 1.0 for one in mixed])
     wanted = np.log([output_at(model, guess, one)[0] for one in model.outputs])
     p = guess.copy()
     for _ in range(_STEPS):
