@@ -22,6 +22,7 @@ from refinements import (
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.run.mechanism import MechanismAnswer, Refinement
 from pvid.run.mechanism_advice import judged_by_prediction
+from pvid.run.reading import aligned
 from pvid.run.refined import GOOD
 from pvid.run.refined_answer import (
     AGREE,
@@ -173,3 +174,15 @@ def test_a_refined_answer_predicts_with_the_extras_that_it_needs() -> None:
     assert refined is not None and "play" in refined.extras
     (sensor,) = judged_by_prediction(replace(answer, refinement=Refinement(True, text, refined))).prediction
     assert sensor.of_noise is not None and sensor.of_noise < 5
+
+
+def test_a_delay_is_advised_as_the_rig_file_has_it() -> None:
+    """A recording that is moved by it has none left."""
+    run = run_of("isolator", 2e-3)
+    (sentence,) = refined_answer(answer_of("isolator", run))[0].advice
+    assert sentence.startswith("b is read 2 ms earlier than the other sensors: --set sensor.b.delay=-0.002 ")
+    model = subject("isolator").model
+    signals = tuple(replace(one, delay=-2e-3 if one.name == "b" else 0.0) for one in model.signals)
+    moved = aligned(run, replace(model, signals=signals))
+    assert refine(answer_of("isolator", moved)).values["tau"] == pytest.approx(0.0, abs=1e-4)
+    assert not refined_answer(answer_of("isolator"))[0].advice

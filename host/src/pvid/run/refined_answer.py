@@ -54,7 +54,8 @@ def refined_answer(answer: MechanismAnswer) -> tuple[MechanismAnswer, RefinedMec
             one = refined.problem.kernel.made.parameters[place]
             text += f"; sgn({one.sign}) changes over {found.r[place]:.2g} {one.unit}"
     noted = replace(recording, notes=(*recording.notes, *_of_breaks(answer, refined)))
-    return replace(_adopted(answer, refined), recording=noted), refined, text
+    advice = (*answer.advice, *_of_skew(answer, refined))
+    return replace(_adopted(answer, refined), recording=noted, advice=advice), refined, text
 
 
 def _estimate(refined: RefinedMechanism) -> tuple[Float, Float]:
@@ -193,6 +194,20 @@ def _doubts(answer: MechanismAnswer, refined: RefinedMechanism) -> Iterator[Reas
 def _differentiated(answer: MechanismAnswer) -> list[str]:
     """Driven sensors."""
     return [one.name for one in answer.model.signals if one.driven and one.kind == "sensor"]
+
+
+def _of_skew(answer: MechanismAnswer, refined: RefinedMechanism) -> Iterator[str]:
+    """A sentence with what to type, where the one differentiated sensor is read half a sample or more too late or too
+    early, and by no more than sensors are."""
+    skew, se = refined.extras.get(SKEW, (0.0, 0.0))
+    driven = _differentiated(answer)
+    if len(driven) == 1 and max(3 * se, 0.5 / answer.recording.sample_rate) < abs(skew) <= LARGEST_SKEW_S:
+        late = "later" if skew < 0 else "earlier"
+        delay = answer.model.signal(driven[0]).delay - skew
+        yield (
+            f"{driven[0]} is read {1000 * abs(skew):.3g} ms {late} than the other sensors: --set "
+            f"sensor.{driven[0]}.delay={delay:.3g} corrects the weak form too"
+        )
 
 
 def _of_breaks(answer: MechanismAnswer, refined: RefinedMechanism) -> Iterator[str]:
