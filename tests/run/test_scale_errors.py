@@ -54,7 +54,7 @@ def test_a_wrong_gain_moves_the_estimate_by_what_the_standard_error_contains(nam
         assert abs(other.value - one.value) == pytest.approx(one.se_scale, rel=0.1, abs=least), parameter
 
 
-@pytest.mark.parametrize(("name", "known"), [("kapitza", "l1"), ("cart_pendulum", "g")])
+@pytest.mark.parametrize(("name", "known"), [("kapitza", "l1"), ("furuta", "kv")])
 def test_a_wrong_constant_moves_the_estimate_by_what_the_standard_error_contains(name: str, known: str) -> None:
     recording, alone = recorded(name)
     value = alone.known[known]
