@@ -9,7 +9,7 @@ import pytest
 
 from bench.year import emulated_year, passages_of_a_year, rig_of
 from pvid.board.target import HOST_TARGET
-from pvid.log.rig import run_of_log
+from pvid.log.rig import recording_of_log
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 
@@ -26,5 +26,5 @@ def test_passages_of_2_to_the_32_ticks_are_recorded_verified_exported_and_drawn(
     assert year.verdict.verified > 0.9 * SAMPLES * len(passages)
     assert year.verdict.verified + year.verdict.trailing == year.account.samples
     assert log.with_suffix(".png").stat().st_size > 10_000
-    run = run_of_log(log)
+    run = recording_of_log(log, ["y", "phi"])
     assert np.allclose(np.diff(run.t), 1e-3, atol=1e-6)

@@ -22,7 +22,7 @@ from pvid.link.frames import Code, Estimate, Form, Raw, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader
 from pvid.log.recorder import EmulatorSource, Logger
-from pvid.log.rig import engine_text_of_log, mechanism_of_log, recording_of_log, rig_of_log
+from pvid.log.rig import engine_text_of_log, mechanism_of_log, recording_of_log
 from pvid.log.verify import Stretch, Verdict, Verifier
 from pvid.models.mechanisms import names
 from pvid.show.log_figure import write_log_figure
@@ -165,8 +165,6 @@ def test_log_of_a_mechanism_is_exported_under_its_names(log: Path, motor: Mechan
     assert list(recording.signals) == ["phi", "V"] and recording.sample_rate == 1000.0
     with pytest.raises(PvidError, match="a log of dc_motor: it has V, i and phi, and not x"):
         recording_of_log(log, ["x"])
-    with pytest.raises(PvidError, match="is the log of a described mechanism"):
-        rig_of_log(log)
 
 
 def test_page_shows_the_names_and_units_of_the_mechanism(log: Path) -> None:

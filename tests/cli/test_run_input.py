@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,9 +18,11 @@ from click.testing import CliRunner, Result
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
-from pvid.log.rig_settings import parse_settings, rig_for
-from pvid.rig.file import RigFile, rig_path_of
+from pvid.log.rig_choice import rig_of
+from pvid.rig.file import rig_path_of
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Run, read_run, write_run
+from pvid.run.mechanism import model_of
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
@@ -83,61 +86,49 @@ def test_l1_is_all_that_is_needed(run: Run, clean: Callable[[str], dict[str, Any
 def test_the_rig_file_beside_a_run_is_taken_by_itself(name: str, run: Run, tmp_path: Path) -> None:
     path = tmp_path / name
     write_run(path, run)
-    RigFile.standard().write(tmp_path / "run.toml")
+    rig = MechanismRig("kapitza", 1000.0, known={"l1": 0.3})
+    rig.write(tmp_path / "run.toml")
     assert rig_path_of(path) == tmp_path / "run.toml"
-    assert rig_for(path, None) == RigFile.standard()
-    assert rig_for(path, None, ["l1=0.5"]).l1 == 0.5
-    (tmp_path / "other.toml").write_text("l1 = 0.7\n")
-    assert rig_for(path, tmp_path / "other.toml").l1 == 0.7
+    assert rig_of(path) == rig
+    assert rig_of(path, None, ["known.l1=0.5"]).known == {"l1": 0.5}
+    (tmp_path / "other.toml").write_text("[known]\nl1 = 0.7\n")
+    assert rig_of(path, tmp_path / "other.toml").known == {"l1": 0.7}
 
 
 def test_settings_come_before_what_the_file_holds(tmp_path: Path) -> None:
     file = tmp_path / "rig.toml"
-    file.write_text("sample_rate = 500\n[sensor]\nphi_lsb = 1e-3\ny_lsb = 2e-5\n[identifier]\nlaw = 'stationary'\n")
-    with pytest.raises(PvidError, match="rig.toml: l1 is missing"):
-        rig_for(None, file)
-    given = ["l1=0.25", "sensor.phi_lsb = 0.0015", "identifier.form=strong", "identifier.core=q31", "nominal.l2=1"]
-    rig = rig_for(None, file, given)
-    assert (rig.l1, rig.sample_rate, rig.sensor.phi_lsb, rig.sensor.y_lsb) == (0.25, 500.0, 0.0015, 2e-5)
-    assert (rig.identifier.form, rig.identifier.core, rig.nominal.l2) == ("strong", "q31", 1.0)
-    assert rig_for(None, None, given).sample_rate is None
-    assert rig_for(None, None, ["l1=0.25", "identifier.core='f64'"]).identifier.core == "f64"
-    file.write_text("l1 = 0.3\nsensor = 3\n")
-    with pytest.raises(PvidError, match="sensor must be a table"):
-        rig_for(None, file, ["sensor.phi_lsb=0.1"])
+    file.write_text("sample_rate = 500\n[sensor]\nphi.resolution = 1e-3\ny.resolution = 2e-5\n")
+    with pytest.raises(PvidError, match=r"l1 \[m\] of the rig is missing"):
+        rig_of(None, file, [], "kapitza")
+    rig = rig_of(None, file, ["known.l1=0.25", "sensor.phi.resolution = 0.0015", "nominal.l2=1"], "kapitza")
+    assert (rig.known, rig.sample_rate, rig.nominal) == ({"l1": 0.25}, 500.0, {"l2": 1.0})
+    assert rig.sensor == {"phi": {"resolution": 0.0015}, "y": {"resolution": 2e-5}}
+    file.write_text("sensor = 3\n[known]\nl1 = 0.3\n")
+    with pytest.raises(PvidError, match="sensor is a number, not a table"):
+        rig_of(None, file, ["sensor.phi.resolution=0.1"], "kapitza")
 
 
 @pytest.mark.parametrize(
     ("setting", "part"),
     [
-        ("l1", "--set 'l1' is not KEY=VALUE, as in --set l1=0.25"),
+        ("known.l1", "--set 'known.l1' is not KEY=VALUE, as in --set known.g=9.81"),
         ("=3", "--set '=3' is not KEY=VALUE"),
-        ("l1=", "--set 'l1=' is not KEY=VALUE"),
-        ("l1=long", "--set l1 must be a number, not 'long'"),
-        ("l1=-1", "--set l1 must be from 1e-06 to 1e[+]06 m, not -1"),
-        ("l1=nan", "--set l1 must be from"),
-        ("l1=true", "--set l1 must be a number, not true"),
-        ("l1=[1,2]", "--set l1 must be a number"),
-        ("l3=1", "--set 'l3' is not a key of a rig file; known are l1, sample_rate"),
-        ("phi_lsb=1e-3", "--set 'phi_lsb' is not a key of a rig file; it is sensor.phi_lsb"),
-        ("sensor.lsb=1", "--set 'sensor.lsb' is not a key of a rig file; known are phi_lsb"),
-        ("sensor=1", "--set 'sensor' is not a key"),
-        ("motor.torque=1", "--set 'motor.torque': a rig file has no table 'motor'; it has sensor, nominal, identifier"),
-        ("sensor.phi_lsb=2", "--set sensor.phi_lsb must be from 0 to 1 rad, not 2"),
-        ("identifier.law=round", '--set identifier.law must be "stationary" or'),
-        ("identifier.zero=true", "--set identifier.zero is no key any more"),
-        ("identifier.divider=1.5", "--set identifier.divider must be a whole number"),
+        ("known.l1=", "--set 'known.l1=' is not KEY=VALUE"),
+        ("known.l1=long", "known.l1 must be a number, not 'long'"),
+        ("known.l1=nan", "known.l1 must be a number, not 'nan'"),
+        ("known.l1=[1,2]", "known.l1 must be a number"),
+        ("known.l3=1", "known.l3: the model has no 'l3'; it has l1"),
+        ("l3=1", "'l3' is not a key of the rig file of a mechanism"),
+        ("sensor.phi.lsb=1", "sensor.phi: 'lsb' is not a key: resolution, noise"),
+        ("sensor.phi.resolution=-2", "sensor.phi.resolution must not be negative"),
+        ("identifier.divider=4", "identifier.divider = '4' is of the strong form"),
+        ("motor.torque=1", "'motor' is not a key of the rig file"),
     ],
 )
 def test_a_wrong_setting_is_one_sentence_that_names_the_key(setting: str, part: str) -> None:
-    with pytest.raises(PvidError, match=f"^{part}") as caught:
-        parse_settings([setting])
+    with pytest.raises(PvidError, match=f"^{re.escape(part)}") as caught:
+        model_of(rig_of(None, None, ["known.l1=0.3", setting], "kapitza"))
     assert str(caught.value).isprintable()
-
-
-def test_a_setting_is_given_once() -> None:
-    with pytest.raises(PvidError, match="--set sensor.phi_lsb is given twice"):
-        parse_settings(["sensor.phi_lsb=1e-3", "l1=1", "sensor.phi_lsb=1e-3"])
 
 
 def test_every_command_that_reads_a_run_takes_rig_settings_and_columns(run: Run, tmp_path: Path) -> None:
@@ -146,7 +137,7 @@ def test_every_command_that_reads_a_run_takes_rig_settings_and_columns(run: Run,
     path.write_text("time_ms;angle_deg;h\n" + "".join(f"{k};{a!r};{b!r}\n".replace(".", ",") for k, a, b in rows))
     given = ["--set", "l1=0.3", "--columns", "t=time_ms:ms,phi=angle_deg:deg,y=h:mm"]
     assert pvid("identify", path, *given, "--no-refine").return_value == 0
-    assert pvid("compare", path, *given, "--law", "stationary").return_value == 0
+    assert pvid("compare", path, *given).return_value == 0
     assert pvid("plot", path, *given, "-o", tmp_path / "a.png").return_value == 0
     assert pvid("design", "--run", path, *given, "--set", "sample_rate=1000").return_value == 0
     with pytest.raises(PvidError, match="use --columns t=time_ms:ms,y=h:m,phi=angle_deg:deg"):
@@ -178,7 +169,7 @@ def test_dropped_samples_and_jitter_leave_the_answer(
 
 def test_clock_error_of_a_thousandth_is_reported(run: Run, tmp_path: Path) -> None:
     path = write(tmp_path / "run.csv", run, t=run.t * 1.001)
-    RigFile.standard().write(tmp_path / "run.toml")
+    MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(tmp_path / "run.toml")
     done = pvid("identify", path, "--no-refine", "--json")
     assert done.stderr.startswith("pvid: input: t runs at 999 Hz, -0.1 % off the rig's sample rate: t is used")
     assert json.loads(done.stdout)["input"] == [done.stderr.splitlines()[0].removeprefix("pvid: input: ")]

@@ -25,7 +25,7 @@ from pvid.log.export import FORMATS, export_log
 from pvid.log.file import LogWriter
 from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogReader, LogStream
-from pvid.log.rig import run_of_log
+from pvid.log.rig import recording_of_log
 from pvid.log.values import UNKNOWN_RIG, Values, tables_of
 from pvid.rig.file import RigFile
 from pvid.rig.run import read_run
@@ -213,15 +213,15 @@ def test_fixed_point_is_exported_in_si() -> None:
 
 
 def test_a_log_is_a_run(tmp_path: Path, log: Path) -> None:
-    run = run_of_log(log)
+    run = recording_of_log(log, ["phi", "y"])
     assert (len(run), run.sample_rate) == (TICKS, 1000)
-    assert np.array_equal(np.stack([run.phi, run.y], axis=1), expected_samples())
+    assert np.array_equal(np.stack([run.signals["phi"], run.signals["y"]], axis=1), expected_samples())
     writer = LogWriter(tmp_path / "empty.pvlog")
     writer.begin("a port", None)
     writer.end("the end")
     writer.close()
     with pytest.raises(PvidError, match="contains no description of the board"):
-        run_of_log(tmp_path / "empty.pvlog")
+        recording_of_log(tmp_path / "empty.pvlog", ["phi", "y"])
 
 
 def test_identify_and_export_take_a_log(tmp_path: Path, log: Path) -> None:

@@ -39,7 +39,7 @@ from pvid.log.file import LOG_MESSAGES, LOG_SCHEMA, LogWriter
 from pvid.log.history import History
 from pvid.log.reader import OTHER_KINDS, Account, LogReader, LogStream, Record
 from pvid.log.recorder import Logger, Recorder
-from pvid.log.rig import rig_of_log, run_of_log
+from pvid.log.rig import recording_of_log, rig_of_log
 from pvid.log.tail import LogTail
 from pvid.log.values import Values
 from pvid.show import patience
@@ -456,14 +456,15 @@ def test_run_of_a_log_contains_samples_only(tmp_path: Path) -> None:
     board = LyingBoard()
     frames = [*board.introduction(), board.say(board.samples()), board.say(board.samples(float("inf"), 3e38), 20)]
     frames += [board.say(board.samples(), 40)]
-    run = run_of_log(log_of(tmp_path / "a.pvlog", b"".join(frames)))
-    assert np.isnan(run.phi[20:40]).all() and np.isfinite(run.phi[[19, 40]]).all() and len(run) == 60
+    run = recording_of_log(log_of(tmp_path / "a.pvlog", b"".join(frames)), ["phi", "y"])
+    phi = run.signals["phi"]
+    assert np.isnan(phi[20:40]).all() and np.isfinite(phi[[19, 40]]).all() and len(run) == 60
     nothing = [*LyingBoard().introduction(), board.say(board.samples(float("nan"), 0.0))]
     with pytest.raises(PvidError, match="holds 0 samples in a row"):
-        run_of_log(log_of(tmp_path / "b.pvlog", b"".join(nothing)))
+        recording_of_log(log_of(tmp_path / "b.pvlog", b"".join(nothing)), ["phi", "y"])
     senseless = LyingBoard().honest(board.hello(sample_rate=0.0))
     with pytest.raises(PvidError, match="sample rate of 0 Hz"):
-        run_of_log(log_of(tmp_path / "c.pvlog", senseless))
+        recording_of_log(log_of(tmp_path / "c.pvlog", senseless), ["phi", "y"])
 
 
 def test_samples_in_pieces_are_kept_in_bounded_memory() -> None:

@@ -41,7 +41,6 @@ def test_a_mechanism_has_none(name: str, imperfections: Imperfections) -> None:
 def test_a_real_recording_has_none(name: str) -> None:
     path = RECORDINGS / name / "identify.csv.gz"
     rig = rig_of(path, None, (), str(RECORDINGS / f"{name}.py"))
-    assert rig is not None
     recording, _ = recording_of(path, rig, None)
     assert not [note for note in recording.notes if "wild" in note]
 

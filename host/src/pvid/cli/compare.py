@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,14 +11,9 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from pvid.base.console import DIFFERENT, DONE, progress_bar
-from pvid.cli.input import form_options, print_notes
-from pvid.core.native import Native
-from pvid.log.rig import LOG_SUFFIX, run_of_log
+from pvid.base.console import DIFFERENT, DONE
+from pvid.cli.input import form_options
 from pvid.log.rig_choice import rig_of
-from pvid.log.rig_settings import strong_rig
-from pvid.rig.columns import parsed
-from pvid.rig.run import read_run
 
 if TYPE_CHECKING:
     from pvid.board.compare_on import Outcome
@@ -55,34 +49,13 @@ def command(
     The C core is compiled for the mechanism (host/docs/models.md); start and tables are those of identify. With --on
     the run is also streamed to targets, and their running hashes are compared with the host's.
     """
-    from pvid.board.compare_on import compare_here, compare_there
     from pvid.board.target import targets_of
+    from pvid.cli.mechanism import compare_recording
 
-    strong = strong_rig(run_path, rig_path, settings, model, form)
-    if strong is None:
-        from pvid.cli.mechanism import compare_recording  # loads SymPy
-
-        rig = rig_of(run_path, rig_path, settings, model, columns)
-        law = None if law == "stationary" and form != "strong" else law
-        given = {"core": core, "form": form, "law": law}
-        return _shown(compare_recording(run_path, rig, columns, targets_of(targets), **given))
-    run = (
-        run_of_log(run_path)
-        if run_path.suffix == LOG_SUFFIX
-        else read_run(run_path, strong.sample_rate, parsed(columns))
-    )
-    print_notes(run.notes)
-    native = Native()
-    outcomes: list[Outcome] = []
-    for arithmetic in ["f32", "q31"] if core == "all" else [core or strong.identifier.core_traits.in_c]:
-        for one in [law] if law else ["stationary", "pseudovelocity"]:
-            chosen = replace(strong, identifier=replace(strong.identifier, law=one, core=arithmetic))  # type: ignore[arg-type]
-            with progress_bar(f"{one} law, {arithmetic}", len(run.t)) as advance:
-                outcomes.append(compare_here(chosen, run, native, advance))
-            for target in targets_of(targets):
-                with progress_bar(f"{one} law, {arithmetic} on {target}", len(run.t)) as advance:
-                    outcomes.append(compare_there(target, chosen, run, native, advance))
-    return _shown(outcomes)
+    rig = rig_of(run_path, rig_path, settings, model, columns)
+    law = None if law == "stationary" and form != "strong" else law
+    given = {"core": core, "form": form, "law": law}
+    return _shown(compare_recording(run_path, rig, columns, targets_of(targets), **given))
 
 
 def _shown(outcomes: Sequence[Outcome]) -> int:

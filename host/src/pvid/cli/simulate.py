@@ -12,7 +12,8 @@ import numpy as np
 from pvid.base.console import DONE, write_stderr
 from pvid.base.replacing import refuse_foreign
 from pvid.cli.input import NewFile, force_option
-from pvid.rig.file import RigFile, rig_path_of
+from pvid.rig.file import rig_path_of
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import write_run
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
@@ -100,12 +101,15 @@ def command(**options: Any) -> int:
     rig_path: Path = options["rig_out"] or rig_path_of(out)
     refuse_foreign(rig_path)
     write_run(out, simulation.run)
-    standard = RigFile.standard()
-    rig = replace(
-        standard,
-        l1=pendulum.l1,
-        sample_rate=options["rate"],
-        sensor=replace(standard.sensor, phi_lsb=sensors.phi_lsb, y_lsb=sensors.y_lsb),
+    exact = {"gain_sd": 0.0} | ({"resolution": sensors.y_lsb} if sensors.y_lsb else {})
+    angle = {"resolution": sensors.phi_lsb} if sensors.phi_lsb else {}
+    rig = MechanismRig(
+        "kapitza",
+        options["rate"],
+        known={"l1": pendulum.l1},
+        sensor={"phi": angle, "y": exact},
+        known_sd={"l1": 0.0},
+        clock_sd=0.0,
     )
     rig.write(rig_path)
     largest = float(np.abs(simulation.run.phi).max())

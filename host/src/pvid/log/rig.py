@@ -24,27 +24,22 @@ from pvid.models.registry import MODELS
 from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile, parsed_file, without_former_keys
 from pvid.rig.former import mechanism_of_former
-from pvid.rig.run import MIN_ROWS, Recording, Run
+from pvid.rig.run import MIN_ROWS, Recording
 
 LOG_SUFFIX = ".pvlog"
 _LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
 
 
 def rig_of_log(path: Path) -> RigFile | None:
-    """The rig file in a log; None when the logger was given none.
+    """The pendulum's rig file in a log of the strong form; None when the logger was given none.
 
     Raises
     ------
     PvidError
-        When the log cannot be read, is that of a described mechanism, or the rig file in it is none.
+        When the log cannot be read, or the rig file in it is none.
     """
     text = _text_of_log(path)
-    if text is None:
-        return None
-    rig = rig_in(text)
-    if rig is None:
-        raise PvidError(f"{path} is the log of a described mechanism: name it with --model")
-    return rig
+    return None if text is None else RigFile.of_document(without_former_keys(toml_document(text)))
 
 
 def engine_text_of_log(path: Path) -> str | None:
@@ -75,34 +70,6 @@ def is_engine_text(text: str) -> bool:
         return False
 
 
-def rig_in(text: str) -> RigFile | None:
-    """The pendulum's rig file in the text of a log; None: it is that of a described mechanism.
-
-    Raises
-    ------
-    PvidError
-        Where it is none.
-    """
-    document = without_former_keys(toml_document(text))
-    is_former = mechanism_of_former(document) is not None
-    return None if "engine" in document and not is_former else RigFile.of_document(_without_engine(document))
-
-
-def described_document_of_log(path: Path) -> dict[str, Any] | None:
-    """The tables of the rig in a log of a described mechanism, without the engine's; None: the log has another rig, or
-    none.
-
-    Raises
-    ------
-    PvidError
-        When the log cannot be read, or the rig file in it is none.
-    """
-    text = _text_of_log(path)
-    if text is None or rig_in(text) is not None:
-        return None
-    return _without_engine(toml_document(text))
-
-
 def document_of_log(path: Path) -> dict[str, Any] | None:
     """The tables of the rig in a log, without the engine's; None: the log has none.
 
@@ -114,11 +81,7 @@ def document_of_log(path: Path) -> dict[str, Any] | None:
     text = _text_of_log(path)
     if text is None:
         return None
-    return _without_engine(toml_document(text))
-
-
-def _without_engine(document: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in document.items() if key != "engine"}
+    return {key: value for key, value in toml_document(text).items() if key != "engine"}
 
 
 def mechanism_of_log(path: Path, rig_path: Path | None = None) -> Mechanism:
@@ -198,20 +161,6 @@ def hello_of_log(path: Path) -> Hello | None:
     return None
 
 
-def run_of_log(path: Path) -> Run:
-    """The longest stretch of samples in a log without a gap; NaN where one is no number, or no rig's.
-
-    Raises
-    ------
-    PvidError
-        When the log cannot be read, the board's sample rate is unknown, or there are too few samples.
-    """
-    (t, phi, y), rate = _longest(path, UNKNOWN_RIG, tuple(Columns().units)[1:])
-    if (there := int(np.isfinite(phi).sum())) < MIN_ROWS:
-        raise PvidError(f"{path} holds {there} samples in a row; a run needs at least {MIN_ROWS}")
-    return Run(t=t, phi=phi, y=y, sample_rate=rate)
-
-
 def source_of(path: Path) -> Path | Callable[[Columns], Recording]:
     """A file as pvid.run.reading takes it: of a log what reads it."""
     return partial(_read, path) if path.suffix == LOG_SUFFIX else path
@@ -236,8 +185,8 @@ def recording_of_log(path: Path, names: Sequence[str]) -> Recording:
     if lacking := [name for name in names if name not in named]:
         raise PvidError(f"{path} is a log of {mechanism.model.name}: it has {listed(named)}, and not {listed(lacking)}")
     (t, *signals), rate = _longest(path, mechanism, names)
-    if len(t) < MIN_ROWS:
-        raise PvidError(f"{path} holds {len(t)} samples in a row; a recording needs at least {MIN_ROWS}")
+    if (there := int(np.isfinite(signals).all(axis=0).sum())) < MIN_ROWS:
+        raise PvidError(f"{path} holds {there} samples in a row; a recording needs at least {MIN_ROWS}")
     return Recording(t, dict(zip(names, signals, strict=True)), rate)
 
 

@@ -49,7 +49,7 @@ def rig_of(
     """
     asked = None if model is None else asked_for(model)
     where = "this recording" if rig_path is None else str(rig_path)
-    document = document_for(run_path, rig_path, asked)
+    document = _document(run_path, rig_path, asked)
     document = with_settings(document, settings)
     name = asked if asked is not None else _named(document)
     if name is None:
@@ -89,7 +89,7 @@ def common_rig(
     return rig
 
 
-def document_for(run_path: Path | None, rig_path: Path | None, asked: str | Path | None) -> Mapping[str, Any]:
+def _document(run_path: Path | None, rig_path: Path | None, asked: str | Path | None) -> Mapping[str, Any]:
     """The tables of the file that a rig is in; none: it is in none."""
     if rig_path is None and run_path is not None and is_run(run_path) and rig_path_of(run_path).is_file():
         rig_path = rig_path_of(run_path)

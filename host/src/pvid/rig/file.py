@@ -272,15 +272,9 @@ class RigFile:
         return cls(l1=0.3, nominal=Nominal(l2=0.1, rho2=0.1), sensor=sensor, sample_rate=1000.0, l1_sd=0.0)
 
     @classmethod
-    def parse(cls, text: str, settings: Mapping[str, Any] | None = None) -> RigFile:
-        """From TOML text; PvidError names the key that is unknown, missing, of wrong type or out of range.
-
-        Parameters
-        ----------
-        settings
-            Keys and tables that come before those of the text.
-        """
-        return cls.of_document(_merged(toml_document(text), settings or {}))
+    def parse(cls, text: str) -> RigFile:
+        """From TOML text; PvidError names the key that is unknown, missing, of wrong type or out of range."""
+        return cls.of_document(toml_document(text))
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> RigFile:
@@ -325,9 +319,9 @@ def rig_path_of(run_path: Path) -> Path:
     return run_path.with_name(Path(name).stem + ".toml")
 
 
-def load(path: str | Path, settings: Mapping[str, Any] | None = None) -> RigFile:
-    """Reads a rig file; PvidError names the file and the key. `settings` come before what it holds."""
-    return parsed_file(path, lambda text: RigFile.parse(text, settings))
+def load(path: str | Path) -> RigFile:
+    """Reads a rig file; PvidError names the file and the key."""
+    return parsed_file(path, RigFile.parse)
 
 
 def is_strong(document: Mapping[str, Any]) -> bool:
@@ -355,31 +349,6 @@ def parsed_file(path: str | Path, parse: Callable[[str], _Parsed]) -> _Parsed:
         raise PvidError(f"{path}: {error}") from error
 
 
-def check_setting(table: str, key: str, value: Any) -> Any:
-    """One value as a rig file holds it; PvidError names a key that is unknown, or has the wrong type or range.
-
-    Parameters
-    ----------
-    table
-        Name of the table; "" for the keys above them.
-    """
-    name = f"{table}.{key}" if table else key
-    if table and table not in _TABLES:
-        raise PvidError(f"{name!a}: a rig file has no table {table!a}; it has {', '.join(_TABLES)}")
-    owner = _TABLES[table] if table else RigFile
-    keys = [one.name for one in fields(owner) if one.name not in _TABLES]
-    if table == "identifier" and key in _GONE:
-        raise PvidError(f"{name} is no key any more: {_GONE[key]}")
-    if key not in keys:
-        within = [f"{other}.{key}" for other, one in _TABLES.items() if key in (f.name for f in fields(one))]
-        hint = f"it is {within[0]}" if within and not table else f"known are {', '.join(keys)}"
-        raise PvidError(f"{name!a} is not a key of a rig file; {hint}")
-    value = _without_integers(owner, {key: value})[key]
-    field_of = _field(owner, key)
-    _check_value(field_of, value, f"{table}." if table else "")
-    return value
-
-
 _TABLES: dict[str, type] = {
     "sensor": Sensor,
     "nominal": Nominal,
@@ -387,18 +356,6 @@ _TABLES: dict[str, type] = {
     "refine": Refine,
     "model": ModelTable,
 }
-
-
-def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The document with the settings in place of its own; a table takes them key by key."""
-    merged = dict(document)
-    for key, value in settings.items():
-        held = merged.get(key, {})
-        if key not in _TABLES:
-            merged[key] = value
-        elif isinstance(held, dict):  # else it is refused as what it is
-            merged[key] = {**held, **value}
-    return merged
 
 
 def _field(owner: type, name: str) -> Field[Any]:

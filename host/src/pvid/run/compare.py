@@ -11,8 +11,6 @@ import numpy.typing as npt
 from pvid.cases import case_of
 from pvid.core.native import Native
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.file import RigFile
-from pvid.rig.run import Run
 from pvid.settings.kinds import Settings
 from pvid.settings.record import Record
 from pvid.twin import fnv
@@ -125,15 +123,3 @@ def compare_run(
         twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
         difference=first_difference(record, twin),
     )
-
-
-def compare_rig(
-    native: Native,
-    rig: RigFile,
-    run: Run,
-    start: npt.ArrayLike | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> Comparison:
-    """compare_run with the form, core and settings of a rig file for a run."""
-    case = case_of(rig.identifier)
-    return compare_run(native, case.settings_for_run(rig, run, start), *case.samples(rig, run), progress=progress)
