@@ -242,7 +242,7 @@ def test_identify_and_export_take_a_log(tmp_path: Path, log: Path) -> None:
     assert (exported.returncode, exported.stdout) == (0, "b.npz\n")
     missing = pvid(tmp_path, "identify", "run.csv")
     assert (missing.returncode, missing.stderr.count("\n")) == (2, 1)
-    assert missing.stderr.endswith("another mechanism is named by --model\n")
+    assert "l1 [m] of the rig is missing" in missing.stderr
 
 
 def test_an_exported_segment_without_gaps_is_a_run(tmp_path: Path, log: Path) -> None:

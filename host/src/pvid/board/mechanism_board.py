@@ -17,7 +17,7 @@ from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import printable
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
-from pvid.board.stream_image import UNNAMED, StreamImage, c_string
+from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
 from pvid.codegen.build import refine_functions
@@ -85,7 +85,6 @@ class MechanismBoard:
         what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
     refine : settings of the second stage; None: without
     repeats : the sensors read the recording over and over
-    logged : number of the settings that the log of the board names, UNNAMED where it names none; None: of no log
     """
 
     configure_frame = Configure
@@ -96,7 +95,6 @@ class MechanismBoard:
     recording: npt.NDArray[np.float32]
     refine: RefineConfig | None = None
     repeats: bool = False
-    logged: int | None = None
 
     @classmethod
     def of_recording(
@@ -345,12 +343,7 @@ class MechanismBoard:
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
         lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config, self.refine).items()]
-        return "\n".join([self.rig.text(), f"[{_TABLE}]", f"settings = {self.stream_image.number}", *lines, ""])
-
-    @property
-    def settings(self) -> int:
-        """Number of the settings of its image; UNNAMED: its log does not name it."""
-        return self.stream_image.number if self.logged is None else self.logged
+        return "\n".join([self.rig.text(), f"[{_TABLE}]", *lines, ""])
 
     @classmethod
     def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoard:
@@ -364,7 +357,7 @@ class MechanismBoard:
         compiled = model_of(rig)
         config = _config(compiled, engine)
         nothing = np.zeros((0, config.design.model.samples), np.float32)
-        return cls(rig, compiled, config, nothing, _refine(engine), logged=engine.get("settings", UNNAMED))
+        return cls(rig, compiled, config, nothing, _refine(engine))
 
 
 def _refine_header(settings: RefineConfig, shown: Sequence[int]) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import UNNAMED, StreamImage, c_string
+from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
@@ -63,7 +63,6 @@ class MechanismBoardQ31:
     rig : of the mechanism
     engine : functions, settings and tables
     recording : what the board's sensors count, int32 [ticks, samples]; empty as of MechanismBoard
-    logged : as of MechanismBoard
     """
 
     configure_frame = ConfigureQ31
@@ -71,7 +70,6 @@ class MechanismBoardQ31:
     rig: MechanismRig
     engine: FixedEngine
     recording: npt.NDArray[np.int32]
-    logged: int | None = None
 
     @classmethod
     def of_recording(
@@ -230,12 +228,7 @@ class MechanismBoardQ31:
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `of_tables` gives the same board back."""
         lines = [f"{name} = {_written(value)}" for name, value in _flat(self.engine).items()]
-        return "\n".join([self.rig.text(), "[engine]", f"settings = {self.stream_image.number}", *lines, ""])
-
-    @property
-    def settings(self) -> int:
-        """As of MechanismBoard."""
-        return self.stream_image.number if self.logged is None else self.logged
+        return "\n".join([self.rig.text(), "[engine]", *lines, ""])
 
     @classmethod
     def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoardQ31:
@@ -273,7 +266,7 @@ class MechanismBoardQ31:
             },
         )
         own = engine_of_parts(compiled, made, config, float(engine["sample_rate"]))
-        return cls(rig, own, np.zeros((0, tables.model.samples), np.int32), engine.get("settings", UNNAMED))
+        return cls(rig, own, np.zeros((0, tables.model.samples), np.int32))
 
 
 def _recording(counts: npt.NDArray[np.int32]) -> str:

@@ -24,7 +24,6 @@ from pvid.settings.enums import Core
 from pvid.twin.sensor import SensorConstants
 
 HOST = "host"
-UNNAMED = -1  # number of settings: that of no image
 
 
 def _tables(rig: StreamRig) -> str:

@@ -20,7 +20,7 @@ from pvid.log.board_model import mechanism_of
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.values import UNKNOWN_RIG, Values, is_rate
 from pvid.models.model import Mechanism
-from pvid.models.registry import MODELS
+from pvid.models.registry import MODELS, shipped
 from pvid.rig.columns import Columns
 from pvid.rig.file import RigFile, parsed_file, without_former_keys
 from pvid.rig.former import mechanism_of_former
@@ -95,7 +95,10 @@ def mechanism_of_log(path: Path, rig_path: Path | None = None) -> Mechanism:
     """
     text = _text_of_log(path)
     logged = {} if text is None else toml_document(text)
-    found = mechanism_in(logged if rig_path is None else parsed_file(rig_path, toml_document))
+    document = logged if rig_path is None else parsed_file(rig_path, toml_document)
+    if rig_path is not None:
+        shipped(named_in(document) or "", str(rig_path))
+    found = mechanism_in(document)
     if found is not None:
         return found
     for names in _names_of_log(path):
@@ -104,12 +107,17 @@ def mechanism_of_log(path: Path, rig_path: Path | None = None) -> Mechanism:
     return UNKNOWN_RIG
 
 
+def named_in(document: Mapping[str, Any]) -> str | None:
+    """The mechanism that a rig file names, or whose former keys it has."""
+    table = document.get("model", {})
+    name = table.get("name") if isinstance(table, Mapping) else None
+    return name if isinstance(name, str) else mechanism_of_former(document)
+
+
 def mechanism_in(document: Mapping[str, Any]) -> Mechanism | None:
     """The mechanism of a rig file, of today or of a former version, with the constants in it; None: the file does not
     name one that has outputs of its own."""
-    table, known = document.get("model"), document.get("known")
-    named = table.get("name") if isinstance(table, Mapping) else mechanism_of_former(document)
-    model = MODELS.get(named) if isinstance(named, str) else None
+    model, known = MODELS.get(named_in(document) or ""), document.get("known")
     if model is None:
         return None
     given = {**(known if isinstance(known, Mapping) else {}), **document}

@@ -11,13 +11,13 @@ from typing import Any
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import listed
-from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log
+from pvid.log.rig import LOG_SUFFIX, document_of_log, mechanism_of_log, named_in
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import described as description_of
 from pvid.models.registry import asked_for, is_named, names, shipped
 from pvid.rig.columns import Columns, MissingColumnError, parsed
 from pvid.rig.file import parsed_file, rig_path_of
-from pvid.rig.former import mechanism_of_former, translated
+from pvid.rig.former import translated
 from pvid.rig.mechanism_file import MechanismRig, channels_of, with_settings
 from pvid.rig.run import is_run, read_recording
 
@@ -51,7 +51,7 @@ def rig_of(
     where = "this recording" if rig_path is None else str(rig_path)
     document = _document(run_path, rig_path, asked)
     document = with_settings(document, settings)
-    name = asked if asked is not None else _named(document)
+    name = asked if asked is not None else named_in(document)
     if name is None:
         name = _proposed(run_path, read, columns)
     if isinstance(name, str):
@@ -97,18 +97,11 @@ def _document(run_path: Path | None, rig_path: Path | None, asked: str | Path | 
         return parsed_file(rig_path, toml_document)
     if run_path is not None and run_path.suffix == LOG_SUFFIX:
         logged = document_of_log(run_path)
-        if logged is not None and (asked is None or is_named(asked, _named(logged) or "")):
+        if logged is not None and (asked is None or is_named(asked, named_in(logged) or "")):
             return logged
     if run_path is not None and not run_path.exists():
         raise PvidError(f"{run_path} does not exist")
     return {}
-
-
-def _named(document: Mapping[str, Any]) -> str | None:
-    """The mechanism that a file names, or whose former keys it has."""
-    table = document.get("model", {})
-    name = table.get("name") if isinstance(table, Mapping) else None
-    return name if isinstance(name, str) else mechanism_of_former(document)
 
 
 def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, columns: str | None) -> str:

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import UNNAMED, settings_number
+from pvid.board.stream_image import StreamImage, settings_number
 from pvid.board.stream_rig import stream_rig
 from pvid.cases import case_of
 from pvid.link.frames import (
@@ -59,7 +59,7 @@ class EngineBoard(Protocol):
     """A board that identifies by the weak engine: MechanismBoard of pvid.board, and that in fixed point."""
 
     @property
-    def settings(self) -> int: ...
+    def stream_image(self) -> StreamImage: ...
 
     @property
     def p_names(self) -> tuple[str, ...]: ...
@@ -322,11 +322,24 @@ class Verifier:
         with np.errstate(all="ignore"):
             recomputation = _Recomputation(twin, names, checks, stretch, self._count)
             recomputation.run(samples)
+        if stretch.difference is not None and self._is_of_another_image(configuration):
+            stretch.difference, stretch.checked = None, 0
+            raise PvidError(
+                "the board's image was made for other settings or another model than the log's, or by another version"
+            )
         stretch.verified = recomputation.covered
         allowed = _pace(configuration) + recomputation.reach
         if recomputation.hashed and configuration.hash_every:
             allowed = configuration.hash_every
         stretch.open = not opened.harmed and stretch.trailing <= allowed
+
+    def _is_of_another_image(self, configuration: Configuration) -> bool:
+        """Whether bits may differ because this version, with the log's settings, makes another image of the engine."""
+        if self.rig is None or isinstance(self.rig, RigFile):
+            return False
+        if self._number is None:
+            self._number = self.rig.stream_image.number
+        return configuration.settings != self._number
 
     def _count(self) -> None:
         self._done += 1
@@ -339,12 +352,6 @@ class Verifier:
             raise PvidError("the log holds no rig file: name it with --rig")
         if isinstance(self.rig, RigFile):
             return _StrongTwin(self._config(self.rig, configuration)), P_NAMES
-        if self._number is None:
-            self._number = self.rig.settings
-        if self._number not in (configuration.settings, UNNAMED):
-            raise PvidError(
-                "the board's image was made for other settings or another model than the log's, or by another version"
-            )
         twin = self.rig.twin_of(configuration)
         if isinstance(twin, BothStagesTwin):
             return _RefinedTwin(twin, self.rig.matrix), self.rig.p_names
