@@ -33,6 +33,7 @@ from pvid.design.c_tables import float_literal
 from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
 from pvid.link.names import BoardNames, shown_of_refined
 from pvid.model.compiled import CompiledModel
+from pvid.models.mechanisms import constants_of
 from pvid.models.registry import asked_for, is_named, shipped
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
@@ -140,7 +141,7 @@ class MechanismBoard:
             Where there is no such mechanism, or the engine or its second stage does not have what it needs.
         """
         simulated = simulated_rig(name)
-        rig = MechanismRig(name, simulated.sample_rate, known=simulated.knowns)
+        rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
         compiled = model_of(rig)
         config = config_for_simulated_rig(compiled)
         if not refined:

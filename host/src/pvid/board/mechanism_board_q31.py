@@ -24,6 +24,7 @@ from pvid.design.c_tables import float_literal
 from pvid.design.weak_q31 import circle_of
 from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
 from pvid.link.names import BoardNames
+from pvid.models.mechanisms import constants_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.edges import with_edges
@@ -86,7 +87,7 @@ class MechanismBoardQ31:
     def of_shipped_rig(cls, name: str) -> MechanismBoardQ31:
         """As MechanismBoard.of_shipped_rig."""
         simulated = simulated_rig(name)
-        rig = MechanismRig(name, simulated.sample_rate, known=simulated.knowns)
+        rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
         compiled = model_of(rig)
         engine = engine_for_simulated_rig(compiled)
         return cls(rig, engine, engine.counts_of(RigSimulation.of(compiled, simulated).run()))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -136,3 +136,8 @@ def compiled_of(mechanism: str | Path) -> CompiledModel:
 @lru_cache(maxsize=32)
 def _compiled(name: str, path: Path, changed: int) -> CompiledModel:
     return described(path).compiled(name)
+
+
+def constants_of(name: str, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of constants, with those of the shipped mechanism for what a rig must give."""
+    return {one.name: one.value for one in compiled_of(name).knowns if one.required} | dict(values)
