@@ -73,7 +73,7 @@ def test_every_former_key_is_one_of_today(tmp_path: Path) -> None:
     assert guess["w"] == pytest.approx(9.8 / 0.25)
     assert guess["d1"] == pytest.approx(1 + ratio * (1 + 0.25 / 0.08), rel=1e-6)
     assert guess["d2"] == pytest.approx(0.25 / 0.08 * ratio, rel=1e-6)
-    assert guess["c"] == 3.1
+    assert guess["c"] == 3.1 and guess["w"] == pytest.approx(39.2, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -120,3 +120,11 @@ def test_columns_of_no_shipped_mechanism_are_refused_with_the_mechanisms(tmp_pat
         rig_of(path)
     assert "no shipped mechanism has these columns" in str(caught.value)
     assert "kapitza (y, phi)" in str(caught.value)
+
+
+def test_a_file_without_rows_is_refused_for_that(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("")
+    with pytest.raises(PvidError) as caught:
+        rig_of(path)
+    assert "can be of" not in str(caught.value) and "run.csv" in str(caught.value)

@@ -449,8 +449,9 @@ def _print(answer: MechanismAnswer) -> None:
     if answer.identified:
         _table(answer.values, f"{answer.model.title}: {_stage(answer)}, float64")
     explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
+    of_weak = "" if _stage(answer) == "weak form" else "weak form: "
     click.echo(
-        f"verdict {found.verdict.word}; chi2 {found.chi2:.2g}; {len(found.times)} windows of "
+        f"verdict {found.verdict.word}; {of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "
         f"{found.design.window_s:.3g} s; R^2 {explained}"
     )
     if answer.refinement is not None and answer.identified:

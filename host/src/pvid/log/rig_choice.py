@@ -118,7 +118,8 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
         read = partial(read_recording, run_path, None)
     if read is None:
         raise PvidError(f"no mechanism is named: use --model, with {listed(names(), 'or')}, or a model file")
-    found = []
+    found: list[str] = []
+    wrong: list[PvidError] = []
     for name in names():
         try:
             wanted = parsed(columns, channels_of(description_of(name)))
@@ -128,9 +129,11 @@ def _proposed(run_path: Path | None, read: Callable[[Columns], object] | None, c
             read(wanted)
         except MissingColumnError:
             continue
-        except PvidError:  # it has the columns, and something else is wrong
-            pass
+        except PvidError as error:  # it has the columns, and something else is wrong
+            wrong.append(error)
         found.append(name)
+    if wrong and len(wrong) == len(found) > 1:  # of the file, whatever its mechanism is
+        raise wrong[0]
     if len(found) == 1:
         return found[0]
     what = "the data" if run_path is None else str(run_path)

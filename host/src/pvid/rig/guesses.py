@@ -18,6 +18,7 @@ Float = npt.NDArray[np.float64]
 
 _PULL = 1e-4  # towards the guess before: what the outputs leave open stays
 _FAR = 1e-3  # relative: an output that is farther from its guess is that of no mechanism
+_EXACT = 1e-15  # of the last steps, which nothing pulls
 _WIDEST = 10.0  # of a logarithm: a factor of 22 000
 
 
@@ -56,6 +57,7 @@ def unknowns_of(model: CompiledModel, outputs: Mapping[str, float], fixed: Colle
     start = np.zeros(int(free.sum()))
     bounds = (-_WIDEST, _WIDEST)
     found = least_squares(lambda x: np.concatenate([off(x), _PULL * x]), start, x_scale="jac", bounds=bounds)
+    found = least_squares(off, found.x, x_scale="jac", bounds=bounds, xtol=_EXACT, ftol=_EXACT, gtol=_EXACT)
     if not len(start) or not np.abs(off(found.x)).max() < _FAR:
         given = listed(f"{name} = {value:g}" for name, value in outputs.items())
         raise PvidError(f"nominal: no {model.title} has {given}, with the constants of this rig")
