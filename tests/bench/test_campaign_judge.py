@@ -135,7 +135,7 @@ def test_the_weak_form_answers_the_standard_rig_and_the_refinement_sharpens_it(n
     rig = replace(simulated(), run=simulate(duration=15.0, truth="full", seed=2).run)
     weak, _ = identify_rig(rig, refine=False)
     record, result = identify_rig(rig)
-    assert flags(weak) >= {"published", "answered", "within_5"} and not weak["warned"]
+    assert flags(weak) >= {"published", "answered", "within_5"}
     assert isinstance(result, MechanismAnswer) and result.refinement is not None and result.refinement.adopted
     assert flags(record) >= {"published", "answered", "within_1", "right"} and not record["warned"]
     for name in NAMES:

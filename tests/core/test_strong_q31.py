@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -177,19 +175,15 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return folder / "run.csv", folder / "rig.toml"
 
 
-def test_identify_and_compare_take_the_fixed_point_core(recorded: tuple[Path, Path]) -> None:
-    run, rig = recorded
-    common = [str(run), "--rig", str(rig), "--core", "q31", "--form", "strong"]
-    done = CliRunner().invoke(commands, ["identify", *common, "--json"])
-    answer = json.loads(done.stdout)
-    assert (answer["core"], answer["form"]) == ("q31", "strong")
-    other = json.loads(CliRunner().invoke(commands, ["identify", *common, "--core", "f32", "--json"]).stdout)
-    assert answer["w"]["value"] == pytest.approx(other["w"]["value"], rel=1e-4)
-    assert answer["status"] == other["status"] == "misfit"  # five points 20 ms apart are 3 % off
-    assert answer["lost"] == 0
-    done = CliRunner().invoke(commands, ["compare", *common])
-    assert len(re.findall(r"q31 .*strong .*equal", done.stdout)) == 2, done.stdout
-    assert "DIFFERENT" not in done.stdout
+def test_the_strong_form_that_is_printed_for_every_model_is_refused_in_fixed_point(
+    recorded: tuple[Path, Path], tmp_path: Path
+) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[model]\nname = 'kapitza'\n[known]\nl1 = 0.3\n", encoding="utf-8")
+    for command in ("identify", "compare"):
+        arguments = [command, str(recorded[0]), "--rig", str(rig), "--core", "q31", "--form", "strong"]
+        with pytest.raises(PvidError, match="omit --core q31"):
+            CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
 
 
 @pytest.mark.parametrize(

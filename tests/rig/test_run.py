@@ -208,10 +208,11 @@ def test_time_in_milliseconds_contradicts_the_rig(tmp_path: Path) -> None:
 
 
 def test_non_file_is_refused(tmp_path: Path) -> None:
-    for path, part in ((tmp_path / "absent.csv", "not exist"), (tmp_path, "must end in")):
+    for path, part in ((tmp_path / "absent.csv", "not exist"), (tmp_path, "is a directory")):
         with pytest.raises(PvidError, match=part) as caught:
             read_run(path)
         assert str(path) in str(caught.value)
+    (tmp_path / "run.tdms").write_bytes(b"TDSm")
     with pytest.raises(PvidError, match="must end in"):
         read_run(tmp_path / "run.tdms")
     folder = tmp_path / "folder.csv"

@@ -237,7 +237,6 @@ def read_recording(
     if rate is not None and not 0 < rate < float("inf"):
         raise PvidError(f"The sample rate must be a positive number of Hz, not {rate:g}.")
     path = Path(path)
-    read = _read_as(path)
     try:
         if path.is_dir():
             raise PvidError(f"{path} is a directory, not a recorded run.")
@@ -245,7 +244,7 @@ def read_recording(
             raise PvidError(f"{path} does not exist.")
         if not path.is_file():
             raise PvidError(f"{path} is not a regular file.")
-        table = read(path, columns or Columns())
+        table = _read_as(path)(path, columns or Columns())
     except (OSError, ValueError) as error:
         raise PvidError(f"{path} cannot be read: {reason(error)}.") from error
     except MemoryError as error:

@@ -169,6 +169,8 @@ def steps_of(
     widths : by argument; from the steps by default
     coarse : where there are signs; from the number of samples by default
     """
+    if samples < 1:
+        raise PvidError("the recording is too short for the refinement")
     r = r.copy()
     r[kernel.widths] = 1e6  # out of the way
     fastest = float(np.abs(np.linalg.eigvals(kernel.slopes(r, *kernel.at_zero))).max())
