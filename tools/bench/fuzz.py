@@ -28,6 +28,7 @@ def fuzz_link(folder: Path, runs: int, seed: int = 1) -> int:
     build = [*_COMPILER, "-fsanitize=fuzzer,address,undefined", f"-I{LINK}", *PUBLIC_INCLUDES]
     _run("the link", folder, [*build, *map(str, sources), "-o", str(binary)])
     limits = [f"-runs={runs}", f"-seed={seed}", "-max_len=1200", "-timeout=10", f"-artifact_prefix={folder}/"]
+    limits += ["-rss_limit_mb=0", "-malloc_limit_mb=64"]  # a child's peak memory begins at that of its parent
     found = re.search(r"^Done (\d+) runs", _run("the link", folder, [str(binary), *limits]).stderr, re.MULTILINE)
     return int(found.group(1)) if found else 0
 
