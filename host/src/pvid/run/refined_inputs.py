@@ -195,7 +195,8 @@ def without_jumps(
     moved = {one.of for jet in made.inputs for one in jets(model.opaque.get(jet, jet)) if one.order == 2}
     for name in sorted(moved):
         x, missing = signals[name], np.isnan(signals[name])
-        whole = np.where(breaks(x, max(8, round(rate / slow_hz)), model.signal(name).sd), np.nan, x)
+        period = round(float(np.clip(rate / slow_hz, 8, max(8, len(x)))))  # a guess may have one beyond the recording
+        whole = np.where(breaks(x, period, model.signal(name).sd), np.nan, x)
         bridge(whole, rate)
         firsts, _ = stretches(np.isnan(whole) & ~missing)
         if len(firsts) <= len(x) / rate * slow_hz / 2:
