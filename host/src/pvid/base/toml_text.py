@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Mapping
 from typing import Any
 
 from pvid.base.errors import PvidError
@@ -34,6 +35,36 @@ def key_and_value(setting: str, example: str) -> tuple[str, Any]:
         return key, toml_document(f"value = {text}")["value"]
     except PvidError:
         return key, text
+
+
+class NotATableError(PvidError):
+    """A dotted key goes through something that is no table, whose name is `table`."""
+
+    def __init__(self, table: str, value: Any) -> None:
+        super().__init__(f"{table} must be a table, [{table}], not {shown(str(value))}")
+        self.table = table
+
+
+def copied(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables that can be changed without the given ones."""
+    return {key: copied(value) if isinstance(value, Mapping) else value for key, value in tables.items()}
+
+
+def put(tables: dict[str, Any], key: str, value: Any) -> None:
+    """Sets a dotted key, as sensor.phi.resolution, in tables that are made where they are missing.
+
+    Raises
+    ------
+    NotATableError
+        Where one of them is none.
+    """
+    *parts, name = key.split(".")
+    place = tables
+    for part in parts:
+        place = place.setdefault(part, {})
+        if not isinstance(place, dict):
+            raise NotATableError(part, place)
+    place[name] = value
 
 
 def quoted(text: str) -> str:

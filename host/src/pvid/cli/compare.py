@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from pvid.base.console import DIFFERENT, DONE
-from pvid.cli.input import form_options
+from pvid.cli.input import form_options, model_option
 from pvid.log.rig_choice import rig_of
 
 if TYPE_CHECKING:
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 
 @click.command(name="compare")
 @click.argument("run_path", metavar="RUN", type=click.Path(path_type=Path))
-@click.option(
-    "--model", help="A mechanism of `pvid models` or a model file.  [default: the rig file's, or the columns']"
-)
+@model_option
 @form_options
 @click.option("--core", type=click.Choice(["f32", "q31", "all"]), help="Arithmetic: f32, q31 or both.  [default: f32]")
 @click.option(

@@ -16,7 +16,9 @@ from pvid.settings.engine_cores import FLOAT
 @click.argument("run_paths", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @model_option
 @form_options
-@click.option("--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic; overrides the rig file.")
+@click.option(
+    "--core", type=click.Choice(["f32", "q31", "f64"]), help="Arithmetic.  [default: f64; of the strong form f32]"
+)
 @click.option(
     "--weights",
     type=click.Choice(["residuals", "sensors"]),

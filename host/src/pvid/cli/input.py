@@ -60,12 +60,12 @@ def form_options(function: Command) -> Command:
         click.option(
             "--form",
             type=click.Choice(["weak", "strong"]),
-            help="Form of the identifier; overrides the rig file.",
+            help="Form of the identifier.  [default: weak]",
         ),
         click.option(
             "--law",
             type=click.Choice(["stationary", "pseudovelocity"]),
-            help="Law of the estimator; overrides the rig file.",
+            help="Law of the strong form.  [default: stationary]",
         ),
         columns_option,
         rig_options,

@@ -13,10 +13,11 @@ def setting_for(error: click.NoSuchOption) -> str | None:
     """The sentence for an unknown option of a command with --set, if a rig file has a key of that name, or a shipped
     mechanism a constant."""
     wanted = error.option_name.lstrip("-").replace("-", "_")
-    has_settings = error.ctx is not None and any("--set" in one.opts for one in error.ctx.command.params)
+    if error.ctx is None or not any("--set" in one.opts for one in error.ctx.command.params):
+        return None
     places = {one.name: f"known.{one.name}" for name in names() for one in described(name).knowns}
     places |= {name: f"identifier.{name}" for name in OF_THE_IDENTIFIER}
     places |= {name: name for name in ("sample_rate", "clock_sd")}
-    if not has_settings or wanted not in places:
+    if wanted not in places:
         return None
     return f"no option {error.option_name}: {wanted} is a key of the rig file: use --set {places[wanted]}=VALUE"

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from pvid.base.errors import PvidError
+from pvid.base.toml_text import copied, put
 from pvid.base.wording import shown
 from pvid.models.registry import names
 
@@ -32,20 +33,20 @@ def translated(document: Mapping[str, Any], name: str) -> dict[str, Any]:
     PvidError
         Naming a key that has no place any more, with what to do.
     """
-    out: dict[str, Any] = _copied(document)
+    out: dict[str, Any] = copied(document)
     former = _former_of(name)
     if former is None:
         return out
     for key, place in former.MOVED.items():
         value = _taken(out, key)
         if value is not None and not (place.endswith((".reach", ".resolution")) and value == 0):
-            _put(out, place, value)
+            put(out, place, value)
     for key, (place, whole) in former.RELATIVE.items():
         share, of = _taken(out, key), _get(out, whole)
         if share is not None:
             if not isinstance(share, int | float) or not isinstance(of, int | float):
                 raise PvidError(f"{key} must be a number, relative to {whole}")
-            _put(out, place, share * of)
+            put(out, place, share * of)
     for key, usual in former.BY_OPTION.items():
         value = _taken(out, f"identifier.{key}")
         if value is not None and usual is not None and value != usual:
@@ -62,10 +63,6 @@ def translated(document: Mapping[str, Any], name: str) -> dict[str, Any]:
 def _former_of(name: str) -> Any:
     module = f"pvid.models.{name}.former"
     return importlib.import_module(module) if name in names() and find_spec(module) is not None else None
-
-
-def _copied(value: Any) -> Any:
-    return {key: _copied(one) for key, one in value.items()} if isinstance(value, Mapping) else value
 
 
 def _get(document: Mapping[str, Any], key: str) -> Any:
@@ -85,13 +82,3 @@ def _taken(document: dict[str, Any], key: str) -> Any:
             place = place[table]
         del place[name]
     return value
-
-
-def _put(document: dict[str, Any], key: str, value: Any) -> None:
-    *tables, name = key.split(".")
-    place = document
-    for table in tables:
-        place = place.setdefault(table, {})
-        if not isinstance(place, dict):
-            raise PvidError(f"{table} must be a table, [{table}], not {shown(str(place))}")
-    place[name] = value

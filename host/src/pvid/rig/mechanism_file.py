@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.base.toml_text import key_and_value, quoted, toml_document
+from pvid.base.toml_text import NotATableError, copied, key_and_value, put, quoted, toml_document
 from pvid.base.wording import listed, shown
 from pvid.models.model import Channel
 from pvid.rig.columns import channel_of
@@ -237,21 +237,14 @@ def with_settings(document: Mapping[str, Any], settings: Iterable[str]) -> dict[
     PvidError
         Where a setting is none.
     """
-    changed = {key: _copied(value) for key, value in document.items()}
+    changed = copied(document)
     for setting in settings:
         key, value = key_and_value(setting, "known.g=9.81")
-        *tables, name = key.split(".")
-        place = changed
-        for table in tables:
-            place = place.setdefault(table, {})
-            if not isinstance(place, dict):
-                raise PvidError(f"--set {shown(setting)}: {table} is a number, not a table")
-        place[name] = value
+        try:
+            put(changed, key, value)
+        except NotATableError as error:
+            raise PvidError(f"--set {shown(setting)}: {error.table} is a number, not a table") from error
     return changed
-
-
-def _copied(value: Any) -> Any:
-    return {key: _copied(one) for key, one in value.items()} if isinstance(value, dict) else value
 
 
 def _table(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:

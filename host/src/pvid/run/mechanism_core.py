@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
@@ -61,7 +60,6 @@ class CoreAnswer:
     windows : how many the engine has judged
     hash : running hash of its state after the last tick
     publications : every estimate that was published; their standard errors contain what `values` contains
-    reasons : count of each reason, in ticks
     by_analysis : nothing is published, because a parameter may be 0; the values are those of the oracle
     """
 
@@ -78,7 +76,6 @@ class CoreAnswer:
     windows: int
     hash: int
     publications: Publications
-    reasons: Mapping[str, int]
     by_analysis: bool = False
 
     @property
@@ -284,7 +281,6 @@ def _answer(answer: MechanismAnswer, run: _Run) -> CoreAnswer:
         windows=int(len(ends)),
         hash=identifier.running_hash,
         publications=_published(answer, run, gains, wider),
-        reasons=_counted(record.reason),
         by_analysis=by_analysis,
     )
     return replace(core, values=values(core.verdict))
@@ -297,9 +293,3 @@ def _published(answer: MechanismAnswer, run: _Run, gains: Float, wider: Float) -
     p, own = run.published
     se = np.hypot(own[ticks, :n_p] * wider, np.sqrt(np.sum(gains**2, axis=0)))
     return Publications(answer.recording.t[ticks], p[ticks, :n_p], se)
-
-
-def _counted(reasons: npt.NDArray[np.uint8]) -> dict[str, int]:
-    """How many ticks ended with each reason."""
-    codes, counts = np.unique(reasons, return_counts=True)
-    return {Outcome(int(code)).text: int(count) for code, count in zip(codes, counts, strict=True)}
