@@ -18,13 +18,13 @@ from block_models import BlockModel, EstimatorInC
 from weak_rig import engine_rig
 
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core import snapshot
 from pvid.core.headers import Headers, Scalar, default_library
 from pvid.core.native import Identifier, Native, Stepper
 from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
-from pvid.run.engine_design_q31 import engine_for_simulated_rig
 from pvid.settings.enums import Status
 from pvid.settings.f32 import EstimatorConfig
 from pvid.setup.f32 import strong_config

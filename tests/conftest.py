@@ -25,17 +25,25 @@ settings.load_profile("seeded")
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = (
-    *("tools/pages", "board/targets", "bench/campaign_run", "tools/wheel", "run/refined"),
+    *("tools/pages", "board/targets", "bench/campaign_run", "tools/wheel", "identification/refined"),
     *("cli/design_cost", "cli/mechanism_core", "log/log", "deploy/deploy", "twin/strong_bits_q31", "cli/cli"),
     *("show/report", "board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
     *("bench/refine_bench", "bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
-    *("board/ports", "tools/notebooks", "cli/run_input", "run/wild_samples", "models/scale_errors"),
+    *("board/ports", "tools/notebooks", "cli/run_input", "identification/wild_samples", "models/scale_errors"),
     *("bench/campaign_refined", "cli/mechanism", "tools/consumer", "twin/weak_bits_q31"),
     *("board/refined_stream", "fleet/batch", "twin/misfit", "twin/gate", "twin/weak_f32", "twin/refinement"),
     *("cli/api", "core/strong_q31", "codegen/build", "bench/strong_bytes", "bench/year", "show/view"),
     *("twin/second_stage", "deploy/deploy_avr", "bench/cost", "bench/strong_mechanisms", "bench/side_by_side"),
-    *("bench/accidents", "run/own_mechanisms", "twin/bits", "bench/hard", "twin/trust_q31", "twin/kinds_q31"),
+    *(
+        "bench/accidents",
+        "identification/own_mechanisms",
+        "twin/bits",
+        "bench/hard",
+        "twin/trust_q31",
+        "twin/kinds_q31",
+    ),
     *("core/sizes_agree", "board/mechanism_board", "codegen/generated_q31", "sim/pendulum", "twin/compare"),
+    *("twin/trust_q31",),
     *("board/port", "codegen/generated_f32", "cli/readme", "core/read_while_stepping", "log/export"),
     *("codegen/strong_model", "log/untrusted", "board/field", "twin/weak_rows_q31", "oracle/missing"),
     *("core/bad_config", "model/elimination", "oracle/weak_identify", "link/link", "bench/campaign_judge"),
@@ -44,7 +52,7 @@ SLOW = (
     *("core/dropped_calls", "bench/build_choices", "board/generated", "tools/core_rooms", "board/strong_image"),
     *("codegen/model_q31", "core/freeze", "twin/estimator_q31", "bench/mechanisms"),
     *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
-    *("bench/campaign_population", "twin/kinds", "bench/random_models", "board/refined_board", "run/skew"),
+    *("bench/campaign_population", "twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
     *("tools/analysis", "board/engine_boards", "oracle/strong_described", "core/snapshot", "codegen/random"),
     *("tools/mutate", "oracle/weak_engine", "show/mechanism_figure"),
 )

@@ -20,7 +20,7 @@ from pvid.models.registry import DEFAULT
 
 IMPORTED = [
     *(f"pvid.cli.{name}" for name in ("compare", "export", "identify", "log", "model", "simulate", "verify")),
-    *("pvid.run.identification", "pvid.run.judge", "pvid.run.mechanism_core"),
+    *("pvid.identification.road", "pvid.identification.judge", "pvid.identification.core"),
     *("scipy.integrate", "scipy.interpolate", "scipy.signal"),
 ]
 TIMEOUT_S = 300

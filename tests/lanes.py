@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.cases import case_of
+from pvid.compare.bits import first_difference
 from pvid.core.native import Identifier, Native
-from pvid.run.compare import first_difference
 from pvid.settings.record import Record
 from pvid.twin import fnv
 

@@ -20,6 +20,8 @@ import numpy.typing as npt
 from pvid.board.refined_image import RefinedRun, refined_run
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration.weak import simulated_run_of
+from pvid.configuration.weak_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.core import snapshot
 from pvid.core.model_library import core_of
 from pvid.core.native import Publisher
@@ -27,8 +29,6 @@ from pvid.core.sizes import options_of, roomy
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
-from pvid.run.engine_design import simulated_run_of
-from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.settings.engine_cores import FIXED, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import GateConfig, TrustConfig

@@ -448,8 +448,8 @@ def unexplained(proof: Proof, said: str) -> list[str]:
 def engine_design(folder: Path) -> None:
     """Writes engine_design_q31.h: functions and tables of the pendulum's shipped rig, the reach of its jets."""
     from pvid.codegen import files_weak_q31
+    from pvid.configuration.weak_q31 import engine_for_simulated_rig
     from pvid.models.mechanisms import compiled_of
-    from pvid.run.engine_design_q31 import engine_for_simulated_rig
 
     engine = engine_for_simulated_rig(compiled_of("kapitza"))
     name, made_by = engine.name, "tools/prove.py"

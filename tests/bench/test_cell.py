@@ -8,12 +8,12 @@ from conftest import ROOT
 
 from bench import cell
 from bench.replay import Replay
+from pvid.identification.analysis import analysed
+from pvid.identification.judge import judged
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.identify import identify
 from pvid.rig.columns import Columns
 from pvid.rig.run import read_recording
-from pvid.run.judge import judged
-from pvid.run.mechanism import identify_mechanism
 
 DATA = ROOT / "tests" / "data" / "cell"
 
@@ -55,7 +55,7 @@ def test_identify_predicts_another_load_with_the_weights_of_the_sensors_and_by_t
     found = identify(model, run.signals, run.sample_rate, weights="sensors")
     assert found.verdict.identified
     assert all(Replay(model, one).matches(found.p)["v"].rms < BAR for one in (run, other))
-    default = judged(identify_mechanism(run, model)).found
+    default = judged(analysed(run, model)).found
     assert "prediction" in [one.name for one in default.verdict.reasons] and default.verdict.identified
     assert all(Replay(model, one).matches(default.p)["v"].rms < BAR for one in (run, other))
 

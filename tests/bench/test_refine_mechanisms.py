@@ -12,8 +12,8 @@ from bench.refine_mechanisms import HEADER, IMPERFECT, NAMES, Case, cases, imper
 from pvid.base.errors import PvidError
 from pvid.codegen.build import refine_functions
 from pvid.codegen.refine_twin import GeneratedRefine
+from pvid.configuration.refine import refine_settings
 from pvid.models.simulated_rig import simulated_rig
-from pvid.run.refine_design import refine_settings
 from pvid.settings.enums import Reason
 from pvid.sim.bound import bound
 from pvid.twin.f32.refine_front import Front

@@ -19,14 +19,14 @@ import numpy.typing as npt
 
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration.weak import config_for_simulated_rig
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core import snapshot
 from pvid.core.native import Identifier, Native, Publisher
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.engine_design import config_for_simulated_rig
-from pvid.run.engine_design_q31 import engine_for_simulated_rig
 from pvid.setup.f32 import strong_config
 from pvid.setup.q31 import counts_of, strong_config_q31
 from pvid.sim.pendulum import simulate, standard_sensors, standard_start

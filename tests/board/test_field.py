@@ -23,11 +23,11 @@ from pvid.board.stream_image import settings_number
 from pvid.board.stream_rig import StreamRig
 from pvid.board.target import HOST_TARGET, Target, open_target
 from pvid.codegen.weak_library import weak_native
+from pvid.configuration.nominal_run import nominal_run
 from pvid.core.native import Native
 from pvid.link.frames import SCHEMA_TEXT, Core, Source, encode
 from pvid.link.port import Port
 from pvid.rig.file import RigFile
-from pvid.run.nominal_run import nominal_run
 from pvid.twin.sensor import SensorConstants, counts
 
 TICKS = 9000  # two announcements more in the weak form's 1 kHz

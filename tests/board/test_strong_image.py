@@ -11,10 +11,10 @@ from click.testing import CliRunner, Result
 from pvid.base.console import DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
+from pvid.compare.strong import StrongComparison
+from pvid.configuration.strong import strong_design
 from pvid.models import mechanisms
 from pvid.rig.run import Recording
-from pvid.run.strong_compare import StrongComparison
-from pvid.run.strong_design import strong_design
 from pvid.settings.enums import Law
 from pvid.sim.simulated_run import simulation_of
 

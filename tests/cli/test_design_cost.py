@@ -16,8 +16,8 @@ from pvid.board import design_cost, sizes
 from pvid.board.boards import BOARDS, Board
 from pvid.board.replay_image import ReplayReport
 from pvid.cli.main import commands
+from pvid.configuration import refine as refine_design
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run import refine_design
 from pvid.settings.refine import RefineConfig
 
 BOARD = "mps2-an386"

@@ -19,14 +19,14 @@ from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.target import HOST_TARGET
 from pvid.cli.main import commands
 from pvid.cli.mechanism import recording_of
+from pvid.configuration.refine import refine_design
+from pvid.configuration.weak import config_to_identify
+from pvid.identification.analysis import analysed
+from pvid.identification.core import identify_in_c
 from pvid.log.rig_choice import rig_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.file import Refine, RigFile
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run.engine_design import config_to_identify
-from pvid.run.mechanism import identify_mechanism
-from pvid.run.mechanism_core import identify_in_c
-from pvid.run.refine_design import refine_design
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
@@ -91,7 +91,7 @@ def test_a_simulated_run_of_the_described_pendulum_is_identified_from_its_descri
 
 def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(recorded: dict[str, Path]) -> None:
     rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
+    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
     assert core.verdict.status == "good"
     one = core.values["Iyz"]
     assert one.value is not None and one.se is not None
@@ -106,7 +106,7 @@ def test_an_answer_of_the_core_that_the_analysis_contradicts_has_a_warning(recor
 
 def test_a_core_that_has_published_nothing_is_not_called_good(recorded: dict[str, Path]) -> None:
     rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
+    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
     silent = replace(core, published=False, reason=Reason.HELD_NOT_EXCITED)
     assert silent.verdict.status == "not_identified"
     assert silent.as_json()["status"] == "not_identified"
@@ -116,7 +116,7 @@ def test_a_core_that_has_published_nothing_is_not_called_good(recorded: dict[str
 def test_core_and_analysis_are_compared_by_their_noise(recorded: dict[str, Path]) -> None:
     """The errors of gains are the same in both: they hide no difference."""
     rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
+    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
     one = core.values["Iyz"]
     assert one.value is not None and one.se_noise is not None
     loud = replace(one, se=100 * one.se_noise)
@@ -130,7 +130,7 @@ def test_core_and_analysis_are_compared_by_their_noise(recorded: dict[str, Path]
 def test_values_that_float32_does_not_resolve_are_alike(recorded: dict[str, Path], steps: int, status: str) -> None:
     """Of sensors without noise the standard errors are far below the last bit of a float."""
     rig = MechanismRig.of_document(tomllib.loads(recorded["rigid_body"].with_suffix(".toml").read_text()))
-    core = identify_in_c(identify_mechanism(*recording_of(recorded["rigid_body"], rig, None)))
+    core = identify_in_c(analysed(*recording_of(recorded["rigid_body"], rig, None)))
     one = core.values["Iyz"]
     assert one.value is not None
     exact = replace(one, value=float(np.float32(one.value)), se_noise=1e-12 * abs(one.value))
@@ -171,7 +171,7 @@ def test_where_the_core_publishes_nothing_the_values_are_null(
         config = config_to_identify(*given)
         return replace(config, trust=replace(config.trust, se_max=1e-6))
 
-    monkeypatch.setattr("pvid.run.mechanism_core.config_to_identify", strict)
+    monkeypatch.setattr("pvid.identification.core.config_to_identify", strict)
     answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--json")
     shown = json.loads(answer.stdout)
     assert answer.return_value == NOTHING_IDENTIFIED and not shown["identified"]
@@ -184,7 +184,7 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     answer = pvid("compare", recorded["dc_motor"], "--core", "all")
     assert answer.return_value == DONE and answer.stdout.count("equal") == 3 and "6000" in answer.stdout
     assert "f32" in answer.stdout and "q31" in answer.stdout
-    changed = "pvid.run.mechanism_compare.WeakTwin"
+    changed = "pvid.compare.weak.WeakTwin"
     monkeypatch.setattr(changed, lambda config: WeakTwin(replace(config, iterations=1)))
     answer = pvid("compare", recorded["rigid_body"])
     assert answer.return_value == DIFFERENT
@@ -281,7 +281,7 @@ def test_where_nothing_is_refined_the_answer_is_that_of_the_weak_form_and_says_s
         settings = refine_design(*given)
         return replace(settings, sd=settings.sd * np.float32(1e-6))
 
-    monkeypatch.setattr("pvid.run.refined_core.refine_design", exact)
+    monkeypatch.setattr("pvid.identification.core_refined.refine_design", exact)
     answer = pvid("identify", recorded["rigid_body"], "--core", "f32", "--refine")
     assert answer.return_value == DONE and "weak form, C in float32" in answer.stdout
     assert "not refined: held searching; the estimate is that of the weak form" in answer.stdout
@@ -294,7 +294,7 @@ def test_the_second_stage_is_compared_with_its_twin_too(
     rows = [line.split() for line in answer.stdout.splitlines() if "host" in line]
     assert answer.return_value == DONE and [row[5] for row in rows] == ["weak", "refined"]
     assert rows[0][11] != rows[1][11] and answer.stdout.count("equal") == 2  # hashes of one stage and of both
-    changed = "pvid.run.refined_core.RefineTwin"
+    changed = "pvid.identification.core_refined.RefineTwin"
     monkeypatch.setattr(changed, lambda model, config: RefineTwin(model, replace(config, gate=1.0)))
     answer = pvid("compare", recorded["rigid_body"])
     assert answer.return_value == DIFFERENT
@@ -304,7 +304,7 @@ def test_the_second_stage_is_compared_with_its_twin_too(
     def refused(*_: Any) -> RefineConfig:
         raise PvidError(why)
 
-    monkeypatch.setattr("pvid.run.refined_core.refine_design", refused)
+    monkeypatch.setattr("pvid.identification.core_refined.refine_design", refused)
     assert f"note: no second stage: {why}" in pvid("compare", recorded["rigid_body"]).stderr
 
 

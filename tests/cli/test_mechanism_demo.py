@@ -13,7 +13,7 @@ from pvid.base.console import DONE
 from pvid.base.errors import PvidError
 from pvid.board.target import HOST_TARGET
 from pvid.cli.mechanism_demo import demo
-from pvid.run.mechanism import refined_shifts_of
+from pvid.identification.values import refined_shifts_of
 
 
 @pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])

@@ -22,7 +22,6 @@ from pvid.log.rig_choice import rig_of
 from pvid.rig.file import rig_path_of
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Run, read_run, write_run
-from pvid.run.mechanism import model_of
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
@@ -127,7 +126,7 @@ def test_settings_come_before_what_the_file_holds(tmp_path: Path) -> None:
 )
 def test_a_wrong_setting_is_one_sentence_that_names_the_key(setting: str, part: str) -> None:
     with pytest.raises(PvidError, match=f"^{re.escape(part)}") as caught:
-        model_of(rig_of(None, None, ["known.l1=0.3", setting], "kapitza"))
+        rig_of(None, None, ["known.l1=0.3", setting], "kapitza").compiled()
     assert str(caught.value).isprintable()
 
 

@@ -16,16 +16,16 @@ from pvid.base.errors import PvidError
 from pvid.codegen.build import Options, build, check, files_of, fixed_point_refusal, refine_functions
 from pvid.codegen.reaches import Reaches
 from pvid.codegen.weak_library import weak_native
+from pvid.configuration.refine import refine_design, refine_settings
+from pvid.configuration.weak import config_for_simulated_rig, samples_of, simulated_run_of
+from pvid.configuration.weak_files_q31 import files_of as fixed_files_of
+from pvid.configuration.weak_files_q31 import fitted_of
+from pvid.configuration.weak_q31 import engine_for_rig_like_the_shipped
 from pvid.core.host_compiler import host_compiler
 from pvid.core.sizes import default_sizes, raised
 from pvid.core.sources import INCLUDES, source
 from pvid.model import Integral, Model
 from pvid.models.mechanisms import compiled_of
-from pvid.run.engine_design import config_for_simulated_rig, samples_of, simulated_run_of
-from pvid.run.engine_design_q31 import engine_for_rig_like_the_shipped
-from pvid.run.engine_files_q31 import files_of as fixed_files_of
-from pvid.run.engine_files_q31 import fitted_of
-from pvid.run.refine_design import refine_design, refine_settings
 from pvid.setup.weak_sizes import sizes_of_design
 
 USER = """

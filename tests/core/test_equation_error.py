@@ -9,9 +9,9 @@ import pytest
 
 from bench.board_engine import Answer, BoardEngine, FixedBoard, Float, FloatBoard, Signals
 from bench.engine import rms
+from pvid.configuration.weak import config_for_simulated_rig, engine_config, simulated_run_of
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.models.mechanisms import compiled_of
-from pvid.run.engine_design import config_for_simulated_rig, engine_config, simulated_run_of
-from pvid.run.engine_design_q31 import engine_for_simulated_rig
 from pvid.settings.enums import Core
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import simulation_of

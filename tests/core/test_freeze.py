@@ -13,10 +13,10 @@ import numpy.typing as npt
 import pytest
 
 from pvid.cases import CASES, Case
+from pvid.compare.bits import first_difference
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import Run
-from pvid.run.compare import first_difference
 from pvid.settings.enums import Reason
 from pvid.sim.pendulum import simulate, standard_sensors
 

@@ -9,11 +9,11 @@ import pytest
 
 from bench.board_engine import PUBLISHED, FixedBoard, FloatBoard, board_of
 from bench.pendulum import RIGS, cramer_rao, design_for, model_for
+from pvid.configuration.weak import config_for_simulated_rig
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.identify import ready
-from pvid.run.engine_design import config_for_simulated_rig
-from pvid.run.engine_design_q31 import engine_for_simulated_rig
 from pvid.settings.enums import Core
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.pendulum import STANDARD_PENDULUM

@@ -18,15 +18,15 @@ from program import pvid
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.boards import run as run_on
+from pvid.configuration.refine import full_motion_of, refine_for_simulated_rig
+from pvid.configuration.weak import config_for_simulated_rig, simulated_run_of
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.deploy.deployment import Deployment
 from pvid.deploy.example import expected
 from pvid.deploy.of_rig import deployment_f32, deployment_q31
 from pvid.deploy.targets import TARGETS, write_package
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
-from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
-from pvid.run.engine_design_q31 import engine_for_simulated_rig
-from pvid.run.refine_design import full_motion_of, refine_for_simulated_rig
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 

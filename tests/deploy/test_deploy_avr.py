@@ -18,6 +18,8 @@ from test_examples import ESTIMATOR, PRINTED
 
 from pvid.base.subprocesses import start
 from pvid.board.boards import BOARDS, prepare_emulator
+from pvid.configuration.weak import simulated_run_of
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.deploy import memory
 from pvid.deploy.arduino import package
 from pvid.deploy.deployment import Deployment
@@ -25,8 +27,6 @@ from pvid.deploy.example import expected
 from pvid.deploy.of_rig import deployment_q31
 from pvid.deploy.targets import write_package
 from pvid.models.mechanisms import compiled_of
-from pvid.run.engine_design import simulated_run_of
-from pvid.run.engine_design_q31 import engine_for_simulated_rig
 
 _SECONDS = 120  # of the emulator
 

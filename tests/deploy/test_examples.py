@@ -10,10 +10,10 @@ import pytest
 from conftest import ROOT
 from packages import STUBS, built, run
 
+from pvid.configuration.weak import config_for_simulated_rig, simulated_run_of
 from pvid.deploy.of_rig import deployment_f32
 from pvid.deploy.targets import write_package
 from pvid.models.mechanisms import compiled_of
-from pvid.run.engine_design import config_for_simulated_rig, simulated_run_of
 
 EXAMPLES = ROOT / "firmware" / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.c"))

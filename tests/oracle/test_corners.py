@@ -7,13 +7,13 @@ import numpy.typing as npt
 import pytest
 from scipy.linalg import expm
 
+from pvid.identification.analysis import analysed
+from pvid.identification.core import identify_in_c
 from pvid.model import Model
 from pvid.model.compiled import CompiledModel, Edge
 from pvid.model.corners import OfInput, feedthroughs, slopes, with_corners
 from pvid.oracle.weak.identify import identify
 from pvid.rig.run import Recording
-from pvid.run.mechanism import identify_mechanism
-from pvid.run.mechanism_core import identify_in_c
 from pvid.settings.enums import Core
 
 Float = npt.NDArray[np.float64]
@@ -117,7 +117,7 @@ def test_the_slope_of_a_product_contains_the_measured_signal() -> None:
 @pytest.mark.parametrize("core", [None, "f32", "q31"])
 def test_inductance_of_a_motor_whose_bridge_voltage_is_measured(core: Core | None) -> None:
     """Without the corners of the product L is 0.9 % off, 46 standard errors of noise, and d is called delayed."""
-    answer = identify_mechanism(motor_run(), motor_on_a_bridge())
+    answer = analysed(motor_run(), motor_on_a_bridge())
     values = answer.values if core is None else identify_in_c(answer, core).values
     for name, truth in MOTOR.items():
         one = values[name]
@@ -183,7 +183,7 @@ def test_a_current_is_right_on_either_side_of_the_jumps_of_the_voltage(
     core: Core | None, edge: Edge, hold: int
 ) -> None:
     """Halfway between the sides R1 is some 10 % off, or the equations are said to lack something."""
-    answer = identify_mechanism(ladder_run(edge, hold), ladder())
+    answer = analysed(ladder_run(edge, hold), ladder())
     assert answer.model.signal("i").edge == edge
     values = answer.values if core is None else identify_in_c(answer, core).values
     for name, truth in LADDER.items():

@@ -14,8 +14,8 @@ SOURCE = ROOT / "host" / "src"
 
 # Each imports from itself and from those before it.
 ORDER = """
-base settings model models core rig sim design oracle setup twin codegen link cases run deploy board log show api fleet
-cli
+base settings model models core rig sim design oracle setup twin codegen link cases configuration compare
+deploy board log identification show api fleet cli
 """.split()
 
 # Names of the pendulum's parameters stand in its own rooms only: what shows, stores or sends them asks the model.

@@ -10,10 +10,10 @@ import numpy.typing as npt
 import pytest
 from lanes import assert_lanes_equal
 
+from pvid.compare.bits import compare_run, first_difference
 from pvid.core.native import Native
 from pvid.design.fir import savitzky_golay
 from pvid.rig.file import Differentiator, RigFile
-from pvid.run.compare import compare_run, first_difference
 from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import EstimatorConfig, StrongConfig
 from pvid.setup.f32 import strong_config

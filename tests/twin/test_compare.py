@@ -31,7 +31,7 @@ from pvid.cases import CASES
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
 from pvid.rig.run import read_run
-from pvid.run.compare import compare_run
+from pvid.compare.bits import compare_run
 
 rig, case, run = RigFile.standard(), CASES["strong", "f32"], read_run(Path("run.csv"), 1000.0)
 found = compare_run(Native(), case.settings(rig, 1000.0), *case.samples(rig, run))

@@ -9,15 +9,15 @@ import numpy.typing as npt
 import pytest
 
 from pvid.codegen.weak_library import weak_native
+from pvid.compare.weak import compare_counts, compare_recording, compare_samples
+from pvid.configuration.weak import engine_config, samples_of
+from pvid.configuration.weak_q31 import fixed_engine
+from pvid.identification.analysis import analysed
+from pvid.identification.core import identify_in_c
 from pvid.model import Integral, Model
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.design import WeakDesign
 from pvid.rig.run import Recording
-from pvid.run.engine_design import engine_config, samples_of
-from pvid.run.engine_design_q31 import fixed_engine
-from pvid.run.mechanism import identify_mechanism
-from pvid.run.mechanism_compare import compare_counts, compare_recording, compare_samples
-from pvid.run.mechanism_core import identify_in_c
 from pvid.settings.enums import Core
 
 Float = npt.NDArray[np.float64]
@@ -64,7 +64,7 @@ def design_of(decimation: int, taps: int) -> WeakDesign:
 @pytest.mark.parametrize("core", ["f32", "q31"])
 def test_a_cell_that_is_loaded_from_the_start_has_the_right_voltage(core: Core) -> None:
     """The integral was a rectangle of the current at the first step: E was 15 standard errors off."""
-    answer = identify_mechanism(loaded_from_the_start(), cell())
+    answer = analysed(loaded_from_the_start(), cell())
     found = identify_in_c(answer, core).values
     for name in ("E", "s"):
         one = found[name]

@@ -17,10 +17,10 @@ from pvid.codegen.build import refine_functions
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of
+from pvid.configuration.refine import refine_settings
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
-from pvid.run.refine_design import refine_settings
 from pvid.settings.enums import Reason, SnapshotStatus
 from pvid.settings.f32 import TrustConfig
 from pvid.settings.refine import RefineConfig

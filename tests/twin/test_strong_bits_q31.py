@@ -10,10 +10,10 @@ import pytest
 from hostile_counts import HOSTILE, hostile
 from lanes import assert_lanes_equal
 
+from pvid.compare.bits import first_difference
 from pvid.core.native import Native
 from pvid.rig.file import Differentiator, RigFile
 from pvid.rig.run import Run
-from pvid.run.compare import first_difference
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, StrongConfigQ31
 from pvid.settings.tables import RowFormatQ31

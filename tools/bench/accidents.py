@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.core.native import Native
+from pvid.identification.analysis import analysed
+from pvid.identification.answer import Answer
+from pvid.identification.reading import read_all
+from pvid.identification.road import identified
+from pvid.identification.wild_samples import without_wild_samples
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording, Run
-from pvid.run.identification import identified
-from pvid.run.mechanism import MechanismAnswer, identify_mechanism
-from pvid.run.reading import read_all
-from pvid.run.wild_samples import without_wild_samples
 from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.sim.simulated_run import PERFECT, simulation_of
 
@@ -188,12 +189,12 @@ def motor_with(accident: Accident, seed: int) -> Outcome:
     signals = {name: values[: round(10 * rate)].copy() for name, values in simulation.run(seed, PERFECT).items()}
     left = accident.happens(signals, np.random.default_rng(seed), rate) or signals
     recording = Recording(np.arange(len(left["V"])) / rate, left, rate).whole()
-    found = identify_mechanism(without_wild_samples(recording, model), model)
+    found = analysed(without_wild_samples(recording, model), model)
     truth = dict(zip(model.p_names, map(float, simulation.truth), strict=True))
     return outcome_of(_known(found, truth), truth, found.found.verdict.warning is not None)
 
 
-def _known(found: MechanismAnswer, names: Collection[str]) -> dict[str, tuple[float, float]]:
+def _known(found: Answer, names: Collection[str]) -> dict[str, tuple[float, float]]:
     """Values and standard errors of these, where they are identified."""
     values = {name: one for name, one in found.values.items() if name in names}
     return {name: (one.value, one.se) for name, one in values.items() if one.value is not None and one.se is not None}

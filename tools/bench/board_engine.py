@@ -12,13 +12,13 @@ import numpy.typing as npt
 
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration.weak import engine_config, samples_of
+from pvid.configuration.weak_q31 import FixedEngine, fixed_engine, with_neglected
 from pvid.core.native import Publisher
 from pvid.core.weak_native import WeakIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.design import WeakDesign
-from pvid.run.engine_design import engine_config, samples_of
-from pvid.run.engine_design_q31 import FixedEngine, fixed_engine, with_neglected
 from pvid.settings.enums import Core, Reason
 from pvid.settings.record import Record
 from pvid.settings.weak import WeakConfig

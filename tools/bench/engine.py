@@ -12,11 +12,11 @@ import numpy.typing as npt
 from bench.mechanisms import design_of, size_of, start_of
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of
+from pvid.configuration.weak import samples_of
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import batch
-from pvid.run.engine_design import samples_of
 from pvid.setup.weak import config_of, design_tables, for_engine
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import PERFECT, SOFT, simulation_of

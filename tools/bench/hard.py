@@ -18,9 +18,9 @@ from scipy import stats
 
 from bench.board_engine import Answer, FixedBoard, FloatBoard, board_of
 from bench.pendulum import RIGS, design_for, model_for
+from pvid.configuration.weak import neglected_part
 from pvid.core.native import Native
 from pvid.rig.run import Run
-from pvid.run.engine_design import neglected_part
 from pvid.settings.enums import Core
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,

@@ -17,10 +17,10 @@ import numpy.typing as npt
 
 from bench.plants import NOTHING, PLANTS, SAMPLES, Axis, Plant, States, Values
 from pvid.base.errors import PvidError
+from pvid.identification.road import identified
 from pvid.oracle.weak.identify import Identified
 from pvid.oracle.weak.naming import Term, terms_of
 from pvid.rig.run import Recording
-from pvid.run.mechanism_advice import analysed
 
 Float = npt.NDArray[np.float64]
 Law = Callable[[States, float], float]  # of states and time [s]
@@ -531,7 +531,7 @@ def outcome(plant: Plant, seed: int, *acting: tuple[Effect, float]) -> Outcome:
     """
     model = plant.model()
     run = Recording(np.arange(SAMPLES) / plant.rate, recording(plant, seed, *acting), plant.rate)
-    found = analysed(run, model).found
+    found = identified(run, model, refine=False).found
     low, high = _truth_of(plant, acting)
     published = np.array([one.status == "identified" for one in found.judged])
     if acting:  # an offset takes up what is constant of an effect

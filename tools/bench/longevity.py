@@ -25,6 +25,8 @@ from pvid.base.errors import PvidError
 from pvid.codegen.build import refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration.weak import config_for_simulated_rig
+from pvid.configuration.weak_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.core.headers import Filled, Headers, default_library
 from pvid.core.native import Identifier, Native, Publisher
 from pvid.core.sources import PUBLIC_FOLDERS, ROOT
@@ -34,8 +36,6 @@ from pvid.design.refine import refine_config
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.file import RigFile
-from pvid.run.engine_design import config_for_simulated_rig
-from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.settings.bounds import SIZES
 from pvid.settings.enums import Reason
 from pvid.settings.f32 import GateConfig

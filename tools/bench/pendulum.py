@@ -16,7 +16,6 @@ from pvid.models.kapitza.modes import modes_hz
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.design import WeakDesign
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run.mechanism import model_of
 from pvid.settings.enums import Core
 from pvid.sim.pendulum import (
     STANDARD_DRIVE,
@@ -138,15 +137,13 @@ def model_for(rig: Rig, **phi: float) -> CompiledModel:
     """The description with the rod, the encoder (`phi`: more of its keys in a rig file) and a guess 5 % off."""
     body = rig.pendulum
     guess = Pendulum(body.l1, 0.95 * body.l2, 1.05 * body.rho2, 1.05 * body.g).linear
-    return model_of(
-        MechanismRig(
-            "kapitza",
-            RATE_HZ,
-            known={"l1": body.l1},
-            sensor={"phi": {"resolution": rig.sensors.phi_lsb, **phi}},
-            nominal=dict(zip(("w", "d1", "d2"), map(float, guess), strict=True)),
-        )
-    )
+    return MechanismRig(
+        "kapitza",
+        RATE_HZ,
+        known={"l1": body.l1},
+        sensor={"phi": {"resolution": rig.sensors.phi_lsb, **phi}},
+        nominal=dict(zip(("w", "d1", "d2"), map(float, guess), strict=True)),
+    ).compiled()
 
 
 def errors_of(rig: Rig, seeds: int, core: Core = "f32", progress: Callable[[], object] = lambda: None) -> Errors:

@@ -31,27 +31,28 @@ from bench.random_rigs import IN_C, random_rig
 from pvid.base.errors import PvidError
 from pvid.cli.mechanism import recording_of
 from pvid.codegen import build as generated
+from pvid.compare.bits import Comparison
+from pvid.compare.weak import compare_recording
+from pvid.configuration.refine import refine_design
+from pvid.configuration.weak import config_for_recording
+from pvid.configuration.weak_files_q31 import config_of, files_of
+from pvid.configuration.weak_q31 import FixedEngine, engine_for_recording
 from pvid.core.host_compiler import compiled_once, host_compiler
 from pvid.core.sources import INCLUDES, core_sources
 from pvid.deploy.deployment import Deployment
 from pvid.deploy.example import expected
 from pvid.deploy.of_rig import deployment_f32, deployment_q31
 from pvid.deploy.targets import write_package
+from pvid.identification.advice import advised
+from pvid.identification.analysis import analysed
+from pvid.identification.answer import Answer, Value
+from pvid.identification.core import identify_in_c
+from pvid.identification.core_refined import compare_both, refined_in_c
+from pvid.identification.refinement.adoption import refined_answer
 from pvid.model.identifiability import identifiable
 from pvid.model.report import check_report
 from pvid.models import mechanisms
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run.compare import Comparison
-from pvid.run.engine_design import config_for_recording
-from pvid.run.engine_design_q31 import FixedEngine, engine_for_recording
-from pvid.run.engine_files_q31 import config_of, files_of
-from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism
-from pvid.run.mechanism_advice import advised
-from pvid.run.mechanism_compare import compare_recording
-from pvid.run.mechanism_core import identify_in_c
-from pvid.run.refine_design import refine_design
-from pvid.run.refined_answer import refined_answer
-from pvid.run.refined_core import compare_both, refined_in_c
 from pvid.settings.enums import Core
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
@@ -175,7 +176,7 @@ def _processor_s() -> float:
     return own.user + own.system + own.children_user + own.children_system
 
 
-def _analysed(road: Road, run: RandomRun, folder: Path) -> MechanismAnswer | None:
+def _analysed(road: Road, run: RandomRun, folder: Path) -> Answer | None:
     """Check, identification and refinement in float64; None: it is refused."""
     path, recorded = folder / "rig.py", folder / "run.csv"
     path.write_text(run.rig.text, encoding="utf-8")
@@ -190,7 +191,7 @@ def _analysed(road: Road, run: RandomRun, folder: Path) -> MechanismAnswer | Non
         return None
     with road.stage("identify"):
         recording, model = recording_of(recorded, MechanismRig(path), None)
-        answer = advised(identify_mechanism(recording, model))
+        answer = advised(analysed(recording, model))
         json.dumps(answer.as_json(), allow_nan=False)
     determined = max(one / _size(run, name) for name, one in run.bound.items())
     if "identify" not in road.reached:
@@ -235,7 +236,7 @@ def _judge(road: Road, run: RandomRun, values: dict[str, Value] | Any, *, good: 
         road.failures.append(f"{stage}: good and wrong: {', '.join(wrong)}")
 
 
-def _in_c(road: Road, run: RandomRun, answer: MechanismAnswer) -> None:
+def _in_c(road: Road, run: RandomRun, answer: Answer) -> None:
     """Both cores and the second stage, and their bits beside those of the twins."""
     model, recording, ranking = answer.model, answer.recording, answer.ranking
     core: Core
@@ -264,7 +265,7 @@ def _equal(road: Road, stage: str, found: Comparison) -> None:
         road.failures.append(f"{stage}: bits differ: {found.difference}")
 
 
-def _built(road: Road, answer: MechanismAnswer, folder: Path) -> None:
+def _built(road: Road, answer: Answer, folder: Path) -> None:
     """Generated files and packages, compiled with the project's warnings as errors, and what they print."""
     compiled, recording, ranking = answer.model, answer.recording, answer.ranking
     design: WeakConfig | None = None

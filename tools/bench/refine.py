@@ -16,6 +16,7 @@ from pvid.codegen.build import refine_functions
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of
+from pvid.configuration.refine import rig_with_options
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.design.refine import refine_config
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
@@ -24,8 +25,6 @@ from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.run.mechanism import model_of
-from pvid.run.refine_design import rig_with_options
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak import config_of, design_tables, for_engine
@@ -117,7 +116,7 @@ def engine_of(bits: int, options: tuple[str, ...] = ()) -> Engine:
     as in a rig file."""
     rig = next(one for one in RIGS if one.name == "standard" and one.bits == bits)
     sensor = {"phi": {"resolution": 2 * np.pi / 2**bits}}
-    model = model_of(MechanismRig("kapitza", RATE_HZ, known={"l1": L1}, sensor=sensor))
+    model = MechanismRig("kapitza", RATE_HZ, known={"l1": L1}, sensor=sensor).compiled()
     phi, y = standard_sensors(bits).measure(*_truth(Case(0.1, bits)), 0)
     made, engine = ready(model), weak_model_of(model)
     rows = WeakRows.of(made, {"phi": phi, "y": y}, for_engine(design_for(rig)))

@@ -12,13 +12,13 @@ import numpy.typing as npt
 from bench.mechanisms import CASES, size_of, start_of
 from pvid.codegen.build import refine_functions
 from pvid.codegen.weak_library import weak_native
+from pvid.configuration.refine import refine_design
+from pvid.configuration.weak import engine_config, samples_of
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.models import mechanisms
 from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
 from pvid.oracle.weak.design import WeakDesign
-from pvid.run.engine_design import engine_config, samples_of
-from pvid.run.refine_design import refine_design
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig

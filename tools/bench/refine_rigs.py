@@ -12,10 +12,11 @@ from bench.campaign.population import shipped
 from bench.campaign.truth import SimulatedRig, simulate_rig
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.run.mechanism import Value, identify_mechanism
-from pvid.run.mechanism_core import identify_in_c
-from pvid.run.reading import read_all
-from pvid.run.refined_core import refined_in_c
+from pvid.identification.analysis import analysed
+from pvid.identification.answer import Value
+from pvid.identification.core import identify_in_c
+from pvid.identification.core_refined import refined_in_c
+from pvid.identification.reading import read_all
 
 HEADER = (
     "condition",
@@ -78,7 +79,7 @@ def outcome_of(simulated: SimulatedRig) -> Outcome:
     recording, model = read_all(file, [lambda _: run.recording], (), None)
     suffices = bool((simulated.bound[:2] < SUFFICES).all())
     try:
-        weak = identify_in_c(identify_mechanism(recording, model), "f32")
+        weak = identify_in_c(analysed(recording, model), "f32")
     except PvidError:
         return Outcome(condition, suffices, None, None, True, False)
     refined, steps = None, True

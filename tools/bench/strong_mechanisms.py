@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.strong_image import play_on_board
+from pvid.compare.strong import StrongComparison
 from pvid.models import mechanisms
 from pvid.rig.run import Recording
-from pvid.run.strong_compare import StrongComparison
 from pvid.sim.simulated_run import simulation_of
 
 ON = ("mps2-an386", "microbit", "virt-rv32imac")

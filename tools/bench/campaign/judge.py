@@ -11,11 +11,10 @@ import numpy.typing as npt
 
 from bench.campaign.truth import SimulatedRig
 from pvid.base.errors import PvidError
-from pvid.run.identification import identified
-from pvid.run.mechanism import MechanismAnswer
-from pvid.run.mechanism_advice import analysed
-from pvid.run.mechanism_core import CoreAnswer, Publications, identify_in_c
-from pvid.run.reading import read_all
+from pvid.identification.answer import Answer
+from pvid.identification.core import CoreAnswer, Publications, identify_in_c
+from pvid.identification.reading import read_all
+from pvid.identification.road import identified
 from pvid.settings.forms import AnyCore
 
 Float = npt.NDArray[np.float64]
@@ -81,7 +80,7 @@ class Judgement:
 
 def identify_rig(
     simulated: SimulatedRig, core: AnyCore = "f64", *, refine: bool = True
-) -> tuple[Record, MechanismAnswer | CoreAnswer | None]:
+) -> tuple[Record, Answer | CoreAnswer | None]:
     """Identifies a rig as `pvid identify` does; the record of `judge`, and the answer.
 
     A crash is no refusal: it is recorded as one, with its exception as the reason.
@@ -90,9 +89,9 @@ def identify_rig(
     try:
         recording, model = read_all(simulated.file, [lambda _: simulated.run.recording], (), None)
         if core == "f64":
-            result: MechanismAnswer | CoreAnswer = identified(recording, model, refine=refine)
+            result: Answer | CoreAnswer = identified(recording, model, refine=refine)
         else:
-            result = identify_in_c(analysed(recording, model), core)
+            result = identify_in_c(identified(recording, model, refine=False), core)
     except PvidError as error:
         return judge(simulated, None, refusal=str(error), seconds=time.perf_counter() - began), None
     except Exception as error:  # one rig must not end the campaign, nor be taken for a refusal
@@ -122,7 +121,7 @@ class Told:
     publications: Publications | None = None
 
     @classmethod
-    def of(cls, result: MechanismAnswer | CoreAnswer) -> Told:
+    def of(cls, result: Answer | CoreAnswer) -> Told:
         """An answer of `identify`."""
         if isinstance(result, CoreAnswer):
             verdict, misfit, text, publications = result.verdict, result.misfit, "", result.publications

@@ -13,15 +13,14 @@ from threadpoolctl import threadpool_limits
 from pvid.api.data import Data, named
 from pvid.api.result import Result, of_core, of_mechanism
 from pvid.base.errors import PvidError
+from pvid.identification.analysis import own_of
+from pvid.identification.core import identify_in_c
+from pvid.identification.reading import read_all
+from pvid.identification.road import identified
 from pvid.log.rig import source_of
 from pvid.log.rig_choice import common_rig, rig_of
 from pvid.rig.run import recording_of_arrays
 from pvid.rig.together import names_of
-from pvid.run.identification import identified
-from pvid.run.mechanism import own_of
-from pvid.run.mechanism_advice import analysed
-from pvid.run.mechanism_core import identify_in_c
-from pvid.run.reading import read_all
 from pvid.settings.engine_cores import ENGINE_CORES
 
 
@@ -114,7 +113,7 @@ def _identify(
     of_each = own_of(compiled, recording, own, shared, in_c=engine is not None)
     if engine is None:
         return of_mechanism(identified(recording, compiled, refine=refine, own=of_each))
-    return of_core(identify_in_c(analysed(recording, compiled, own=of_each), engine.name))
+    return of_core(identify_in_c(identified(recording, compiled, refine=False, own=of_each), engine.name))
 
 
 def _names(paths: Sequence[Path | None]) -> tuple[str, ...]:

@@ -16,16 +16,16 @@ import numpy.typing as npt
 from pvid.api.data import Data, recording_of
 from pvid.base.replacing import replacing
 from pvid.base.rounding import with_error
+from pvid.identification.answer import Answer
+from pvid.identification.core import CoreAnswer
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.words import Word
 from pvid.rig.columns import parsed
 from pvid.rig.mechanism_file import channels_of
 from pvid.rig.run import Recording
-from pvid.run.mechanism import MechanismAnswer
-from pvid.run.mechanism_core import CoreAnswer
 
 if TYPE_CHECKING:
-    from pvid.run.validation import Validation
+    from pvid.identification.validation import Validation
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Result:
     advice: tuple[str, ...]
     notes: tuple[str, ...]
     details: Mapping[str, Any]
-    _answer: MechanismAnswer | CoreAnswer
+    _answer: Answer | CoreAnswer
     _model: CompiledModel
 
     def __getitem__(self, name: str) -> Parameter:
@@ -145,7 +145,7 @@ class Result:
         PvidError
             Where the data cannot be read, or a parameter has no value.
         """
-        from pvid.run.validation import predicted
+        from pvid.identification.validation import predicted
 
         values = {name: one.value for name, one in self.parameters.items()}
         return predicted(self._model, self._recording(data, columns), values, self.details.get("window_s"))
@@ -168,7 +168,7 @@ class Result:
             Where the data cannot be read, a parameter has no value, or the motion runs away, as an unstable one does:
             `validate` simulates it in blocks.
         """
-        from pvid.run.validation import p_of, simulation_of
+        from pvid.identification.validation import p_of, simulation_of
 
         values = {name: one.value for name, one in self.parameters.items()}
         return simulation_of(self._model, self._recording(data, columns), p_of(self._model, values))
@@ -196,7 +196,7 @@ class Result:
         return self[name].se if noise is None else math.hypot(noise, model or 0.0)
 
 
-def of_mechanism(found: MechanismAnswer) -> Result:
+def of_mechanism(found: Answer) -> Result:
     """Of the analysis."""
     verdict = found.found.verdict
     notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
@@ -212,7 +212,7 @@ def of_core(found: CoreAnswer) -> Result:
 
 
 def _result(
-    found: MechanismAnswer | CoreAnswer,
+    found: Answer | CoreAnswer,
     details: Mapping[str, Any],
     identified: bool,
     status: str,

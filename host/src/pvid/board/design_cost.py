@@ -19,17 +19,17 @@ from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_engine,
 from pvid.codegen.build import refine_functions, refine_refusal
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
-from pvid.model.compiled import CompiledModel
-from pvid.rig.run import Recording
-from pvid.run.engine_design import (
+from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
+from pvid.configuration.weak import (
     Run,
     config_for_recording,
     config_for_rig_like_the_shipped,
     samples_of,
     simulated_run_of,
 )
-from pvid.run.engine_design_q31 import FixedEngine, engine_for_recording, engine_for_rig_like_the_shipped
-from pvid.run.refine_design import full_motion_of, refine_design, refine_for_simulated_rig
+from pvid.configuration.weak_q31 import FixedEngine, engine_for_recording, engine_for_rig_like_the_shipped
+from pvid.model.compiled import CompiledModel
+from pvid.rig.run import Recording
 from pvid.settings.engine_cores import FLOAT
 from pvid.settings.enums import Core, Reason
 from pvid.settings.refine import BIG_STEP, RefineConfig

@@ -26,6 +26,17 @@ from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of
+from pvid.configuration.nominal_run import nominal_run
+from pvid.configuration.refine import full_motion_of, refine_design
+from pvid.configuration.weak import (
+    config_for_recording,
+    config_for_simulated_rig,
+    config_to_identify,
+    engine_config,
+    neglected_part,
+    samples_of,
+    with_neglected,
+)
 from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.core.weak_native import RefinedIdentifier
@@ -41,18 +52,6 @@ from pvid.oracle.weak.edges import with_edges
 from pvid.rig.former import mechanism_of_former, translated
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.engine_design import (
-    config_for_recording,
-    config_for_simulated_rig,
-    config_to_identify,
-    engine_config,
-    neglected_part,
-    samples_of,
-    with_neglected,
-)
-from pvid.run.mechanism import model_of
-from pvid.run.nominal_run import nominal_run
-from pvid.run.refine_design import full_motion_of, refine_design
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
@@ -111,7 +110,7 @@ class MechanismBoard:
         Parameters
         ----------
         to_identify : as `identify` does: what is published is judged on this machine
-        ranking : as of pvid.run.engine_design.design_for_recording
+        ranking : as of pvid.configuration.weak.design_for_recording
         refined : with the second stage
 
         Raises
@@ -121,7 +120,7 @@ class MechanismBoard:
         """
         recording.refuse_damaged()
         whole = recording.whole()
-        compiled = with_edges(model_of(rig), whole.signals, whole.sample_rate)
+        compiled = with_edges(rig.compiled(), whole.signals, whole.sample_rate)
         config = (config_to_identify if to_identify else config_for_recording)(compiled, whole, ranking=ranking)
         refine = refine_design(compiled, config, whole.signals) if refined else None
         return cls(rig, compiled, config, samples_of(config, whole.signals), refine)
@@ -142,7 +141,7 @@ class MechanismBoard:
         """
         simulated = simulated_rig(name)
         rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
-        compiled = model_of(rig)
+        compiled = rig.compiled()
         config = config_for_simulated_rig(compiled)
         if not refined:
             return cls(rig, compiled, config, samples_of(config, RigSimulation.of(compiled, simulated).run()))
@@ -355,7 +354,7 @@ class MechanismBoard:
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
-        compiled = model_of(rig)
+        compiled = rig.compiled()
         config = _config(compiled, engine)
         nothing = np.zeros((0, config.design.model.samples), np.float32)
         return cls(rig, compiled, config, nothing, _refine(engine))

@@ -18,6 +18,17 @@ from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library_q31 import weak_native_q31
 from pvid.codegen.weak_q31 import JetReaches, fixed_weak
+from pvid.configuration.nominal_run import nominal_run
+from pvid.configuration.weak import neglected_part
+from pvid.configuration.weak_q31 import (
+    FixedEngine,
+    engine_for_recording,
+    engine_for_simulated_rig,
+    engine_of_parts,
+    engine_to_identify,
+    fixed_engine,
+    with_neglected,
+)
 from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
@@ -30,18 +41,6 @@ from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.edges import with_edges
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.engine_design import neglected_part
-from pvid.run.engine_design_q31 import (
-    FixedEngine,
-    engine_for_recording,
-    engine_for_simulated_rig,
-    engine_of_parts,
-    engine_to_identify,
-    fixed_engine,
-    with_neglected,
-)
-from pvid.run.mechanism import model_of
-from pvid.run.nominal_run import nominal_run
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak_q31 import Rescale, WeakConfigQ31, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakNoiseQ31
 from pvid.setup.weak_sizes import sizes_of_q31
@@ -79,7 +78,7 @@ class MechanismBoardQ31:
         """As MechanismBoard.of_recording."""
         recording.refuse_damaged()
         whole = recording.whole()
-        compiled = with_edges(model_of(rig), whole.signals, whole.sample_rate)
+        compiled = with_edges(rig.compiled(), whole.signals, whole.sample_rate)
         engine = (engine_to_identify if to_identify else engine_for_recording)(compiled, whole, ranking=ranking)
         return cls(rig, engine, engine.counts_of(whole.signals))
 
@@ -88,7 +87,7 @@ class MechanismBoardQ31:
         """As MechanismBoard.of_shipped_rig."""
         simulated = simulated_rig(name)
         rig = MechanismRig(name, simulated.sample_rate, known=constants_of(name, simulated.knowns))
-        compiled = model_of(rig)
+        compiled = rig.compiled()
         engine = engine_for_simulated_rig(compiled)
         return cls(rig, engine, engine.counts_of(RigSimulation.of(compiled, simulated).run()))
 
@@ -240,7 +239,7 @@ class MechanismBoardQ31:
         KeyError, TypeError, ValueError, IndexError
             Where it is damaged.
         """
-        compiled = model_of(rig)
+        compiled = rig.compiled()
         functions = weak_functions_of(compiled)
         of_jets = dict(zip(functions.jet_names, map(float, engine["jet_reach"]), strict=True))
         made = fixed_weak(functions, JetReaches(run_s=float(engine["run_s"]), of=of_jets))

@@ -18,13 +18,13 @@ from pvid.codegen import files_design, files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native
+from pvid.configuration.weak import config_for_simulated_rig, samples_of
 from pvid.core.sizes import smallest
 from pvid.core.sources import left_out
 from pvid.design.c_tables import float_literal
 from pvid.model.compiled import CompiledModel
 from pvid.models import mechanisms
 from pvid.models.simulated_rig import simulated_rig
-from pvid.run.engine_design import config_for_simulated_rig, samples_of
 from pvid.settings.enums import Core
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model

@@ -14,10 +14,10 @@ from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with, long_run, measured_from
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration import weak_files_q31 as engine_files_q31
+from pvid.configuration.weak import simulated_run_of
+from pvid.configuration.weak_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.models import mechanisms
-from pvid.run import engine_files_q31
-from pvid.run.engine_design import simulated_run_of
-from pvid.run.engine_design_q31 import FixedEngine, engine_for_simulated_rig
 from pvid.twin import fnv
 from pvid.twin.weak_q31 import WeakTwinQ31
 

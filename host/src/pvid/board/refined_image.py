@@ -24,10 +24,10 @@ from pvid.codegen.build import refine_functions
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak_library import weak_native
+from pvid.configuration.refine import full_pendulum, refine_settings
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
-from pvid.run.refine_design import full_pendulum, refine_settings
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 

@@ -11,8 +11,8 @@ from pvid.board.mechanism_image import build_with, refuse_float_on_avr
 from pvid.board.replay_image import REPORT_EVERY, ReplayReport, play
 from pvid.codegen import files_strong_design
 from pvid.codegen.strong_library import sizes_of_strong, strong_texts
-from pvid.run.strong_compare import StrongComparison
-from pvid.run.strong_design import StrongDesign
+from pvid.compare.strong import StrongComparison
+from pvid.configuration.strong import StrongDesign
 
 MADE_BY = "pvid.board.strong_image"
 MOST_TICKS = 20_000  # of a recording in an image

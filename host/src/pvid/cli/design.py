@@ -69,8 +69,8 @@ def command(
     """
     from pvid.cli.mechanism import recording_of  # loads SymPy
     from pvid.cli.mechanism_design import print_design
+    from pvid.configuration.nominal_run import nominal_run
     from pvid.models.mechanisms import compiled_of
-    from pvid.run.nominal_run import nominal_run
 
     if run_path is None and columns is not None:
         raise PvidError("--columns needs --run")

@@ -209,7 +209,6 @@ def _board(
     if rig_path is None and model is None and run_path is None:
         return None
     from pvid.board.mechanism_board import BOARDS, MechanismBoard, board_of_guess, refuse_unrefined  # loads SymPy
-    from pvid.run.mechanism import model_of
 
     if refine:
         refuse_unrefined(core)
@@ -218,7 +217,7 @@ def _board(
     rig = rig_of(run_path, rig_path, (), model)
     if run_path is None:
         return board_of_guess(rig, core, refine)
-    recording = read_recording(run_path, rig.sample_rate, parsed(None, channels_of(model_of(rig))))
+    recording = read_recording(run_path, rig.sample_rate, parsed(None, channels_of(rig.compiled())))
     if refine:
         return MechanismBoard.of_recording(rig, recording, refined=True)
     return BOARDS[core].of_recording(rig, recording)

@@ -18,25 +18,25 @@ from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.base.wording import listed
 from pvid.cli.input import print_notes
+from pvid.identification.analysis import analysed, own_of
+from pvid.identification.answer import Answer, Value
+from pvid.identification.reading import read_all
+from pvid.identification.road import identified
 from pvid.log.rig import source_of
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.rig.together import names_of
-from pvid.run.identification import identified
-from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of, own_of
-from pvid.run.mechanism_advice import analysed
-from pvid.run.reading import read_all
 from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 if TYPE_CHECKING:
     from pvid.board.compare_on import Outcome
+    from pvid.compare.bits import Comparison
+    from pvid.identification.core import CoreAnswer
+    from pvid.identification.validation import Validation
     from pvid.model.compiled import CompiledModel
-    from pvid.run.compare import Comparison
-    from pvid.run.mechanism_core import CoreAnswer
-    from pvid.run.validation import Validation
 
 _FORM = ("form", "weak")
 _IN_C = tuple(("core", name) for name in ENGINE_CORES)
@@ -91,14 +91,14 @@ def identify_run(
     ----------
     paths : of the recordings
     weights : of the rows, as in pvid.oracle.weak.identify
-    refine : the equations are fitted to the whole run, from the answer on; None: as of pvid.run.identification
+    refine : the equations are fitted to the whole run, from the answer on; None: as of pvid.identification.road
     other : another recording, of which is said how well the answer predicts it
     add, write_model : terms that are added to the model, and where the model file with them is written
-    own, shared : unknowns that each recording has of its own, or not, as in pvid.run.mechanism.own_of
+    own, shared : unknowns that each recording has of its own, or not, as in pvid.identification.analysis.own_of
     on : a target, to which the recording is streamed as well; nothing is printed unless its hashes are those of here
     only_in_c : options that the C core alone has, by name; a value is refused
     """
-    name = model_of(rig).name
+    name = rig.compiled().name
     if len(paths) > 1:
         _refuse_several(on=on, refine=bool(refine), **only_in_c)
     if only_in_c.get("form") == _STRONG:
@@ -131,19 +131,17 @@ def identify_run(
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, bool(refine)):
         return DIFFERENT
     of_each = own_of(model, recording, own, shared, in_c=in_c is not None)
-    without: MechanismAnswer | None = None
+    without: Answer | None = None
     if add:
-        from pvid.run.additions import added
+        from pvid.identification.additions import added
 
         with working("identifying without the added terms"):
-            without = identify_mechanism(recording, model, weights, of_each)
+            without = analysed(recording, model, weights, of_each)
             more = added(without, rig, add)
             model = more.model
     with working("identifying"):
-        if in_c:
-            answer = analysed(recording, model, weights, predict=not refine, own=of_each)
-        else:
-            answer = identified(recording, model, weights, refine=refine, own=of_each)
+        in_float = False if in_c else refine
+        answer = identified(recording, model, weights, refine=in_float, predict=not (in_c and refine), own=of_each)
     if without is not None:
         with_them: dict[str, Any] = {"added": list(more.terms), "without": _values_json(without.values)}
         if not as_json:
@@ -155,7 +153,7 @@ def identify_run(
     core: CoreAnswer | None = None
     no_second: dict[str, Any] = {}
     if in_c:
-        from pvid.run.mechanism_core import identify_in_c
+        from pvid.identification.core import identify_in_c
 
         with working(f"identifying in {in_c.words}"):
             core = identify_in_c(answer, in_c.name)
@@ -205,9 +203,9 @@ def _identified_by_strong_form(
     path: Path, rig: MechanismRig, columns: str | None, *, as_json: bool, **given: str | None
 ) -> int:
     """Identifies a recording by the strong form and prints the answer."""
-    from pvid.run.strong_mechanism import identify_strong_mechanism
+    from pvid.identification.strong import identify_strong_mechanism
 
-    core = _strong_core(model_of(rig).name, given)
+    core = _strong_core(rig.compiled().name, given)
     if given.get("on") is not None:
         raise PvidError("--on with the strong form of a described mechanism is for `compare`")
     recording, model = recording_of(path, rig, columns)
@@ -242,7 +240,7 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
     return core
 
 
-def _draw(answer: MechanismAnswer | CoreAnswer, figure: Path) -> None:
+def _draw(answer: Answer | CoreAnswer, figure: Path) -> None:
     """What was printed, as a figure."""
     from pvid.show.mechanism_figure import write_figure  # loads matplotlib
 
@@ -286,15 +284,15 @@ def _streamed(target: str, rig: MechanismRig, recording: Recording, core: Core, 
 
 
 def _predicted(
-    other: Path | None, rig: MechanismRig, columns: str | None, answer: MechanismAnswer | CoreAnswer
+    other: Path | None, rig: MechanismRig, columns: str | None, answer: Answer | CoreAnswer
 ) -> Validation | None:
     """How well an answer predicts another recording of the rig; None: none was given."""
-    from pvid.run.validation import predicted
+    from pvid.identification.validation import predicted
 
     if other is None:
         return None
     recording, model = recording_of(other, rig, columns, whole=False)
-    oracle = answer if isinstance(answer, MechanismAnswer) else answer.oracle
+    oracle = answer if isinstance(answer, Answer) else answer.oracle
     values = {name: one.value for name, one in answer.values.items()}
     return predicted(model, recording, values, oracle.found.design.window_s)
 
@@ -303,7 +301,7 @@ def _validation_json(validation: Validation | None) -> dict[str, Any]:
     return {} if validation is None else {"validation": validation.as_json()}
 
 
-def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> MechanismAnswer | None:
+def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> Answer | None:
     """The refined answer of a recording, or that of the weak form; None: neither identifies it. A sentence on standard
     error says which and why.
 
@@ -311,9 +309,9 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     ----------
     figure : where the measured and the simulated signals are drawn
     """
-    from pvid.run.refined_answer import refined_answer
+    from pvid.identification.refinement.adoption import refined_answer
 
-    answer, refined, text = refined_answer(identify_mechanism(recording, model))
+    answer, refined, text = refined_answer(analysed(recording, model))
     write_stderr(f"pvid: {text}")
     if figure is not None and refined is not None:
         from pvid.show.mechanism_figure import write_comparison  # loads matplotlib
@@ -332,7 +330,7 @@ def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
     PvidError
         Where the mechanism, or its rig, has no second stage in C; nothing is printed.
     """
-    from pvid.run.refined_core import refined_in_c
+    from pvid.identification.core_refined import refined_in_c
 
     with working(f"refining in {FLOAT.words}"):
         answer, found = core.oracle, refined_in_c(core)
@@ -369,13 +367,13 @@ def compare_recording(
     """
     from pvid.board.compare_on import Outcome
     from pvid.board.engine_board import verify_recording
-    from pvid.run.compare import Comparison
-    from pvid.run.mechanism_compare import compare_recording as compared
-    from pvid.run.refined_core import compare_both
+    from pvid.compare.bits import Comparison
+    from pvid.compare.weak import compare_recording as compared
+    from pvid.identification.core_refined import compare_both
 
     if given.get("form") == _STRONG:
         return _compared_strong(path, rig, columns, targets, given)
-    name = model_of(rig).name
+    name = rig.compiled().name
     for option, value in given.items():
         if value is not None and (option, value) not in _COMPARED:
             raise PvidError(
@@ -421,9 +419,9 @@ def _compared_strong(
     """The same by the strong form, on this computer and on emulated boards."""
     from pvid.board.compare_on import Outcome
     from pvid.board.strong_image import compare_on_board
-    from pvid.run.strong_compare import StrongComparison
+    from pvid.compare.strong import StrongComparison
 
-    core = _strong_core(model_of(rig).name, given)
+    core = _strong_core(rig.compiled().name, given)
     if core != STRONG.name:
         raise PvidError(f"--core {core} has no twin; omit it")
     recording, model = recording_of(path, rig, columns)
@@ -440,11 +438,11 @@ def _compared_strong(
     return outcomes
 
 
-def _stage(answer: MechanismAnswer) -> str:
+def _stage(answer: Answer) -> str:
     return "refined" if answer.refinement is not None and answer.refinement.adopted else "weak form"
 
 
-def _print(answer: MechanismAnswer) -> None:
+def _print(answer: Answer) -> None:
     found = answer.found
     if answer.identified:
         _table(answer.values, f"{answer.model.title}: {_stage(answer)}, float64")
@@ -462,7 +460,7 @@ def _print(answer: MechanismAnswer) -> None:
         click.echo(f"predicts motion that was not fitted: {listed(answer.prediction)}")
 
 
-def _print_advice(answer: MechanismAnswer) -> None:
+def _print_advice(answer: Answer) -> None:
     for sentence in answer.advice:
         write_stderr(f"pvid: advice: {sentence}")
 

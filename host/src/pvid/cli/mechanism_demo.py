@@ -18,18 +18,20 @@ from pvid.base.rounding import percent, with_prefix
 from pvid.board.design_cost import Asked, Cost, CostedDesign
 from pvid.board.engine_board import verify_recording
 from pvid.board.target import HOST_TARGET, Verdict
+from pvid.compare.bits import Comparison
+from pvid.compare.weak import compare_recording
+from pvid.configuration.refine import full_motion_of
+from pvid.identification.analysis import analysed
+from pvid.identification.answer import Answer, Value
+from pvid.identification.core import CoreAnswer, identify_in_c
+from pvid.identification.core_refined import RefinedCoreAnswer, compare_both, refined_in_c
+from pvid.identification.strong import identify_strong_mechanism
+from pvid.identification.values import outputs_at
 from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.run.compare import Comparison
-from pvid.run.mechanism import MechanismAnswer, Value, identify_mechanism, model_of, outputs_at
-from pvid.run.mechanism_compare import compare_recording
-from pvid.run.mechanism_core import CoreAnswer, identify_in_c
-from pvid.run.refine_design import full_motion_of
-from pvid.run.refined_core import RefinedCoreAnswer, compare_both, refined_in_c
-from pvid.run.strong_mechanism import identify_strong_mechanism
 from pvid.settings.engine_cores import FIXED, FLOAT
 from pvid.show.demo_figure import convergence
 from pvid.sim.simulated_run import RigSimulation
@@ -57,7 +59,7 @@ class Demonstrated:
     rig: MechanismRig
     recording: Recording
     truth: Mapping[str, float]
-    answer: MechanismAnswer
+    answer: Answer
 
     @classmethod
     def of(cls, model: str, seed: int) -> Demonstrated:
@@ -65,7 +67,7 @@ class Demonstrated:
         rig = simulated_rig(model)
         simulation = RigSimulation.of(compiled_of(model), rig)
         own = _guessed(model, rig, simulation, seed)
-        compiled = model_of(own)
+        compiled = own.compiled()
         if compiled.refinement.equations:
             signals = {name: np.asarray(one, np.float64) for name, one in full_motion_of(compiled).items()}
             t = np.arange(len(next(iter(signals.values())))) / rig.sample_rate
@@ -74,7 +76,7 @@ class Demonstrated:
             t, signals = run["t"], {one.name: run[one.name] for one in compiled.signals}
         recording = Recording(t, signals, rig.sample_rate)
         truth = {**outputs_at(compiled, simulation.truth), **dict(zip(compiled.p_names, simulation.truth, strict=True))}
-        return cls(own, recording, truth, identify_mechanism(recording, compiled))
+        return cls(own, recording, truth, analysed(recording, compiled))
 
     @property
     def names(self) -> tuple[str, ...]:

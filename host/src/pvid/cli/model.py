@@ -89,11 +89,11 @@ def predict(
     released by --start. The first column is the shipped mechanism's own rig. The last rows name the parameter that is
     known worst, and the one whose change looks alike.
     """
+    from pvid.configuration.drives import advice, predicted
     from pvid.models.mechanisms import compiled_of
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.models.registry import asked_for
     from pvid.models.simulated_rig import simulated_rig
-    from pvid.run.prediction import advice, predicted
     from pvid.sim.drives import DRIVES, drive_named
     from pvid.sim.simulated_run import RigSimulation, rig_of_guess
 
@@ -334,9 +334,9 @@ def _name_beside(out: Path, model: str) -> str:
 
 def _strong_design_of(compiled: CompiledModel, model: str, recording: Recording | None) -> StrongModelConfig | None:
     """Of the strong form for the rig of a recording, or for the shipped rig of a shipped mechanism."""
+    from pvid.configuration.strong import strong_design
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.rig.run import Recording
-    from pvid.run.strong_design import strong_design
     from pvid.sim.simulated_run import simulation_of
 
     if recording is not None:
@@ -356,7 +356,7 @@ def _refine_design_of(
     soft_signs: dict[str, float],
 ) -> tuple[RefineConfig | None, str | None]:
     """Of the refinement behind the weak form, or why there is none."""
-    from pvid.run.refine_design import refine_design, refine_for_simulated_rig
+    from pvid.configuration.refine import refine_design, refine_for_simulated_rig
 
     try:
         if recording is not None:
@@ -373,8 +373,8 @@ def _design_of(
     functions: int | None,
 ) -> WeakConfig | None:
     from pvid.codegen.build import weak_refusal
+    from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped
     from pvid.models.mechanisms import names as names_of_shipped
-    from pvid.run.engine_design import config_for_recording, config_for_rig_like_the_shipped
 
     if weak_refusal(compiled) is not None:
         return None
@@ -395,8 +395,8 @@ def _fixed_weak(
     title: str,
 ) -> tuple[dict[str, str], str | None]:
     """Files of the fixed-point weak form, or why there are none."""
-    from pvid.run.engine_design_q31 import engine_for_recording, engine_for_rig_like_the_shipped
-    from pvid.run.engine_files_q31 import config_of, files_of
+    from pvid.configuration.weak_files_q31 import config_of, files_of
+    from pvid.configuration.weak_q31 import engine_for_recording, engine_for_rig_like_the_shipped
 
     try:
         if recording is None:

@@ -44,8 +44,8 @@ def command(
     more than the noise, whatever warnings it has.
     """
     from pvid.cli.mechanism import recording_of  # loads SymPy
+    from pvid.identification.validation import predicted
     from pvid.log.rig_choice import rig_of
-    from pvid.run.validation import predicted
 
     if model is None and answer_path.is_file():
         model = _shipped_in(_answer(answer_path))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pvid.base.rounding import percent
 from pvid.cli.page_table import markdown
+from pvid.identification.judge import PREDICTED
 from pvid.oracle.weak.missing import MOVES, VISIBLE
 from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.words import WIDE, Word
-from pvid.run.judge import PREDICTED
 
 HEADER = ("verdict", "meaning", "rule, of a parameter", "rule, of the answer", "what to do with the values")
 

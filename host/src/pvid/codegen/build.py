@@ -118,7 +118,7 @@ class Options:
     soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
     strong : the strong form as well, an identifier from derivatives of the signals
     design : of the weak form for a rig; None: no NAME_design_f32.h
-    fixed_weak : files of the fixed-point weak form for a rig, name -> text (pvid.run.engine_files_q31)
+    fixed_weak : files of the fixed-point weak form for a rig, name -> text (pvid.configuration.weak_files_q31)
     strong_design : settings of the strong form for a rig; None: no NAME_strong_design_f32.h
     refine_design : settings of the refinement for a rig; None: no NAME_refine_design_f32.h
     """

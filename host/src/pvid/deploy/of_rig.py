@@ -14,13 +14,13 @@ from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration.weak import Run, samples_of
+from pvid.configuration.weak_files_q31 import files_of, fitted_of
+from pvid.configuration.weak_q31 import FixedEngine
 from pvid.core.weak_native import RefinedRecord
 from pvid.deploy.arithmetic import FIXED, FLOAT
 from pvid.deploy.deployment import Deployment, Playback, Quantity, SecondStage
 from pvid.model.compiled import CompiledModel
-from pvid.run.engine_design import Run, samples_of
-from pvid.run.engine_design_q31 import FixedEngine
-from pvid.run.engine_files_q31 import files_of, fitted_of
 from pvid.settings.enums import Reason
 from pvid.settings.record import Record
 from pvid.settings.refine import BIG_STEP, RefineConfig

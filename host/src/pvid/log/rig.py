@@ -170,7 +170,7 @@ def hello_of_log(path: Path) -> Hello | None:
 
 
 def source_of(path: Path) -> Path | Callable[[Columns], Recording]:
-    """A file as pvid.run.reading takes it: of a log what reads it."""
+    """A file as pvid.identification.reading takes it: of a log what reads it."""
     return partial(_read, path) if path.suffix == LOG_SUFFIX else path
 
 

@@ -25,6 +25,7 @@ from pvid.base.errors import PvidError
 from pvid.board.stream_image import StreamImage, settings_number
 from pvid.board.stream_rig import stream_rig
 from pvid.cases import case_of
+from pvid.compare.bits import P_NAMES, Difference
 from pvid.link.frames import (
     MAX_P,
     Configuration,
@@ -43,7 +44,6 @@ from pvid.link.frames import (
 from pvid.link.names import shown_of_refined
 from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
-from pvid.run.compare import P_NAMES, Difference
 from pvid.settings.enums import Reason
 from pvid.settings.kinds import Settings
 from pvid.settings.record import HASHED_TYPES

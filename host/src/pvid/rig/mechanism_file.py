@@ -155,6 +155,12 @@ class MechanismRig:
         except OSError as error:
             raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
 
+    def compiled(self) -> CompiledModel:
+        """The compiled model of its mechanism, with its values; loads SymPy."""
+        from pvid.models.mechanisms import compiled_of
+
+        return self.applied(compiled_of(self.model))
+
     def applied(self, model: CompiledModel) -> CompiledModel:
         """The model with the values of this rig.
 

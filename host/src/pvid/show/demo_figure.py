@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from pvid.base.figure_file import save
 from pvid.base.rounding import with_prefix
-from pvid.run.mechanism import MechanismAnswer
-from pvid.run.mechanism_core import CoreAnswer
-from pvid.run.refined_core import RefinedCoreAnswer
+from pvid.identification.answer import Answer
+from pvid.identification.core import CoreAnswer
+from pvid.identification.core_refined import RefinedCoreAnswer
 
 Float = npt.NDArray[np.float64]
 _FROM = 0.15  # of the publications: those before may be off the scale
@@ -25,7 +25,7 @@ _IN_A_COLUMN = 3  # parameters
 
 
 def convergence(
-    answer: MechanismAnswer,
+    answer: Answer,
     weak: CoreAnswer,
     refined: RefinedCoreAnswer | None,
     truth: Mapping[str, float],

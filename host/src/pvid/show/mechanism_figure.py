@@ -19,10 +19,10 @@ from matplotlib.figure import SubFigure
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
-from pvid.run.mechanism import MechanismAnswer, RefinedFit
-from pvid.run.mechanism_core import CoreAnswer
-from pvid.run.refined import Problem, Refined
-from pvid.run.refined_mechanism import simulated_at
+from pvid.identification.answer import Answer, RefinedFit
+from pvid.identification.core import CoreAnswer
+from pvid.identification.refinement.fit import Problem, Refined
+from pvid.identification.refinement.problem import simulated_at
 from pvid.show.axis_limits import plain_ticks
 
 _MOST = 4000  # points of a line
@@ -31,10 +31,10 @@ _SETTLED = 3  # the axis shows the estimates behind the first third
 _LINE = 110  # characters of the title
 _PANEL = 1.9  # inches
 
-Answer = MechanismAnswer | CoreAnswer
+AnyAnswer = Answer | CoreAnswer
 
 
-def write_figure(answer: Answer, path: Path, title: str = "") -> None:
+def write_figure(answer: AnyAnswer, path: Path, title: str = "") -> None:
     """Writes the estimates after each window with the answer and +-2 of its standard errors; below them, for each
     sensor, the measured against the simulated signal and their difference: of the refinement where it gave the answer,
     else at the answer's values, where the model's equations can be simulated. png, svg or pdf by suffix.
@@ -48,17 +48,17 @@ def write_figure(answer: Answer, path: Path, title: str = "") -> None:
     PvidError
         When it cannot be written.
     """
-    refinement = _oracle(answer).refinement if isinstance(answer, MechanismAnswer) else None
+    refinement = _oracle(answer).refinement if isinstance(answer, Answer) else None
     fit = refinement.fit if refinement is not None and refinement.adopted else _motion(answer)
     _write(answer, fit, path, title)
 
 
-def convergence(answer: Answer, path: Path) -> None:
+def convergence(answer: AnyAnswer, path: Path) -> None:
     """Writes the first part of it alone."""
     _write(answer, None, path, "")
 
 
-def _motion(answer: Answer) -> RefinedFit | None:
+def _motion(answer: AnyAnswer) -> RefinedFit | None:
     oracle = _oracle(answer)
     p = [answer.values[name].value for name in oracle.model.p_names]
     if None in p:
@@ -70,11 +70,11 @@ def _motion(answer: Answer) -> RefinedFit | None:
     return fit if np.isfinite(fit.found.sum_of_squares) else None
 
 
-def _oracle(answer: Answer) -> MechanismAnswer:
+def _oracle(answer: AnyAnswer) -> Answer:
     return answer.oracle if isinstance(answer, CoreAnswer) else answer
 
 
-def _write(answer: Answer, fit: RefinedFit | None, path: Path, title: str) -> None:
+def _write(answer: AnyAnswer, fit: RefinedFit | None, path: Path, title: str) -> None:
     oracle = _oracle(answer)
     heights = [_PANEL * -(-len(oracle.model.p_names) // _COLUMNS)]
     if fit is not None:
@@ -104,14 +104,14 @@ def write_comparison(fit: RefinedFit, path: Path) -> None:
         plt.close(figure)
 
 
-def _history(answer: Answer, k: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], str]:
+def _history(answer: AnyAnswer, k: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], str]:
     """Times and estimates of the k-th unknown, and whose they are."""
     if isinstance(answer, CoreAnswer):
         return answer.publications.t, answer.publications.p[:, k], "each window, in C"
     return answer.found.times, answer.found.history[:, k], "weak form, each window"
 
 
-def _converge(answer: Answer, oracle: MechanismAnswer, place: SubFigure) -> None:
+def _converge(answer: AnyAnswer, oracle: Answer, place: SubFigure) -> None:
     names = oracle.model.p_names
     rows = -(-len(names) // _COLUMNS)
     grid = place.subplots(rows, _COLUMNS, sharex=True, squeeze=False)

@@ -1,0 +1,1 @@
+"""The C core against its twin, bit for bit, after every tick."""

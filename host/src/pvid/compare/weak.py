@@ -1,0 +1,97 @@
+"""The C core against its twin on a recording of a described mechanism, bit for bit, after every tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.compare.bits import Comparison, first_difference
+from pvid.configuration.weak import config_to_identify, samples_of
+from pvid.configuration.weak_q31 import FixedEngine, engine_to_identify
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.choice import Scored
+from pvid.rig.run import Recording
+from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.enums import Core
+from pvid.settings.weak import WeakConfig
+from pvid.setup.weak_sizes import sizes_of_model
+from pvid.twin import fnv
+from pvid.twin.weak import WeakTwin
+from pvid.twin.weak_q31 import WeakTwinQ31
+
+Progress = Callable[[int], None]
+
+
+def compare_recording(
+    compiled: CompiledModel,
+    recording: Recording,
+    core: Core = "f32",
+    progress: Progress | None = None,
+    ranking: Sequence[Scored] = (),
+) -> Comparison:
+    """Runs a recording through the engine and its twin, with the design that `identify` chooses.
+
+    Parameters
+    ----------
+    ranking : of the analysis of the recording, where there is one: the design is not searched for again
+
+    Raises
+    ------
+    PvidError
+        When there is no C compiler, or the engine does not have what the model needs.
+    """
+    return _COMPARISONS[core](compiled, recording, progress, ranking)
+
+
+def _in_float(
+    compiled: CompiledModel, recording: Recording, progress: Progress | None, ranking: Sequence[Scored]
+) -> Comparison:
+    config = config_to_identify(compiled, recording, ranking)
+    return compare_samples(compiled, config, samples_of(config, recording.signals), progress)
+
+
+def _in_fixed_point(
+    compiled: CompiledModel, recording: Recording, progress: Progress | None, ranking: Sequence[Scored]
+) -> Comparison:
+    engine = engine_to_identify(compiled, recording, ranking)
+    return compare_counts(engine, engine.counts_of(recording.signals), progress)
+
+
+_COMPARISONS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
+
+
+def compare_samples(
+    compiled: CompiledModel, config: WeakConfig, samples: npt.ArrayLike, progress: Progress | None = None
+) -> Comparison:
+    """The same for samples [ticks, samples] and settings."""
+    identifier = weak_native(compiled, config.design).identifier_of(config)
+    record = identifier.run_samples(samples)
+    twin = WeakTwin(config).run(samples, progress=progress).lane()
+    hashes = fnv.running_hashes(twin)
+    moments = sizes_of_model(config.design.model)["PVID_MAX_MOMENTS"]
+    return Comparison(
+        ticks=len(record.reason),
+        core_hash=identifier.running_hash,
+        twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
+        difference=first_difference(record, twin, compiled.p_names, moments),
+    )
+
+
+def compare_counts(engine: FixedEngine, readings: npt.ArrayLike, progress: Progress | None = None) -> Comparison:
+    """The same in fixed point, for readings [ticks, samples]."""
+    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    record = identifier.run_samples(readings)
+    twin = WeakTwinQ31(engine.config, engine.parameters.model).run(np.asarray(readings).T).lane()
+    hashes = fnv.running_hashes(twin)
+    if progress is not None:
+        progress(len(record.reason))
+    return Comparison(
+        ticks=len(record.reason),
+        core_hash=identifier.running_hash,
+        twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
+        difference=first_difference(record, twin, engine.compiled.p_names, engine.parameters.model.moments),
+    )

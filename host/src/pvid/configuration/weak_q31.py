@@ -1,0 +1,245 @@
+"""The fixed-point weak engine for a rig: formats, tables and settings, from a recording or a simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.codegen.parameters_q31 import ParametersQ31, fixed_parameters
+from pvid.codegen.weak import WeakFunctions, weak_functions_of
+from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_weak
+from pvid.configuration.weak import Run, design_and_p, engine_tables, neglected_part, simulated_run_of
+from pvid.design.weak_q31 import Sensing, fixed_design, most_counts
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import ready
+from pvid.oracle.weak.parameters import UNKNOWN, Parameters
+from pvid.rig.run import Recording
+from pvid.settings.weak_q31 import WeakConfigQ31
+from pvid.setup.weak import drive_min_of, with_soft_widths
+from pvid.setup.weak_q31 import config_of_q31, row_formats, with_noisy_means
+
+_INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
+_HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
+_FULL_SCALE = 1.5  # over the reach of a signal
+_SE_BITS = 24  # of se_max
+_PART_BITS = 30  # of neglected
+_ON_GRID = 1e-3  # of a count: digits of a file
+_FINER_BITS = 10  # at most
+_LONGEST_RUN_S = 3600.0  # of integrals since the start of the run, at least
+
+
+@dataclass(frozen=True, eq=False)
+class FixedEngine:
+    """A mechanism's fixed-point engine for a rig.
+
+    Attributes
+    ----------
+    compiled : the mechanism
+    made : functions of the rows, with their formats
+    parameters : functions of p
+    config : settings and tables
+    sample_rate : [Hz]
+    lsb : value of a count of each sample [samples]
+    """
+
+    compiled: CompiledModel
+    made: FixedWeak
+    parameters: ParametersQ31
+    config: WeakConfigQ31
+    sample_rate: float
+    lsb: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the mechanism, in C."""
+        return self.made.functions.name
+
+    @property
+    def sample_names(self) -> tuple[str, ...]:
+        """In the argument of step."""
+        return self.made.functions.samples
+
+    @property
+    def hop_s(self) -> float:
+        """Half a window."""
+        return self.config.design.hop * self.config.design.decimation / self.sample_rate
+
+    @property
+    def ticks_needed(self) -> int:
+        """Samples up to the first estimate, at most: as in float32."""
+        return self.config.design.ticks_needed
+
+    def counts_of(self, run: Run) -> npt.NDArray[np.int32]:
+        """The argument of step at every tick [ticks, samples]."""
+        columns = [np.rint(np.asarray(run[name]) / lsb) for name, lsb in zip(self.sample_names, self.lsb, strict=True)]
+        most = float(np.iinfo(np.int32).max)
+        columns = [np.where(np.isnan(one), most, one) for one in columns]  # beyond every range: a gap
+        return np.asarray(np.clip(np.stack(columns, axis=1), -most, most), np.int32)
+
+    def values(self, p: npt.ArrayLike) -> Float:
+        """Parameters, or standard errors, from their integers [..., n_p]."""
+        return np.asarray(p, np.float64) * 2.0 ** -np.array(self.parameters.p_bits, np.float64)
+
+    def integers(self, p: npt.ArrayLike) -> npt.NDArray[np.int32]:
+        """The nearest integers of parameters [n_p]."""
+        return np.rint(np.asarray(p, np.float64) * 2.0 ** np.array(self.parameters.p_bits, np.float64)).astype(np.int32)
+
+
+def fixed_engine(
+    compiled: CompiledModel,
+    run: Run,
+    design: WeakDesign,
+    p: Float | None = None,
+    *,
+    start_there: bool = False,
+    between_counts: bool = False,
+    soft_signs: Mapping[str, float] | None = None,
+) -> FixedEngine:
+    """The engine for a rig, from a run of it.
+
+    Parameters
+    ----------
+    design : of the oracle; the engine gets the nearest one that it has
+    p : parameters near those of the rig [n_p]; None: the guesses
+    start_there : the engine starts at the parameters of this run; False: at the guesses
+    between_counts
+        samples of the run that lie between counts, as with an offset taken off, are not rounded to them: the engine
+        gets finer counts; False: those of the sensor, as of a board
+    soft_signs : argument of a sgn, as in phi_1 -> width of the soft sign v / (|v| + width) in its place
+
+    Raises
+    ------
+    PvidError
+        Where fixed point, or the engine, does not have what the model or the design needs.
+    """
+    functions = weak_functions_of(compiled)
+    found = engine_tables(compiled, run, design, p)
+    known = {one.name: one for one in compiled.signals}
+    lsb = lsb_of(compiled, functions.samples)
+    largest = [float(np.nanmax(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
+    limits = most_counts(functions.signal, len(lsb), found.tables.decimation)
+    tops = [max(_FULL_SCALE * known[one].reach, top) for one, top in zip(functions.samples, largest, strict=True)]
+    if between_counts:
+        lsb = tuple(
+            _finer(step, run[one], limit / (top / step))
+            for one, step, top, limit in zip(functions.samples, lsb, tops, limits, strict=True)
+        )
+    full_scale = tuple(
+        max(round(min(top / step, limit)), 16) for step, top, limit in zip(lsb, tops, limits, strict=True)
+    )
+    of_jets = {str(jet): x for jet, x in found.rows.record.grid.jets.items()}
+    reaches = {one: _HIGHEST_JET * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in functions.jet_names}
+    seconds = len(next(iter(of_jets.values()))) * found.tables.decimation / design.sample_rate
+    made = fixed_weak(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
+    parameters_of = found.rows.compiled.parameters
+    parameters = _parameters(functions, parameters_of)
+    sizes = with_noisy_means(with_soft_widths(found.tables, soft_signs or {}), found.rows, found.p)
+    tables = fixed_design(made.model, sizes, Sensing(lsb, full_scale, design.sample_rate), made.formats)
+    formats = row_formats(found.rows, found.p, found.errors)
+    config = config_of_q31(
+        tables,
+        parameters_of,
+        formats,
+        parameters.p_bits,
+        (0,) * len(lsb),
+        design.sample_rate,
+        found.p if start_there else None,
+        found.tables.overlap,
+    )
+    still = drive_min_of(found.tables, found.rows.compiled.model)
+    if still is not None:
+        least = tuple(min(round(float(x) / step), 2**24) for x, step in zip(still, lsb, strict=True))
+        config = replace(config, drive_min=least)
+    return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
+
+
+def _finer(step: float, samples: npt.ArrayLike, room: float) -> float:
+    """A count for samples: the sensor's, by a power of 2 finer where they lie between counts. room: at most so much."""
+    counts = np.asarray(samples, np.float64) / step
+    if room < 2 or np.nanmax(np.abs(counts - np.rint(counts))) < _ON_GRID:
+        return step
+    return step / 2.0 ** min(_FINER_BITS, math.floor(math.log2(room)))
+
+
+def lsb_of(compiled: CompiledModel, samples: Sequence[str]) -> tuple[float, ...]:
+    """Value of a count of each sample: a sensor's resolution, of an input a part of its reach."""
+    known = {one.name: one for one in compiled.signals}
+    return tuple(known[one].resolution or known[one].reach / 2**_INPUT_BITS for one in samples)
+
+
+def _parameters(functions: WeakFunctions, known: Parameters) -> ParametersQ31:
+    bounds = [(min(one.low, x), max(one.high, x)) for one, x in zip(known.model.unknowns, known.guess, strict=True)]
+    return fixed_parameters(functions.functions, bounds)
+
+
+def engine_of_parts(compiled: CompiledModel, made: FixedWeak, config: WeakConfigQ31, sample_rate: float) -> FixedEngine:
+    """An engine whose formats and settings are known, as from a log."""
+    parameters = _parameters(made.functions, ready(compiled).parameters)
+    lsb = lsb_of(compiled, made.functions.samples)
+    return FixedEngine(compiled, made, parameters, config, sample_rate, lsb)
+
+
+def engine_for_recording(
+    compiled: CompiledModel,
+    recording: Recording,
+    functions: int | None = None,
+    soft_signs: Mapping[str, float] | None = None,
+    ranking: Sequence[Scored] = (),
+    *,
+    between_counts: bool = False,
+) -> FixedEngine:
+    """For the rig that made a recording, with the design that float32 gets.
+
+    Parameters
+    ----------
+    functions : K; None: chosen
+    soft_signs, between_counts : as of fixed_engine
+    ranking : as of pvid.configuration.weak.design_for_recording
+    """
+    design, p, known = design_and_p(compiled, recording, functions, ranking)
+    engine = fixed_engine(
+        compiled,
+        recording.signals,
+        design,
+        p,
+        start_there=known,
+        between_counts=between_counts,
+        soft_signs=soft_signs,
+    )
+    return with_neglected(engine, neglected_part(compiled, recording.signals))
+
+
+def with_neglected(engine: FixedEngine, part: float) -> FixedEngine:
+    """With standard errors that contain a relative error of p because equations are linearised."""
+    trust = replace(engine.config.trust, neglected=round(part * 2**_PART_BITS))
+    return replace(engine, config=replace(engine.config, trust=trust))
+
+
+def engine_to_identify(compiled: CompiledModel, recording: Recording, ranking: Sequence[Scored] = ()) -> FixedEngine:
+    """The same, to identify the recording itself: as config_to_identify."""
+    engine = engine_for_recording(compiled, recording, ranking=ranking, between_counts=True)
+    trust = replace(engine.config.trust, se_max=round(UNKNOWN * 2**_SE_BITS), neglected=0)
+    return replace(engine, config=replace(engine.config, trust=trust))
+
+
+def engine_for_simulated_rig(
+    compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
+) -> FixedEngine:
+    """For the shipped rig of a mechanism, with its own design."""
+    run, design, p = simulated_run_of(compiled, functions)
+    return fixed_engine(compiled, run, design, p, soft_signs=soft_signs)
+
+
+def engine_for_rig_like_the_shipped(
+    compiled: CompiledModel, functions: int | None = None, soft_signs: Mapping[str, float] | None = None
+) -> FixedEngine:
+    """The same for a real rig that moves as much: as config_for_rig_like_the_shipped."""
+    part = neglected_part(compiled, simulated_run_of(compiled, functions)[0])
+    return with_neglected(engine_for_simulated_rig(compiled, functions, soft_signs), part)

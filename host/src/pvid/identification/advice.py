@@ -1,0 +1,184 @@
+"""What makes a recording that a mechanism's equations do not explain fit them: a sign, or a unit; also of the time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from pvid.base.wording import with_unit
+from pvid.identification.analysis import analysed
+from pvid.identification.answer import Answer
+from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.together import with_own
+from pvid.oracle.weak.choice import score_of
+from pvid.oracle.weak.failures import attempted
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.identify import neglected, ready
+from pvid.rig.columns import Columns
+from pvid.rig.mechanism_file import channels_of
+
+# Residuals over what the sensors explain, above which a mistake is sought.
+_MISFIT = 20.0
+# Of several recordings: above it, a parameter is sought that differs; it is named if it leaves residuals below it.
+_DIFFER = 2.0
+# A mistake is named if it leaves less than this part of the residuals, relative to the motion ...
+_PART = 1 / 30
+# ... or, where the answer without it is implausible, this part: another sign gives a linear mechanism other residuals,
+# another unit the same ones.
+_PART_OF_SIGN, _PART_OF_UNIT = 0.3, 1.5
+_FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: a unit is doubted beyond the one, right within the other
+_ALIKE = 1.05  # times the least part that is left
+_EXPLAINS = 0.9  # R^2 of rows that explain a recording
+_TIMES = ("ms", "us")
+# By unit: what a column may be in instead, and what to type for it.
+_UNITS = {
+    "rad": {"deg": "deg", "rev": "rev"},
+    "rad/s": {"deg/s": f"{np.pi / 180:.9g}"},
+    "m": {"mm": "mm", "cm": "cm"},
+    **{unit: {f"m{unit}": f"m{unit}"} for unit in ("A", "V", "N")},
+}
+
+
+def advised(answer: Answer) -> Answer:
+    """The answer with its advice: a column that is wrong, else what to type for the terms that seem to lack."""
+    found = advice_on(answer)
+    if answer.found.named is not None and answer.identified:
+        from pvid.identification.additions import to_type
+
+        found = (*found, *to_type(answer))
+    return replace(answer, advice=found)
+
+
+@np.errstate(all="ignore")  # what diverges is judged and left out
+def advice_on(answer: Answer) -> tuple[str, ...]:
+    """A sentence with what to type, or none; some tenths of a second, where the answer is bad alone.
+
+    Each signal in turn has the other sign or another usual unit, with the design of the answer.
+    """
+    if (unit := _unit_of_time(answer)) is not None:
+        return (f"t seems to be in {unit}, not s: --columns t=t:{unit}",)
+    if answer.recording.origins and answer.found.chi2 > _DIFFER and (own := _of_own(answer)) is not None:
+        return (own,)
+    near = _distance(answer, answer.found.p) < _FAR and not _is_beyond_equations(answer)
+    if answer.identified and answer.found.chi2 < _MISFIT and near:
+        return ()
+    run = answer.recording.run
+    for one in answer.model.signals:
+        if one.kind == "input" and np.nanmax(run[one.name]) == np.nanmin(run[one.name]):
+            value = float(np.nanmin(run[one.name]))
+            shown = with_unit(value, one.unit, 3) if value else "0"
+            return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
+    found = list(_tried(answer)) or list(_turned(answer))
+    least = min((left for left, _, _ in found), default=0.0)
+    # A linear mechanism moves alike with the other sign of its input and of its sensor.
+    alike = [(said, typed) for left, said, typed in found if left <= _ALIKE * least][:2]
+    if not alike:
+        return ()
+    other = [f" (or {typed.partition('=')[0]}: --columns {typed})" for _, typed in alike[1:]]
+    return (f"{alike[0][0]}: --columns {alike[0][1]}" + "".join(other),)
+
+
+def _unit_of_time(answer: Answer) -> str | None:
+    """In which the parameters come near their guesses; None where they are near as it is, or in no unit.
+
+    Residuals contain nothing of it: another unit of time gives a linear mechanism other parameters and the same motion.
+    """
+    if _distance(answer, answer.found.p) < _FAR:
+        return None
+    model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
+    for unit in _TIMES:
+        scale = float(Columns.parse(f"t=t:{unit}", channels_of(answer.model))["t"].in_si(np.ones(1))[0])
+        other = replace(design, sample_rate=design.sample_rate / scale, window_s=design.window_s * scale)
+        one = score_of(model, signals, other, None, False)
+        if one is not None and one.known and _distance(answer, one.p) < _NEAR:
+            return unit
+    return None
+
+
+def _distance(answer: Answer, p: Float) -> float:
+    """The largest factor between a positive parameter and its guess."""
+    of = [value / one.guess for value, one in zip(p, answer.model.unknowns, strict=True) if one.positive]
+    return max((max(ratio, 1 / ratio) if ratio > 0 else np.inf for ratio in of), default=1.0)
+
+
+def _is_beyond_equations(answer: Answer) -> bool:
+    """Whether a signal is so large that linearised equations mean nothing: they fit it in any unit."""
+    return neglected(answer.model, answer.recording.run) > 1
+
+
+def _turned(answer: Answer) -> Iterator[tuple[float, str, str]]:
+    """The same of a drive with the other sign, which makes another mechanism of it: by designs of its own."""
+    if max(answer.found.r2.values(), default=0.0) > _EXPLAINS:
+        return
+    for signal in answer.model.signals:
+        if signal.driven or signal.kind == "input":
+            signals = {**answer.recording.signals, signal.name: -answer.recording.signals[signal.name]}
+            turned = replace(answer.recording, signals=signals)
+            again = attempted(partial(analysed, turned, answer.model, answer.weights))
+            if again is None or not again.identified or _distance(again, again.found.p) > _NEAR:
+                continue
+            if min(again.found.r2.values()) > _EXPLAINS:
+                said, unit, _ = next(_mistakes(signal, signals[signal.name]))
+                yield again.found.chi2, said, f"{signal.name}={signal.name}:{unit}"
+
+
+def _tried(answer: Answer) -> Iterator[tuple[float, str, str]]:
+    """Part of the residuals that is left by a mistake which explains the run, its sentence, and what to type."""
+    model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
+    before = score_of(model, signals, design, None, False)
+    far = before is None or _distance(answer, before.p) > _FAR or _is_beyond_equations(answer)
+    for signal in sorted(answer.model.signals, key=lambda one: one.kind != "input"):
+        name = signal.name
+        for said, unit, most in _mistakes(signal, signals[name]):
+            typed = f"{name}={name}:{unit}"
+            scale = float(Columns.parse(typed, channels_of(answer.model))[name].in_si(np.ones(1))[0])
+            # Noise is scaled with its signal: a signal that is small beside its noise fits any equations.
+            scaled = model if abs(scale) == 1 else ready(_with_noise(answer.model, name, abs(scale)))
+            one = score_of(scaled, {**signals, name: scale * signals[name]}, design, None, False)
+            if one is None or not one.known or _distance(answer, one.p) > _NEAR:
+                continue
+            left = one.chi2 / before.chi2 if before is not None else 0.0
+            implausible = far or (scale < 0 and before is not None and not before.known)
+            if left < (most if implausible else _PART):
+                yield left, said, typed
+
+
+def _of_own(answer: Answer) -> str | None:
+    """Of several recordings: which parameter explains them if each has its own; the one that leaves least."""
+    model, run, design = answer.model, answer.recording.run, answer.found.design
+    before = score_of(ready(model), run, design, None, False)
+    if before is None or not answer.recording.origins:
+        return None
+    names = [one.name for one in answer.recording.origins]
+    own = set(model.together.names) if model.together is not None else set()
+    left = {}
+    for name in model.alone.p_names:
+        if name not in own:
+            one = score_of(ready(with_own(model.alone, own | {name}, names)), run, design, None, False)
+            if one is not None and one.known:
+                left[name] = one.chi2 / before.chi2
+    best = min(left, key=lambda name: left[name], default="")
+    if not best or left[best] > max(_PART, min(0.5, _DIFFER / before.chi2)):
+        return None
+    return f"the recordings differ in {best}: --own {best} gives each its own"
+
+
+def _with_noise(model: CompiledModel, name: str, scale: float) -> CompiledModel:
+    """With the resolution and the noise of a signal so many times as large."""
+    own = model.signal(name)
+    noise = own.noise if own.resolution else scale * own.noise
+    other = replace(own, resolution=scale * own.resolution, noise=noise)
+    return replace(model, signals=tuple(other if one is own else one for one in model.signals))
+
+
+def _mistakes(signal: Signal, values: Float) -> Iterator[tuple[str, str, float]]:
+    """What a signal seems to be, what to type behind its column, and the part of the residuals that may be left."""
+    yield f"{signal.name} seems to have the opposite sign", "-1", _PART_OF_SIGN
+    if signal.resolution and np.array_equal(values, np.rint(values)):
+        typed = f"{signal.resolution:.9g}"
+        yield f"{signal.name} seems to be in counts, not {signal.unit or 'the unit 1'}", typed, _PART_OF_UNIT
+    for unit, typed in _UNITS.get(signal.unit, {}).items():
+        yield f"{signal.name} seems to be in {unit}, not {signal.unit}", typed, _PART_OF_UNIT

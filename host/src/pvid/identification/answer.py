@@ -1,0 +1,200 @@
+"""What the identification of a recording finds: the answer, each of its values, and what a refinement made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.identification.sensor_prediction import SensorPrediction
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.identify import Identified
+from pvid.oracle.weak.naming import terms_of
+from pvid.oracle.weak.verdict import ParameterStatus
+from pvid.oracle.weak.weights import Weights
+from pvid.oracle.weak.words import Word
+from pvid.rig.run import Recording
+
+if TYPE_CHECKING:
+    from pvid.identification.refinement.fit import Problem, Refined
+
+Float = npt.NDArray[np.float64]
+
+_NOISE = 2.0  # chi^2 over the sensors' noise up to which it explains the residuals
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter, or what follows from p.
+
+    Attributes
+    ----------
+    value, se : its standard error; None where it is not identified
+    se_noise, se_scale, se_model
+        its parts, whose squares add up to its own: from noise; from gains, constants, the clock and linearised
+        equations; from what the equations seem to lack
+    status, reason : whether the run determines it; a clause where it does not, or where it may be 0
+    below : it is below this with 95 %, where it may be 0
+    word : what it may be used for
+    """
+
+    unit: str
+    value: float | None
+    se: float | None
+    se_noise: float | None
+    status: ParameterStatus = "identified"
+    reason: str | None = None
+    below: float | None = None
+    se_model: float | None = None
+    se_scale: float | None = None
+    word: Word = "good"
+
+    def as_json(self) -> dict[str, Any]:
+        """Its entry in the object of `identify --json`."""
+        out = {"value": self.value, "se": self.se, "unit": self.unit, "se_noise": self.se_noise}
+        out |= {"se_scale": self.se_scale, "se_model": self.se_model, "verdict": self.word, "status": self.status}
+        out |= {} if self.reason is None else {"reason": self.reason}
+        return out | ({} if self.below is None else {"below": self.below})
+
+
+class RefinedFit(Protocol):
+    """An outcome of a refinement, as pvid.identification.refinement.problem makes it."""
+
+    @property
+    def problem(self) -> Problem: ...
+
+    @property
+    def found(self) -> Refined: ...
+
+    @property
+    def extras(self) -> Mapping[str, tuple[float, float]]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """What became of a refinement.
+
+    Attributes
+    ----------
+    adopted : the answer's values are the refined ones
+    text : why, in a clause
+    fit : its outcome; None: there is none
+    """
+
+    adopted: bool
+    text: str
+    fit: RefinedFit | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """For `identify --json`; parameters that the weak form does not have by name."""
+        out: dict[str, Any] = {"adopted": self.adopted, "text": self.text}
+        if self.fit is None:
+            return out
+        found = self.fit.found
+        extras = {name: {"value": value, "se": se} for name, (value, se) in self.fit.extras.items()}
+        out |= {"chi2": found.chi2, "slow_chi2": found.slow_chi2, "blocks": len(found.cut.first)}
+        return out | {"parameters": extras}
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """An identification of a recording.
+
+    Attributes
+    ----------
+    model : with the values of the rig file
+    found : estimate and verdict
+    values : by name: outputs of the model, then p
+    recording : the samples
+    weights : of the rows
+    advice : sentences with what to type, where a column seems to be wrong
+    prediction : how well each sensor's motion is predicted that was not fitted; none: it was not looked at
+    predicted : the same in each of several recordings, by name
+    refinement : None: none was tried
+    """
+
+    model: CompiledModel
+    found: Identified
+    values: Mapping[str, Value]
+    recording: Recording
+    weights: Weights = "residuals"
+    advice: tuple[str, ...] = ()
+    prediction: tuple[SensorPrediction, ...] = ()
+    predicted: Mapping[str, tuple[SensorPrediction, ...]] = field(default_factory=dict)
+    refinement: Refinement | None = None
+
+    @property
+    def identified(self) -> bool:
+        """Whether at least one parameter is."""
+        return self.found.verdict.identified
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the residuals are those of the sensors' noise, or a named term explains the rest of them: estimates
+        of the same equations are then alike, or all lack the same."""
+        named = self.found.named
+        return (self.found.chi2 <= _NOISE and self.identified) or (named is not None and named.complete)
+
+    @property
+    def ranking(self) -> tuple[Scored, ...]:
+        """The designs that were tried, where they were compared as the engine's are; else ()."""
+        return self.found.ranking if self.weights == "residuals" else ()
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        found = self.found
+        parameters = {name: one.as_json() for name, one in self.values.items()}
+        return {
+            "identified": self.identified,
+            "verdict": found.verdict.word,
+            "status": found.verdict.status,
+            "warning": found.verdict.warning,
+            "advice": list(self.advice),
+            "reasons": {one.name: one.text for one in found.verdict.reasons},
+            "parameters": parameters,
+            "missing": missing_of(found),
+            "chi2": found.chi2,
+            "r2": found.r2,
+            "prediction": {one.name: one.as_json() for one in self.prediction},
+            **recordings_of(self),
+            "window_s": found.design.window_s,
+            "windows": len(found.times),
+            "weights": self.weights,
+            "input": list(self.recording.notes),
+            "samples": len(self.recording),
+            "model": self.model.name,
+            "core": "f64",
+            "form": "weak",
+        } | ({} if self.refinement is None else {"refinement": self.refinement.as_json()})
+
+
+def recordings_of(answer: Answer) -> dict[str, Any]:
+    """Of several recordings: samples of each, begin on the common time axis [s], and how well it is predicted."""
+    recording = answer.recording
+    if not recording.origins:
+        return {}
+    each = {
+        one.name: {
+            "samples": one.end - one.first,
+            "begin_s": float(recording.t[one.first]),
+            "prediction": {sensor.name: sensor.as_json() for sensor in answer.predicted.get(one.name, ())},
+        }
+        for one in recording.origins
+    }
+    return {"recordings": each}
+
+
+def missing_of(found: Identified) -> dict[str, Any] | None:
+    """What the equations seem to lack, and the parameters with it; None: nothing that moves a parameter visibly."""
+    named = found.named
+    if named is None:
+        return None
+    with_it = zip(found.names, named.fit.p, uncertainty(named.fit).se, strict=True)
+    parameters = {name: {"value": float(p), "se": float(se)} for name, p, se in with_it}
+    terms = [asdict(one) for one in terms_of(found.fit, named)]
+    return {"explained": named.complete, "share": named.share, "terms": terms, "parameters": parameters}

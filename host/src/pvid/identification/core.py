@@ -1,0 +1,296 @@
+"""Identification of a described mechanism by the C core in float32 or fixed point, compiled for this computer.
+
+The float64 oracle analyses the recording first, for the verdict; then it chooses the engine's design and finds the
+equations' own errors. The engine starts at the guesses and runs over the samples as on a board.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pvid.base.errors import PvidError
+from pvid.base.wording import listed, with_unit
+from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.configuration.weak import config_to_identify, samples_of
+from pvid.configuration.weak_q31 import engine_to_identify
+from pvid.core.native import Publisher
+from pvid.identification.answer import Answer, Value
+from pvid.identification.values import gains_of, noise_of, shifts_of, unless_held, values_of
+from pvid.oracle.weak.failures import FAILURES
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.verdict import Reason, Verdict
+from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.enums import Core
+from pvid.settings.enums import Reason as Outcome
+from pvid.settings.record import Record
+
+# Reasons of ticks that end no window.
+_WITHIN = (Outcome.WARMING_UP, Outcome.ACCUMULATED, Outcome.REJECTED_NOT_FINITE, Outcome.REJECTED_SATURATED)
+_CLASH = 3.0  # standard errors of noise by which the core and the analysis disagree
+
+
+@dataclass(frozen=True)
+class Publications:
+    """Every estimate that was published during a run: t [n] in s, p and their standard errors [n, n_p]."""
+
+    t: Float
+    p: Float
+    se: Float
+
+
+@dataclass(frozen=True, eq=False)
+class CoreAnswer:
+    """An identification by the C core, beside that of the oracle.
+
+    Attributes
+    ----------
+    oracle : of the same recording
+    core : arithmetic
+    functions, decimation, hop_s : of the engine's design
+    averages_signs : whether signs are averaged over a step
+    values : by name: outputs of the model, then p; of the last published estimate
+    published : whether there is one
+    reason : of the last window
+    misfit : of the published estimate; None: not judged
+    windows : how many the engine has judged
+    hash : running hash of its state after the last tick
+    publications : every estimate that was published; their standard errors contain what `values` contains
+    by_analysis : nothing is published, because a parameter may be 0; the values are those of the oracle
+    """
+
+    oracle: Answer
+    core: Core
+    functions: int
+    decimation: int
+    hop_s: float
+    averages_signs: bool
+    values: Mapping[str, Value]
+    published: bool
+    reason: Outcome
+    misfit: float | None
+    windows: int
+    hash: int
+    publications: Publications
+    by_analysis: bool = False
+
+    @property
+    def identified(self) -> bool:
+        """Whether the core has published, or need not, and the recording shows a parameter."""
+        return (self.published or self.by_analysis) and self.oracle.identified
+
+    def history(self) -> list[tuple[float, Mapping[str, Value]]]:
+        """Time [s] and values of every publication; correlations are those of the analysis."""
+        own, model = self.publications, self.oracle.model
+        sd = np.sqrt(np.diag(self.oracle.found.covariance))
+        correlation = self.oracle.found.covariance / np.outer(sd, sd)
+        none, judged, verdict = np.zeros((1, len(sd))), self.oracle.found.judged, self.verdict
+        return [
+            (float(t), values_of(model, p, correlation * np.outer(se, se), none, judged, verdict, of_known=False))
+            for t, p, se in zip(own.t, own.p, own.se, strict=True)
+        ]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The doubts of the core's own answer, then those of the analysis."""
+        return Verdict((*self._doubts(), *self.oracle.found.verdict.reasons))
+
+    def _doubts(self) -> Iterator[Reason]:
+        if not self.identified:
+            if self.oracle.identified:
+                yield Reason("not_identified", f"The C core has published no estimate: {self.reason.text}.")
+            return
+        if self.by_analysis:
+            yield Reason(
+                "held",
+                f"The C core publishes nothing ({self.reason.text}), as a parameter may be 0: the values are those of "
+                "the float64 analysis.",
+            )
+            return
+        if apart := [name for name in self.oracle.model.p_names if self._clashes(name)]:
+            first = [values[apart[0]] for values in (self.values, self.oracle.values)]
+            one, other = (with_unit(found.value or 0.0, found.unit, 4) for found in first)
+            of_signs = " The core takes the mean of a friction's sign over a step, the analysis locates its reversals."
+            yield Reason(
+                "core",
+                f"The C core and the float64 analysis disagree on {listed(apart)} ({apart[0]}: "
+                f"{one} and {other}); the analysis is nearer." + (of_signs if self.averages_signs else ""),
+                of=tuple(apart),
+            )
+        if self.reason not in (Outcome.UPDATED, Outcome.MISFIT):
+            yield Reason(
+                "held", f"The C core holds an earlier estimate, its last windows published nothing: {self.reason.text}."
+            )
+        if self.reason == Outcome.MISFIT and self.misfit is not None:
+            yield Reason(
+                "misfit",
+                f"The residuals in the C core are {self.misfit:.3g} times what the sensors explain; standard errors "
+                "are from their scatter.",
+                alarm=False,
+            )
+
+    def _clashes(self, name: str) -> bool:
+        one, other = self.values[name], self.oracle.values[name]
+        if one.value is None or one.se_noise is None or other.value is None or other.se_noise is None:
+            return False
+        # What gains and constants are off by is the same in both. No core resolves more than float32 does.
+        resolved = float(np.spacing(np.float32(abs(other.value))))
+        return abs(one.value - other.value) > _CLASH * math.hypot(one.se_noise, other.se_noise, resolved)
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        parameters = {name: one.as_json() for name, one in self.values.items()}
+        return self.oracle.as_json() | {
+            "identified": self.identified,
+            "parameters": parameters,
+            "verdict": self.verdict.word,
+            "status": self.verdict.status,
+            "warning": self.verdict.warning,
+            "reasons": {one.name: one.text for one in self.verdict.reasons},
+            "chi2": self.misfit,
+            "reason": self.reason.text,
+            "window_s": 2 * self.hop_s,
+            "windows": self.windows,
+            "functions": self.functions,
+            "decimation": self.decimation,
+            "hash": f"{self.hash:08x}",
+            "core": self.core,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """The C core after a recording, in the units of the model.
+
+    p, covariance : of the published estimate
+    published : p and standard errors published after every tick [ticks, n_p]
+    """
+
+    core: Core
+    functions: int
+    decimation: int
+    hop_s: float
+    signs: int
+    identifier: Publisher
+    record: Record
+    p: Float
+    covariance: Float
+    published: tuple[Float, Float]
+
+
+def identify_in_c(answer: Answer, core: Core = "f32") -> CoreAnswer:
+    """The same recording by the C core.
+
+    Raises
+    ------
+    PvidError
+        When there is no C compiler, or the engine does not have what the model needs.
+    """
+    try:
+        run = _RUNS[core](answer)
+    except FAILURES as error:  # a search that runs away among them
+        raise PvidError(f"--core {core}: {error}") from error
+    return _answer(answer, run)
+
+
+def _in_float(answer: Answer) -> _Run:
+    config = config_to_identify(answer.model, answer.recording, answer.ranking)
+    design = config.design
+    identifier = weak_native(answer.model, design).identifier_of(config)
+    record = identifier.run_samples(samples_of(config, answer.recording.signals), sums=False)
+    last, n_p = identifier.estimate, len(answer.found.p)
+    return _Run(
+        "f32",
+        design.functions,
+        design.decimation,
+        config.hop_s,
+        design.model.signs,
+        identifier,
+        record,
+        np.asarray(last["p"][:n_p], np.float64),
+        np.asarray(last["covariance"], np.float64)[:n_p, :n_p],
+        (record.published.astype(np.float64), record.published_se.astype(np.float64)),
+    )
+
+
+def _in_fixed_point(answer: Answer) -> _Run:
+    engine = engine_to_identify(answer.model, answer.recording, answer.ranking)
+    design = engine.config.design
+    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
+    record = identifier.run_samples(engine.counts_of(answer.recording.signals), sums=False)
+    last, n_p = identifier.estimate, len(answer.found.p)
+    se = engine.values(np.maximum(last["se"][:n_p], 1))  # an error below the format's step counts as a step
+    correlation = np.asarray(last["correlation"], np.float64)[:n_p, :n_p] * 2.0**-30
+    return _Run(
+        "q31",
+        design.functions,
+        design.decimation,
+        engine.hop_s,
+        design.model.signs,
+        identifier,
+        record,
+        engine.values(last["p"][:n_p]),
+        correlation * np.outer(se, se),
+        (engine.values(record.published), engine.values(record.published_se)),
+    )
+
+
+_RUNS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
+
+
+def _answer(answer: Answer, run: _Run) -> CoreAnswer:
+    identifier, record = run.identifier, run.record
+    published = identifier.is_published
+    ends = record.reason[~np.isin(record.reason, _WITHIN)]
+    model, found = answer.model, answer.found
+    gains = gains_of(model, found)
+    # The larger of two standard errors: halves and other windows of the run are seen by the analysis alone.
+    wider = np.maximum(noise_of(model, found) / np.sqrt(np.diag(run.covariance)), 1.0)
+    covariance = run.covariance * np.outer(wider, wider)
+    # A core searches logarithms: of what may be 0 it stays uncertain, and publishes nothing.
+    by_analysis = not published and any(one.status == "near_zero" for one in found.judged)
+    outcome = Outcome(int(ends[-1])) if len(ends) else Outcome.WARMING_UP
+    judged = unless_held(found.judged, None if published else outcome.text)
+
+    # Where the analysis publishes another estimate of the same equations, its distance belongs to the model's part.
+    apart = np.abs(found.p - run.p)
+    noise = np.hypot(noise_of(model, found), np.sqrt(np.diag(covariance)))
+    shifts = np.vstack([shifts_of(found), np.where(apart > _CLASH * noise, apart, 0.0)])
+
+    def values(verdict: Verdict) -> Mapping[str, Value]:
+        if by_analysis:
+            return answer.values
+        return values_of(model, run.p, covariance, gains, judged, verdict, shifts)
+
+    misfit = identifier.misfit
+    core = CoreAnswer(
+        oracle=answer,
+        core=run.core,
+        functions=run.functions,
+        decimation=run.decimation,
+        hop_s=run.hop_s,
+        averages_signs=run.signs > 0,
+        values=values(found.verdict),
+        published=published,
+        reason=outcome,
+        misfit=None if not published or np.isnan(misfit) else misfit,
+        windows=int(len(ends)),
+        hash=identifier.running_hash,
+        publications=_published(answer, run, gains, wider),
+        by_analysis=by_analysis,
+    )
+    return replace(core, values=values(core.verdict))
+
+
+def _published(answer: Answer, run: _Run, gains: Float, wider: Float) -> Publications:
+    """All publications of a run: their own errors, times what the analysis found, and those of gains and constants."""
+    ticks = np.flatnonzero(np.isin(run.record.reason, (Outcome.UPDATED, Outcome.MISFIT)))
+    n_p = len(wider)
+    p, own = run.published
+    se = np.hypot(own[ticks, :n_p] * wider, np.sqrt(np.sum(gains**2, axis=0)))
+    return Publications(answer.recording.t[ticks], p[ticks, :n_p], se)

@@ -1,0 +1,263 @@
+"""Both stages in C on a recording of a described mechanism: the refined estimate, and the twin of the second stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.refine_twin import GeneratedRefine
+from pvid.codegen.weak_library import weak_native
+from pvid.compare.bits import Comparison, Difference
+from pvid.compare.weak import compare_samples
+from pvid.configuration.refine import refine_design
+from pvid.configuration.weak import config_to_identify, samples_of
+from pvid.core.weak_native import RefinedIdentifier, RefinedRecord
+from pvid.identification.answer import Answer, Value
+from pvid.identification.core import CoreAnswer
+from pvid.identification.values import refined_gains_of, refined_shifts_of, values_of
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.choice import Scored
+from pvid.rig.run import Recording
+from pvid.settings.enums import Reason
+from pvid.settings.refine import RefineConfig
+from pvid.settings.weak import Float32, WeakConfig
+from pvid.twin.refine import RefineTwin
+
+_PIECE = 500  # ticks between two reports of progress
+_ENDS = (
+    Reason.UPDATED,
+    Reason.HELD_SEARCHING,
+    Reason.HELD_BLOCK,
+    Reason.HELD_UNCERTAIN,
+    Reason.HELD_DISAGREES,
+)  # of a block
+
+
+@dataclass(frozen=True, eq=False)
+class BothStages:
+    """Both stages for a recording.
+
+    Attributes
+    ----------
+    made : functions of the refinement
+    config, settings : of the weak form and of the refinement
+    samples : as the core gets them [ticks, samples]
+    """
+
+    model: CompiledModel
+    made: RefineFunctions
+    config: WeakConfig
+    settings: RefineConfig
+    samples: Float32
+
+    @classmethod
+    def of(cls, model: CompiledModel, recording: Recording, config: WeakConfig) -> BothStages:
+        """PvidError where the refinement in C does not have what the model needs."""
+        settings = refine_design(model, config, recording.signals)
+        return cls(model, refine_functions(model), config, settings, samples_of(config, recording.signals))
+
+    def run(self) -> tuple[RefinedIdentifier, RefinedRecord]:
+        """The C core after the recording, and what it did."""
+        native = weak_native(self.model, self.config.design, self.made)
+        identifier = native.refined_of(self.config, self.settings)
+        return identifier, identifier.run_both(self.samples)
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedCoreAnswer:
+    """An identification by both stages in C.
+
+    Attributes
+    ----------
+    weak : of the first stage
+    values : by name: outputs of the model, p, then what the refinement has beside p; of the last refined estimate, or
+        those of the first stage where there is none
+    adopted : whether there is one
+    reason : of the refinement's last block
+    first_s : time of the first refined estimate [s]
+    level, clash : as in pvid/refine.h
+    hash : running hash of both stages after the last tick
+    record, made : every tick; the functions of the refinement
+    covariance : of the last refined estimate, as the core has it; None: there is none
+    """
+
+    weak: CoreAnswer
+    values: Mapping[str, Value]
+    adopted: bool
+    reason: Reason
+    first_s: float | None
+    level: float | None
+    clash: float | None
+    hash: int
+    record: RefinedRecord
+    made: RefineFunctions
+    covariance: npt.NDArray[np.float64] | None
+
+    def history(self) -> list[tuple[float, Mapping[str, Value]]]:
+        """Time [s] and values of every refined estimate; correlations are those of the last one."""
+        if self.covariance is None:
+            return []
+        answer, places = self.weak.oracle, list(self.made.places_of_p)
+        sd = np.sqrt(np.diag(self.covariance))
+        correlation = (self.covariance / np.outer(sd, sd))[np.ix_(places, places)]
+        gains = refined_gains_of(answer.model, answer.found)
+        r = self.record.r[:, places].astype(np.float64)
+        new = np.flatnonzero(np.any(np.diff(r, axis=0) != 0, axis=1)) + 1
+        out = list[tuple[float, Mapping[str, Value]]]()
+        for tick in new:
+            p = r[tick]
+            se = self.record.se[tick, places].astype(np.float64)
+            values = values_of(
+                answer.model, p, correlation * np.outer(se, se), gains, answer.found.judged, answer.found.verdict
+            )
+            out.append((float(answer.recording.t[tick]), values))
+        return out
+
+    @property
+    def identified(self) -> bool:
+        """Whether a stage has published, and the recording shows a parameter."""
+        return (self.adopted and self.weak.oracle.identified) or self.weak.identified
+
+    @property
+    def text(self) -> str:
+        """Which estimate it is, in a clause."""
+        if not self.adopted:
+            own = self.weak.oracle.model.refinement.equations
+            beaten = self.reason == Reason.HELD_UNCERTAIN and self.first_s is not None and not own
+            why = ", the weak form's standard errors are smaller" if beaten else ""
+            return f"not refined: {self.reason.text}{why}; the estimate is that of the weak form"
+        held = "" if self.reason == Reason.UPDATED else f", held since: {self.reason.text}"
+        return (
+            f"refined by the second stage, first after {self.first_s:.3g} s{held}; residual level {self.level:.2g}, "
+            f"clash {self.clash:.2g}"
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        parameters = {name: one.as_json() for name, one in self.values.items()}
+        refinement = {
+            "adopted": self.adopted,
+            "text": self.text,
+            "reason": self.reason.text,
+            "first_s": self.first_s,
+            "level": self.level,
+            "clash": self.clash,
+        }
+        return self.weak.as_json() | {
+            "identified": self.identified,
+            "parameters": parameters,
+            "hash": f"{self.hash:08x}",
+            "refinement": refinement,
+        }
+
+
+def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
+    """The recording of an identification by the first stage in float32 (identify_in_c), by both stages in C.
+
+    Raises
+    ------
+    PvidError
+        When there is no C compiler, or the second stage does not have what the model needs.
+    """
+    answer = weak.oracle
+    config = config_to_identify(answer.model, answer.recording, answer.ranking)
+    stages = BothStages.of(answer.model, answer.recording, config)
+    identifier, record = stages.run()
+    last, t = identifier.refined, answer.recording.t
+    published = np.flatnonzero(record.told == Reason.UPDATED)
+    return RefinedCoreAnswer(
+        weak=weak,
+        values=weak.values if last is None else _values(answer, stages.made, last),
+        adopted=last is not None,
+        reason=Reason(int(record.told[-1])),
+        first_s=float(t[published[0]] - t[0]) if len(published) else None,
+        level=None if last is None else float(last["level"]),
+        clash=None if last is None else float(last["clash"]),
+        hash=int(record.hash[-1]),
+        record=record,
+        made=stages.made,
+        covariance=None if last is None else np.asarray(last["covariance"], np.float64),
+    )
+
+
+def _values(answer: Answer, made: RefineFunctions, estimate: npt.NDArray[np.void]) -> dict[str, Value]:
+    """Of the model's outputs and of p; then those that the weak form does not have."""
+    parameters = made.parameters
+    r = np.asarray(estimate["r"], np.float64)
+    unit = np.where([one.log for one in parameters], r, 1.0)
+    covariance = np.asarray(estimate["covariance"], np.float64) * np.outer(unit, unit)
+    places = made.places_of_p
+    model, found, own = answer.model, answer.found, covariance[np.ix_(places, places)]
+    gains, shifts = refined_gains_of(model, found), refined_shifts_of(model, found)
+    values = values_of(model, r[places], own, gains, found.judged, found.verdict, shifts)
+    for k, one in enumerate(parameters):
+        if one.place < 0 and answer.identified:
+            se = float(np.sqrt(covariance[k, k]))
+            values[one.name] = Value(one.unit, float(r[k]), se, se)
+    return values
+
+
+def compare_both(
+    model: CompiledModel,
+    recording: Recording,
+    progress: Callable[[int], None] | None = None,
+    ranking: Sequence[Scored] = (),
+) -> tuple[Comparison, Comparison | str]:
+    """Both stages against their twins, bit for bit, after every tick; in place of the second one why there is none."""
+    config = config_to_identify(model, recording, ranking)
+    first = compare_samples(model, config, samples_of(config, recording.signals), progress)
+    try:
+        stages = BothStages.of(model, recording, config)
+    except PvidError as error:
+        return first, str(error)
+    return first, compare_refined(stages, progress)
+
+
+def compare_refined(stages: BothStages, progress: Callable[[int], None] | None = None) -> Comparison:
+    """The second stage against its twin, which gets the estimates of the first one in C: r, its standard errors and the
+    outcome of the last block after every tick; the state of the last block.
+
+    Cost: 0.1 ms a tick.
+    """
+    identifier, core = stages.run()
+    ticks = len(core.told)
+    twin = RefineTwin(GeneratedRefine(stages.made), stages.settings)
+    pieces = []
+    for first in range(0, ticks, _PIECE):
+        part = slice(first, first + _PIECE)
+        pieces.append(twin.run(stages.samples[part], core.weak_p[part], core.weak_se[part], core.busy[part]))
+        if progress is not None:
+            progress(min(first + _PIECE, ticks))
+    reason = np.concatenate([one.reason for one in pieces])
+    told = _last(reason, np.isin(reason, _ENDS))
+    end = np.zeros((ticks, twin.shape.states), np.float32), np.zeros((ticks, twin.shape.states), np.float32)
+    end[0][-1], end[1][-1] = list(identifier.refinement.work.state), twin.work.state
+    names = [one.name for one in stages.made.parameters]
+    compared = {
+        "refined ": (core.r, np.concatenate([one.r for one in pieces]), names),
+        "standard error of ": (core.se, np.concatenate([one.se for one in pieces]), names),
+        "state of the last block ": (*end, [str(k) for k in range(twin.shape.states)]),
+    }
+    found = [
+        Difference(int(k), "reason", int(core.told[k]), int(told[k])) for k in np.flatnonzero(core.told != told)[:1]
+    ]
+    for what, (own, other, labels) in compared.items():
+        words = own.view(np.uint32), other.view(np.uint32)
+        for tick, place in np.argwhere(words[0] != words[1])[:1]:
+            ours, theirs = (int(one[tick, place]) for one in words)
+            found.append(Difference(int(tick), f"{what}{labels[place]}", ours, theirs))
+    last = int(core.hash[-1])
+    return Comparison(ticks, last, last, min(found, key=lambda one: one.tick) if found else None)
+
+
+def _last(reason: npt.NDArray[np.uint8], ends: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    """The reason of the last block's end up to each tick."""
+    at = np.maximum.accumulate(np.where(ends, np.arange(len(reason)), -1))
+    return np.where(at >= 0, reason[at], np.uint8(Reason.WARMING_UP)).astype(np.uint8)

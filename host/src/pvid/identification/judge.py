@@ -1,0 +1,384 @@
+"""Which estimate to publish: that which predicts motion that it has not seen.
+
+Estimates of the same equations differ: by the weights of the rows, by the compensation of the regressors' noise, by the
+length of a window, by the stage. Each is computed from one half of the run, in several parts, and simulates the other
+half. The usual estimate is published unless another one has a prediction error (rms) at least 10 % smaller.
+
+Where the residuals are those of the sensors' noise alone, or a missing term explains the rest, the usual estimate
+stands, with the prediction of each half by the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
+from operator import attrgetter
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.wording import listed
+from pvid.identification.answer import Answer, RefinedFit
+from pvid.identification.refinement.fit import Problem, Refined, Stretch, refined
+from pvid.identification.refinement.problem import prior_about
+from pvid.identification.sensor_prediction import SensorPrediction
+from pvid.identification.validation import Motion
+from pvid.identification.values import gains_of, noise_of, shifts_of, values_of_found
+from pvid.oracle.weak import verdict
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.errors import uncertainty
+from pvid.oracle.weak.failures import FAILURES, attempted
+from pvid.oracle.weak.gate import gated
+from pvid.oracle.weak.identify import Identified, ready
+from pvid.oracle.weak.rows import WeakRows
+from pvid.oracle.weak.solve import Fit
+from pvid.oracle.weak.verdict import Reason, Verdict
+from pvid.rig.run import Recording
+
+Float = npt.NDArray[np.float64]
+
+_PARTS = 6  # of a run, of which every other one is fitted, and the rest predicted
+_FEWEST = 4  # windows of a half of the parts, to which a model is fitted
+_SAMPLES = 3000  # that are simulated of each half
+_ALIKE = 0.1  # difference of the logarithms of the rms up to which estimates predict alike
+_PASSES = 8  # of the refinement
+_MOST = 12_000  # samples that it takes: no more are needed where the equations are what errs
+_NEAR = 4  # passes of a fit that begins at that to all data
+_DESCRIBED = 0.5  # R^2 that an estimate has at least that replaces the usual one
+PREDICTED = 0.9  # R^2 of motion that was not seen, below which the equations do not describe it
+
+_USUAL = "the usual estimate"
+# Doubts of the usual estimate alone: another has its own, or is one of those that were compared.
+_OF_USUAL = (
+    *("not_identified", "undetermined", "near_zero", "range", "not_settled"),
+    *("halves", "windows", "smoothing", "attenuation", "weights"),
+)
+_OF_WIDTH = ("wide", "model_error")  # of standard errors that the spread of the estimates is not in
+# Of a window, times the chosen one; words, error of the equations in the weights, compensation.
+_LENGTHS = {1.0: _USUAL, 2.0: "the estimate with windows twice as long", 0.5: "the estimate with windows half as long"}
+_WEIGHTS = (
+    ("", True, True),
+    (", without compensation of the regressors' noise", True, False),
+    (", with the weights of the sensors' noise", False, True),
+    (", with the weights of the sensors' noise and without compensation", False, False),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An estimate of the parameters.
+
+    Attributes
+    ----------
+    name : what it is, in words
+    p, se : from all data [n_p]
+    halves : r from each half of the parts [2][parameters and settings of the simulation]
+    fit : of the weak form; of the refinement the estimate at which it began
+    sensors : how well the halves predict each other
+    of_recordings : the same in each of several recordings, by name
+    """
+
+    name: str
+    p: Float
+    se: Float
+    halves: tuple[Float, Float]
+    fit: Fit
+    sensors: tuple[SensorPrediction, ...] = ()
+    of_recordings: Mapping[str, tuple[SensorPrediction, ...]] = field(default_factory=dict)
+    score: float = np.inf
+
+
+def judged(answer: Answer) -> Answer:
+    """The answer, or that of the estimate that predicts best. Its standard errors include the spread of the estimates
+    that predict about equally well.
+
+    Cost: a second or some for 10 000 samples, where the residuals exceed the sensors' noise alone.
+    """
+    if answer.is_explained:
+        return answer
+    try:
+        with np.errstate(all="ignore"):
+            return _judged(answer)
+    except FAILURES:  # the equations cannot be simulated on this run: the usual answer, as it is
+        return answer
+
+
+def with_prediction(answer: Answer) -> Answer:
+    """The same answer with how well its equations predict motion that was not fitted: each half of the run the other's,
+    after a refinement of each where the answer is refined.
+
+    Cost: some tenths of a second, where the model's simulation is compiled already.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            found, trial = answer.found, _Trial(answer)
+            if trial.fit is not None:
+                usual = [trial.of_fit(trial.fit)]
+            else:
+                usual = trial.estimates(_USUAL, found.design, found.fit.start, _WEIGHTS[:1])
+    except FAILURES:  # they cannot be simulated on this run
+        return answer
+    return replace(answer, prediction=usual[0].sensors) if usual else answer
+
+
+def _judged(answer: Answer) -> Answer:
+    trial = _Trial(answer)
+    designs = {name: (design, start) for name, design, start in _designs(answer)}
+    found = [one for name, given in designs.items() for one in trial.estimates(name, *given, _WEIGHTS[:1])]
+    if found:
+        best = min(found, key=attrgetter("score"))
+        found += trial.estimates(best.name, *designs[best.name], _WEIGHTS[1:])
+        again = trial.refined(min(found, key=attrgetter("score")))
+        found += [] if again is None else [again]
+    found = [one for one in found if np.isfinite(one.score)]
+    if not found:
+        return answer
+    best = min(found, key=attrgetter("score"))
+    usual = next((one for one in found if one.name == _USUAL), None)
+    describes = all(one.r2 > _DESCRIBED for one in best.sensors)
+    if usual is None and not describes:
+        return answer
+    chosen = best if usual is None or (describes and best.score < usual.score - _ALIKE) else usual
+    alike = [one for one in found if one.score < chosen.score + _ALIKE] if describes else [chosen]
+    return _published(answer, chosen, usual, alike)
+
+
+def _designs(answer: Answer) -> Iterator[tuple[str, WeakDesign, Float]]:
+    """Of windows: the chosen one and others, in words, and where to search from."""
+    design, start = answer.found.design, answer.found.fit.start
+    for factor, name in _LENGTHS.items():
+        other = attempted(partial(replace, design, window_s=factor * design.window_s))
+        if other is not None:  # else a window is too short for its functions
+            yield name, other, start
+    for window_s in sorted({one.design.window_s for one in answer.found.ranking}):
+        least = min(
+            (one for one in answer.found.ranking if one.design.window_s == window_s),
+            key=lambda one: one.design.functions,
+        )
+        if least.design.functions < design.functions:
+            name = f"the estimate with {least.design.functions} functions a window of {window_s:.3g} s"
+            yield name, least.design, least.p
+
+
+def _parts(recording: Recording) -> tuple[list[Stretch], list[Stretch]]:
+    """Of the run, the first, third, ... and the others: about as many as _PARTS, each within one recording, and as many
+    of each recording in either half."""
+    whole = [(one.first, one.end) for one in recording.origins] or [(0, len(recording))]
+    total = sum(end - first for first, end in whole)
+    halves: tuple[list[Stretch], list[Stretch]] = ([], [])
+    for first, end in whole:
+        count = 2 * max(1, round(_PARTS / 2 * (end - first) / total))
+        edges = np.linspace(first, end, count + 1).astype(int).tolist()
+        parts = list(pairwise(edges))
+        halves[0].extend(parts[0::2])
+        halves[1].extend(parts[1::2])
+    return halves
+
+
+class _Trial:
+    """Estimates from one recording, and how well they predict."""
+
+    def __init__(self, answer: Answer) -> None:
+        self._answer, self._compiled = answer, ready(answer.model)
+        self._parts = _parts(answer.recording)
+        refinement, rate = answer.refinement, answer.recording.sample_rate
+        self.fit = refinement.fit if refinement is not None and refinement.adopted else None
+        self._every = 1 if self.fit is None else round(rate / self.fit.problem.measured.rate)
+        if self.fit is not None:
+            early, late = ([(a // self._every, b // self._every) for a, b in part] for part in self._parts)
+            self._parts = early, late
+            self._motion = Motion(self.fit.problem, self.fit.found.r)
+            self._block = self._motion.block(answer.found.design.window_s, _PARTS)
+            return
+        known = all(one.status == "identified" for one in answer.found.judged)
+        p = answer.found.p if known else np.array([one.guess for one in answer.model.unknowns])
+        self._motion = Motion.near(answer.model, answer.recording.run, rate, p)
+        self._block = self._motion.block(answer.found.design.window_s, _PARTS)
+
+    def estimates(
+        self, name: str, design: WeakDesign, start: Float, weights: Sequence[tuple[str, bool, bool]]
+    ) -> list[Candidate]:
+        """By the weak form with these weights (name, error of the equations, compensation), scored."""
+        rows = attempted(lambda: WeakRows.of(self._compiled, self._answer.recording.run, design))
+        if rows is None:
+            return []
+        out = []
+        for words, equation_error, compensate in weights:
+            fitted = _Fitted(equation_error, compensate)
+            usual = self._answer.found.fit
+            own = name == _USUAL and not words and not usual.diverged
+            fit = usual if own else attempted(partial(fitted, rows, start))
+            known = None if fit is None else attempted(partial(uncertainty, fit))
+            if fit is None or known is None or not np.isfinite(fit.p).all():
+                continue
+            halves = [attempted(partial(fitted.half, rows, part, fit)) for part in self._parts]
+            if all(one is not None and np.isfinite(one).all() for one in halves):
+                first, second = (self._motion.r_of(one) for one in halves if one is not None)
+                out.append(self._scored(Candidate(name + words, fit.p, known.se, (first, second), fit)))
+        return out
+
+    def _scored(self, one: Candidate) -> Candidate:
+        """With how well each half predicts the other."""
+        motion, samples = self._motion, self._block
+        measured, simulated, firsts = [], [], []
+        for r, others in zip(one.halves, reversed(self._parts), strict=True):
+            problem = motion.within(others)
+            if not problem.measured.stretches or problem.longest < samples:
+                return one
+            cut, z = motion.simulated(r, problem, samples, _SAMPLES)
+            measured.append(cut.rows(problem.measured.z))
+            simulated.append(z)
+            firsts.append(cut.first)
+        shortest = min(part.shape[1] for part in measured)
+        z, x = (np.concatenate([part[:, :shortest] for part in both]) for both in (measured, simulated))
+        if not np.isfinite(x).all():
+            return one
+        sensors = motion.compared(z, x)
+        rms = np.array([one.rms for one in sensors])
+        first = np.concatenate(firsts)
+        of_recordings = {
+            own.name: motion.compared(z[inside], x[inside])
+            for own in self._answer.recording.origins
+            if (inside := (own.first <= self._every * first) & (self._every * first < own.end)).any()
+        }
+        return replace(
+            one, sensors=sensors, of_recordings=of_recordings, score=float(np.mean(np.log(np.maximum(rms, motion.sd))))
+        )
+
+    def of_fit(self, fit: RefinedFit) -> Candidate:
+        """The refinement that gave the answer, with one of each half from there on, scored."""
+        problem, found = fit.problem, fit.found
+        prior = replace(prior_about(problem, found.r), free=np.diag(found.covariance) > 0)
+        halves = []
+        for parts in self._parts:
+            half = self._motion.within(parts, problem.measured.sd)
+            samples = min(found.cut.samples, half.longest)
+            halves.append(refined(half, prior, (samples,), most=_PASSES).r)
+        p, covariance = problem.values(found, problem.kernel.made.places_of_p)
+        usual = self._answer.found.fit
+        return self._scored(Candidate(_USUAL, p, np.sqrt(np.diag(covariance)), (halves[0], halves[1]), usual))
+
+    def refined(self, best: Candidate) -> Candidate | None:
+        """The refinement from an estimate on: it is weighted by what that reaches, not by the sensors' noise."""
+        motion, samples = self._motion, self._block
+        if not np.isfinite(best.score):
+            return None
+        sd = np.maximum(motion.sd, [one.rms for one in best.sensors])
+
+        def searched(problem: Problem, r: Float) -> Refined:
+            return refined(problem, prior_about(problem, r), (max(8, samples // 3), samples), most=_PASSES)
+
+        try:
+            whole = searched(
+                motion.within(self._thinned(self._parts[0] + self._parts[1], _MOST), sd), motion.r_of(best.p)
+            )
+            first, second = (
+                searched(motion.within(self._thinned(part, _MOST // 2), sd), r).r
+                for part, r in zip(self._parts, best.halves, strict=True)
+            )
+        except FAILURES:
+            return None
+        p, covariance = motion.problem.values(whole, motion.problem.kernel.made.places_of_p)
+        if not np.isfinite(covariance).all():
+            return None
+        name = "the fit of the whole equations" + ("" if best.name == _USUAL else f", from {best.name} on")
+        return self._scored(Candidate(name, p, np.sqrt(np.diag(covariance)), (first, second), best.fit))
+
+    def _thinned(self, parts: Sequence[Stretch], most: int) -> list[Stretch]:
+        """Pieces of the parts with at most about so many samples together, evenly spread."""
+        total = sum(end - first for first, end in parts)
+        if total <= most:
+            return list(parts)
+        piece = 2 * self._block
+        pieces = [(at, at + piece) for first, end in parts for at in range(first, end - piece + 1, piece)]
+        return pieces[:: -(-total // most)] or [(first, min(end, first + most // len(parts))) for first, end in parts]
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A fit with these weights."""
+
+    equation_error: bool
+    compensate: bool
+
+    def __call__(self, rows: WeakRows, start: Float) -> Fit:
+        return gated(rows, start, self.equation_error, self.compensate)
+
+    def half(self, rows: WeakRows, parts: Sequence[Stretch], fit: Fit) -> Float:
+        """p from the windows within these parts; that of the whole where they are too few."""
+        rate = rows.record.grid.design.sample_rate
+        end = np.rint(rows.end_times() * rate)
+        begin = end - np.rint(rows.functions.length * rate)
+        within = np.any([(begin >= first - 1) & (end <= last + 1) for first, last in parts], axis=0)
+        if within.sum() < _FEWEST:
+            return fit.p
+        return gated(rows.only(within), fit.p, self.equation_error, self.compensate, _NEAR).p
+
+
+def _published(answer: Answer, chosen: Candidate, usual: Candidate | None, alike: Sequence[Candidate]) -> Answer:
+    """The answer with the chosen estimate; its standard errors contain how far the estimates that predict alike are."""
+    found, model = answer.found, answer.model
+    fit = chosen.fit.at(chosen.p)
+    apart = np.array([one.p - chosen.p for one in alike])
+    shifts = np.concatenate([shifts_of(found), apart]) if chosen is usual else apart
+    by_model = np.max(np.abs(shifts), axis=0)
+    noise = noise_of(model, found) if chosen is usual else chosen.se
+    se = np.sqrt(noise**2 + np.sum(gains_of(model, found) ** 2, axis=0) + by_model**2)
+    status = tuple(verdict.judged(model, fit, noise))
+    r2 = list(found.r2.values()) if chosen is usual else uncertainty(fit).r2
+    own = (*_OF_WIDTH, *(() if chosen is usual else _OF_USUAL))
+    reasons = [one for one in found.verdict.reasons if one.name not in own]
+    poor = [one for one in chosen.sensors if one.r2 < PREDICTED]
+    if not poor:  # the cause is unknown, but the values are those that move the mechanism
+        reasons = [replace(one, name="missing") if one.name == "unexplained" else one for one in reasons]
+    reasons += verdict.of_width(model, fit, se, by_model, status)
+    if chosen is not usual:
+        reasons += [
+            *verdict.of_parameters(model, fit, noise, status, r2),
+            *verdict.of_range(model, chosen.p, status),
+            _of_choice(chosen, usual),
+        ]
+    if not poor and (worse := _poorly_predicted(chosen)):
+        text = f"The answer predicts {listed(worse)}: did something change, or does a parameter differ there (--own)?"
+        reasons.append(Reason("unpredicted", text))
+    if poor:
+        shares = listed(f"{100 * max(one.r2, 0.0):.0f} % of {one.name}" for one in poor)
+        text = f"Of motion that was not fitted the answer predicts {shares}: the equations lack something that matters."
+        reasons.append(Reason("unpredicted", text))
+    judged_found: Identified = replace(
+        found,
+        p=chosen.p,
+        se=se,
+        by_model=by_model,
+        shifts=shifts,
+        fit=fit,
+        judged=status,
+        verdict=Verdict(verdict.sorted_by_gravity(reasons)),
+    )
+    return replace(
+        answer,
+        found=judged_found,
+        values=values_of_found(model, judged_found),
+        prediction=chosen.sensors,
+        predicted=chosen.of_recordings,
+    )
+
+
+def _poorly_predicted(one: Candidate) -> list[str]:
+    """Of several recordings: how much of the motion of a sensor is predicted in those where it is too little."""
+    return [
+        f"{100 * max(sensor.r2, 0.0):.0f} % of {sensor.name} in {name}"
+        for name, sensors in one.of_recordings.items()
+        for sensor in sensors
+        if sensor.r2 < PREDICTED
+    ]
+
+
+def _of_choice(chosen: Candidate, usual: Candidate | None) -> Reason:
+    """Which estimate is published, and why."""
+    text = f"Published is {chosen.name}, because it predicts motion that was not fitted better"
+    than = f"{_USUAL} cannot" if usual is None else f"{_USUAL} {listed(usual.sensors)}"
+    own = f"{listed(chosen.sensors)}; {than}"
+    return Reason("prediction", f"{text}. It predicts {own}.")

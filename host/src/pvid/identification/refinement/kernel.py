@@ -1,0 +1,365 @@
+"""The refinement's functions of a model in float64 C on this computer: blocks of a run and their derivatives."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.recent import Recent
+from pvid.codegen.files_refine import DOUBLE, function
+from pvid.codegen.refine import (
+    RefinedParameter,
+    RefineFunctions,
+    is_driven_by_derivatives,
+    refine_functions_of,
+    signs_of,
+    width_of,
+    without_optional,
+)
+from pvid.model.compiled import CompiledModel
+from pvid.sim.compiled_plant import loaded
+
+Float = npt.NDArray[np.float64]
+
+_MOVED = 0.1  # of the logarithm of a sign's width: its derivative is a difference
+
+
+def play_of(model: CompiledModel, sensor: str) -> str:
+    """Name of the play of a sensor: play, and where several are fitted the sensor's behind it."""
+    several = sum(one.kind == "sensor" and not one.driven for one in model.signals) > 1
+    return f"play_{sensor}" if several else "play"
+
+
+class RefinedKernel:
+    """Blocks of a run of a model.
+
+    Attributes
+    ----------
+    made : the functions; the widths of signs are the last parameters, knowns are settings
+    widths : places of those of the signs in r
+    states : numbers in a start: q and, of order 2, v
+    columns : derivatives by these, by the motion's parameters (and the skew) and by the rest of r
+    """
+
+    def __init__(self, model: CompiledModel) -> None:
+        made = refine_functions_of(model, None, is_driven_by_derivatives(model))
+        self._library = loaded(_code(made, any(one.edge == "before" for one in model.signals)))
+        widths = tuple(width_of(model, one) for one in signs_of(model))
+        self.widths = list(range(len(made.parameters), len(made.parameters) + len(widths)))
+        self.made = replace(made, parameters=(*made.parameters, *widths), settings=made.settings[len(widths) :])
+        self.states = self.made.order * len(self.made.coordinates)
+        self.columns = self.states + len(self.made.parameters)
+
+    @property
+    def at_zero(self) -> tuple[Float, Float]:
+        """A state and inputs of 0."""
+        return np.zeros(self.states), np.zeros(len(self.made.inputs))
+
+    def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
+        """Of the recording that holds each block, 0 where there is one."""
+        return np.zeros(len(first), np.intp)
+
+    def blocks(
+        self,
+        r: Float,
+        first: npt.NDArray[np.int32],
+        samples: int,
+        sub: int,
+        h: float,
+        u: Float,
+        du: Float,
+        starts: Float,
+        derivatives: bool = True,
+        coarse: int = 1,
+    ) -> tuple[Float, Float | None, Float]:
+        """Readings, derivatives, ends.
+
+        Parameters
+        ----------
+        r : parameters and settings
+        first : sample of each block's start [blocks]
+        samples : of each block
+        sub : steps a sample, of h [s]
+        u, du : inputs and their rates at begin, middle and end of each step [steps, 3, inputs]
+        starts : [blocks, states]
+        coarse : steps, an even number or 1, that are taken as one where no friction reverses
+
+        Returns
+        -------
+        z [blocks, samples, outputs], its derivatives by starts and steps of r [blocks, samples, outputs, columns] (or
+        None), ends [blocks, states]
+        """
+        made, n = self.made, len(first)
+        z = np.empty((n, samples, len(made.outputs)))
+        jacobian = np.empty((*z.shape, self.columns - len(self.widths))) if derivatives else None
+        ends = np.empty((n, self.states))
+        self._library.refine_blocks(
+            _pointer(r),
+            n,
+            np.ascontiguousarray(first, np.int32).ctypes.data_as(ctypes.c_void_p),
+            samples,
+            sub,
+            coarse,
+            ctypes.c_double(h),
+            _pointer(u),
+            _pointer(du),
+            _pointer(starts),
+            _pointer(z),
+            None if jacobian is None else _pointer(jacobian),
+            _pointer(ends),
+        )
+        if jacobian is not None and "chart" in made.functions:
+            moving = made.moving - made.skew
+            part = slice(self.states, self.states + moving)
+            jacobian[..., part] = jacobian[..., part] @ self.chart(r)
+        if jacobian is not None and self.widths:
+            near = np.tile(r, (len(self.widths), 1))
+            near[range(len(near)), self.widths] *= np.exp(_MOVED)
+            given = first, samples, sub, h, u, du, starts, False, coarse
+            moved = [self.blocks(one, *given)[0] for one in near]
+            jacobian = np.concatenate([jacobian, (np.stack(moved, -1) - z[..., None]) / _MOVED], -1)
+        return z, jacobian, ends
+
+    def derivatives(self, r: Float, q: Float, v: Float, u: Float) -> dict[str, Float]:
+        """a, K, D, U, B at one instant, flat."""
+        out = {key: np.empty(max(n, 1)) for key, n in self.made.functions["jacobian"].written}
+        given = [np.ascontiguousarray(one, np.float64) for one in (r, q, v, u)]
+        self._library.refine_derivatives(*map(_pointer, given), *map(_pointer, out.values()))
+        return out
+
+    def slopes(self, r: Float, state: Float, u: Float) -> Float:
+        """dx'/dx [states, states] at a state, which has v behind q."""
+        n = len(self.made.coordinates)
+        found = self.derivatives(r, state[:n], state[n:] if self.made.order == 2 else np.zeros(1), u)
+        below = found["K"].reshape(n, n)
+        if self.made.order == 1:
+            return below
+        return np.block([[np.zeros((n, n)), np.eye(n)], [below, found["D"].reshape(n, n)]])
+
+    def chart(self, r: Float) -> Float:
+        """d(steps of the motion's parameters)/d(steps of r) [moving, moving], the skew left out."""
+        moving = self.made.moving - self.made.skew
+        rows = np.eye(moving)
+        if "chart" in self.made.functions:
+            for row in rows:
+                self._library.refine_chart(_pointer(r), row.ctypes.data_as(ctypes.c_void_p))
+        return rows
+
+    def possible(self, r: Float) -> bool:
+        """Whether a mechanism can have these parameters."""
+        return bool(self._library.refine_region(_pointer(r)))
+
+
+class PlayedKernel(RefinedKernel):
+    """A kernel with one more parameter behind the others: half the play between the mechanism and a sensor of it, or
+    half the sensor's hysteresis.
+
+    Parameters
+    ----------
+    inner : without it
+    output : number of the sensor among the outputs
+    prior_sd : how large it may be, in the sensor's unit
+    """
+
+    def __init__(self, inner: RefinedKernel, output: int = 0, prior_sd: float = 1.0) -> None:
+        self._inner, self._library, self.states, self._output = inner, inner._library, inner.states, output
+        own = RefinedParameter(
+            play_of(inner.made.model, inner.made.outputs[output]),
+            inner.made.model.signal(inner.made.outputs[output]).unit,
+            False,
+            -1,
+            prior_sd,
+        )
+        self.made = replace(inner.made, parameters=(*inner.made.parameters, own))
+        self._place, self.widths = len(inner.made.parameters), inner.widths
+        self.columns = inner.columns + 1
+
+    def blocks(
+        self,
+        r: Float,
+        first: npt.NDArray[np.int32],
+        samples: int,
+        sub: int,
+        h: float,
+        u: Float,
+        du: Float,
+        starts: Float,
+        derivatives: bool = True,
+        coarse: int = 1,
+    ) -> tuple[Float, Float | None, Float]:
+        """As of RefinedKernel; ends are those of the motion."""
+        z, inner, ends = self._inner.blocks(
+            self._without(r), first, samples, sub, h, u, du, starts, derivatives, coarse
+        )
+        jacobian = None if inner is None else np.concatenate([inner, np.zeros((*z.shape, 1))], -1)
+        self._library.refine_play(
+            len(first),
+            samples,
+            self._output,
+            ctypes.c_double(float(r[self._place])),
+            _pointer(z),
+            None if jacobian is None else _pointer(jacobian),
+            self.columns,
+            self.columns - 1,
+        )
+        return z, jacobian, ends
+
+    def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
+        """As of RefinedKernel."""
+        return self._inner.number_of(first)
+
+    def _without(self, r: Float) -> Float:
+        return np.delete(r, self._place)
+
+    def derivatives(self, r: Float, q: Float, v: Float, u: Float) -> dict[str, Float]:
+        """As of RefinedKernel."""
+        return self._inner.derivatives(self._without(r), q, v, u)
+
+    def chart(self, r: Float) -> Float:
+        """As of RefinedKernel."""
+        return self._inner.chart(self._without(r))
+
+    def possible(self, r: Float) -> bool:
+        """Whether a mechanism can have these parameters."""
+        return bool(r[self._place] >= 0) and self._inner.possible(self._without(r))
+
+
+class TogetherKernel(RefinedKernel):
+    """A kernel of several recordings, with the parameters of all: blocks of each have its own.
+
+    Parameters
+    ----------
+    inner : of one recording
+    model : with the parameters of all
+    begins : first sample of each recording
+    """
+
+    def __init__(self, inner: RefinedKernel, model: CompiledModel, begins: Sequence[int]) -> None:
+        self._inner, self._library, self._begins, self.states = inner, inner._library, begins, inner.states
+        own = inner.made
+        parameters: list[RefinedParameter] = []
+        self._places: list[list[int]] = [[] for _ in model.places]  # of each recording, in `parameters`
+        for one in own.parameters:
+            of_p = [one.place] if one.place < 0 else list(dict.fromkeys(places[one.place] for places in model.places))
+            for at in self._places:
+                at.append(len(parameters))
+            for k, place in enumerate(of_p):
+                name = one.name if place < 0 else model.p_names[place]
+                parameters.append(replace(one, name=name, place=place))
+                if len(of_p) > 1:
+                    self._places[k][-1] = len(parameters) - 1
+        extra = len(parameters) - len(own.parameters)
+        # every own parameter is one of the motion or of the readings; both stand in the order of `inner`
+        moving = self._places[-1][own.moving - 1] + 1 if own.moving else 0
+        self.made = replace(own, model=model, parameters=tuple(parameters), moving=moving)
+        self.widths = [one + extra for one in inner.widths]
+        self.columns = inner.columns + extra
+
+    def blocks(
+        self,
+        r: Float,
+        first: npt.NDArray[np.int32],
+        samples: int,
+        sub: int,
+        h: float,
+        u: Float,
+        du: Float,
+        starts: Float,
+        derivatives: bool = True,
+        coarse: int = 1,
+    ) -> tuple[Float, Float | None, Float]:
+        """As of RefinedKernel."""
+        z = np.empty((len(first), samples, len(self.made.outputs)))
+        jacobian = np.zeros((*z.shape, self.columns)) if derivatives else None
+        ends = np.empty((len(first), self.states))
+        number = self.number_of(first)
+        for k in np.unique(number).tolist():
+            own = np.flatnonzero(number == k)
+            begun = np.ascontiguousarray(starts[own])
+            z[own], inner, ends[own] = self._inner.blocks(
+                self._of(r, k), first[own], samples, sub, h, u, du, begun, derivatives, coarse
+            )
+            if jacobian is not None and inner is not None:
+                columns = np.array([*range(self.states), *(self.states + place for place in self._places[k])])
+                jacobian[own[:, None], :, :, columns] = np.moveaxis(inner, 3, 1)
+        return z, jacobian, ends
+
+    def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
+        """As of RefinedKernel."""
+        return np.asarray(np.searchsorted(self._begins, first, side="right") - 1)
+
+    def _of(self, r: Float, k: int) -> Float:
+        """Parameters and settings of one recording."""
+        return np.concatenate([r[self._places[k]], r[len(self.made.parameters) :]])
+
+    def derivatives(self, r: Float, q: Float, v: Float, u: Float) -> dict[str, Float]:
+        """As of RefinedKernel, of the first recording."""
+        return self._inner.derivatives(self._of(r, 0), q, v, u)
+
+    def chart(self, r: Float) -> Float:
+        """As of RefinedKernel, of the first recording."""
+        return self._inner.chart(self._of(r, 0))
+
+    def possible(self, r: Float) -> bool:
+        """Whether a mechanism can have these parameters, of each recording."""
+        return all(self._inner.possible(self._of(r, k)) for k in range(len(self._places)))
+
+
+def _pointer(array: Float) -> ctypes.c_void_p:
+    assert array.dtype == np.float64 and array.flags.c_contiguous
+    return array.ctypes.data_as(ctypes.c_void_p)
+
+
+def _code(made: RefineFunctions, read_before: bool) -> str:
+    counts = {
+        "N": len(made.coordinates),
+        "ORDER": made.order,
+        "NU": len(made.inputs),
+        "NZ": len(made.outputs),
+        "NM": made.moving - made.skew,
+        "NT": len(made.parameters) - made.moving,
+        "SKEW": int(made.skew),
+        "NS": dict(made.functions["signs"].written)["g"] if "signs" in made.functions else 0,
+        "WIDTHS": len(made.parameters),
+        "READ_BEFORE": int(read_before),
+        "NUMBER_OF_CONSTANTS": len(made.constants),
+    }
+    jacobian = [key for key, _ in made.functions["jacobian"].written]
+    arrays = ", ".join(f"double *{key}" for key in jacobian)
+    export = [
+        f"void refine_derivatives(const double *r, const double *q, const double *v, const double *u, {arrays}) "
+        f"{{ double m[NUMBER_OF_CONSTANTS + 1]; pvid_refine_constants(r, m); "
+        f"pvid_refine_jacobian(m, q, v, u, {', '.join(jacobian)}); }}",
+    ]
+    export += ["int refine_region(const double *r) { return pvid_refine_region(r); }"]
+    if "chart" in made.functions:
+        export.append("void refine_chart(const double *r, double *row) { pvid_refine_chart(r, row); }")
+    return "\n".join(
+        [
+            "#include <math.h>\n#include <stdbool.h>",
+            *(f"#define {name} {value}" for name, value in counts.items()),
+            *(function(one, DOUBLE) for one in made.functions.values()),
+            (files("pvid.identification.refinement") / "refinement.c").read_text(encoding="utf-8"),
+            *export,
+        ]
+    )
+
+
+_made = Recent(RefinedKernel, 32)
+
+
+def kernel_of(model: CompiledModel, optional: tuple[str, ...] = (), begins: Sequence[int] = ()) -> RefinedKernel:
+    """The kernel of a compiled model with these of its optional extras.
+
+    Parameters
+    ----------
+    begins : first sample of each recording, of a model of several; without them no block can be simulated
+    """
+    if model.together is not None:
+        return TogetherKernel(kernel_of(model.alone, optional), model, begins)
+    return _made(without_optional(model, optional))

@@ -1,0 +1,69 @@
+"""The road from a recording to an answer in float64: analysis, advice, refinement, prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from pvid.base.console import working
+from pvid.identification.advice import advised
+from pvid.identification.analysis import analysed
+from pvid.identification.answer import Answer, Refinement
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.weights import Weights
+from pvid.rig.run import Recording
+
+
+def identified(
+    recording: Recording,
+    model: CompiledModel,
+    weights: Weights = "residuals",
+    *,
+    refine: bool | None = None,
+    predict: bool = True,
+    own: Collection[str] = (),
+) -> Answer:
+    """The answer that `identify` prints.
+
+    Parameters
+    ----------
+    weights : of the rows; those of the sensors alone are not compared with others
+    refine
+        the full equations are fitted to the whole recording, from the answer on; None: of a single recording, where the
+        model has equations of its own for that, because those of its rows are approximations
+    predict
+        with the prediction of unseen motion; where the equations do not explain the recording, publish the estimate
+        that predicts it best
+    own : unknowns that have a value of their own in each of several recordings
+
+    Raises
+    ------
+    PvidError
+        When the recording is too short, or holds a signal beyond all reason.
+    """
+    answer = advised(analysed(recording, model, weights, own))
+    another_column = bool(answer.advice) and not answer.identified  # no estimate of this one can help
+    if refine is None:
+        refine = bool(model.refinement.equations) and weights == "residuals" and not recording.origins
+        refine = refine and not another_column
+    if refine:
+        from pvid.identification.refinement.adoption import refined_answer  # loads the simulation
+
+        with working("refining"):
+            found, fit, text = refined_answer(answer)
+        answer = replace(found, refinement=Refinement(found is not answer, text, fit))
+    elif another_column:
+        return answer
+    return judged_by_prediction(answer) if predict else answer
+
+
+def judged_by_prediction(answer: Answer) -> Answer:
+    """The answer with how well it predicts motion that was not fitted; where the equations do not explain the recording
+    and no refinement has been adopted, the estimate that predicts it best."""
+    if not answer.identified and answer.is_explained:
+        return answer
+    from pvid.identification.judge import judged, with_prediction  # loads the simulation
+
+    refined = answer.refinement is not None and answer.refinement.adopted
+    as_it_is = answer.is_explained or answer.weights != "residuals" or refined
+    return with_prediction(answer) if as_it_is else judged(answer)

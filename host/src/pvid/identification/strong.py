@@ -1,0 +1,155 @@
+"""Identification of a described mechanism by its strong form: the C core in float32 or the analysis in float64."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pvid.base.wording import listed
+from pvid.codegen.strong_library import strong_native
+from pvid.configuration.strong import StrongDesign, strong_design
+from pvid.identification.analysis import refuse_constant
+from pvid.identification.answer import Value
+from pvid.identification.values import unless_held, values_of
+from pvid.model.compiled import CompiledModel
+from pvid.oracle.weak.functions import Float
+from pvid.oracle.weak.parameters import UNKNOWN
+from pvid.oracle.weak.verdict import Judged, Verdict
+from pvid.oracle.weak.verdict import Reason as Doubt
+from pvid.rig.run import Recording
+from pvid.settings.engine_cores import STRONG_CORES
+from pvid.settings.enums import Law, Reason
+
+_UNKNOWN_OF_RANGE = 0.5  # as in the verdict of the weak form
+_CLASH = 3.0  # standard errors between the core and the analysis
+_GOOD = (Reason.UPDATED, Reason.MISFIT, Reason.ACCUMULATED)
+_BIAS = (
+    "The strong form differentiates the samples, and their noise biases its regressors; the standard errors contain "
+    "what another window changes, not all of it. The weak form (omit --form strong) has no such bias."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class StrongAnswer:
+    """An identification by the strong form.
+
+    Attributes
+    ----------
+    model : with the values of the rig file
+    design : window and settings
+    values : by name: outputs of the model, then p
+    core : arithmetic
+    reason : of the last tick; None in float64
+    hash : running hash after the last tick; None in float64
+    verdict : what it may be used for
+    unknown : parameters that the recording does not determine
+    recording : the samples
+    """
+
+    model: CompiledModel
+    design: StrongDesign
+    values: Mapping[str, Value]
+    core: str
+    reason: Reason | None
+    hash: int | None
+    verdict: Verdict
+    unknown: tuple[str, ...]
+    recording: Recording
+
+    @property
+    def identified(self) -> bool:
+        """Whether every parameter is."""
+        return not self.unknown and (self.reason is None or self.reason in _GOOD)
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        parameters = {
+            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise, "verdict": one.word}
+            for name, one in self.values.items()
+        }
+        config = self.design.config
+        return {
+            "identified": self.identified,
+            "verdict": self.verdict.word,
+            "status": self.verdict.status,
+            "warning": self.verdict.warning,
+            "reasons": {one.name: one.text for one in self.verdict.reasons},
+            "parameters": parameters,
+            "window_s": config.window / config.sample_rate,
+            "reason": None if self.reason is None else self.reason.text,
+            "hash": None if self.hash is None else f"{self.hash:08x}",
+            "input": list(self.recording.notes),
+            "samples": len(self.recording),
+            "model": self.model.name,
+            "core": self.core,
+            "form": "strong",
+        }
+
+
+def identify_strong_mechanism(
+    recording: Recording, model: CompiledModel, in_c: bool = True, law: Law = Law.STATIONARY
+) -> StrongAnswer:
+    """Parameters of a mechanism from a recording without missing samples: by the C core, or by the analysis alone.
+
+    Raises
+    ------
+    PvidError
+        When the recording is too short, or the strong form of the model needs what the core does not have.
+    """
+    refuse_constant(recording, model)
+    design = strong_design(model, recording, law)
+    fitted = design.fitted
+    reason: Reason | None = None
+    running: int | None = None
+    p, noise = fitted.p, fitted.noise
+    if in_c:
+        identifier = strong_native(design.strong, design.config).identifier_of(design.config)
+        record = identifier.run_samples(design.samples, sums=False)
+        p = record.p[-1].astype(np.float64)
+        n_p = len(p)
+        noise = np.maximum(noise, identifier.assess()["se"][:n_p].astype(np.float64))
+        reason, running = _last(record.reason.tolist()), identifier.running_hash
+    unknown = tuple(_unknown(model, p, np.hypot(noise, fitted.change)))
+    identified = not unknown and (reason is None or reason in _GOOD)
+    held = None if identified else "the strong form does not determine every parameter"
+    judged = unless_held([Judged()] * len(p), held)
+    # What another window changes is common to all parameters, as a gain is.
+    verdict = Verdict(tuple(_doubts(model, p, design, noise, unknown, held)))
+    change = fitted.change[np.newaxis]
+    values = values_of(model, p, np.diag(noise**2), change, judged, verdict, of_known=False)
+    core = STRONG_CORES[0 if in_c else 1]
+    return StrongAnswer(model, design, values, core, reason, running, verdict, unknown, recording)
+
+
+def _last(reasons: list[int]) -> Reason:
+    """The last reason that is not ordinary waiting."""
+    ends = [one for one in reasons if one not in (Reason.WARMING_UP, Reason.ACCUMULATED)]
+    return Reason(ends[-1]) if ends else Reason.WARMING_UP
+
+
+def _unknown(model: CompiledModel, p: Float, error: Float) -> Iterator[str]:
+    """Parameters at a bound, or with a standard error that leaves nothing of them."""
+    for one, value, own in zip(model.unknowns, p, error, strict=True):
+        bound = UNKNOWN * abs(value) if one.positive else _UNKNOWN_OF_RANGE * (one.high - one.low)
+        rim = 1e-5 * abs(value) if one.positive else 0.0
+        if not own <= bound or value <= one.low + rim or value >= one.high - rim:
+            yield one.name
+
+
+def _doubts(
+    model: CompiledModel, p: Float, design: StrongDesign, noise: Float, unknown: tuple[str, ...], held: str | None
+) -> Iterator[Doubt]:
+    if unknown:
+        yield Doubt("not_identified", f"The strong form does not determine {listed(unknown)} from this recording.")
+    elif held is not None:
+        yield Doubt("not_identified", "The strong form has published no estimate.")
+    yield Doubt("noise", _BIAS)
+    fitted = design.fitted
+    bounds = _CLASH * np.hypot(noise, fitted.error)
+    apart = [one for one, x, y, most in zip(model.p_names, p, fitted.p, bounds, strict=True) if abs(x - y) > most]
+    if apart:
+        text = f"The C core and the float64 analysis disagree on {listed(apart)}."
+        yield Doubt("core", text, of=tuple(apart))

@@ -1,0 +1,152 @@
+"""Values of an answer, with the parts of their standard errors: parameters, and outputs that follow from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+
+from pvid.identification.answer import Value
+from pvid.model.compiled import CompiledModel, Output
+from pvid.model.evaluation import numpy_function
+from pvid.oracle.weak.identify import Identified, given
+from pvid.oracle.weak.verdict import Judged, Verdict
+from pvid.oracle.weak.words import WIDE, Word, worst
+
+if TYPE_CHECKING:
+    pass
+
+Float = npt.NDArray[np.float64]
+
+
+def values_of_found(model: CompiledModel, found: Identified) -> dict[str, Value]:
+    """Outputs of the model, then p, by name."""
+    # The correlations of the rows, with the published standard errors but for gains and constants.
+    widened = noise_of(model, found) / np.sqrt(np.diag(found.covariance))
+    covariance = found.covariance * np.outer(widened, widened)
+    return values_of(model, found.p, covariance, gains_of(model, found), found.judged, found.verdict, shifts_of(found))
+
+
+def noise_of(model: CompiledModel, found: Identified) -> Float:
+    """The published standard errors but for gains, constants and what is missing [n_p]."""
+    other = np.sum(gains_of(model, found) ** 2, axis=0) + found.by_model**2
+    return np.asarray(np.sqrt(np.maximum(found.se**2 - other, 0.0)))
+
+
+def shifts_of(found: Identified) -> Float:
+    """What p moves by with each term that the equations may lack, and to other estimates [terms, n_p]."""
+    if found.shifts is not None:
+        return found.shifts
+    return np.zeros((0, len(found.p))) if found.lacking is None else found.lacking.shifts
+
+
+def gains_of(model: CompiledModel, found: Identified) -> Float:
+    """What p is off by for one standard deviation of each gain, constant and clock that has any, and of what
+    linearised equations neglect [gains, n_p]."""
+    return np.array([*given(model, found.by_gain, found.by_known, found.by_clock), found.by_neglect])
+
+
+def refined_gains_of(model: CompiledModel, found: Identified) -> Float:
+    """The same of a refined estimate, whose equations neglect nothing where the refinement has its own."""
+    return gains_of(model, found)[:-1] if model.refinement.equations else gains_of(model, found)
+
+
+def refined_shifts_of(model: CompiledModel, found: Identified) -> Float:
+    """The same of a refined estimate: where the refinement has its own equations, what the linear rows lack counts only
+    where it is more than they neglect."""
+    shifts = shifts_of(found)
+    return np.where(np.abs(shifts) > found.by_neglect, shifts, 0.0) if model.refinement.equations else shifts
+
+
+def values_of(
+    model: CompiledModel,
+    p: Float,
+    covariance: Float,
+    gains: Float,
+    judged: Sequence[Judged],
+    verdict: Verdict,
+    shifts: Float | None = None,
+    *,
+    of_known: bool = True,
+) -> dict[str, Value]:
+    """Outputs of the model, then p, by name.
+
+    Parameters
+    ----------
+    covariance : of p by noise [n_p, n_p]
+    gains : see gains_of
+    judged : of each parameter; an output is identified where all parameters that it depends on are
+    verdict : whose word a parameter has; an output has the worst of those that it depends on
+    shifts : see shifts_of; None: no terms were tried
+    of_known : the first of the gains are those of constants, in which an output may stand by itself
+    """
+    terms = np.zeros((0, len(p))) if shifts is None else shifts
+
+    def shown(unit: str, value: float, slope: Float, of: Judged, word: Word, direct: Float | float = 0.0) -> Value:
+        if of.status == "not_identified":
+            return Value(unit, None, None, None, of.status, of.reason, word="not_identified")
+        se_noise, se_scale = float(np.sqrt(slope @ covariance @ slope)), float(np.linalg.norm(gains @ slope + direct))
+        se_model = float(np.max(np.abs(terms @ slope), initial=0.0))
+        se = math.hypot(se_noise, se_scale, se_model)
+        return Value(unit, value, se, se_noise, of.status, of.reason, of.below, se_model, se_scale, word)
+
+    values = {}
+    for one in model.outputs:
+        used = [of for symbol, of in zip(model.p, judged, strict=True) if one.value.has(symbol)]
+        missing = next((of for of in used if of.status == "not_identified"), Judged())
+        slope = np.where([of.status == "not_identified" for of in judged], 0.0, (found := output_at(model, p, one))[1])
+        word = worst(verdict.of(name) for name, p_k in zip(model.p_names, model.p, strict=True) if one.value.has(p_k))
+        direct = np.zeros(len(gains))
+        if of_known:
+            by_known = _of_constants(model, p, one, found[0])
+            direct[: len(by_known)] = by_known
+        own = shown(one.unit, found[0], slope, missing, word, direct)
+        if own.value is not None and not (own.se or 0.0) <= WIDE * abs(own.value):
+            own = replace(own, word=worst([word, "usable"]))
+        values[one.name] = own
+    for k, unknown in enumerate(model.unknowns):
+        values[unknown.name] = shown(unknown.unit, float(p[k]), np.eye(len(p))[k], judged[k], verdict.of(unknown.name))
+    return values
+
+
+def unless_held(judged: Sequence[Judged], reason: str | None) -> Sequence[Judged]:
+    """Of each parameter; with a reason (a clause) why an identifier publishes nothing, none is identified."""
+    return judged if reason is None else [Judged("not_identified", reason)] * len(judged)
+
+
+def outputs_at(model: CompiledModel, p: Float) -> dict[str, float]:
+    """Outputs of the model at p [n_p], by name."""
+    return {one.name: output_at(model, p, one)[0] for one in model.outputs}
+
+
+def _of_constants(model: CompiledModel, p: Float, output: Output, value: float) -> list[float]:
+    """What an output at p is off by for one standard deviation of each constant that has any, beside what p is."""
+    off = []
+    for known in model.knowns:
+        if known.sd > 0:
+            moved = tuple(replace(one, value=one.value + one.sd) if one is known else one for one in model.knowns)
+            stands = output.value.has(known.symbol)
+            off.append(output_at(replace(model, knowns=moved), p, output)[0] - value if stands else 0.0)
+    return off
+
+
+@lru_cache(maxsize=256)
+def _gradient(value: sp.Expr, p: tuple[sp.Symbol, ...]) -> Any:
+    """A function of p: the value, then its slopes."""
+    return numpy_function(p, [value, *(value.diff(symbol) for symbol in p)])
+
+
+def output_at(model: CompiledModel, p: Float, output: Output) -> tuple[float, Float]:
+    """Value at p and its gradient [n_p]; NaN where it does not exist at p."""
+    value = model.with_knowns(output.value)
+    with np.errstate(all="ignore"):
+        at, *slopes = (complex(one) for one in _gradient(value, model.p)(*p.astype(complex)))
+    if abs(at.imag) > 0:
+        return float("nan"), np.full(len(p), np.nan)
+    return at.real, np.array(slopes).real

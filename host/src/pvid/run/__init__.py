@@ -1,1 +1,0 @@
-"""What is done with a recorded run: identify, compare, tune, explain."""

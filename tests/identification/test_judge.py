@@ -1,0 +1,143 @@
+"""What an answer predicts: another run, and motion of its own that it was not fitted to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+from scipy.signal import cont2discrete, dlsim, lfilter
+
+import pvid
+from pvid.base.errors import PvidError
+from pvid.cli.main import commands
+from pvid.identification.analysis import analysed
+from pvid.identification.judge import judged
+from pvid.identification.refinement.inputs import second_derivative_of
+from pvid.identification.validation import validated
+from pvid.model.compiled import CompiledModel
+from pvid.model.description import Model
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.run import Recording
+from pvid.sim.simulated_run import RigSimulation
+
+Float = npt.NDArray[np.float64]
+
+
+def recording(name: str, seed: int = 0) -> tuple[CompiledModel, Recording, Float]:
+    """A run of a shipped rig, and its truth."""
+    model = compiled_of(name)
+    simulation = RigSimulation.of(model, simulated_rig(name))
+    run = simulation.run(seed)
+    t = run.pop("t")
+    return model, Recording(t, run, simulation.rig.sample_rate), np.asarray(simulation.truth)
+
+
+@pytest.mark.parametrize("name", ["dc_motor", "battery_2rc", "rigid_body", "cart_pendulum"])
+def test_the_truth_predicts_every_sensor_to_its_noise(name: str) -> None:
+    model, run, truth = recording(name)
+    found = validated(model, run, truth, 1e3 / run.sample_rate)
+    assert {one.name for one in found.sensors} <= {one.name for one in model.signals if one.kind == "sensor"}
+    for one in found.sensors:
+        assert one.of_noise == pytest.approx(1.0, abs=0.15)
+        assert one.r2 > 0.99
+        rms = np.sqrt(np.mean((found.measured[one.name] - found.simulated[one.name]) ** 2))
+        assert rms == pytest.approx(one.rms, rel=1e-6)
+
+
+def test_a_wrong_parameter_predicts_worse() -> None:
+    model, run, truth = recording("dc_motor")
+    wrong = truth * np.where(np.arange(len(truth)) == 3, 1.02, 1.0)  # J
+    right, other = (validated(model, run, p, 1.0).sensors for p in (truth, wrong))
+    assert other[1].rms > 5 * right[1].rms
+
+
+def test_the_pendulum_is_simulated_by_its_full_equations_under_a_measured_pivot(tmp_path: Path) -> None:
+    """Its input is the second derivative of what a sensor measures."""
+    run, answer = tmp_path / "run.csv", tmp_path / "answer.json"
+    assert (
+        CliRunner().invoke(commands, ["simulate", str(run), "--duration", "15"], standalone_mode=False).exit_code == 0
+    )
+    told = CliRunner().invoke(commands, ["identify", str(run), "--json"], standalone_mode=False)
+    answer.write_text(told.stdout, encoding="utf-8")
+    done = CliRunner().invoke(commands, ["validate", str(run), "--from", str(answer), "--json"], standalone_mode=False)
+    phi = json.loads(done.stdout)["sensors"]["phi"]
+    assert phi["of_noise"] == pytest.approx(1.0, abs=0.1) and phi["r2"] > 0.999
+
+
+def test_second_derivative_of_a_signal_with_a_gap() -> None:
+    t = np.arange(4000) * 1e-3
+    rng = np.random.default_rng(1)
+    x = 1e-2 * np.sin(20 * t) + rng.normal(size=t.size) * 1e-6
+    x[1500:1600] = np.nan
+    found = second_derivative_of(x, 1e3, 1e-6)
+    there = np.isfinite(found)
+    assert not there[1500:1600].any() and there.sum() > 2500
+    assert np.abs(found - -4.0 * np.sin(20 * t))[there].max() < 0.02
+
+
+def cart(seed: int, disturbance: float) -> tuple[CompiledModel, Recording]:
+    """A cart on a spring, m 1.3 kg, c 1.7 N s/m, k 82 N/m, and a force that nobody records [N]: no term is missing."""
+    model = Model("cart")
+    x, force = model.sensor("x", "m", resolution=1e-5), model.input("F", "N", hold="zoh")
+    mass, c, k = model.unknown("m", "kg", 1.0), model.unknown("c", "N*s/m", 1.0), model.unknown("k", "N/m", 60.0)
+    model.equation(mass * x.d(2) + c * x.d() + k * x - force)
+    rng, rate, count = np.random.default_rng(seed), 500.0, 10_000
+    drive = np.repeat(rng.normal(size=count // 50) * 3, 50)
+    other = lfilter([1 - 0.98], [1, -0.98], rng.normal(size=count)) * 10 * disturbance
+    a, b = np.array([[0, 1], [-82 / 1.3, -1.7 / 1.3]]), np.array([[0], [1 / 1.3]])
+    system = cont2discrete((a, b, np.array([[1.0, 0.0]]), np.zeros((1, 1))), 1 / rate)
+    place = dlsim((*system[:4], 1 / rate), drive + other)[1][:, 0]
+    read = np.round((place + rng.normal(size=count) * 2e-6) / 1e-5) * 1e-5
+    return model.compiled("cart"), Recording(np.arange(count) / rate, {"x": read, "F": drive}, rate)
+
+
+def test_a_run_of_the_sensors_noise_alone_is_not_judged() -> None:
+    model, run = cart(3, 0.0)
+    answer = analysed(run, model)
+    assert answer.found.chi2 < 2.0 and judged(answer) is answer
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_estimates_that_predict_alike_are_in_the_standard_errors(seed: int) -> None:
+    model, run = cart(seed, 0.2)
+    usual = analysed(run, model)
+    answer = judged(usual)
+    assert usual.found.chi2 > 2.0 and answer.prediction
+    assert all(0.5 < one.r2 < 0.9999 for one in answer.prediction)
+    for name, truth in {"m": 1.3, "c": 1.7, "k": 82.0}.items():
+        value, se = answer.values[name].value, answer.values[name].se
+        assert value is not None and se is not None and abs(value - truth) < 3 * se
+    assert np.all(answer.found.se >= 0.99 * usual.found.se) or not np.array_equal(answer.found.p, usual.found.p)
+
+
+def test_validate_in_python_and_the_difference_of_two_results(tmp_path: Path) -> None:
+    model, run, _ = recording("dc_motor")
+    _, other, _ = recording("dc_motor", seed=5)
+    data = [{"t": one.t, **one.signals} for one in (run, other)]
+    first, second = (pvid.identify(one, model="dc_motor") for one in data)
+    found = first.validate(data[1])
+    assert [one.name for one in found.sensors] == ["i", "phi"] and found.sensors[0].of_noise == pytest.approx(
+        1, abs=0.1
+    )
+    apart = first.compare(second)
+    assert set(apart) == set(model.p_names) and max(map(abs, apart.values())) < 4.5
+
+
+def test_an_answer_without_a_value_or_of_another_mechanism_is_refused(tmp_path: Path) -> None:
+    model, run, truth = recording("dc_motor")
+    answer = {"model": "furuta", "parameters": {}}
+    (tmp_path / "a.json").write_text(json.dumps(answer), encoding="utf-8")
+    columns = [run.t, *(run.signals[name] for name in ("V", "i", "phi"))]
+    np.savetxt(tmp_path / "run.csv", np.transpose(columns), delimiter=",", header="t,V,i,phi", comments="")
+    arguments = ["validate", str(tmp_path / "run.csv"), "--from", str(tmp_path / "a.json"), "--model", "dc_motor"]
+    with pytest.raises(PvidError, match="is of the mechanism furuta"):
+        CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)
+    answer = {"parameters": {name: {"value": None if name == "L" else 1.0} for name in model.p_names}}
+    (tmp_path / "a.json").write_text(json.dumps(answer), encoding="utf-8")
+    with pytest.raises(PvidError, match="L of dc_motor has no value there"):
+        CliRunner().invoke(commands, arguments, standalone_mode=False, catch_exceptions=False)

@@ -1,0 +1,193 @@
+"""Advice on signs and units: right where a column is wrong, silent on clean recordings and on missing terms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.identification.advice import advice_on
+from pvid.identification.analysis import analysed
+from pvid.identification.answer import Answer
+from pvid.model import Model, sgn, sin
+from pvid.model.compiled import CompiledModel
+from pvid.models.mechanisms import compiled_of
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.identify import identify
+from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import Recording
+from pvid.rig.sensor_steps import with_resolutions
+from pvid.sim.pendulum import simulate
+
+Float = npt.NDArray[np.float64]
+
+SECONDS = 12.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mechanism with its recordings: `rate_of(extra)` is x' of (x, u), with a term that the model lacks."""
+
+    model: CompiledModel
+    rate: float
+    drive: Callable[[Float], Float]
+    rate_of: Callable[[float], Callable[[Float, float], Float]]
+    states: int
+    lsb: float
+
+    def run(self, extra: float = 0.0, seed: int = 1) -> dict[str, Float]:
+        """The input, then the sensor, of Runge-Kutta's midpoint rule."""
+        random, parts = np.random.default_rng(seed), 4
+        n = round(SECONDS * self.rate)
+        steps = np.repeat(random.uniform(-0.5, 0.5, n // 50 + 1), 50)[:n]
+        u = self.drive(np.arange(n) / self.rate) * (1 + steps)
+        f, h = self.rate_of(extra), 1 / self.rate / parts
+        x, y = np.zeros(self.states), np.empty(n)
+        for k, now in enumerate(u):
+            y[k] = x[0]
+            for _ in range(parts):
+                x = x + h * f(x + h / 2 * f(x, now), now)
+        given, sensor = (one.name for one in self.model.signals)
+        return {given: u, sensor: np.rint(y / self.lsb + random.normal(0.0, 0.5, n)) * self.lsb}
+
+
+def _spring() -> Case:
+    model = Model("cart on a spring")
+    F, x = (
+        model.input("F", "N", hold="zoh", reach=10, gain_sd=0),
+        model.sensor("x", "m", resolution=1e-5, reach=0.2),
+    )
+    m, c, k = model.unknown("m", "kg", 1.0), model.unknown("c", "N*s/m", 1.5), model.unknown("k", "N/m", 100.0)
+    model.equation(m * x.d(2) + c * x.d() + k * x - F)
+
+    def rate_of(extra: float) -> Callable[[Float, float], Float]:
+        return lambda s, u: np.array([s[1], (u - 1.7 * s[1] - 82 * s[0] - extra * 2e3 * s[0] ** 3) / 1.3])
+
+    return Case(model.compiled("spring"), 500.0, lambda t: 4 * np.sin(4.0 * t) + 2 * np.sin(13 * t), rate_of, 2, 1e-5)
+
+
+def _pendulum() -> Case:
+    model = Model("pendulum with a motor")
+    lsb = 2 * np.pi / 4096
+    u, q = (
+        model.input("u", "N*m", hold="zoh", reach=5, gain_sd=0),
+        model.sensor("q", "rad", resolution=lsb, reach=4),
+    )
+    J, G, b = model.unknown("J", "kg*m^2", 0.15), model.unknown("G", "N*m", 3.0), model.unknown("b", "N*m*s", 0.1)
+    model.equation(J * q.d(2) + G * sin(q) + b * q.d() - u)
+
+    def rate_of(extra: float) -> Callable[[Float, float], Float]:
+        return lambda s, v: np.array([s[1], (v - 3.7 * np.sin(s[0]) - 0.2 * s[1] - extra * s[0]) / 0.19])
+
+    return Case(model.compiled("pendulum"), 500.0, lambda t: 2 * np.sin(3 * t) + 1.5 * np.sin(7.1 * t), rate_of, 2, lsb)
+
+
+def _vehicle() -> Case:
+    model = Model("vehicle")
+    F, v = (
+        model.input("F", "N", hold="zoh", reach=400, gain_sd=0),
+        model.sensor("v", "m/s", resolution=0.01, reach=20),
+    )
+    m, Fr, b = model.unknown("m", "kg", 80.0), model.unknown("Fr", "N", 10.0), model.unknown("b", "N*s/m", 15.0)
+    model.equation(m * v.d() + Fr * sgn(v) + b * v - F)
+
+    def rate_of(extra: float) -> Callable[[Float, float], Float]:
+        return lambda s, u: np.array(
+            [(u - 13.5 * np.tanh(s[0] / 0.01) - 22 * s[0] - extra * 20 * s[0] * abs(s[0])) / 92]
+        )
+
+    return Case(model.compiled("vehicle"), 200.0, lambda t: 150 * np.sin(1.1 * t), rate_of, 1, 0.01)
+
+
+CASES = {"spring": _spring(), "pendulum": _pendulum(), "vehicle": _vehicle()}
+
+
+def advice_of(case: Case, signals: Mapping[str, Float]) -> tuple[str, ...]:
+    found = identify(case.model, signals, case.rate, design=WeakDesign(case.rate, 1.0, 12, 6))
+    times = np.arange(len(next(iter(signals.values())))) / case.rate
+    return advice_on(Answer(case.model, found, {}, Recording(times, dict(signals), case.rate)))
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("extra", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_right_columns_have_no_advice(name: str, extra: float, seed: int) -> None:
+    """Whether the model is right or lacks a term: a cubic spring, a second spring, a drag."""
+    case = CASES[name]
+    assert advice_of(case, case.run(extra, seed)) == ()
+
+
+def _counts(lsb: float) -> Callable[[Float], Float]:
+    return lambda x: np.rint(x / lsb)
+
+
+@pytest.mark.parametrize("extra", [0.0, 0.3])
+@pytest.mark.parametrize(
+    ("name", "signal", "changed", "sentence"),
+    [
+        ("spring", "F", lambda x: -x, "F seems to have the opposite sign: --columns F=F:-1 (or x: --columns x=x:-1)"),
+        ("spring", "x", lambda x: 1e3 * x, "x seems to be in mm, not m: --columns x=x:mm"),
+        ("spring", "x", lambda x: 1e2 * x, "x seems to be in cm, not m: --columns x=x:cm"),
+        ("spring", "F", lambda x: 1e3 * x, "F seems to be in mN, not N: --columns F=F:mN"),
+        ("spring", "x", _counts(1e-5), "x seems to be in counts, not m: --columns x=x:1e-05"),
+        ("pendulum", "u", lambda x: -x, "u seems to have the opposite sign: --columns u=u:-1 (or q: --columns q=q:-1)"),
+        ("pendulum", "q", np.degrees, "q seems to be in deg, not rad: --columns q=q:deg"),
+        ("pendulum", "q", lambda x: x / (2 * np.pi), "q seems to be in rev, not rad: --columns q=q:rev"),
+        (
+            "pendulum",
+            "q",
+            _counts(2 * np.pi / 4096),
+            "q seems to be in counts, not rad: --columns q=q:0.00153398079",
+        ),
+        ("vehicle", "F", lambda x: -x, "F seems to have the opposite sign: --columns F=F:-1 (or v: --columns v=v:-1)"),
+    ],
+)
+def test_wrong_column_is_named(
+    name: str, signal: str, changed: Callable[[Float], Float], sentence: str, extra: float
+) -> None:
+    """Also where the model lacks a term, whose residuals are far above the sensors' noise in the right unit too."""
+    case = CASES[name]
+    run = case.run(extra)
+    assert advice_of(case, run | {signal: changed(run[signal])}) == (sentence,)
+
+
+def test_input_that_never_changes_is_named() -> None:
+    case = CASES["spring"]
+    run = case.run()
+    assert advice_of(case, run | {"F": np.full(len(run["F"]), 1.5)}) == (
+        "F is 1.5 N in every sample: is it the column of the drive?",
+    )
+
+
+STEP = 2 * np.pi / 2**14
+
+
+@pytest.mark.parametrize(
+    ("column", "spoilt", "typed"),
+    [
+        ("phi", np.degrees, "phi=phi:deg"),
+        ("phi", lambda x: np.rint(x / STEP), f"phi=phi:{STEP:.9g}"),
+        ("y", lambda x: 1e3 * x, "y=y:mm"),
+        ("y", np.negative, "y=y:-1"),
+        ("phi", np.negative, None),  # the equations are linear in it
+        ("phi", lambda x: x + np.pi, None),  # an encoder's offset is an unknown
+        ("y", lambda x: x + 0.9, None),
+    ],
+)
+def test_wrong_column_of_a_driven_linearised_mechanism_is_named(
+    column: str, spoilt: Callable[[Float], Float], typed: str | None
+) -> None:
+    run = simulate(duration=20.0, seed=0).run
+    signals = {"phi": run.phi, "y": run.y}
+    recording = Recording(run.t, {**signals, column: spoilt(signals[column])}, run.sample_rate)
+    model = MechanismRig("kapitza", known={"l1": 0.3}).applied(compiled_of("kapitza"))
+    answer = analysed(*with_resolutions(recording, model))
+    told = advice_on(answer)
+    if typed is None:
+        assert told == () and answer.identified
+    else:
+        assert len(told) == 1 and f"--columns {typed}" in told[0]
+        assert "seems to" in told[0] and f"{column} seems to" in told[0]
