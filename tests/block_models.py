@@ -196,7 +196,12 @@ class EstimatorInC:
         self._filled.struct.model = self.model
         self._filled.struct.update_rate_hz = rate
         self.state = ffi.new("pvid_estimator_f32 *")
-        assert self.library.pvid_estimator_init_f32(self.state, ffi.addressof(self._filled.struct)) == 0
+        assert (
+            self.library.pvid_estimator_init_layout_f32(
+                self.state, ffi.addressof(self._filled.struct), self.library.pvid_layout()
+            )
+            == 0
+        )
 
     def add(self, kind: int, n: Float32, y: float) -> int:
         """Adds a row of a kind; returns the reason."""
@@ -250,7 +255,12 @@ class Q31InC:
         self._filled = native.headers.filled("pvid_estimator_config_q31", config)
         self._filled.struct.model = model
         self.state = ffi.new("pvid_estimator_q31 *")
-        assert self.library.pvid_estimator_init_q31(self.state, ffi.addressof(self._filled.struct)) == 0
+        assert (
+            self.library.pvid_estimator_init_layout_q31(
+                self.state, ffi.addressof(self._filled.struct), self.library.pvid_layout()
+            )
+            == 0
+        )
 
     def add(self, kind: int, n: Int, y: int) -> int:
         """Adds a row of a kind; returns the reason."""

@@ -76,7 +76,7 @@ class Subject(Protocol):
 
 def defined(sizes: Mapping[str, int]) -> tuple[str, ...]:
     """As options of the compiler, with those of every library of a mechanism."""
-    return ("-DPVID_PLAIN_NAMES", *options_of(sizes))
+    return tuple(options_of(sizes))
 
 
 def played(core: Publisher, kind: str, size: int, run: Callable[[Any], Any], samples: npt.NDArray[Any]) -> str:

@@ -48,8 +48,8 @@ GCC = {  # by family: the compiler, and what it needs to be told of the processo
 PLATFORMS = {"host": "unix64", "cortex_m": "unix32", "riscv": "unix32", "avr": "avr8"}  # cppcheck's
 
 # cppcheck reads a source once for every set of macros that it or a header chooses by, which takes MISRA's rules half a
-# second each. Headers choose alike for every source: all are read with the macros that they choose by themselves, under
-# the names that they use (pvid/sized.h), and these, which include every header that chooses, once more with all macros.
+# second each. Headers choose alike for every source: all are read with the macros that they choose by themselves, and
+# these, which include every header that chooses, once more with all macros.
 WHOLE = ("values_q31.c", "weak_step_f32.c", "strong_f32.c", "strong_q31.c")
 FEWER_PATHS = ("-Xclang", "-analyzer-config", "-Xclang", "max-nodes=75000")  # of 225000, of each function
 UNUSED = ("2.3", "2.4", "2.5")  # MISRA's rules of what a program never uses: of some sources they say nothing
@@ -187,7 +187,7 @@ def cppcheck(alike: list[Unit], whole: bool = False) -> set[Finding]:
     ]
     checks += ["-UPVID_CONFIG_HEADER"]  # the name of a user's header; cppcheck would invent a value for it
     if not whole and not any(option.startswith("-D") for option in options):  # with definitions it reads once anyhow
-        checks += ["-DPVID_PLAIN_NAMES", "--force", f"--config-exclude={FIRMWARE}/"]
+        checks += ["--force", f"--config-exclude={FIRMWARE}/"]
     checks += [f"--cppcheck-build-dir={folder}"]
     template = "--template={file}:{line}:{id}:{message}"
     output = run(["cppcheck", *checks, template, *options, *(str(unit.source) for unit in alike)])

@@ -48,7 +48,7 @@ INCLUDES = " ".join(
 )
 PAGE = ROOT / "host" / "docs" / "proofs.md"
 GENERATED = ROOT / "build" / "proofs"  # of this run: the design of the weak engine
-PREPROCESSOR = f"{INCLUDES} -I'{GENERATED}' -DPVID_PLAIN_NAMES"  # contracts and options name functions
+PREPROCESSOR = f"{INCLUDES} -I'{GENERATED}'"
 LONGEST = 3600  # seconds: many times what the slowest needs on a machine that is busy
 
 
@@ -194,7 +194,7 @@ PROOFS = (
             *("-eva-min-loop-unroll", "80", "-eva-split-return", "full", "-eva-subdivide-non-linear", "4"),
             "-eva-slevel-function",
             "main:50,any_configuration:50,any_row:50,any_compensation:50,config_is_valid:100,model_is_valid:50,"
-            "pvid_settings_are_valid_q31:200,parameters_are_valid:200,prepare:200,pvid_estimator_init_q31:200,pvid_estimator_add_kind_q31:20,pvid_estimator_add_to_b_q31:20,pvid_estimator_innovation_q31:200,"
+            "pvid_settings_are_valid_q31:200,parameters_are_valid:200,prepare:200,pvid_estimator_init_q31:200,pvid_estimator_init_layout_q31:200,pvid_estimator_add_kind_q31:20,pvid_estimator_add_to_b_q31:20,pvid_estimator_innovation_q31:200,"
             "pvid_estimator_terms_q31:200",
         ),
         taken=(
@@ -232,7 +232,7 @@ PROOFS = (
         ),
         taken=(
             *("pvid_scale_q31", "pvid_bit_length_q31", *SCALED, "pvid_gate_passes_q31"),
-            *("pvid_differentiator_init_q31", "pvid_differentiator_step_q31", "pvid_differentiator_reset_q31"),
+            *("pvid_differentiator_init_layout_q31", "pvid_differentiator_step_q31", "pvid_differentiator_reset_q31"),
             *("pvid_kapitza_strong_row_q31", "pvid_kapitza_estimator_innovate_q31", "acceleration"),
             *("pvid_kapitza_estimator_init_q31", "pvid_kapitza_estimator_take_q31"),
             *("pvid_misfit_init_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),

@@ -80,7 +80,7 @@ class Generated:
             for one in ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
         ]
         library = folder / "generated.so"
-        options = ["-std=c99", "-O2", "-shared", "-fPIC", "-DPVID_PLAIN_NAMES", *WARNINGS, *INCLUDES, f"-I{folder}"]
+        options = ["-std=c99", "-O2", "-shared", "-fPIC", *WARNINGS, *INCLUDES, f"-I{folder}"]
         sources = map(str, [*code, folder / "loop.c", *core])
         subprocess.run(["gcc", *options, *sources, "-o", str(library), "-lm"], check=True)
         self.library = ctypes.CDLL(str(library))

@@ -26,7 +26,7 @@ from pvid.twin.q31.estimator import EstimatorQ31
 Float = npt.NDArray[np.float64]
 
 SIZES = {"PVID_MAX_P": 8, "PVID_MAX_THETA_Q31": 16, "PVID_MAX_MOMENTS_Q31": 136, "PVID_MAX_C_Q31": 40}
-OPTIONS = ["-std=c99", "-DPVID_PLAIN_NAMES", *(f"-D{name}={size}" for name, size in SIZES.items())]
+OPTIONS = ["-std=c99", *(f"-D{name}={size}" for name, size in SIZES.items())]
 ROW_SD = 1e-3
 Y_BITS = 22
 GROUPS = 24

@@ -116,7 +116,7 @@ def test_random_expressions(tmp_path: Path) -> None:
         source(f"{one}.c")
         for one in ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
     ]
-    options = ["-std=c99", "-O2", "-shared", "-fPIC", "-ffp-contract=off", "-DPVID_PLAIN_NAMES", *WARNINGS, *INCLUDES]
+    options = ["-std=c99", "-O2", "-shared", "-fPIC", "-ffp-contract=off", *WARNINGS, *INCLUDES]
     sources = [str(tmp_path / "random.c"), *map(str, core)]
     subprocess.run(["gcc", *options, *sources, "-o", str(tmp_path / "random.so"), "-lm"], check=True)
     library = ctypes.CDLL(str(tmp_path / "random.so"))

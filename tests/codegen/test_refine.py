@@ -119,7 +119,6 @@ class InC:
             "-std=c99",
             "-O2",
             "-ffp-contract=off",
-            "-DPVID_PLAIN_NAMES",
             *WARNINGS,
             "-shared",
             "-fPIC",

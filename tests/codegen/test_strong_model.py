@@ -33,7 +33,7 @@ Float32 = npt.NDArray[np.float32]
 
 TICKS = 400
 GAP = 180  # a sample of the run that is no number
-SIZES = ("-DPVID_MAX_P=8", "-DPVID_MAX_THETA=16", "-DPVID_MAX_MOMENTS=136", "-DPVID_PLAIN_NAMES")
+SIZES = ("-DPVID_MAX_P=8", "-DPVID_MAX_THETA=16", "-DPVID_MAX_MOMENTS=136")
 DRIVER = """
 #include "{name}.h"
 #include <string.h>

@@ -47,7 +47,8 @@ int main(void)
     memset(&guarded, 0xA5, sizeof guarded);
     const pvid_status status = pvid_weak_init_f32(&guarded.identifier, &config);
     if (status != PVID_OK) {
-        fprintf(stderr, "init: status %d\n", (int)status);
+        fprintf(stderr, "init: %s\nlibrary: %s\napplication: %s\n", pvid_status_text(status), pvid_layout_sizes(),
+                PVID_LAYOUT_SIZES);
         return 1;
     }
     if (!layouts_agree()) {

@@ -1,4 +1,4 @@
-"""An application whose sizes are not the library's does not link: every PVID_MAX_, C and C++, static and shared."""
+"""init refuses an application whose sizes are not the library's and writes nothing: every size, C and C++."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
 
-from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, public_headers, source
+from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, public_headers
+from pvid.settings.enums import Status
 
-FREESTANDING = f"-I{ROOT / 'firmware' / 'ports' / 'freestanding' / 'include'}"
 SOURCES = core_sources()
 
 # Every size of config.h, and another value than its default that is allowed.
@@ -45,35 +44,45 @@ EXACT = ("", *(f"_{one}" for one in "SIGNALS JETS RUNS SIGNS GAINS INTEGRANDS CH
 
 LANGUAGES = {"c": ("gcc", "-std=c99"), "cpp": ("g++", "-std=c++11")}
 
-# The first call of each kind of application; the last one represents files without an init.
-FUNCTIONS = (
-    "pvid_weak_init_f32",
-    "pvid_strong_init_f32",
-    "pvid_weak_init_q31",
-    "pvid_strong_init_q31",
-    "pvid_estimator_init_f32",
-    "pvid_estimator_init_q31",
-    "pvid_weak_estimate_f32",
-)
-USER = """#include "pvid/pvid.h"
+# Prints for each object the status of its init, then whether the object and the bytes behind it are as before.
+USER = """#include <stdio.h>
+#include <string.h>
+#include "pvid/pvid.h"
 #include "pvid/pvid_q31.h"
-static pvid_weak_f32 weak; static pvid_weak_config_f32 weak_config;
-static pvid_strong_f32 strong; static pvid_strong_config_f32 strong_config;
-static pvid_weak_q31 weak_q31; static pvid_weak_config_q31 weak_config_q31;
-static pvid_strong_q31 strong_q31; static pvid_strong_config_q31 strong_config_q31;
-static pvid_estimator_f32 estimator; static pvid_estimator_config_f32 estimator_config;
-static pvid_estimator_q31 estimator_q31; static pvid_estimator_config_q31 estimator_config_q31;
+#define ROOM 65536
+#define TRY(type, init, calls) do {                                        \\
+    static struct { type object; unsigned char behind[ROOM]; } memory;     \\
+    static type zeros;                                                     \\
+    memset(memory.behind, 0xA5, ROOM);                                     \\
+    type *const self = &memory.object;                                     \\
+    const int status = (int)(init);                                        \\
+    calls;                                                                 \\
+    int same = memcmp(self, &zeros, sizeof zeros) == 0;                    \\
+    for (int i = 0; i < ROOM; i++) { same = same && memory.behind[i] == 0xA5; } \\
+    printf("%s %d %d\\n", #type, status, same);                            \\
+} while (0)
+static pvid_weak_config_f32 weak; static pvid_estimator_config_f32 of_rows; static pvid_fir_bank_f32 bank;
+static pvid_weak_config_q31 weak_q31; static pvid_estimator_config_q31 of_rows_q31; static pvid_fir_bank_q31 bank_q31;
 int main(void)
 {
-    (void)pvid_weak_init_f32(&weak, &weak_config);
-    (void)pvid_strong_init_f32(&strong, &strong_config);
-    (void)pvid_weak_init_q31(&weak_q31, &weak_config_q31);
-    (void)pvid_strong_init_q31(&strong_q31, &strong_config_q31);
-    (void)pvid_estimator_init_f32(&estimator, &estimator_config);
-    (void)pvid_estimator_init_q31(&estimator_q31, &estimator_config_q31);
-    return (pvid_weak_estimate_f32(&weak) != 0) ? 0 : 1;
+    static float sample[64]; static int32_t reading[64]; static pvid_estimate_f32 estimate; uint32_t number;
+    TRY(pvid_weak_f32, pvid_weak_init_f32(self, &weak),
+        if (pvid_weak_step_f32(self, sample) != PVID_NOT_READY) return 1;
+        if (pvid_weak_read_f32(self, &estimate, &number)) return 1;
+        pvid_weak_gap_f32(self); pvid_weak_freeze_f32(self, true));
+    TRY(pvid_weak_q31, pvid_weak_init_q31(self, &weak_q31),
+        if (pvid_weak_step_q31(self, reading) != PVID_NOT_READY) return 2; pvid_weak_gap_q31(self));
+    TRY(pvid_estimator_f32, pvid_estimator_init_f32(self, &of_rows),
+        if (pvid_estimator_step_f32(self, sample, 1.0f) != PVID_NOT_READY) return 3);
+    TRY(pvid_estimator_q31, pvid_estimator_init_q31(self, &of_rows_q31),
+        if (pvid_estimator_update_q31(self) != PVID_NOT_READY) return 4);
+    TRY(pvid_differentiator_f32, pvid_differentiator_init_f32(self, &bank, 1000.0f), (void)0);
+    TRY(pvid_differentiator_q31, pvid_differentiator_init_q31(self, &bank_q31), (void)0);
+    printf("%s\\n%s\\n", pvid_layout_sizes(), PVID_LAYOUT_SIZES);
+    return (pvid_layout() == PVID_LAYOUT) ? 0 : 5;
 }
 """
+OBJECTS = [f"pvid_{one}_{core}" for one in ("weak", "estimator", "differentiator") for core in ("f32", "q31")]
 
 
 def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -81,30 +90,25 @@ def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProces
 
 
 @pytest.fixture(scope="module")
-def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The library with the default sizes, static and shared, as who copies include and src makes it."""
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The library with the default sizes, as who copies include and src makes it."""
     folder = tmp_path_factory.mktemp("library")
-    done = run("gcc", "-std=c99", "-O0", "-fPIC", *INCLUDES, "-c", *SOURCES, cwd=folder)
+    done = run("gcc", "-std=c99", "-O0", *INCLUDES, "-c", *SOURCES, cwd=folder)
     assert done.returncode == 0, done.stderr
-    objects = sorted(folder.glob("*.o"))
-    made = {"static": folder / "libpvid.a", "shared": folder / "libpvid.so"}
-    assert run("ar", "rcs", made["static"], *objects).returncode == 0
-    assert run("gcc", "-shared", "-o", made["shared"], *objects, "-lm").returncode == 0
-    return made
+    assert run("ar", "rcs", folder / "libpvid.a", *sorted(folder.glob("*.o"))).returncode == 0
+    return folder / "libpvid.a"
 
 
-def user(folder: Path, language: str, *sizes: str) -> Path:
-    """The object of an application that was compiled with those sizes."""
+def said(folder: Path, language: str, library: Path, *sizes: str) -> tuple[int, dict[str, tuple[int, int]], list[str]]:
+    """Exit code of the application compiled with those sizes; status and sameness by object; both sizes in words."""
     source = folder / f"user.{language}"
     source.write_text(USER, encoding="utf-8")
-    compiled = folder / "user.o"
-    done = run(*LANGUAGES[language], *sizes, *PUBLIC_INCLUDES, "-c", source, "-o", compiled)
+    done = run(*LANGUAGES[language], *sizes, *PUBLIC_INCLUDES, source, library, "-lm", "-o", folder / "user")
     assert done.returncode == 0, done.stderr
-    return compiled
-
-
-def link(folder: Path, language: str, compiled: Path, library: Path) -> subprocess.CompletedProcess[str]:
-    return run(LANGUAGES[language][0], compiled, library, "-lm", "-o", folder / "user")
+    done = run(folder / "user")
+    *lines, of_library, own = done.stdout.splitlines()
+    objects = {name: (int(status), int(same)) for name, status, same in map(str.split, lines)}
+    return done.returncode, objects, [of_library, own]
 
 
 def test_every_size_of_the_headers_is_tried() -> None:
@@ -113,59 +117,28 @@ def test_every_size_of_the_headers_is_tried() -> None:
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_the_same_sizes_link(language: str, libraries: dict[str, Path], tmp_path: Path) -> None:
-    compiled = user(tmp_path, language)
-    for library in libraries.values():
-        done = link(tmp_path, language, compiled, library)
-        assert done.returncode == 0, done.stderr
+def test_the_same_sizes_are_accepted(language: str, library: Path, tmp_path: Path) -> None:
+    """Each init refuses the empty configuration itself, and its object is all zeros again."""
+    code, objects, (of_library, own) = said(tmp_path, language, library)
+    assert code == 0 and of_library == own and sorted(objects) == sorted(OBJECTS)
+    assert all(one not in (Status.OK, Status.BAD_LAYOUT) and same for one, same in objects.values()), objects
 
 
 @pytest.mark.parametrize("name", OTHER)
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_another_size_is_refused(language: str, name: str, libraries: dict[str, Path], tmp_path: Path) -> None:
-    """Each function by itself, with its name and the size in the message."""
-    compiled = user(tmp_path, language, f"-D{name}={OTHER[name]}")
-    for library in libraries.values():
-        done = link(tmp_path, language, compiled, library)
-        assert done.returncode != 0
-        refused = set(
-            re.findall(rf"undefined reference to `(pvid_\w+[fq]3[12])_window(?:\w*[a-z])?{OTHER[name]}_", done.stderr)
-        )
-        assert refused == set(FUNCTIONS), done.stderr
+def test_another_size_is_refused_and_nothing_is_written(
+    language: str, name: str, library: Path, tmp_path: Path
+) -> None:
+    code, objects, (of_library, own) = said(tmp_path, language, library, f"-D{name}={OTHER[name]}")
+    assert code == 5 and objects == dict.fromkeys(OBJECTS, (int(Status.BAD_LAYOUT), 1))
+    told = name.removeprefix("PVID_").removeprefix("MAX_").lower()
+    different = set(own.split()) - set(of_library.split())
+    assert different == {f"{told}={OTHER[name]}"}
 
 
-def test_a_build_for_one_design_is_refused(libraries: dict[str, Path], tmp_path: Path) -> None:
-    """Its counts of the model have places of their own in the names."""
-    compiled = user(tmp_path, "c", *(f"-DPVID_EXACT{name}={place}" for place, name in enumerate(EXACT, 1)))
-    done = link(tmp_path, "c", compiled, libraries["static"])
-    names = re.findall(
-        r"`(pvid_\w+[fq]3[12])_window\w+_exact1_plain9_runs4_signs5_gains6_integrals7_enum\d", done.stderr
+def test_a_build_for_one_design_is_refused(library: Path, tmp_path: Path) -> None:
+    code, objects, (of_library, own) = said(
+        tmp_path, "c", library, *(f"-DPVID_EXACT{name}={place}" for place, name in enumerate(EXACT, 1))
     )
-    assert set(names) == set(FUNCTIONS), done.stderr
-
-
-def test_every_function_that_takes_a_struct_has_its_sizes_in_its_name() -> None:
-    all_text = "".join(
-        re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL) for path in public_headers()
-    )
-    structs = set(re.findall(r"^\} (pvid_\w+);", all_text, re.MULTILINE)) | set(
-        re.findall(r"struct (pvid_\w+)", all_text)
-    )
-    pointer = re.compile(rf"\b({'|'.join(sorted(structs))}) \*")
-    prototypes = re.findall(r"^(?!static|typedef|extern)([a-z][\w *]*?(pvid_\w+)\([^;{]*\));", all_text, re.MULTILINE)
-    given = {name for prototype, name in prototypes if pointer.search(prototype)}
-    listed = re.findall(r"^#define (pvid_\w+) PVID_(SIZED|REFINED)\((pvid_\w+)\)$", all_text, re.MULTILINE)
-    assert all(one == other and ("_refine_" in one) == (how == "REFINED") for one, how, other in listed)
-    assert given and given | {"pvid_estimator_defaults_f32", "pvid_refine_stage_f32"} == {one for one, _, _ in listed}
-
-
-def test_a_size_costs_nothing_on_a_board(tmp_path: Path) -> None:
-    """With the check and without: the same code and data."""
-    sections = {}
-    for names in ("", "-DPVID_PLAIN_NAMES"):
-        compiled = tmp_path / "strong.o"
-        options = ("-std=c99", "-mcpu=cortex-m4", "-mthumb", "-O2", *INCLUDES, FREESTANDING, *names.split())
-        done = run("arm-none-eabi-gcc", *options, "-c", source("strong_f32.c"), "-o", compiled)
-        assert done.returncode == 0, done.stderr
-        sections[names] = run("arm-none-eabi-size", compiled).stdout.split()[6:10]
-    assert sections[""] == sections["-DPVID_PLAIN_NAMES"]
+    assert code == 5 and objects == dict.fromkeys(OBJECTS, (int(Status.BAD_LAYOUT), 1))
+    assert "exact=1 exact_plain=9 exact_runs=4 exact_signs=5 exact_gains=6 exact_integrands=7" in own

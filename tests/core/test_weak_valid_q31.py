@@ -53,7 +53,7 @@ class Tables:
     def status(self) -> Status:
         """Of init."""
         self.kept.append(self.ffi.new("pvid_weak_q31 *"))
-        return Status(self.library.pvid_weak_init_q31(self.kept[-1], self.config))
+        return Status(self.library.pvid_weak_init_layout_q31(self.kept[-1], self.config, self.library.pvid_layout()))
 
 
 @pytest.fixture(scope="module")

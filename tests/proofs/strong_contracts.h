@@ -32,7 +32,8 @@ bool pvid_gate_passes_q31(pvid_gate_q31 *self, pvid_scaled_q31 square);
     ensures \result != 0 ==> \result >= 1;
     ensures \result == 0 ==> \initialized(&self->bank.phi_max) && 1 <= self->bank.phi_max <= 0x1000000;
     ensures \result == 0 ==> \initialized(&self->bank.y_max) && 1 <= self->bank.y_max <= 0x1000000; */
-pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
+pvid_status pvid_differentiator_init_layout_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank,
+                                                uint32_t layout);
 
 /*@ assigns self->head, self->at, self->missing \from \nothing;
     assigns self->history[0 .. PVID_MAX_WINDOW - 1][0 .. 1] \from \nothing; */

@@ -36,7 +36,7 @@ def uses(tmp_path_factory: pytest.TempPathFactory) -> Graph:
 
     def compiled(source: Path) -> str:
         target = folder / f"{source.stem}.o"
-        command = ["gcc", "-std=c99", "-O0", "-DPVID_PLAIN_NAMES", *INCLUDES, "-c", str(source), "-o", str(target)]
+        command = ["gcc", "-std=c99", "-O0", *INCLUDES, "-c", str(source), "-o", str(target)]
         subprocess.run(command, check=True)
         return subprocess.run(["nm", str(target)], capture_output=True, text=True, check=True).stdout
 

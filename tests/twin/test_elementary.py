@@ -52,7 +52,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     folder = tmp_path_factory.mktemp("elementary")
     (folder / "loops.c").write_text(LOOPS, encoding="utf-8")
     core = [str(source(f"{one}.c")) for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
-    options = ["-std=c99", "-O2", "-shared", "-fPIC", "-DPVID_PLAIN_NAMES", "-ffp-contract=off", *INCLUDES]
+    options = ["-std=c99", "-O2", "-shared", "-fPIC", "-ffp-contract=off", *INCLUDES]
     target = folder / "loops.so"
     subprocess.run(["gcc", *options, str(folder / "loops.c"), *core, "-o", str(target), "-lm"], check=True)
     return ctypes.CDLL(str(target))

@@ -221,7 +221,7 @@ def roomy(tmp_path_factory: pytest.TempPathFactory) -> Native:
     """The core with room for the largest mechanisms, and its headers for cffi as host/native makes them."""
     folder = tmp_path_factory.mktemp("roomy")
     sizes = {"PVID_MAX_P": 8, "PVID_MAX_THETA_Q31": 31, "PVID_MAX_MOMENTS_Q31": 496, "PVID_MAX_C_Q31": 62}
-    options = ["-std=c99", "-DPVID_PLAIN_NAMES", *(f"-D{name}={size}" for name, size in sizes.items())]
+    options = ["-std=c99", *(f"-D{name}={size}" for name, size in sizes.items())]
     sources = [str(path) for path in sources_of("q31")]
     library = folder / "libpvid_roomy.so"
     subprocess.run(["gcc", *options, "-O1", "-shared", "-fPIC", *INCLUDES, *sources, "-o", str(library)], check=True)

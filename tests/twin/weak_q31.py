@@ -285,7 +285,7 @@ SIZES = (
 )
 # Not -O1: with -fsanitize=undefined the compiler of Debian 12 (gcc 12.2) then takes the sign off a negative sine.
 _OPTIONS = (
-    *("-std=c99", "-O2", "-fPIC", "-DPVID_PLAIN_NAMES", "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"),
+    *("-std=c99", "-O2", "-fPIC", "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"),
     *("-Werror", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wvla"),
     *(f"-D{one}" for one in SIZES),
     *INCLUDES,

@@ -54,8 +54,7 @@ def build(folder: Path, compiler: str = "gcc", level: str = "-O2") -> Path:
     """
     sources = sorted([*sources_of("f32"), *(ROOT / "tests" / "cost").glob("*.c"), PENDULUM / "kapitza_weak_f32.c"])
     binary = folder / "tick_cost"
-    plain = "-DPVID_PLAIN_NAMES"  # callgrind is given names
-    command = [compiler, "-std=c99", level, "-ffp-contract=off", plain, *INCLUDES, f"-I{PENDULUM.parent}"]
+    command = [compiler, "-std=c99", level, "-ffp-contract=off", *INCLUDES, f"-I{PENDULUM.parent}"]
     try:
         done = subprocess.run(
             [*command, *map(str, sources), "-o", str(binary), "-lm"], capture_output=True, text=True, check=False

@@ -303,7 +303,7 @@ def _compile(road: Road, files: Path, name: str, designed: bool, fixed: bool, se
     core = [one for one in core_sources() if one.stem in _NUMBERS]
     program = str(files / "it")
     sources = [str(one) for one in [*plain, *core] if one.exists()]
-    done = _cc(road, [*_STRICT, "-DPVID_PLAIN_NAMES", *own, *sources, "-o", program, "-lm"])
+    done = _cc(road, [*_STRICT, *own, *sources, "-o", program, "-lm"])
     if done:
         ran = subprocess.run([program], capture_output=True, text=True, check=False)
         if ran.returncode != 0:

@@ -1,9 +1,9 @@
 /* pvid/config.h - compile-time bounds of the core.
  *
  * Every array of the library has a size from one of these macros: no heap, no VLA. Override them with -D, or in
- * your own header named by -DPVID_CONFIG_HEADER="my.h". A size is a plain decimal number. Sizes determine the
- * layout of the state structs: an application compiled with other sizes than the library does not link (sized.h).
- * The CMake target passes its sizes on to its users.
+ * your own header named by -DPVID_CONFIG_HEADER="my.h". Sizes determine the layout of the state
+ * structs: init refuses an application compiled with other sizes than the library (layout.h). The CMake target passes
+ * its sizes on to its users.
  */
 #ifndef PVID_CONFIG_H
 #define PVID_CONFIG_H
@@ -224,7 +224,9 @@
 #define PVID_EXACT_GAINS 0
 #define PVID_EXACT_INTEGRANDS 0
 #define PVID_EXACT_CHANNELS 0 /* that are summed */
-#define PVID_EXACT_PLAIN 0    /* 1: the signals are the samples */
+#endif
+#ifndef PVID_EXACT_PLAIN /* 1: the signals are the samples; of the float core */
+#define PVID_EXACT_PLAIN 0
 #endif
 
 /* Parts that a design or its settings may not need; 0 leaves a part out, for less flash. `pvid model build` prints
@@ -276,10 +278,6 @@
 #define PVID_TRUST_SHORT 8   /* groups in the alarm's short mean; see trust.h */
 #define PVID_TRUST_LONG 16   /* least number of groups in its long mean */
 #define PVID_READ_ATTEMPTS 8 /* attempts of a read; one fails only during a put */
-
-#if !defined(PVID_PLAIN_NAMES)
-#include "pvid/sized.h"
-#endif
 
 /* The promised bits need IEEE-754 binary32: no excess precision, no fast-math. */
 #if defined(__FAST_MATH__)

@@ -23,6 +23,7 @@
 #include <stdint.h>
 
 #include "pvid/config.h"
+#include "pvid/layout.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus
@@ -50,13 +51,21 @@ extern const float pvid_five_points_f32[PVID_ORDERS * 2];
 /* State: detail/differentiator_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_differentiator_f32 pvid_differentiator_f32;
 
+/* The init below, for an application with this word (layout.h). */
+pvid_status pvid_differentiator_init_layout_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
+                                                float sample_rate_hz, uint32_t layout);
+
 /* Initialises `self` for samples at sample_rate_hz [Hz]. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - library and application were compiled with different sizes (PVID_BAD_LAYOUT; *self is unchanged),
  *   - half or stride is out of its range (PVID_BAD_HALF, PVID_BAD_STRIDE),
  *   - a weight is not finite (PVID_BAD_BANK), or
  *   - the rate is not in 1e-3..1e6 Hz (PVID_BAD_SAMPLE_RATE). */
-pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
-                                         float sample_rate_hz);
+static inline pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
+                                                       float sample_rate_hz)
+{
+    return pvid_differentiator_init_layout_f32(self, bank, sample_rate_hz, PVID_LAYOUT);
+}
 
 /* Empties the window; call it after a gap, when samples are no longer equidistant. */
 void pvid_differentiator_reset_f32(pvid_differentiator_f32 *self);

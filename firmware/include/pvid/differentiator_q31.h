@@ -22,6 +22,7 @@
 #include <stdint.h>
 
 #include "pvid/config.h"
+#include "pvid/layout.h"
 #include "pvid/status.h"
 
 #ifdef __cplusplus
@@ -62,11 +63,19 @@ extern const PVID_TABLE int32_t pvid_five_points_q31[PVID_ORDERS * 2];
 /* State: detail/differentiator_state_q31.h, not API. Only the functions below write to it. */
 typedef struct pvid_differentiator_q31 pvid_differentiator_q31;
 
+/* The init below, for an application with this word (layout.h). */
+pvid_status pvid_differentiator_init_layout_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank,
+                                                uint32_t layout);
+
 /* Initialises `self`. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - library and application were compiled with different sizes (PVID_BAD_LAYOUT; *self is unchanged),
  *   - a field of the bank is out of its range (the status names it), or
  *   - counts within full scale could overflow a product (PVID_BAD_FULL_SCALE) or a sum (PVID_BAD_SHIFT). */
-pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank);
+static inline pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
+{
+    return pvid_differentiator_init_layout_q31(self, bank, PVID_LAYOUT);
+}
 
 /* Empties the window; call it after a gap, when samples are no longer equidistant. */
 void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self);

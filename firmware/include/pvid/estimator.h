@@ -40,6 +40,7 @@
 #include <stdint.h>
 
 #include "pvid/information.h"
+#include "pvid/layout.h"
 #include "pvid/model.h"
 #include "pvid/status.h"
 
@@ -91,10 +92,18 @@ typedef struct {
     float misfit;      /* residual variance of all rows in the sums over its expectation; 0: unknown */
 } pvid_estimate_f32;
 
+/* The init below, for an application with this word (layout.h). */
+pvid_status pvid_estimator_init_layout_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config,
+                                           uint32_t layout);
+
 /* Initialises `self`. Fails iff
- *   - a pointer is NULL (PVID_BAD_POINTER), or
+ *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - library and application were compiled with different sizes (PVID_BAD_LAYOUT; *self is unchanged), or
  *   - a field of config is out of its range (the status names the field). */
-pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config);
+static inline pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+{
+    return pvid_estimator_init_layout_f32(self, config, PVID_LAYOUT);
+}
 
 /* Adds a row, ends its group and solves: add and update in one call, for one row per tick. Returns their reason. */
 pvid_reason pvid_estimator_step_f32(pvid_estimator_f32 *self, const float n[], float y);

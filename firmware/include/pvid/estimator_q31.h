@@ -17,6 +17,7 @@
 #include <stdint.h>
 
 #include "pvid/config.h"
+#include "pvid/layout.h"
 #include "pvid/model_q31.h"
 #include "pvid/status.h"
 
@@ -65,10 +66,18 @@ typedef struct {
     int32_t misfit;      /* Q16, at most 2^31 - 1: see estimator.h; 0: unknown */
 } pvid_estimate_q31;
 
+/* The init below, for an application with this word (layout.h). */
+pvid_status pvid_estimator_init_layout_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config,
+                                           uint32_t layout);
+
 /* Initialises `self`. Fails iff
- *   - a pointer is NULL (PVID_BAD_POINTER), or
+ *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - library and application were compiled with different sizes (PVID_BAD_LAYOUT; *self is unchanged), or
  *   - a field of config is out of its range (the status names it; PVID_BAD_FORMAT: p_bits, n_bits or y_bits). */
-pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config);
+static inline pvid_status pvid_estimator_init_q31(pvid_estimator_q31 *self, const pvid_estimator_config_q31 *config)
+{
+    return pvid_estimator_init_layout_q31(self, config, PVID_LAYOUT);
+}
 
 /* Sets p[index] to `value` before the first row, clamped to its bounds. */
 void pvid_estimator_place_q31(pvid_estimator_q31 *self, uint8_t index, int64_t value);

@@ -147,7 +147,11 @@ typedef enum { PVID_STAGE_WEAK, PVID_STAGE_REFINED } pvid_stage;
 typedef struct pvid_refine_f32 pvid_refine_f32;
 
 /* Table of init, step, gap and freeze for the configuration of the weak form, which then calls them. The application
- * calls only best, latest, read and reason. */
+ * calls only best, latest, read and reason. Its linker symbol contains the mechanism (refine_shape.h): an application
+ * with the refinement of another one does not link. Sizes: layout.h. */
+#define PVID_REFINED_AS(name, id) name##_model##id
+#define PVID_REFINED(name, id) PVID_REFINED_AS(name, id)
+#define pvid_refine_stage_f32 PVID_REFINED(pvid_refine_stage_f32, PVID_REFINE_MODEL_ID)
 extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
 
 /* Initialises `self`; `samples`: in the argument of step. Fails iff

@@ -4,9 +4,9 @@
 
 #include <stdint.h>
 
-/* Result of every init: the refused field of the configuration. After a refused init the object is all zeros, like
- * a static object before its init: step returns PVID_NOT_READY and all other functions do nothing. (An automatic
- * variable before its init is not zero; this misuse is not detected.) */
+/* Result of every init: the refused field of the configuration. After a refused init the object is all zeros
+ * (after PVID_BAD_LAYOUT unchanged), like a static object before its init: step returns PVID_NOT_READY and all other
+ * functions do nothing. (An automatic variable before its init is not zero; this misuse is not detected.) */
 typedef enum {
     PVID_OK = 0,
     PVID_BAD_MODEL,         /* NULL, larger than the PVID_MAX_ bounds, or its kinds do not divide theta */
@@ -53,7 +53,8 @@ typedef enum {
     PVID_BAD_FORMAT,       /* p_bits, n_bits or y_bits of a q31 estimator: outside -64..64 */
     PVID_BAD_RENEWAL,      /* of trust.h: not finite, or neither 0 nor 0.01..1e3 */
     PVID_BAD_NEGLECTED,    /* of trust.h: outside 0..1 */
-    PVID_BAD_POINTER       /* the object, the configuration or the bank is NULL */
+    PVID_BAD_POINTER,      /* the object, the configuration or the bank is NULL */
+    PVID_BAD_LAYOUT /* library and application were compiled with different sizes: layout.h; nothing was written */
 } pvid_status;
 
 /* Result of a tick. Every estimate is reported together with one of these. */

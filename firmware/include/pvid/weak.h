@@ -33,6 +33,7 @@
 #include "pvid/config.h"
 #include "pvid/estimator.h"
 #include "pvid/gate.h"
+#include "pvid/layout.h"
 #include "pvid/trust.h"
 #include "pvid/weak_parts.h"
 
@@ -156,13 +157,20 @@ typedef struct {
 /* State: detail/weak_state.h, not API. Only the functions below write to it. */
 typedef struct pvid_weak_f32 pvid_weak_f32;
 
+/* The init below, for an application with this word (layout.h). */
+pvid_status pvid_weak_init_layout_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t layout);
+
 /* Initialises `self`. *config is copied; design, range, drive_min and refine must outlive the identifier. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - library and application were compiled with different sizes (PVID_BAD_LAYOUT; *self is unchanged),
  *   - a field of config, design or model is out of its range (the status names it),
  *   - a table is NULL or contains a number that is not finite (PVID_BAD_DESIGN),
  *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS), or
  *   - the init of config.refine fails, with its status. */
-pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config);
+static inline pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+{
+    return pvid_weak_init_layout_f32(self, config, PVID_LAYOUT);
+}
 
 /* One tick: the samples [samples], taken at the same time, in the units of the model. Returns
  *   - PVID_WARMING_UP until the first window is complete,

@@ -25,6 +25,7 @@
 #include "pvid/config.h"
 #include "pvid/estimator_q31.h"
 #include "pvid/gate_q31.h"
+#include "pvid/layout.h"
 #include "pvid/trust_q31.h"
 #include "pvid/weak_parts.h"
 
@@ -155,12 +156,19 @@ typedef struct {
 /* State: detail/weak_state_q31.h, not API. Only the functions below write to it. */
 typedef struct pvid_weak_q31 pvid_weak_q31;
 
+/* The init below, for an application with this word (layout.h). */
+pvid_status pvid_weak_init_layout_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config, uint32_t layout);
+
 /* Initialises `self`. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
+ *   - library and application were compiled with different sizes (PVID_BAD_LAYOUT; *self is unchanged),
  *   - a field of config, design or model is out of its range (the status names it), or
  *   - a window cannot be processed before the next one is complete (PVID_BAD_ITERATIONS).
  * The tables must come from the design tool, which proves that no sum overflows. */
-pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config);
+static inline pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
+{
+    return pvid_weak_init_layout_q31(self, config, PVID_LAYOUT);
+}
 
 /* One tick: the readings [samples], taken at the same time. Returns as pvid_weak_step_f32. */
 pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, const int32_t reading[]);

@@ -71,6 +71,7 @@ static const char *const statuses[] = {
     "bad renewal: of trust.h: not finite, or neither 0 nor 0.01..1e3",
     "bad neglected: of trust.h: outside 0..1",
     "bad pointer: the object, the configuration or the bank is NULL",
+    "bad layout: library and application were compiled with different sizes: layout.h; nothing was written",
 };
 /* clang-format on */
 

@@ -88,8 +88,12 @@ PVID_COLD static pvid_status prepare(pvid_estimator_f32 *self, const pvid_estima
     return PVID_OK;
 }
 
-pvid_status pvid_estimator_init_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config)
+pvid_status pvid_estimator_init_layout_f32(pvid_estimator_f32 *self, const pvid_estimator_config_f32 *config,
+                                           uint32_t layout)
 {
+    if (layout != PVID_LAYOUT) {
+        return PVID_BAD_LAYOUT;
+    }
     const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
 }

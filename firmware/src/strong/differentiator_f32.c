@@ -62,9 +62,12 @@ static pvid_status prepare(pvid_differentiator_f32 *self, const pvid_fir_bank_f3
     return PVID_OK;
 }
 
-PVID_COLD pvid_status pvid_differentiator_init_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
-                                                   float sample_rate_hz)
+PVID_COLD pvid_status pvid_differentiator_init_layout_f32(pvid_differentiator_f32 *self, const pvid_fir_bank_f32 *bank,
+                                                          float sample_rate_hz, uint32_t layout)
 {
+    if (layout != PVID_LAYOUT) {
+        return PVID_BAD_LAYOUT;
+    }
     const pvid_status status = pvid_init_is_given(self, bank) ? prepare(self, bank, sample_rate_hz) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
 }

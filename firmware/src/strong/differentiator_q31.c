@@ -147,8 +147,12 @@ static pvid_status prepare(pvid_differentiator_q31 *self, const pvid_fir_bank_q3
     return PVID_OK;
 }
 
-PVID_COLD pvid_status pvid_differentiator_init_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank)
+PVID_COLD pvid_status pvid_differentiator_init_layout_q31(pvid_differentiator_q31 *self, const pvid_fir_bank_q31 *bank,
+                                                          uint32_t layout)
 {
+    if (layout != PVID_LAYOUT) {
+        return PVID_BAD_LAYOUT;
+    }
     const pvid_status status = pvid_init_is_given(self, bank) ? prepare(self, bank) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
 }

@@ -232,8 +232,11 @@ PVID_COLD static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config
     return init_refinement(self, config->refine);
 }
 
-pvid_status pvid_weak_init_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)
+pvid_status pvid_weak_init_layout_f32(pvid_weak_f32 *self, const pvid_weak_config_f32 *config, uint32_t layout)
 {
+    if (layout != PVID_LAYOUT) {
+        return PVID_BAD_LAYOUT;
+    }
     const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
 }

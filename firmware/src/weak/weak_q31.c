@@ -111,8 +111,11 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     return PVID_OK;
 }
 
-pvid_status pvid_weak_init_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config)
+pvid_status pvid_weak_init_layout_q31(pvid_weak_q31 *self, const pvid_weak_config_q31 *config, uint32_t layout)
 {
+    if (layout != PVID_LAYOUT) {
+        return PVID_BAD_LAYOUT;
+    }
     const pvid_status status = pvid_init_is_given(self, config) ? prepare(self, config) : PVID_BAD_POINTER;
     return pvid_init_end(self, sizeof *self, status);
 }

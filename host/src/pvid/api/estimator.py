@@ -105,7 +105,7 @@ class Estimator:
             for k, value in enumerate(values):
                 getattr(config, name)[k] = value
         config.row_sd, config.update_rate_hz, config.forgetting_s = row_sd, rate, forgetting
-        status = Status(library.pvid_estimator_init_f32(self._state, config))
+        status = Status(library.pvid_estimator_init_layout_f32(self._state, config, library.pvid_layout()))
         if status is Status.BAD_MODEL:
             raise self._too_large()
         if status is not Status.OK:

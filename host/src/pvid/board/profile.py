@@ -55,10 +55,9 @@ def _symbols(board: Board, image: Path) -> list[_Symbol]:
     command = [f"{board.tool_prefix}nm", "--line-numbers", "--print-size", "--defined-only", str(image)]
     listing = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     entry = re.compile(r"^([0-9a-f]+) ([0-9a-f]+) [tTwW] (\S+)(?:\t(\S+):\d+)?$", re.MULTILINE)
-    sizes = re.compile(r"(_model0x\w{8}u)?_window\d+_theta\d+_p\d+_\w+_enum\d+")  # of pvid/sized.h
     return sorted(
         (
-            _Symbol(int(start, 16), int(size, 16), sizes.sub("", name), Path(file or "compiler").name)
+            _Symbol(int(start, 16), int(size, 16), name, Path(file or "compiler").name)
             for start, size, name, file in entry.findall(listing)
         ),
         key=lambda symbol: symbol.start,

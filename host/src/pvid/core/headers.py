@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ Tables = dict[str, npt.NDArray[Any]]
 # Fields of a configuration that the identifier sets, and a field with another name in Python.
 _FILLED_LATER = ("angle", "model", "update_rate_hz", "refine")
 _NAMES = {"sample_rate_hz": "sample_rate"}
+_INLINE = re.compile(r"^static inline [^{;]*\{[^}]*\}\n", re.MULTILINE)
 
 
 def default_library() -> Path:
@@ -215,7 +217,8 @@ def _compiled(text: str) -> str:
     from cffi import recompiler  # with the parser of C
 
     ffi = cffi.FFI()
-    ffi.cdef(text.replace("extern const ", "extern "))  # a constant that is no number has no address in cffi
+    without = _INLINE.sub("", text)  # cffi knows no inline functions, and no address of a constant that is no number
+    ffi.cdef(without.replace("extern const ", "extern "))
     out = io.StringIO()
     recompiler.make_py_source(ffi, "pvid_headers", out)
     with suppress(OSError):

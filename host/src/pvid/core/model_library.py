@@ -20,7 +20,7 @@ from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_
 from pvid.settings.engine_cores import FLOAT, EngineCore
 
 NATIVE = ROOT / "host" / "native"
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-DPVID_PLAIN_NAMES", "-w")
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-w")
 _ROOMS = ("number", "solve", "judge", "keep")  # of every form
 _REFINED = "refine_model_f32.h"  # a text that comes with the second stage
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")

@@ -149,7 +149,11 @@ class Native:
         every tick, and whether there were any."""
         ffi = self.headers.ffi
         filled, state = self.headers.filled("pvid_fir_bank_q31", bank), ffi.new("pvid_differentiator_q31 *")
-        status = Status(self.library.pvid_differentiator_init_q31(state, ffi.addressof(filled.struct)))
+        status = Status(
+            self.library.pvid_differentiator_init_layout_q31(
+                state, ffi.addressof(filled.struct), self.library.pvid_layout()
+            )
+        )
         if status is not Status.OK:
             raise PvidError(f"the core refused the bank: {status.text}")
         counts = [np.ascontiguousarray(x, np.int32) for x in (phi, y)]
@@ -232,6 +236,9 @@ class Stepper:
 
     def initialise(self) -> Status:
         """Runs init on the present configuration."""
+        library = self.native.library
+        if hasattr(library, f"{self._prefix}{self._name}_init_layout_{self.core}"):
+            return Status(self._call("init_layout", self.config_pointer, library.pvid_layout()))
         return Status(self._call("init", self.config_pointer))
 
     @property

@@ -113,7 +113,8 @@ class RefinedIdentifier(WeakIdentifier):
         ffi, library = native.headers.ffi, native.library
         self.refinement = ffi.new("pvid_refine_f32 *")
         self.refine_filled = native.headers.filled("pvid_refine_config_f32", refine)
-        stage, settings = ffi.addressof(library, "pvid_refine_stage_f32"), ffi.addressof(self.refine_filled.struct)
+        settings = ffi.addressof(self.refine_filled.struct)
+        stage = ffi.addressof(library, next(one for one in dir(library) if one.startswith("pvid_refine_stage_f32")))
         self._second = ffi.new("pvid_weak_refine_f32 *", [stage, self.refinement, settings])
         super().__init__(native, config, also=(refine,), refine=self._second)
 

@@ -44,7 +44,6 @@ def amalgamated(d: Deployment) -> tuple[str, str]:
     source = [
         top,
         f'#include "{d.library}.h"\n',
-        "/* One translation unit: no sizes in the names. */\n#define PVID_PLAIN_NAMES\n",
     ]
     parts = _parts(files)
     done = {*_IN_HEADER, own, *parts}

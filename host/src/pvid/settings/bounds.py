@@ -4,7 +4,6 @@ MAX_WINDOW = 321  # samples of the differentiator
 MAX_MOMENTS = 55
 # Compiler options of the library and of whatever links with it (host/native/CMakeLists.txt).
 SIZES = (
-    "-DPVID_PLAIN_NAMES",
     "-DPVID_MAX_P=6",
     f"-DPVID_MAX_MOMENTS={MAX_MOMENTS}",
 )

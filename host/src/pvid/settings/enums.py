@@ -85,6 +85,7 @@ class Status(_Named):
     BAD_RENEWAL = 42
     BAD_NEGLECTED = 43
     BAD_POINTER = 44
+    BAD_LAYOUT = 45
 
 
 class Stage(_Named):

@@ -17,11 +17,6 @@
 #include "pvid/kapitza_parameters.h"
 #include "pvid/model.h"
 
-#if !defined(PVID_PLAIN_NAMES) /* see sized.h */
-#define pvid_kapitza_linear_f32 PVID_SIZED(pvid_kapitza_linear_f32)
-#define pvid_kapitza_physical_f32 PVID_SIZED(pvid_kapitza_physical_f32)
-#endif
-
 #ifdef __cplusplus
 extern "C" {
 #endif

@@ -12,10 +12,6 @@
 
 #include "pvid/estimator_q31.h"
 
-#if !defined(PVID_PLAIN_NAMES) /* see sized.h */
-#define pvid_kapitza_physical_q31 PVID_SIZED(pvid_kapitza_physical_q31)
-#endif
-
 #ifdef __cplusplus
 extern "C" {
 #endif

@@ -22,14 +22,6 @@
 #include "pvid/estimator_q31.h"
 #include "pvid/kapitza_parameters.h"
 
-#if !defined(PVID_PLAIN_NAMES) /* see sized.h */
-#define pvid_kapitza_strong_row_q31 PVID_SIZED(pvid_kapitza_strong_row_q31)
-#define pvid_kapitza_estimator_init_q31 PVID_SIZED(pvid_kapitza_estimator_init_q31)
-#define pvid_kapitza_estimator_innovate_q31 PVID_SIZED(pvid_kapitza_estimator_innovate_q31)
-#define pvid_kapitza_estimator_take_q31 PVID_SIZED(pvid_kapitza_estimator_take_q31)
-#define pvid_kapitza_estimator_assess_q31 PVID_SIZED(pvid_kapitza_estimator_assess_q31)
-#endif
-
 #ifdef __cplusplus
 extern "C" {
 #endif
