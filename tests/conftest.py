@@ -54,7 +54,7 @@ SLOW = (
     *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
     *("bench/campaign_population", "twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
     *("tools/analysis", "board/engine_boards", "oracle/strong_described", "core/snapshot", "codegen/random"),
-    *("tools/mutate", "oracle/weak_engine", "show/mechanism_figure"),
+    *("paper/paper", "tools/mutate", "oracle/weak_engine", "show/mechanism_figure"),
 )
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")

@@ -111,10 +111,13 @@ missing_packages() {
         need doxygen command -v doxygen
         need frama-c-base command -v frama-c
         need g++ command -v g++
+        need gcc-powerpc-linux-gnu command -v powerpc-linux-gnu-gcc
+        need libc6-dev-powerpc-cross test -e /usr/powerpc-linux-gnu/include/stdio.h
         need libclang-rt-dev links_with clang -fsanitize=address,undefined
         need llvm command -v opt
         need libcmocka-dev test -e /usr/include/cmocka.h
         need pkg-config command -v pkg-config
+        need qemu-user command -v qemu-ppc
         need shellcheck command -v shellcheck
         need valgrind command -v valgrind
         need why3 command -v why3

@@ -24,6 +24,7 @@ import pvid
 from pvid.cli.page_table import put_table, with_table
 from pvid.cli.verdict_table import verdict_table
 from pvid.link import frames
+from pvid.oracle import paper
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -95,8 +96,14 @@ def python_reference() -> str:
     return "\n".join(lines).strip()
 
 
+def paper_block() -> str:
+    """The identifier of the paper, for paper.md."""
+    return f"```python\n{inspect.getsource(paper)}```"
+
+
 # page, marker, text
 GENERATED = (
+    ("paper.md", "paper", paper_block),
     ("link-and-log.md", "schema", schema_block),
     ("api-python.md", "api", python_reference),
     ("reasons.md", "verdict", verdict_table),

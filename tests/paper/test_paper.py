@@ -1,0 +1,131 @@
+"""The paper's identifier by hand against the C core in its literal form: the same bits at every tick and on boards."""
+
+from __future__ import annotations
+
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from paper_run import (
+    CLEAN,
+    HERE,
+    MAIN,
+    MISSING,
+    RATE,
+    ROW_SD,
+    SIZES,
+    TRUTH,
+    KeepsRows,
+    PaperRun,
+    compile_with_core,
+    replay_header,
+)
+
+from pvid.board.boards import BOARDS
+from pvid.board.mechanism_image import build_with
+from pvid.board.replay_image import play
+from pvid.oracle import strong
+from pvid.settings.enums import Core
+
+CORES: tuple[Core, ...] = ("f32", "q31")
+TIMEOUT_S = 300.0
+# An FPU, none, RISC-V without one; in the long form all but the ATmega328P, whose memory is too small, and the float32
+# of an AVR, which is another one.
+FEW = (("f32", "mps2-an386"), ("f32", "microbit"), ("q31", "microbit"), ("f32", "virt-rv32imac"), ("q31", "atmega2560"))
+ON_BOARDS = [
+    pytest.param(core, name, marks=[] if (core, name) in FEW else pytest.mark.long)
+    for core in CORES
+    for name, board in BOARDS.items()
+    if name != "atmega328p" and (core == "q31" or board.toolchain != "avr")
+]
+COMPILERS = {
+    "gcc -O3": ("gcc", "-O3", "-march=native"),
+    "gcc -Os": ("gcc", "-Os"),
+    "clang": ("clang", "-O2"),
+}
+
+
+@cache
+def wild_run(ticks: int) -> PaperRun:
+    """The motion again and again with what happens to sensors: each is missing, dead, stuck at full scale or jumps."""
+    random = np.random.default_rng(2)
+    counts = np.tile(CLEAN, (-(-ticks // len(CLEAN)), 1))[:ticks].astype(np.int64)
+    for first in range(300, ticks, 700):
+        channel, length = random.integers(2), random.integers(1, 60)
+        part = counts[first : first + length, channel]
+        what = random.integers(5)
+        part[:] = (MISSING, 0, part[0], -32767, np.clip(part + random.integers(-9000, 9000), -32767, 32767))[what]
+    return PaperRun(counts.astype(np.int16))
+
+
+def hashes_of(words: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """FNV-1a of the words, after every tick."""
+    hash_, out = 0x811C9DC5, []
+    for tick in words.astype("<u4"):
+        for byte in tick.tobytes():
+            hash_ = ((hash_ ^ byte) * 0x01000193) & 0xFFFFFFFF
+        out.append(hash_)
+    return np.array(out, np.uint32)
+
+
+@pytest.mark.ticks(short=2500, long=40_000)
+@pytest.mark.parametrize("core", CORES)
+def test_the_core_has_the_bits_of_the_paper_by_hand(core: Core, ticks: int, tmp_path: Path) -> None:
+    run = wild_run(ticks)
+    on_core = run.on_core(core, tmp_path)
+    assert np.array_equal(run.by_hand(core), on_core)
+    assert np.isnan(run.samples).any() and len(np.unique(on_core, axis=0)) > 1000  # values of p
+
+
+def test_law_5_by_hand_is_that_of_the_oracle_in_float64() -> None:
+    """Rounding alone is between them: float32 has 6e-8, the condition of C^T M C is 160."""
+    one = KeepsRows()
+    start, bounds = one.p.astype(np.float64), (one.lower.astype(np.float64), one.upper.astype(np.float64))
+    y, n = one.after(PaperRun(CLEAN).samples)
+    law = strong.Settings(start, start / 2, *bounds, ROW_SD, RATE, "pseudovelocity", kappa_min=0.0)
+    found = strong.identify_strong(n, y, law)
+    assert np.allclose(one.p, found.p[-1], rtol=1e-4)
+    assert np.allclose(one.p, TRUTH, rtol=0.15) and not np.allclose(one.p, start, rtol=0.05)
+
+
+@pytest.mark.parametrize("options", COMPILERS.values(), ids=COMPILERS)
+@pytest.mark.parametrize("core", CORES)
+def test_other_compilers_keep_the_bits(core: Core, options: tuple[str, ...], tmp_path: Path) -> None:
+    run = wild_run(5000)
+    (tmp_path / "other").mkdir()
+    assert np.array_equal(run.on_core(core, tmp_path / "other", *options), run.on_core(core, tmp_path))
+
+
+def test_fused_products_are_noticed(tmp_path: Path) -> None:
+    """The comparison refutes what it is there to refute."""
+    run = PaperRun(CLEAN[:300])
+    fused = run.on_core("f32", tmp_path, "gcc", "-march=haswell", "-ffp-contract=fast")
+    assert not np.array_equal(run.by_hand("f32"), fused)
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_a_big_endian_processor_has_the_bits_of_the_paper_by_hand(core: Core, tmp_path: Path) -> None:
+    run = wild_run(600)
+    (tmp_path / "replay_run.h").write_text(replay_header(run, core), encoding="utf-8")
+    (tmp_path / "main.c").write_text(MAIN, encoding="utf-8")
+    compile_with_core(core, tmp_path / "main.c", tmp_path / "main", "powerpc-linux-gnu-gcc", "-static", f"-I{tmp_path}")
+    done = subprocess.run(["qemu-ppc", str(tmp_path / "main")], capture_output=True, text=True, check=True)
+    assert np.array_equal(np.array(done.stdout.split(), np.uint32), hashes_of(run.by_hand(core)))
+
+
+@pytest.mark.parametrize(("core", "board"), ON_BOARDS)
+@pytest.mark.ticks(short=600, long=40_000)
+def test_a_board_has_the_bits_of_the_paper_by_hand(core: Core, board: str, ticks: int, tmp_path: Path) -> None:
+    target = BOARDS[board]
+    run = wild_run(min(ticks, target.sample_bytes // 4 - 200))
+    header, model = replay_header(run, core), (HERE / f"paper_{core}.h").read_text(encoding="utf-8")
+    sizes = {**SIZES, "PVID_MAX_WINDOW": 5}
+    image, _ = build_with(
+        target, f"paper-{core}", {"replay_run.h": header, f"paper_{core}.h": model}, sizes, core, "strong"
+    )
+    report = play(target, image, TIMEOUT_S)
+    hashes = hashes_of(run.by_hand(core) if ticks < 1000 else run.on_core(core, tmp_path))
+    assert report.ticks == len(run.counts) and report.differs_at(hashes) is None
