@@ -336,11 +336,11 @@ PROOFS = (
         "any configuration of the strong form, a bank of any extent that fits; `pvid_fnv_estimator_q31`, any state",
         (
             *(
-                "src/keep/fingerprint_q31.c",
-                "src/keep/fingerprint_parts_q31.c",
-                "src/keep/fingerprint_tables.c",
-                "src/keep/fnv_q31.c",
-                "src/keep/fnv.c",
+                "src/persist/fingerprint_q31.c",
+                "src/persist/fingerprint_parts_q31.c",
+                "src/persist/fingerprint_tables.c",
+                "src/persist/fnv_q31.c",
+                "src/persist/fnv.c",
             ),
         ),
         ("-eva-auto-loop-unroll", "20"),
@@ -384,18 +384,18 @@ PROOFS = (
     Proof(
         "snapshot",
         "two slots with any bytes in them, any lengths and identities; sealing one",
-        ("src/keep/snapshot.c", "src/keep/crc32.c", "src/keep/fnv.c"),
+        ("src/persist/snapshot.c", "src/persist/crc32.c", "src/persist/fnv.c"),
         ("-eva-auto-loop-unroll", "10"),
     ),
     Proof(
         "snapshot_q31",
         "states of all forms saved into any room, any bytes of any length restored; their pointers stay",
         (
-            "src/keep/snapshot_weak_q31.c",
-            "src/keep/snapshot_strong_q31.c",
-            "src/keep/snapshot.c",
-            "src/keep/crc32.c",
-            "src/keep/fnv.c",
+            "src/persist/snapshot_weak_q31.c",
+            "src/persist/snapshot_strong_q31.c",
+            "src/persist/snapshot.c",
+            "src/persist/crc32.c",
+            "src/persist/fnv.c",
         ),
         ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
         taken=(
@@ -412,7 +412,7 @@ PROOFS = (
     Proof(
         "link",
         "the decoder, any number of any bytes",
-        ("link/link.c", "src/keep/crc32.c"),
+        ("link/link.c", "src/persist/crc32.c"),
         (
             *("-eva-split-return", "full"),
             *("-eva-slevel-function", "one_byte:20,pvid_link_decode:40,accept:40"),

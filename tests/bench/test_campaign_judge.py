@@ -225,9 +225,9 @@ def test_a_table_by_property_has_a_row_a_group(name: str) -> None:
 
 def test_reasons_that_differ_in_numbers_are_one() -> None:
     refused = [judged(None, refusal=f"decimation must be 1 to 32, not {number}") for number in (40, 50)]
-    assert table.reasons([*refused, judged(None, refusal="held pivot")]) == [
+    assert table.reasons([*refused, judged(None, refusal="held singular")]) == [
         "2 x decimation must be # to # not #",
-        "1 x held pivot",
+        "1 x held singular",
     ]
 
 

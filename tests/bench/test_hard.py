@@ -138,7 +138,7 @@ def test_row_contains_the_verdicts_of_its_runs() -> None:
         errors=np.array([[0.01, 0.02, 0.02], [0.5, 0.5, 0.5], [0.5, 0.0, 0.0], [9.0, 9.0, 9.0]]),
         standard_errors=np.full((4, 3), 0.01),
         correlation=np.tile(np.eye(3), (4, 1, 1)),
-        held=("held pivot",),
+        held=("held singular",),
     )
     none = replace(few, published=np.zeros(4, np.bool_))
     cells = row(CASES[0], few, none)
@@ -146,8 +146,8 @@ def test_row_contains_the_verdicts_of_its_runs() -> None:
     assert cells[1] == "3/4"
     assert cells[5] == "1"  # median of 0.01, per cent
     assert cells[6] == "33/67/67"
-    assert cells[7:] == ("1/3", "1", "held pivot", "0/4", "0", "0.02", "f32: biased")
-    assert row(CASES[0], none, few)[1:] == ("0/4", *["-"] * 6, "0", "held pivot", "3/4", "1", "-", "q31: biased")
+    assert cells[7:] == ("1/3", "1", "held singular", "0/4", "0", "0.02", "f32: biased")
+    assert row(CASES[0], none, few)[1:] == ("0/4", *["-"] * 6, "0", "held singular", "3/4", "1", "-", "q31: biased")
 
 
 def silent_runs(errors: Float, correlation: float = 0.0) -> Outcome:

@@ -49,7 +49,7 @@ def test_the_core_equals_its_twin(case: Case, law: str, native: Native, run: Run
     rig = rig_with(form=case.form, dead_zone=1.5, forgetting_s=4.0, **LAWS[law])
     phi, y = (x[:ticks] for x in case.samples(rig, run))
     (lane,) = assert_lanes_equal([native], case.settings(rig, 1000.0), phi, y)
-    assert lane.counters["at_rest"] > 0 or law == "paper"  # whose F does not decay
+    assert lane.counters["in_dead_zone"] > 0 or law == "paper"  # whose F does not decay
 
 
 Played = tuple[Float, Float, dict[str, int]]
@@ -83,9 +83,9 @@ def test_p_stays_within_the_zone_of_the_solution(played: Callable[[float], Playe
     assert (np.abs(rested - end) <= 1.02 * error).all()
     # not smaller; the scores of windows scatter more where p is off by up to a standard error
     assert (as_before >= 0.98 * error).all() and (as_before <= 1.1 * error).all()
-    assert counters["at_rest"] == 0
-    assert at_rest["updates"] + at_rest["at_rest"] == counters["updates"]  # the same solves
-    assert at_rest["at_rest"] > 0.5 * counters["updates"]  # and most of them needed no step
+    assert counters["in_dead_zone"] == 0
+    assert at_rest["updates"] + at_rest["in_dead_zone"] == counters["updates"]  # the same solves
+    assert at_rest["in_dead_zone"] > 0.5 * counters["updates"]  # and most of them needed no step
 
 
 @every_case

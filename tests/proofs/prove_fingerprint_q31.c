@@ -2,7 +2,7 @@
  * an estimator of any size. */
 #include "prove.h"
 
-#include "keep/fingerprint_q31.h"
+#include "persist/fingerprint_q31.h"
 #include "pvid/fnv_q31.h"
 
 #define BANK_HALF_MAX ((PVID_MAX_WINDOW - 1) / 2)

@@ -1,7 +1,7 @@
 /* snapshot: two slots with any bytes in them, looked at with any identity; and one that is sealed. */
 #include "prove.h"
 
-#include "keep/snapshot.h"
+#include "persist/snapshot.h"
 
 #define ROOM 96u
 

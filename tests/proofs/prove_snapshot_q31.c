@@ -2,8 +2,8 @@
  * restored, whose bytes then are the state's but for its pointers. The hash of the configuration is arbitrary. */
 #include "prove.h"
 
-#include "keep/fingerprint_weak_q31.h"
-#include "keep/fingerprint_q31.h"
+#include "persist/fingerprint_weak_q31.h"
+#include "persist/fingerprint_q31.h"
 #include "pvid/snapshot_weak_q31.h"
 #include "pvid/snapshot_q31.h"
 #include "pvid/strong_q31.h"

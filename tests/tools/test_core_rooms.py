@@ -12,7 +12,7 @@ import pytest
 from pvid.core.sources import INCLUDES, MODEL, SRC, core_sources
 
 # Each room may use itself and those before it; the forms do not use each other.
-ROOMS = ("number", "solve", "judge", "strong", MODEL.name, "weak", "refine", "keep")
+ROOMS = ("number", "solve", "judge", "strong", MODEL.name, "weak", "refine", "persist")
 FORMS = ("strong", "weak", "refine")
 STRANGERS = {(a, b) for a in FORMS for b in FORMS if a != b}
 

@@ -134,8 +134,8 @@ def test_planted_loops_and_recursion_are_found(copy: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        ("firmware/src/keep/crc32.c", "i < n; i++", "i < n;"),
-        ("firmware/src/keep/fnv_q31.c", "i < information->n_sums; i++", "i < information->n_sums; i += 0u"),
+        ("firmware/src/persist/crc32.c", "i < n; i++", "i < n;"),
+        ("firmware/src/persist/fnv_q31.c", "i < information->n_sums; i++", "i < information->n_sums; i += 0u"),
         ("firmware/src/weak/weak_front_q31.c", "left > 0u; left--", "left > 0u; left -= 0u"),
         ("firmware/ports/freestanding/square_root.c", "shift++", ""),
     ],
@@ -166,6 +166,6 @@ def test_reasons_do_not_outlive_their_loops(copy: Path) -> None:
 def test_loops_that_the_compiler_takes_to_end_are_refused(copy: Path) -> None:
     tool = copy / "tools" / "loops.py"
     tool.write_text(tool.read_text(encoding="utf-8").replace(" -fno-finite-loops", " -ffinite-loops"), encoding="utf-8")
-    done = run(copy, "firmware/src/keep/crc32.c")
+    done = run(copy, "firmware/src/persist/crc32.c")
     assert done.returncode != 0
     assert "crc32.c (host): loops are taken to end" in done.stderr

@@ -34,7 +34,7 @@ def change(place: Path, old: str, new: str) -> None:
 
 
 def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
-    copy(tmp_path, "firmware/link", "firmware/src/keep/crc32.c")
+    copy(tmp_path, "firmware/link", "firmware/src/persist/crc32.c")
     assert prove(tmp_path).returncode == 0
     assert "since then nothing has changed" in prove(tmp_path).stdout
     link = tmp_path / "firmware" / "link" / "link.c"
@@ -46,7 +46,7 @@ def test_byte_too_far_is_an_alarm(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_room_that_is_a_byte_short_is_not_proved(tmp_path: Path) -> None:
-    copy(tmp_path, "firmware/link", "firmware/src/keep/crc32.c")
+    copy(tmp_path, "firmware/link", "firmware/src/persist/crc32.c")
     room = "(PVID_LINK_RAW_BYTES(n) / 254u) + "
     change(tmp_path / "firmware" / "link" / "link.h", f"{room}2u)", f"{room}1u)")
     done = prove(tmp_path, "encoder")

@@ -119,7 +119,7 @@ def test_core_and_twin_have_the_same_integers(
         pair.assert_equal()
     assert pair.core.assess().tobytes() == pair.twin.assess()[0].tobytes()
     assert pair.core.counters == {name: int(of[0]) for name, of in pair.twin.counters.items()}
-    assert pair.core.counters["at_rest"] > 0 or "dead_zone" not in fields
+    assert pair.core.counters["in_dead_zone"] > 0 or "dead_zone" not in fields
     # rough: the laws without iteration, and what was added to b, leave more than the rows' noise
     assert np.allclose(pair.core.p, truth, rtol=0.05)
 

@@ -13,7 +13,7 @@ from pvid.settings.enums import Core, Reason
 from pvid.sim.pendulum import standard_start
 from pvid.twin.weak_q31 import WeakTwinQ31
 
-VERDICTS = (*PUBLISHED, Reason.HELD_NOT_EXCITED, Reason.HELD_PIVOT, Reason.HELD_UNCERTAIN)
+VERDICTS = (*PUBLISHED, Reason.HELD_NOT_EXCITED, Reason.HELD_SINGULAR, Reason.HELD_UNCERTAIN)
 
 SEEDS = 2
 DURATION_S = 20.0

@@ -82,13 +82,13 @@ static void within_the_dead_zone_p_stays(void **state)
     add_rows(0, 60);
     assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
     assert_int_equal(estimator.counters.updates, 1);
-    while (estimator.counters.at_rest == 0u) {
+    while (estimator.counters.in_dead_zone == 0u) {
         assert_in_range(estimator.counters.updates, 1, 20);
         assert_int_equal(pvid_estimator_iterate_q31(&estimator), PVID_UPDATED);
     }
     const pvid_estimator_q31 before = estimator;
     assert_int_equal(pvid_estimator_iterate_q31(&estimator), PVID_UPDATED);
-    assert_int_equal(estimator.counters.at_rest, 2);
+    assert_int_equal(estimator.counters.in_dead_zone, 2);
     assert_memory_equal(estimator.p, before.p, sizeof before.p);
     assert_memory_equal(&estimator.information, &before.information, sizeof before.information);
     assert_int_equal(estimator.counters.updates, before.counters.updates);
@@ -97,7 +97,7 @@ static void within_the_dead_zone_p_stays(void **state)
     begin();
     add_rows(0, 60);
     assert_int_equal(pvid_estimator_update_q31(&estimator), PVID_UPDATED);
-    assert_int_equal(estimator.counters.at_rest + estimator.counters.updates, 1);
+    assert_int_equal(estimator.counters.in_dead_zone + estimator.counters.updates, 1);
 }
 
 /* With noise in the rows: wider zones are left less often. (With the paper's law F does not decay, and p may never come
@@ -125,7 +125,7 @@ static void a_wider_dead_zone_is_left_less_often(void **state)
                 (void)pvid_estimator_update_q31(&estimator);
             }
             steps[zone] = estimator.counters.updates;
-            assert_true((estimator.counters.at_rest > 0u) == (zone > 0u));
+            assert_true((estimator.counters.in_dead_zone > 0u) == (zone > 0u));
         }
         assert_true(steps[0] > steps[1]);
         assert_true(steps[1] > steps[2]);

@@ -133,7 +133,7 @@ static void result_is_invariant_to_row_scale(void **state)
             add_row(&large, 10);
             const pvid_reason reason = pvid_estimator_update_q31(&small);
             assert_int_equal(pvid_estimator_update_q31(&large), reason);
-            assert_true((reason == PVID_UPDATED) || ((reason == PVID_HELD_PIVOT) && (i < 20)));
+            assert_true((reason == PVID_UPDATED) || ((reason == PVID_HELD_SINGULAR) && (i < 20)));
             for (size_t a = 0; a < PVID_MAX_P; a++) {
                 /* the smaller rows' innovations are rounded: 0.3 of some 40 000, over the root of so many rows; the
                  * rates keep something of their first steps */
@@ -422,7 +422,7 @@ static void the_strong_form_agrees_with_the_float_core(void **state)
             (void)pvid_strong_step_f32(&other, (float)(angle * 5.992112452678286e-06), (float)(height * 5.0e-06));
         }
         assert_int_equal(reasons[PVID_WARMING_UP], 80);
-        const int solved = reasons[PVID_UPDATED] + reasons[PVID_ACCUMULATED] + reasons[PVID_HELD_PIVOT];
+        const int solved = reasons[PVID_UPDATED] + reasons[PVID_ACCUMULATED] + reasons[PVID_HELD_SINGULAR];
         assert_int_equal(solved + reasons[PVID_HELD_NOT_EXCITED], 12000 - 80);
         assert_in_range(self.estimator.counters.rows, 11800, 11920);
         assert_in_range(reasons[PVID_ACCUMULATED], (k == 1) ? 7800 : 0, (k == 1) ? 7947 : 0);

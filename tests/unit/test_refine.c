@@ -333,7 +333,7 @@ static void test_init_refuses(void **state)
     REFUSES(second, NULL, PVID_BAD_DESIGN);
     REFUSES(signal, NULL, PVID_BAD_DESIGN);
     REFUSES(signal, derived_output, PVID_BAD_DESIGN);
-    REFUSES(signal, no_range, PVID_BAD_ANGLE_LIMIT);
+    REFUSES(signal, no_range, PVID_BAD_RANGE);
     REFUSES(block, (PVID_REFINE_RING / 6) + 1, PVID_BAD_WINDOW);
     REFUSES(first_block, 85, PVID_BAD_WINDOW);
     REFUSES(passes, 0, PVID_BAD_ITERATIONS);

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "first_order.h"
-#include "keep/fingerprint_parts_q31.h"
+#include "persist/fingerprint_parts_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 

@@ -142,10 +142,10 @@ static void a_singular_system_holds_p(void **state)
     pvid_system_f32 system = known_system();
     system.s[0][0] = 1.6f; /* 4^2 / 10: rank one */
     float p[2];
-    assert_int_equal(solved(&system, &settings, p).reason, PVID_HELD_PIVOT);
+    assert_int_equal(solved(&system, &settings, p).reason, PVID_HELD_SINGULAR);
     assert_memory_equal(p, start, sizeof start);
     memset(system.s, 0, sizeof system.s);
-    assert_int_equal(solved(&system, &settings, p).reason, PVID_HELD_PIVOT);
+    assert_int_equal(solved(&system, &settings, p).reason, PVID_HELD_SINGULAR);
 }
 
 static void a_number_that_is_none_holds_p(void **state)
@@ -159,12 +159,12 @@ static void a_number_that_is_none_holds_p(void **state)
             for (size_t b = a; b < 2u; b++) {
                 pvid_system_f32 system = known_system();
                 system.s[a][b] = bad[k];
-                assert_int_equal(solved(&system, &settings, p).reason, PVID_HELD_PIVOT);
+                assert_int_equal(solved(&system, &settings, p).reason, PVID_HELD_SINGULAR);
             }
             pvid_system_f32 system = known_system();
             system.force[a] = bad[k];
             const pvid_solution_f32 solution = solved(&system, &settings, p);
-            assert_int_equal(solution.reason, PVID_HELD_PIVOT);
+            assert_int_equal(solution.reason, PVID_HELD_SINGULAR);
             assert_true(solution.size == 0.0f);
             assert_memory_equal(p, start, sizeof start);
         }

@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "pvid/former.h"
 #include "pvid/text.h"
 
 static void test_a_reason_is_its_name_in_words(void **state)
@@ -30,18 +31,31 @@ static void test_a_number_that_is_none_has_a_text_too(void **state)
 {
     (void)state;
     assert_string_equal(pvid_reason_text((pvid_reason)(PVID_HELD_DISAGREES + 1)), "unknown reason");
-    assert_string_equal(pvid_status_text((pvid_status)(PVID_BAD_POINTER + 1)), "unknown status");
+    assert_string_equal(pvid_status_text((pvid_status)(PVID_BAD_LAYOUT + 1)), "unknown status");
     assert_string_equal(pvid_reason_text((pvid_reason)INT32_MAX), "unknown reason");
 }
 
 static void test_every_status_has_a_text_of_its_own(void **state)
 {
     (void)state;
-    for (int a = 0; a <= (int)PVID_BAD_POINTER; a++) {
+    for (int a = 0; a <= (int)PVID_BAD_LAYOUT; a++) {
         for (int b = 0; b < a; b++) {
             assert_string_not_equal(pvid_status_text((pvid_status)a), pvid_status_text((pvid_status)b));
         }
     }
+}
+
+static void test_the_names_of_version_0_1_mean_the_same(void **state)
+{
+    (void)state;
+    const pvid_counters counters = {.held_singular = 3, .in_dead_zone = 5};
+    assert_int_equal(PVID_BAD_ANGLE_LIMIT, 25);
+    assert_int_equal(PVID_HELD_PIVOT, 4);
+    assert_int_equal(counters.held_pivot, 3);
+    assert_int_equal(counters.at_rest, 5);
+    assert_string_equal(pvid_reason_text(PVID_HELD_PIVOT), "held singular");
+    assert_string_equal(pvid_status_text(PVID_BAD_ANGLE_LIMIT),
+                        "bad range: range of a signal: not finite or not positive");
 }
 
 int main(void)
@@ -51,6 +65,7 @@ int main(void)
         cmocka_unit_test(test_a_status_tells_what_the_field_must_be),
         cmocka_unit_test(test_a_number_that_is_none_has_a_text_too),
         cmocka_unit_test(test_every_status_has_a_text_of_its_own),
+        cmocka_unit_test(test_the_names_of_version_0_1_mean_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

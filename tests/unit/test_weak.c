@@ -666,7 +666,7 @@ static void init_names_what_is_out_of_range(void **state)
     REFUSES(design.error_order = high, PVID_BAD_DESIGN);
     REFUSES(design.noise = of_no_column, PVID_BAD_DESIGN);
     REFUSES(design.n_noise = 0, PVID_BAD_DESIGN); /* nothing that the rows could be weighted with */
-    REFUSES(config.range = zero_range, PVID_BAD_ANGLE_LIMIT);
+    REFUSES(config.range = zero_range, PVID_BAD_RANGE);
     REFUSES(config.drive_min = not_a_number, PVID_BAD_DRIVE_MIN);
     REFUSES(config.iterations = 0, PVID_BAD_ITERATIONS);
     REFUSES(config.estimator.start[0] = -1.0f, PVID_BAD_START);

@@ -58,7 +58,7 @@ static void held_group_keeps_the_published_estimate_with_reason(void **state)
     }
     const an_estimate before = trust.estimate;
     const an_estimate fine = candidate(0.02, 1.0e-2);
-    assert_int_equal(judge(PVID_HELD_PIVOT, 0.0, true, 1.0, fine), PVID_HELD_PIVOT);
+    assert_int_equal(judge(PVID_HELD_SINGULAR, 0.0, true, 1.0, fine), PVID_HELD_SINGULAR);
     assert_int_equal(judge(PVID_HELD_NOT_EXCITED, 0.0, true, 1.0, fine), PVID_HELD_NOT_EXCITED);
     assert_int_equal(judge(PVID_ACCUMULATED, 0.0, true, 1.0, fine), PVID_ACCUMULATED);
     assert_int_equal(judge(PVID_UPDATED, 0.0, false, 1.0, fine), PVID_HELD_NOT_EXCITED);
@@ -103,10 +103,10 @@ static void a_step_ends_the_refusals(void **state)
 {
     (void)state;
     for (int i = 0; i < 15; i++) {
-        (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, candidate(1.0, 0.0));
+        (void)judge(PVID_HELD_SINGULAR, 0.0, true, 1.0, candidate(1.0, 0.0));
     }
     (void)judge_good(1.0);
-    (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, candidate(1.0, 0.0));
+    (void)judge(PVID_HELD_SINGULAR, 0.0, true, 1.0, candidate(1.0, 0.0));
     assert_null(fallback());
 }
 
@@ -202,7 +202,7 @@ static void nothing_fades_before_convergence_or_with_large_errors(void **state)
     place(15.0);
     (void)judge(PVID_UPDATED, 0.021, true, 1.0, estimate); /* on its way */
     assert_int_equal(groups_of_fading(&left), 0);
-    (void)judge(PVID_HELD_PIVOT, 0.0, true, 1.0, estimate);
+    (void)judge(PVID_HELD_SINGULAR, 0.0, true, 1.0, estimate);
     assert_int_equal(groups_of_fading(&left), 0);
     (void)judge(PVID_UPDATED, 1.0e-5, true, 1.0, vague);
     assert_int_equal(groups_of_fading(&left), 0);

@@ -35,8 +35,8 @@ class Choice:
 
 
 _PARTS = {f"PVID_{one}": 1 for one in ("REFINEMENT", "DEAD_ZONE", "FEEDBACK", "NEGLECTED")}
-_USUAL = {"CMAKE_BUILD_TYPE": "RelWithDebInfo", "PVID_SELDOM_OPTIONS": ""}
-_SELDOM = {"PVID_SELDOM_OPTIONS": "-Os"}
+_USUAL = {"CMAKE_BUILD_TYPE": "RelWithDebInfo", "PVID_COLD_OPTIONS": ""}
+_COLD = {"PVID_COLD_OPTIONS": "-Os"}
 _SMALL = {"CMAKE_BUILD_TYPE": "MinSizeRel"}
 CHOICES = (
     Choice(
@@ -49,13 +49,13 @@ CHOICES = (
     ),
     Choice("and no check of the printed tables: `PVID_CHECK_TABLES=0`", sizes=_PARTS),
     Choice("and no second stage, no dead zone, no law with g < 1, no neglected terms: what `pvid model build` prints"),
-    Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", options=_SELDOM),
+    Choice("and `-DPVID_COLD_OPTIONS=-Os`", options=_COLD),
     Choice("or all of it with `-Os` (`MinSizeRel`)", options=_SMALL),
     Choice("both stages, as printed", refined=True),
-    Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", refined=True, options=_SELDOM),
+    Choice("and `-DPVID_COLD_OPTIONS=-Os`", refined=True, options=_COLD),
     Choice("or all of it with `-Os`", refined=True, options=_SMALL),
     Choice("fixed point, Cortex-M0, as printed", "q31"),
-    Choice("and `-DPVID_SELDOM_OPTIONS=-Os`", "q31", options=_SELDOM),
+    Choice("and `-DPVID_COLD_OPTIONS=-Os`", "q31", options=_COLD),
     Choice("or all of it with `-Os`", "q31", options=_SMALL),
 )
 

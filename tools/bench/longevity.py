@@ -60,7 +60,7 @@ JUDGED = (
     Reason.UPDATED,
     Reason.MISFIT,
     Reason.HELD_NOT_EXCITED,
-    Reason.HELD_PIVOT,
+    Reason.HELD_SINGULAR,
     Reason.HELD_UNCERTAIN,
     Reason.HELD_OUT_OF_RANGE,
     Reason.REJECTED_OUTLIER,

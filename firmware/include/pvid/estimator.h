@@ -128,7 +128,7 @@ pvid_reason pvid_estimator_add_kind_f32(pvid_estimator_f32 *self, uint8_t kind, 
 pvid_reason pvid_estimator_add_to_b_f32(pvid_estimator_f32 *self, const float g[]);
 
 /* Ends a group of rows; every `divider` groups it solves and moves p. Returns PVID_UPDATED, PVID_ACCUMULATED (no
- * solve due), PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT; the last two leave p unchanged. */
+ * solve due), PVID_HELD_NOT_EXCITED or PVID_HELD_SINGULAR; the last two leave p unchanged. */
 pvid_reason pvid_estimator_update_f32(pvid_estimator_f32 *self);
 
 /* One more Gauss-Newton step on the same sums; does not end a group. Returns as update does. */

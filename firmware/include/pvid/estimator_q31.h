@@ -97,7 +97,7 @@ pvid_reason pvid_estimator_add_kind_q31(pvid_estimator_q31 *self, uint8_t kind, 
 pvid_reason pvid_estimator_add_to_b_q31(pvid_estimator_q31 *self, const pvid_scaled_q31 g[]);
 
 /* Ends a group of rows; every `divider` groups it solves and moves p. Returns PVID_UPDATED, PVID_ACCUMULATED (no
- * solve due), PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT. */
+ * solve due), PVID_HELD_NOT_EXCITED or PVID_HELD_SINGULAR. */
 pvid_reason pvid_estimator_update_q31(pvid_estimator_q31 *self);
 
 /* One more Gauss-Newton step on the same sums; does not end a group. Returns as update does. */

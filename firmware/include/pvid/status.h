@@ -33,7 +33,7 @@ typedef enum {
     PVID_BAD_PUBLISH_KAPPA, /* kappa_min of trust.h not finite or outside [0, 1) */
     PVID_BAD_SE_MAX,        /* not finite or not positive */
     PVID_BAD_MISFIT_MAX,    /* not finite, or neither 0 nor at least 1 */
-    PVID_BAD_ANGLE_LIMIT,   /* range of a signal: not finite or not positive */
+    PVID_BAD_RANGE,         /* range of a signal: not finite or not positive */
     PVID_BAD_GATE_SIGMAS,   /* not finite, or neither 0 nor 2..1e3 */
     PVID_BAD_GATE_PATIENCE, /* not finite or outside 0..1e12 s */
     PVID_BAD_DEAD_ZONE,     /* not finite or outside 0..100 */
@@ -64,12 +64,12 @@ typedef enum {
     PVID_ACCUMULATED,         /* data added, no solve due at this tick (divider) */
     PVID_HELD_NOT_EXCITED,    /* insufficient excitation for p[0]: no drive, kappa below its threshold, or no more
                                  information than noise gives */
-    PVID_HELD_PIVOT,          /* the system could not be solved, or its solution was not finite */
+    PVID_HELD_SINGULAR,       /* the system could not be solved, or its solution was not finite */
     PVID_REJECTED_NOT_FINITE, /* NaN or infinity in the sample or in its row */
     PVID_REJECTED_OUTLIER,    /* a residual far beyond the usual size: gate.h */
     PVID_REJECTED_SATURATED,  /* a row beyond PVID_ROW_LIMIT */
     PVID_HELD_UNCERTAIN,      /* not published: standard errors too large, or p not converged */
-    PVID_HELD_OUT_OF_RANGE,   /* window dropped: the angle exceeded the range of the equations */
+    PVID_HELD_OUT_OF_RANGE,   /* window dropped: a sample exceeded its range */
     PVID_MISFIT, /* p was updated, but the residuals exceed the sensors' noise: the model does not fit the mechanism */
     PVID_HELD_FROZEN, /* row or window not used: the identifier is frozen */
     PVID_NOT_READY,   /* not initialised, init refused, NULL instead of an object, or a kind of rows that the model does
@@ -92,14 +92,14 @@ typedef struct {
     uint32_t limited; /* of those, shortened to step_limit */
     uint32_t bounded; /* of those, stopped at a bound */
     uint32_t held_not_excited;
-    uint32_t held_pivot;
+    uint32_t held_singular;
     uint32_t rejected_not_finite;
     uint32_t rejected_saturated;
     uint32_t held_uncertain;    /* groups without publication, see trust.h */
-    uint32_t held_out_of_range; /* windows dropped for their angle */
+    uint32_t held_out_of_range; /* windows dropped for their range */
     uint32_t misfits;           /* groups published, or updates reported, during the misfit alarm */
     uint32_t rejected_outlier;  /* rows or windows rejected by the gate */
-    uint32_t at_rest;           /* solves within the dead zone: p unchanged */
+    uint32_t in_dead_zone;      /* solves within the dead zone: p unchanged */
 } pvid_counters;                /* each stops at 2^32 - 1 */
 
 #endif

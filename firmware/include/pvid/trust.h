@@ -6,7 +6,7 @@
  *   PVID_UPDATED            published
  *   PVID_MISFIT             published, but the residuals exceed the sensors' noise: the model does not fit
  *   PVID_HELD_NOT_EXCITED   held: too little information on p[0], or no more than noise alone gives
- *   PVID_HELD_PIVOT         held: the system could not be solved
+ *   PVID_HELD_SINGULAR         held: the system could not be solved
  *   PVID_HELD_UNCERTAIN     held: standard errors too large, or p not converged
  *
  * Until the first estimate is trusted, the published one is the start with start_sd. A published estimate is held until

@@ -67,7 +67,7 @@ PVID_ALWAYS_INLINE void take_family(const int64_t sums[], size_t count, uint32_t
 }
 
 /* m = sums 2^-shift rounded half up, below 2^28 by the choice of the scales; that of Y Y is not needed. */
-PVID_APART static void take_mantissas(const int64_t sums[], const pvid_kapitza_system_q31 *scales, int32_t m[])
+PVID_NOINLINE static void take_mantissas(const int64_t sums[], const pvid_kapitza_system_q31 *scales, int32_t m[])
 {
     uint32_t shift[N_FAMILIES];
     if (!shifts_of(scales, shift)) {
@@ -94,7 +94,7 @@ typedef struct {
     int32_t r6[6];
 } shift_coefficients;
 
-PVID_APART static void shift_by(int32_t d, shift_coefficients *c)
+PVID_NOINLINE static void shift_by(int32_t d, shift_coefficients *c)
 {
     const int32_t d2 = pvid_part_q31(d, d);
     const int32_t d3 = pvid_part_q31(d2, d);
@@ -182,8 +182,8 @@ typedef struct {
     shifted_triple k00;
 } shifted_sums;
 
-PVID_APART static void shift_sums(const int64_t sums[], const pvid_kapitza_system_q31 *scales,
-                                  const shift_coefficients *c, shifted_sums *out)
+PVID_NOINLINE static void shift_sums(const int64_t sums[], const pvid_kapitza_system_q31 *scales,
+                                     const shift_coefficients *c, shifted_sums *out)
 {
     int32_t m[PVID_SUM_WEIGHT];
     take_mantissas(sums, scales, m);
@@ -222,7 +222,7 @@ static int32_t as_part(int32_t p, int32_t exponent, int32_t factor)
 }
 
 /* S, F of the shifted sums; d = w - w_r. */
-PVID_APART static void combine(int32_t d, const shape *p, const shifted_sums *m, pvid_kapitza_system_q31 *out)
+PVID_NOINLINE static void combine(int32_t d, const shape *p, const shifted_sums *m, pvid_kapitza_system_q31 *out)
 {
     const int32_t two_d = 2 * d;
     const int32_t dd = pvid_part_q31(d, d);

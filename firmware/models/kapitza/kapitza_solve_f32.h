@@ -22,7 +22,8 @@ typedef struct {
 } pvid_kapitza_factor_f32;
 
 /* Factors S + H0, s the upper triangle of S. Returns PVID_UPDATED. Fails iff
- *   - a diagonal entry is not a positive normal number, or a pivot is below PVID_PIVOT_MIN of it: PVID_HELD_PIVOT, or
+ *   - a diagonal entry is not a positive normal number, or a pivot is below PVID_PIVOT_MIN of it: PVID_HELD_SINGULAR,
+ * or
  *   - p[0] is not sufficiently excited: PVID_HELD_NOT_EXCITED. */
 static inline pvid_reason pvid_kapitza_factorise_f32(const pvid_strong_estimator_f32 *self, const float s[6],
                                                      pvid_kapitza_factor_f32 *factor)
@@ -32,21 +33,21 @@ static inline pvid_reason pvid_kapitza_factorise_f32(const pvid_strong_estimator
     const float s22 = s[5] + self->prior[2];
     /* infinity and NaN of any show in the sum; s11 and s00 that are not positive in their pivots */
     if (!pvid_positive_normal_f32(s22) || !pvid_positive_normal_f32((s00 + s11) + s22)) {
-        return PVID_HELD_PIVOT;
+        return PVID_HELD_SINGULAR;
     }
     factor->inverse2 = 1.0f / s22;
     factor->l02 = s[2] * factor->inverse2;
     factor->l12 = s[4] * factor->inverse2;
     const float pivot1 = s11 - (factor->l12 * s[4]);
     if (!pvid_pivot_is_significant_f32(pivot1, s11)) {
-        return PVID_HELD_PIVOT;
+        return PVID_HELD_SINGULAR;
     }
     const float c01 = s[1] - (factor->l02 * s[4]);
     factor->inverse1 = 1.0f / pivot1;
     factor->l01 = c01 * factor->inverse1;
     factor->pivot0 = (s00 - (factor->l02 * s[2])) - (factor->l01 * c01);
     if (!pvid_pivot_is_significant_f32(factor->pivot0, s00)) {
-        return PVID_HELD_PIVOT;
+        return PVID_HELD_SINGULAR;
     }
     const bool own = factor->pivot0 >= (2.0f * self->prior[0]);
     const float kappa_min = self->config->estimator.kappa_min;
@@ -87,7 +88,7 @@ static inline uint32_t pvid_kapitza_relative_f32(const pvid_strong_estimator_f32
     return pvid_bits_f32(x / self->p[a]) & 0x7FFFFFFFu;
 }
 
-/* p += dp, shortened to the step limit and kept within the bounds. Fails iff dp is not finite: PVID_HELD_PIVOT. */
+/* p += dp, shortened to the step limit and kept within the bounds. Fails iff dp is not finite: PVID_HELD_SINGULAR. */
 static inline pvid_reason pvid_kapitza_move_f32(pvid_strong_estimator_f32 *self, const float dp[3])
 {
     const pvid_estimator_config_f32 *config = &self->config->estimator;
@@ -99,7 +100,7 @@ static inline pvid_reason pvid_kapitza_move_f32(pvid_strong_estimator_f32 *self,
     float part = 1.0f;
     if (size > pvid_bits_f32(config->step_limit)) {
         if (!pvid_finite_f32(pvid_from_bits_f32(size))) {
-            return PVID_HELD_PIVOT;
+            return PVID_HELD_SINGULAR;
         }
         part = config->step_limit / pvid_from_bits_f32(size);
         pvid_count_up(&self->counters.limited);

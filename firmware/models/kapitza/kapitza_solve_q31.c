@@ -192,8 +192,8 @@ static int64_t with_prior(const pvid_kapitza_estimator_q31 *self, size_t a, int6
 }
 
 /* Factors S + H0, H0 the prior of the settings. Returns whether every pivot is data, not rounding. */
-PVID_APART static bool factorise(const pvid_kapitza_estimator_q31 *self, const pvid_kapitza_system_q31 *system,
-                                 factors *factor)
+PVID_NOINLINE static bool factorise(const pvid_kapitza_estimator_q31 *self, const pvid_kapitza_system_q31 *system,
+                                    factors *factor)
 {
     int32_t of[PVID_KAPITZA_P];
     int64_t prior;
@@ -256,7 +256,7 @@ static inline int32_t lifted(int32_t y, uint32_t up, int32_t down)
 }
 
 /* The solution for f, |f| < 2^62. */
-PVID_APART static void solve_for(const factors *factor, const int64_t f[PVID_KAPITZA_P], solutions *solution)
+PVID_NOINLINE static void solve_for(const factors *factor, const int64_t f[PVID_KAPITZA_P], solutions *solution)
 {
     int32_t h = INT32_MIN;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
@@ -365,7 +365,7 @@ static int32_t bounded(const pvid_kapitza_estimator_q31 *self, size_t a, int32_t
     return (int32_t)within;
 }
 
-PVID_APART static void take_step(pvid_kapitza_estimator_q31 *self, const int64_t dp[])
+PVID_NOINLINE static void take_step(pvid_kapitza_estimator_q31 *self, const int64_t dp[])
 {
     bool is_long = false;
     for (size_t a = 0; a < PVID_KAPITZA_P; a++) {
@@ -391,19 +391,19 @@ static bool is_excited(const pvid_kapitza_estimator_q31 *self, const factors *fa
            ((factor->p0 >= pvid_part_q31(kappa_min, factor->s00)) && ((factor->p0 / 2) >= factor->prior));
 }
 
-PVID_APART static pvid_reason solve(pvid_kapitza_estimator_q31 *self)
+PVID_NOINLINE static pvid_reason solve(pvid_kapitza_estimator_q31 *self)
 {
     pvid_kapitza_system_q31 system;
     factors factor;
     pvid_kapitza_project_q31(self, &system);
     if (!factorise(self, &system, &factor)) {
-        return pvid_count_held(&self->counters, PVID_HELD_PIVOT);
+        return pvid_count_held(&self->counters, PVID_HELD_SINGULAR);
     }
     if (!is_excited(self, &factor)) {
         return pvid_count_held(&self->counters, PVID_HELD_NOT_EXCITED);
     }
     if ((PVID_DEAD_ZONE != 0) && (self->settings.dead_zone > 0u) && is_in_dead_zone(self, &system, &factor)) {
-        pvid_count_up(&self->counters.at_rest);
+        pvid_count_up(&self->counters.in_dead_zone);
         return PVID_UPDATED;
     }
     solutions solution;

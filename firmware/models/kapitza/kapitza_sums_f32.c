@@ -65,7 +65,7 @@ void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 block[restrict], const 
     low[PVID_SUM_WEIGHT] += (float)PVID_STRONG_ROWS;
     const four f2 = OF_ROWS(f2);
     const four f0 = OF_ROWS(f0);
-    PVID_ROLLED
+    PVID_NO_UNROLL
     for (size_t i = 0; i < 3u; i++) {
         const four x = OF_ROWS(x[i]);
         add_powers(&low[(PVID_SUM_A2 + 3u) + (4u * i)], 4, 4, 4, times(x, f2), u);
@@ -73,7 +73,7 @@ void pvid_kapitza_add_rows_f32(const pvid_strong_row_f32 block[restrict], const 
     }
     four x = times(f2, f2);
     float *end = &low[PVID_SUM_K22 + 6u];
-    PVID_ROLLED
+    PVID_NO_UNROLL
     for (size_t n = 7; n <= 9u; n++) {
         add_powers(end, n, 7, 9, x, u);
         x = (n == 7u) ? times(f2, f0) : times(f0, f0);

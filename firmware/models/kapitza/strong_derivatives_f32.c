@@ -52,8 +52,8 @@ PVID_COLD void pvid_strong_window_reset_f32(pvid_strong_window_f32 *self)
     }
 }
 
-PVID_SELDOM bool pvid_strong_window_takes_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, float phi,
-                                              float y)
+PVID_NOINLINE bool pvid_strong_window_takes_f32(pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank, float phi,
+                                                float y)
 {
     const size_t head = self->head;
     const uint32_t samples = (uint32_t)self->at + 1u;
@@ -85,8 +85,8 @@ static inline void add_pair(pvid_strong_filters_f32 *sums, float after, float be
     sums->order4 += weights[4] * even;
 }
 
-PVID_SELDOM void pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank,
-                                               pvid_strong_filters_f32 sums[2])
+PVID_NOINLINE void pvid_strong_window_filter_f32(const pvid_strong_window_f32 *self, const pvid_fir_bank_f32 *bank,
+                                                 pvid_strong_filters_f32 sums[2])
 {
     const size_t half = bank->half;
     const float *weight = bank->weights;

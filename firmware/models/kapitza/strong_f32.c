@@ -154,7 +154,7 @@ static PVID_COLD bool project_in_zone(pvid_strong_estimator_f32 *self, const flo
         pvid_kapitza_back_f32(&factor, force, x);
         const float square = ((force[0] * x[0]) + (force[1] * x[1])) + (force[2] * x[2]);
         if (pvid_kapitza_is_at_rest_f32(self, square, &residual)) {
-            pvid_count_up(&self->counters.at_rest);
+            pvid_count_up(&self->counters.in_dead_zone);
             return true;
         }
     }
@@ -185,7 +185,7 @@ static inline size_t third(size_t i)
 }
 
 /* A part of the fold at rows 4, 5, 6 of a staged round: between two blocks, after projection and solve. */
-static PVID_SELDOM void fold_in_stages(pvid_strong_estimator_f32 *self)
+static PVID_NOINLINE void fold_in_stages(pvid_strong_estimator_f32 *self)
 {
     const size_t place = self->in_block;
     if ((self->staged != 0u) && (place < (PVID_STRONG_ROWS - 1u)) && (self->age >= self->fold_every)) {

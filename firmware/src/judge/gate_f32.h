@@ -35,10 +35,10 @@ static inline void pvid_gate_begin_anew_f32(pvid_gate_f32 *self)
 /* pvid_gate_passes_f32: inlined for a finite residual while the memory fills, and for one of usual size behind that. */
 static inline bool pvid_gate_judges_f32(pvid_gate_f32 *self, float square)
 {
-    if (PVID_USUALLY(self->judged >= self->memory)) {
-        if (PVID_USUALLY(square < (self->limit * self->scale))) {
+    if (PVID_LIKELY(self->judged >= self->memory)) {
+        if (PVID_LIKELY(square < (self->limit * self->scale))) {
             const float scale = pvid_gate_scale_with_f32(self, square);
-            if (PVID_USUALLY(scale < PVID_GATE_SCALE_MAX)) {
+            if (PVID_LIKELY(scale < PVID_GATE_SCALE_MAX)) {
                 self->scale = scale;
                 return true;
             }

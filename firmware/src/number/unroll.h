@@ -1,5 +1,5 @@
-/* Loop unrolling, which gcc does at -O2 only on request, functions that are for little flash, conditions that are
- * usual. Changes no result. */
+/* Loop unrolling, which gcc does at -O2 only on request, functions that are not inlined or for little flash, likely
+ * conditions. Changes no result. */
 #ifndef PVID_UNROLL_H
 #define PVID_UNROLL_H
 
@@ -9,12 +9,12 @@
 #define PVID_UNROLL _Pragma("GCC unroll 16")
 #define PVID_UNROLL_BY_TWO _Pragma("GCC unroll 2")
 #define PVID_UNROLL_BY_FOUR _Pragma("GCC unroll 4")
-#define PVID_ROLLED _Pragma("GCC unroll 1") /* stays a loop: its turns are long */
+#define PVID_NO_UNROLL _Pragma("GCC unroll 1") /* stays a loop: its turns are long */
 #else
 #define PVID_UNROLL
 #define PVID_UNROLL_BY_TWO
 #define PVID_UNROLL_BY_FOUR
-#define PVID_ROLLED
+#define PVID_NO_UNROLL
 #endif
 
 /* Instead of `static inline`, for a function that is called with constants for which it becomes short, but looks long
@@ -25,26 +25,19 @@
 #define PVID_ALWAYS_INLINE static inline
 #endif
 
-/* Before a function whose results go through memory on purpose: inlined, gcc keeps 32-bit numbers as 64 and multiplies
- * them so. */
+/* Before a function that few ticks need: kept out of its caller, whose other ticks would pay for its registers. And
+ * before one that stores 32-bit results: inlined, gcc holds them in 64 bits and multiplies 64 by 64. */
 #if defined(__GNUC__)
-#define PVID_APART __attribute__((noinline))
+#define PVID_NOINLINE __attribute__((noinline))
 #else
-#define PVID_APART
-#endif
-
-/* Before a function that few ticks need: kept out of its caller, whose other ticks would pay for its registers. */
-#if defined(__GNUC__)
-#define PVID_SELDOM __attribute__((noinline))
-#else
-#define PVID_SELDOM
+#define PVID_NOINLINE
 #endif
 
 /* A condition that nearly every tick meets: gcc keeps the other case out of its way. */
 #if defined(__GNUC__)
-#define PVID_USUALLY(condition) (__builtin_expect((condition), true) != 0)
+#define PVID_LIKELY(condition) (__builtin_expect((condition), true) != 0)
 #else
-#define PVID_USUALLY(condition) (condition)
+#define PVID_LIKELY(condition) (condition)
 #endif
 
 /* Before a function that runs once, or at one tick of hundreds: compiled for little flash. */

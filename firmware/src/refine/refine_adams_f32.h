@@ -43,7 +43,7 @@ static inline void clear_steps(pvid_refine_pass_f32 *self)
     memset(self->difference, 0, sizeof self->difference);
 }
 
-PVID_SELDOM static void predict(pvid_refine_pass_f32 *self)
+PVID_NOINLINE static void predict(pvid_refine_pass_f32 *self)
 {
     const float h = self->h;
     PVID_UNROLL for (size_t i = 0; i < N_Q; i++)
@@ -170,7 +170,7 @@ static void end_double(pvid_refine_pass_f32 *self, const float u[])
 }
 
 /* What the columns need, at the middle of the big step; `a`: the accelerations there. */
-PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float r[], const float u[], float a[])
+PVID_NOINLINE static void differentiate(pvid_refine_pass_f32 *self, const float r[], const float u[], float a[])
 {
     const float *x = self->state;
     pvid_refine_jacobian(self->constants, x, &x[RATES], u, a, self->kick, &self->kick[N_Q * RATES],
@@ -196,7 +196,7 @@ static void start(pvid_refine_pass_f32 *self, const float r[], const pvid_refine
 /* A step: of Adams-Bashforth, or the first or second one behind Runge-Kutta; `signals` are those of its end. At the
  * middle of a big step the derivatives are needed: there the work is longest, and the state has been moved there by the
  * job before. */
-PVID_SELDOM static void step(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
+PVID_NOINLINE static void step(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {
     const bool middle = self->at == (uint8_t)(MIDDLE - 1);
     const bool started = self->starts == 0u;

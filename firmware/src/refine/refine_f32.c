@@ -804,7 +804,7 @@ PVID_COLD static pvid_reason seldom(pvid_refine_f32 *self)
     return reason;
 }
 
-PVID_SELDOM static pvid_reason work(pvid_refine_f32 *self)
+PVID_NOINLINE static pvid_reason work(pvid_refine_f32 *self)
 {
     if (self->phase != (uint8_t)PASS) {
         return seldom(self);
@@ -888,7 +888,7 @@ static inline pvid_reason work_unless(pvid_refine_f32 *self, bool busy)
 }
 
 /* The last tick of a step: of its own it has no jobs. */
-PVID_SELDOM static pvid_reason end_step(pvid_refine_f32 *self, const float sample[], bool busy)
+PVID_NOINLINE static pvid_reason end_step(pvid_refine_f32 *self, const float sample[], bool busy)
 {
     const pvid_refine_entry entry = pvid_refine_front_end_block_f32(&self->front, &self->config, sample);
     if (entry == PVID_REFINE_BROKEN) {

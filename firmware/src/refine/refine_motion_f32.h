@@ -13,7 +13,7 @@
 #define MIDDLE (PVID_REFINE_SUB / 2)
 
 /* Accelerations without derivatives, out of line: one copy of the model. */
-PVID_SELDOM static void accelerations(const float m[], const float state[], const float u[], float a[])
+PVID_NOINLINE static void accelerations(const float m[], const float state[], const float u[], float a[])
 {
     pvid_refine_motion(m, state, &state[RATES], u, a);
 }

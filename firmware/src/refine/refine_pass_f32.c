@@ -221,7 +221,7 @@ static void correct(pvid_refine_pass_f32 *self, const float derivatives[])
 #endif
 
 /* The end of a big step: the first columns, or the others and what completes the rows. */
-PVID_SELDOM static void end_big_step(pvid_refine_pass_f32 *self, const float r[], const float weight[])
+PVID_NOINLINE static void end_big_step(pvid_refine_pass_f32 *self, const float r[], const float weight[])
 {
 #if PVID_REFINE_OUTPUT_LINEAR
     float derivatives[PVID_REFINE_OUTPUTS * (PVID_REFINE_STATES + PVID_REFINE_STILL)];
@@ -268,12 +268,12 @@ PVID_ALWAYS_INLINE void add_rows(pvid_refine_pass_f32 *self, float sum[], size_t
     }
 }
 
-PVID_SELDOM static void add_first_rows(pvid_refine_pass_f32 *self)
+PVID_NOINLINE static void add_first_rows(pvid_refine_pass_f32 *self)
 {
     add_rows(self, self->sums.sum, 0, PART_OF_SUMS);
 }
 
-PVID_SELDOM static void add_other_rows(pvid_refine_pass_f32 *self)
+PVID_NOINLINE static void add_other_rows(pvid_refine_pass_f32 *self)
 {
     add_rows(self, &self->sums.sum[SUMS_BEFORE], PART_OF_SUMS, PVID_REFINE_WIDTH);
     self->rows = 0;

@@ -59,7 +59,7 @@ static void double_factor(pvid_refine_pass_f32 *self)
 }
 
 /* Adds the derivatives at the beginning of a part to their mean over the big step; `a`: the rates there. */
-PVID_SELDOM static void differentiate(pvid_refine_pass_f32 *self, const float u[], float a[])
+PVID_NOINLINE static void differentiate(pvid_refine_pass_f32 *self, const float u[], float a[])
 {
     const float share = 1.0f / (float)((uint32_t)PVID_REFINE_SUB * (uint32_t)self->parts);
     const float *x = self->state;
@@ -129,7 +129,7 @@ static void divide(pvid_refine_pass_f32 *self, const float u[])
 }
 
 /* The first two slopes of a part of a step. */
-PVID_SELDOM static void slopes(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
+PVID_NOINLINE static void slopes(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {
     float at[PVID_REFINE_STATES];
     if ((self->at == (uint8_t)MIDDLE) && (self->part == 0u)) {
@@ -147,7 +147,7 @@ PVID_SELDOM static void slopes(pvid_refine_pass_f32 *self, const float r[], cons
 }
 
 /* The other two, and its end. */
-PVID_SELDOM static void step(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
+PVID_NOINLINE static void step(pvid_refine_pass_f32 *self, const float r[], const pvid_refine_signals_f32 *signals)
 {
     const float h = self->part_s;
     const float *second = self->scratch[0];

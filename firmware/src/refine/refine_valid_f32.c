@@ -33,7 +33,7 @@ static pvid_status signals_are_valid(const pvid_refine_config_f32 *config, size_
             return PVID_BAD_DESIGN;
         }
         if (!pvid_within_f32(signal->range, 1.0e-9f, 1.0e9f)) {
-            return PVID_BAD_ANGLE_LIMIT;
+            return PVID_BAD_RANGE;
         }
     }
     const bool weights =

@@ -19,10 +19,10 @@ static inline bool pvid_solve_is_due(uint16_t *phase, uint16_t divider)
     return true;
 }
 
-/* Counts a solve that holds p, PVID_HELD_PIVOT or PVID_HELD_NOT_EXCITED, and returns the reason. */
+/* Counts a solve that holds p, PVID_HELD_SINGULAR or PVID_HELD_NOT_EXCITED, and returns the reason. */
 static inline pvid_reason pvid_count_held(pvid_counters *counters, pvid_reason reason)
 {
-    pvid_count_up((reason == PVID_HELD_PIVOT) ? &counters->held_pivot : &counters->held_not_excited);
+    pvid_count_up((reason == PVID_HELD_SINGULAR) ? &counters->held_singular : &counters->held_not_excited);
     return reason;
 }
 

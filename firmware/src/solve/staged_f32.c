@@ -188,7 +188,7 @@ static void take_step(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *solve,
         solve->reason = pvid_count_held(&self->counters, solution.reason);
     }
     if (solution.in_dead_zone) {
-        pvid_count_up(&self->counters.at_rest);
+        pvid_count_up(&self->counters.in_dead_zone);
     }
     pvid_count_step(&self->counters, solution.limited, solution.bounded);
     solve->in_dead_zone = solution.in_dead_zone;
@@ -268,7 +268,7 @@ static void commit_stage(pvid_estimator_f32 *self, pvid_estimator_solve_f32 *sol
     float *low = &self->information.low[self->model->n_moments];
     if (!pvid_finite_f32(solve->fall) || !pvid_finite_f32(low[n] - solve->fall)) {
         if (steps) {
-            solve->reason = pvid_count_held(&self->counters, PVID_HELD_PIVOT);
+            solve->reason = pvid_count_held(&self->counters, PVID_HELD_SINGULAR);
         }
         return;
     }

@@ -151,7 +151,7 @@ static void factor_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     }
     solve->reason = PVID_UPDATED;
     if (!solve->now.system.factor.positive) {
-        solve->reason = pvid_count_held(&self->counters, PVID_HELD_PIVOT);
+        solve->reason = pvid_count_held(&self->counters, PVID_HELD_SINGULAR);
     } else if (!solve->above_noise || !pvid_step_is_excited_q31(&solve->now.system, &self->settings)) {
         solve->reason = pvid_count_held(&self->counters, PVID_HELD_NOT_EXCITED);
     } else {
@@ -255,7 +255,7 @@ static void step_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *solve
 {
     memcpy(solve->now.step.p, self->p, sizeof solve->now.step.p);
     if (solve->in_dead_zone) {
-        pvid_count_up(&self->counters.at_rest);
+        pvid_count_up(&self->counters.in_dead_zone);
     } else if (solve->reason == PVID_UPDATED) {
         take_step(self, solve);
     } else if (solve->has_fallback) {
@@ -336,7 +336,7 @@ static void commit_stage(pvid_estimator_q31 *self, pvid_estimator_solve_q31 *sol
     const int64_t residual = sums[n] - fall_of(self, solve);
     if (!fits || (residual > PVID_CLAMP_LIMIT)) {
         if (steps) {
-            solve->reason = pvid_count_held(&self->counters, PVID_HELD_PIVOT);
+            solve->reason = pvid_count_held(&self->counters, PVID_HELD_SINGULAR);
         }
         return;
     }

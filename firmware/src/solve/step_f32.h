@@ -21,7 +21,7 @@
 typedef struct {
     float *p;           /* [n_p] p after the step, within its bounds */
     float size;         /* largest |dp/p| before step_limit; 0 if there is no step */
-    pvid_reason reason; /* PVID_UPDATED, or PVID_HELD_PIVOT if dp is not finite */
+    pvid_reason reason; /* PVID_UPDATED, or PVID_HELD_SINGULAR if dp is not finite */
     bool in_dead_zone;  /* p is within the dead zone: no step */
     bool limited;       /* shortened to step_limit */
     bool bounded;       /* a parameter was stopped at its bound */
@@ -98,7 +98,7 @@ static inline bool pvid_step_is_in_dead_zone_f32(const pvid_system_f32 *system, 
 
 /* Factors S + H0. Returns PVID_UPDATED if a step is allowed. Fails iff
  *   - a diagonal entry of S + H0 is not a positive normal number or a relative pivot is below PVID_PIVOT_MIN:
- *     PVID_HELD_PIVOT, or
+ *     PVID_HELD_SINGULAR, or
  *   - p[0] is not sufficiently excited: PVID_HELD_NOT_EXCITED.
  * Cost: a factorisation. */
 static inline pvid_reason pvid_step_factor_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
@@ -107,13 +107,13 @@ static inline pvid_reason pvid_step_factor_f32(const pvid_system_f32 *system, co
     const bool solvable = pvid_cholesky_factor_f32(factor, settings->n_p, system->s);
     const float kappa = factor->first_pivot;
     if (!solvable) {
-        return PVID_HELD_PIVOT;
+        return PVID_HELD_SINGULAR;
     }
     return pvid_step_is_excited_f32(settings, kappa, system->s[0][0]) ? PVID_UPDATED : PVID_HELD_NOT_EXCITED;
 }
 
 /* dp = (S + H0)^-1 rhs, shortened to the step limit, and p + dp within the bounds. No step in the dead zone. Fails iff
- * dp is not finite: solution->reason is PVID_HELD_PIVOT. Cost: a solve, two with a dead zone, n_p
+ * dp is not finite: solution->reason is PVID_HELD_SINGULAR. Cost: a solve, two with a dead zone, n_p
  * + 1 divisions. Source: theory.md 4, equation (6). */
 static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_solve_settings_f32 *settings,
                                       const pvid_cholesky_f32 *factor, const float p[], const float rhs[],
@@ -132,7 +132,7 @@ static inline void pvid_step_take_f32(const pvid_system_f32 *system, const pvid_
     pvid_cholesky_solve_f32(factor, rhs, dp);
     const float size = pvid_step_size_f32(settings, p, dp);
     if (!pvid_finite_f32(size)) {
-        solution->reason = PVID_HELD_PIVOT;
+        solution->reason = PVID_HELD_SINGULAR;
         return;
     }
     solution->size = size;

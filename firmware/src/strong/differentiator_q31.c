@@ -169,7 +169,7 @@ PVID_COLD void pvid_differentiator_reset_q31(pvid_differentiator_q31 *self)
 }
 
 /* Adds a sample of each channel to the sums of a block, which are exact. Returns whether it is complete. */
-static PVID_SELDOM bool add_to_block(pvid_differentiator_q31 *self, int32_t phi, int32_t y)
+static PVID_NOINLINE bool add_to_block(pvid_differentiator_q31 *self, int32_t phi, int32_t y)
 {
     const uint32_t samples = (uint32_t)self->at + 1u;
     int32_t *point = self->history[self->head];
@@ -250,8 +250,8 @@ static inline int64_t weighted(int32_t weight, int32_t difference, bool wide)
 #endif
 }
 
-PVID_SELDOM static void differentiate(const pvid_differentiator_q31 *self, int32_t d_phi[PVID_ORDERS],
-                                      int32_t d_y[PVID_Y_ORDERS_Q31])
+PVID_NOINLINE static void differentiate(const pvid_differentiator_q31 *self, int32_t d_phi[PVID_ORDERS],
+                                        int32_t d_y[PVID_Y_ORDERS_Q31])
 {
     const size_t length = self->length;
     const size_t half = self->bank.half;

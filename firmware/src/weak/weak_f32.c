@@ -41,7 +41,7 @@ PVID_COLD static pvid_status limits_are_valid(const pvid_weak_config_f32 *config
 {
     for (size_t i = 0; i < config->design->model->samples; i++) {
         if ((config->range != NULL) && !pvid_within_f32(config->range[i], 1.0e-30f, 3.4e38f)) {
-            return PVID_BAD_ANGLE_LIMIT;
+            return PVID_BAD_RANGE;
         }
         if ((config->drive_min != NULL) && !pvid_within_f32(config->drive_min[i], 0.0f, 1.0e9f)) {
             return PVID_BAD_DRIVE_MIN;
@@ -123,7 +123,7 @@ static inline uint8_t harmonics_of(const pvid_weak_f32 *self)
 }
 
 /* What a tick without a step does from now on. */
-PVID_SELDOM static void rest(pvid_weak_f32 *self)
+PVID_NOINLINE static void rest(pvid_weak_f32 *self)
 {
     if (pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self))) {
         self->rest = ADD;
@@ -280,7 +280,7 @@ PVID_COLD static pvid_reason drop_reason(pvid_weak_f32 *self)
 
 /* Behind the channels of a step, the block's end; if they complete a window that is dropped, returns the reason; else
  * PVID_ACCUMULATED. */
-PVID_SELDOM static pvid_reason end_half(pvid_weak_f32 *self)
+PVID_NOINLINE static pvid_reason end_half(pvid_weak_f32 *self)
 {
     if (self->sums.halves < 2u) {
         return PVID_ACCUMULATED;
@@ -296,7 +296,7 @@ PVID_SELDOM static pvid_reason end_half(pvid_weak_f32 *self)
 }
 
 /* The channels of a step to the present block. */
-PVID_SELDOM static pvid_reason form(pvid_weak_f32 *self)
+PVID_NOINLINE static pvid_reason form(pvid_weak_f32 *self)
 {
     mark_busy(self);
     const pvid_weak_design_f32 *design = self->design;
@@ -387,7 +387,7 @@ PVID_COLD static void lead(pvid_weak_f32 *self)
 }
 
 /* The last tick of a block. */
-PVID_SELDOM static pvid_reason end_block(pvid_weak_f32 *self, const float sample[])
+PVID_NOINLINE static pvid_reason end_block(pvid_weak_f32 *self, const float sample[])
 {
     const uint8_t decimation = pvid_weak_decimation(self->front.decimation);
     const bool steps = pvid_weak_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
@@ -411,7 +411,7 @@ PVID_SELDOM static pvid_reason end_block(pvid_weak_f32 *self, const float sample
 }
 
 /* A tick with something to do. */
-PVID_SELDOM static pvid_reason due(pvid_weak_f32 *self)
+PVID_NOINLINE static pvid_reason due(pvid_weak_f32 *self)
 {
     if (self->rest == ADD) {
         return add(self);
@@ -479,7 +479,7 @@ PVID_ALWAYS_INLINE pvid_reason weak_tick(pvid_weak_f32 *self, const float sample
 #define RENEWING ((1uL << PVID_UPDATED) | (1uL << PVID_MISFIT) | (1uL << PVID_HELD_UNCERTAIN))
 
 /* A tick of both stages: the second one knows at which the first one has more to do than to take a sample. */
-PVID_SELDOM static pvid_reason both_ticks(pvid_weak_f32 *self, const float sample[])
+PVID_NOINLINE static pvid_reason both_ticks(pvid_weak_f32 *self, const float sample[])
 {
     self->busy = false;
     const pvid_reason reason = weak_tick(self, sample);

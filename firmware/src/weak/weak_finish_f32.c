@@ -155,7 +155,7 @@ static size_t last_of(const pvid_weak_finish_f32 *self, size_t each, size_t all)
     return (end < all) ? end : all;
 }
 
-PVID_SELDOM static bool weigh_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool weigh_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const size_t all = self->design->n_noise;
@@ -170,7 +170,7 @@ PVID_SELDOM static bool weigh_stage(pvid_weak_f32 *self)
     return goes_on(finish, last, all);
 }
 
-PVID_SELDOM static bool spectrum_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool spectrum_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     pvid_weak_white_spectrum_f32(&finish->white, self->design, finish->kind, finish->error[finish->kind].variance);
@@ -188,7 +188,7 @@ PVID_COLD static bool scale_stage(pvid_weak_f32 *self)
     return false;
 }
 
-PVID_SELDOM static bool basis_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool basis_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const size_t place = finish->index;
@@ -196,7 +196,7 @@ PVID_SELDOM static bool basis_stage(pvid_weak_f32 *self)
     return goes_on(finish, place + 1u, pvid_weak_basis_stages(self->design));
 }
 
-PVID_SELDOM static bool share_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool share_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const size_t all = pvid_weak_harmonics(self->design);
@@ -249,7 +249,7 @@ static void add_noise(pvid_weak_f32 *self, const pvid_weak_slopes_f32 *slopes)
 
 /* C at p; then for each column of it, whose non-zeros begin at `other`, V times it by a few entries of the noise table,
  * V as in white_f32.h. The sum is in the place of the covariance of the assessment, which comes later. */
-PVID_SELDOM static bool noise_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool noise_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const pvid_model_f32 *model = self->estimator.model;
@@ -329,7 +329,7 @@ static void clear_parts(pvid_weak_f32 *self)
 }
 
 /* The present column: its terms, the first of them in phase 0, then the rows of one family after the other. */
-PVID_SELDOM static bool column_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool column_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const bool both = self->design->functions <= BOTH_FAMILIES;
@@ -361,7 +361,7 @@ static size_t projections_per_stage(const pvid_weak_design_f32 *design)
 
 /* Of each nuisance in order: part 0 its inverse square, then the columns without it, those of theta, Y and the
  * nuisances behind it. */
-PVID_SELDOM static bool project_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool project_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     float (*column)[PVID_MAX_FUNCTIONS] = finish->work.rows.of_kind.column;
@@ -409,7 +409,7 @@ static size_t products_per_stage(const pvid_weak_design_f32 *design)
 }
 
 /* e, in the place of Y */
-PVID_SELDOM static bool residual_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool residual_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     const float (*column)[PVID_MAX_FUNCTIONS] = (const float (*)[PVID_MAX_FUNCTIONS])finish->work.rows.of_kind.column;
@@ -552,7 +552,7 @@ PVID_COLD static void take_error(pvid_weak_f32 *self)
 
 /* Products of column `index` with those behind it, the last of them e: a row of M without its diagonal, and an entry of
  * b. */
-PVID_SELDOM static bool add_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool add_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     pvid_weak_rows_f32 *work = &finish->work.rows;
@@ -617,7 +617,7 @@ PVID_COLD static bool begin_stage(pvid_weak_f32 *self)
 }
 
 /* ACCUMULATED: the divider allows no solve after this window. */
-PVID_SELDOM static bool solve_stage(pvid_weak_f32 *self)
+PVID_NOINLINE static bool solve_stage(pvid_weak_f32 *self)
 {
     pvid_weak_finish_f32 *finish = &self->finish;
     if (!pvid_estimator_advance_f32(&self->estimator, &finish->work.solve)) {

@@ -132,8 +132,8 @@ static inline float other_signal(uint8_t source, float before, float last, float
     return (source == (uint8_t)PVID_SIGNAL_JUMP) ? (jump_scale * (now - last)) : last;
 }
 
-PVID_SELDOM void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvid_weak_model_f32 *model,
-                                            const float sample[])
+PVID_NOINLINE void pvid_weak_front_derive_f32(pvid_weak_front_f32 *self, const pvid_weak_model_f32 *model,
+                                              const float sample[])
 {
     const size_t signals = PVID_COUNT(PVID_EXACT_SIGNALS, model->signals);
     const bool next = self->needs == PVID_WEAK_NEEDS_NEXT; /* then the signals are those of the tick before */

@@ -95,8 +95,8 @@ static int32_t signal_of(const pvid_weak_front_q31 *self, pvid_weak_signal signa
     return (signal.source == (uint8_t)PVID_SIGNAL_JUMP) ? (now - last) : now;
 }
 
-PVID_SELDOM bool pvid_weak_front_derive_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design,
-                                            const int32_t reading[])
+PVID_NOINLINE bool pvid_weak_front_derive_q31(pvid_weak_front_q31 *self, const pvid_weak_design_q31 *design,
+                                              const int32_t reading[])
 {
     const pvid_weak_model_q31 *model = design->model;
     const bool first = !self->seen;

@@ -171,7 +171,7 @@ static pvid_reason hand_over(pvid_weak_q31 *self)
     return PVID_ACCUMULATED;
 }
 
-PVID_SELDOM static pvid_reason reject(pvid_weak_q31 *self)
+PVID_NOINLINE static pvid_reason reject(pvid_weak_q31 *self)
 {
     restart(self);
     pvid_count_up(&self->estimator.counters.rejected_saturated);
@@ -179,7 +179,7 @@ PVID_SELDOM static pvid_reason reject(pvid_weak_q31 *self)
 }
 
 /* The last tick of a step. */
-PVID_SELDOM static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t reading[])
+PVID_NOINLINE static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t reading[])
 {
     const uint16_t index = self->collect.values.index;
     const uint8_t half = self->collect.values.half;
@@ -225,7 +225,7 @@ static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
 }
 
 /* A tick that ends no step, with work. */
-PVID_SELDOM static pvid_reason work(pvid_weak_q31 *self)
+PVID_NOINLINE static pvid_reason work(pvid_weak_q31 *self)
 {
     if (self->collect.sums.left == 0u) {
         return advance_finish(self);
@@ -246,7 +246,7 @@ static inline pvid_reason end_tick(pvid_weak_q31 *self, const int32_t reading[])
 }
 
 /* A tick whose readings need more than to be added. */
-PVID_SELDOM static pvid_reason other_tick(pvid_weak_q31 *self, const int32_t reading[])
+PVID_NOINLINE static pvid_reason other_tick(pvid_weak_q31 *self, const int32_t reading[])
 {
     if (!is_ready(self) || (reading == NULL)) {
         return PVID_NOT_READY;

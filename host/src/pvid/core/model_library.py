@@ -21,7 +21,7 @@ from pvid.settings.engine_cores import FLOAT, EngineCore
 
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-w")
-_ROOMS = ("number", "solve", "judge", "keep")  # of every form
+_ROOMS = ("number", "solve", "judge", "persist")  # of every form
 _REFINED = "refine_model_f32.h"  # a text that comes with the second stage
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"

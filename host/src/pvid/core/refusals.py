@@ -40,7 +40,7 @@ _RANGES: Mapping[Status, tuple[tuple[str, float, float], ...]] = {
     Status.BAD_NEGLECTED: (("neglected", 0, 1),),
     Status.BAD_GATE_SIGMAS: (("sigmas", 0, 1e3), ("outlier_gate", 0, 1e3), ("gate", 0, 1e3)),
     Status.BAD_GATE_PATIENCE: (("patience_s", 0, 1e12),),
-    Status.BAD_ANGLE_LIMIT: (("range", 1e-9, 1e9),),
+    Status.BAD_RANGE: (("range", 1e-9, 1e9),),
     Status.BAD_OVERLAP: (("overlap", 1, 1e6),),
     Status.BAD_DECIMATION: (("decimation", 1, 255), ("ratio", 1, 255), ("parts", 1, 64), ("fine_parts", 1, 64)),
     Status.BAD_ITERATIONS: (("iterations", 1, 255), ("passes", 1, 16), ("most_passes", 1, 16), ("jobs", 1, 128)),

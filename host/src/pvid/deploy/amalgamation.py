@@ -18,11 +18,12 @@ _OWN_INCLUDE = re.compile(r'^#include "([^"]+)"[^\n]*\n', re.MULTILINE)
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 # At file scope: the name before a parameter list, an array's bounds, a value or the end.
 _STATIC = re.compile(
-    r"^(?:PVID_(?:SELDOM|COLD) )?(?:static|PVID_[A-Z_]*INLINE)\s[^;{=(]*?\b(\w+)\s*(?:\(|\[|=|;)", re.MULTILINE
+    r"^(?:PVID_(?:NOINLINE|COLD) )?(?:static|PVID_[A-Z_]*INLINE)\s[^;{=(]*?\b(\w+)\s*(?:\(|\[|=|;)", re.MULTILINE
 )
 _ENUM = re.compile(r"^(?:typedef )?enum\s*\w*\s*\{([^}]*)\}", re.MULTILINE)
 _PUBLIC = re.compile(
-    r"^(?:PVID_(?:SELDOM|COLD) )?(?!static|typedef|extern|return)[a-z][\w \*]*?\b(pvid_\w+)\s*(?:\(|\[|=)", re.MULTILINE
+    r"^(?:PVID_(?:NOINLINE|COLD) )?(?!static|typedef|extern|return)[a-z][\w \*]*?\b(pvid_\w+)\s*(?:\(|\[|=)",
+    re.MULTILINE,
 )
 _MACRO = re.compile(r"^[ \t]*#[ \t]*define (\w+)", re.MULTILINE)
 _TEXTS = "pvid/text.h"

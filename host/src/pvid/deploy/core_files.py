@@ -12,7 +12,7 @@ from pvid.core.sources import FIRMWARE, SRC
 from pvid.deploy.arithmetic import Arithmetic
 from pvid.deploy.deployment import Deployment, Files
 
-_ROOMS = ("number", "solve", "judge", "weak", "keep")
+_ROOMS = ("number", "solve", "judge", "weak", "persist")
 _REFINED = "refine"  # a room that some deployments have
 _OF_MODEL = ("pvid/refine_shape.h", "refine_model_f32.h")  # which come with the mechanism
 _INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)

@@ -26,14 +26,14 @@ COUNTERS = (
     "limited",
     "bounded",
     "held_not_excited",
-    "held_pivot",
+    "held_singular",
     "rejected_not_finite",
     "rejected_saturated",
     "held_uncertain",
     "held_out_of_range",
     "misfits",
     "rejected_outlier",
-    "at_rest",
+    "in_dead_zone",
 )
 
 

@@ -67,7 +67,7 @@ bool pvid_kapitza_estimator_innovate_q31(const pvid_kapitza_estimator_q31 *self,
                                          int32_t gradient[PVID_KAPITZA_P]);
 
 /* Adds such a row and, every `divider` rows, solves and moves p. Returns PVID_UPDATED, PVID_ACCUMULATED (no solve due),
- * PVID_HELD_NOT_EXCITED or PVID_HELD_PIVOT. */
+ * PVID_HELD_NOT_EXCITED or PVID_HELD_SINGULAR. */
 pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, const int32_t row[PVID_KAPITZA_ROW_Q31],
                                             int32_t e, const int32_t gradient[PVID_KAPITZA_P]);
 

@@ -127,14 +127,14 @@ class Estimator:
         below = x < self.lower
         x = np.where(below, self.lower, x)
         reason = np.full(len(due), Reason.UPDATED, np.uint8)
-        reason[~np.isfinite(size) & ~in_dead_zone] = Reason.HELD_PIVOT
+        reason[~np.isfinite(size) & ~in_dead_zone] = Reason.HELD_SINGULAR
         reason[~excited] = Reason.HELD_NOT_EXCITED
-        reason[~f.ok] = Reason.HELD_PIVOT
+        reason[~f.ok] = Reason.HELD_SINGULAR
         self.counters["limited"] += moving & limited
         self.counters["bounded"] += moving & (above | below).any(axis=0)
         self.counters["held_not_excited"] += due & (reason == Reason.HELD_NOT_EXCITED)
-        self.counters["held_pivot"] += due & (reason == Reason.HELD_PIVOT)
-        self.counters["at_rest"] += in_dead_zone
+        self.counters["held_singular"] += due & (reason == Reason.HELD_SINGULAR)
+        self.counters["in_dead_zone"] += in_dead_zone
         return x, reason, in_dead_zone
 
     def _at_rest(self, f: cholesky.Factor, force: Float32) -> npt.NDArray[np.bool_]:
@@ -424,8 +424,8 @@ class RelativeEstimator(Estimator):
         residual = self.information.low[-2] - fall
         finite = np.isfinite(fall) & np.isfinite(residual)
         overflow = stepping & ~finite
-        reason[overflow] = Reason.HELD_PIVOT
-        self.counters["held_pivot"] += overflow
+        reason[overflow] = Reason.HELD_SINGULAR
+        self.counters["held_singular"] += overflow
         moving = (stepping | falls_back) & finite
         places = slice(pattern.moments, pattern.moments + pattern.n_theta)
         low = self.information.low.copy()

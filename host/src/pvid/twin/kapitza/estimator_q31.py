@@ -431,17 +431,17 @@ class KapitzaEstimatorQ31:
         excited |= self.kappa_min == 0
         reason = np.full(self.lanes, Reason.UPDATED, np.uint8)
         reason[~excited] = Reason.HELD_NOT_EXCITED
-        reason[~factor.ok] = Reason.HELD_PIVOT
+        reason[~factor.ok] = Reason.HELD_SINGULAR
         updated = reason == Reason.UPDATED
         at_rest = updated & self._at_rest(system, factor)
         x, exponent, _, _ = factor.solve(self._driven(system))
         bits = np.stack([W_BITS + system.time, self.bits[0] - system.of_x, self.bits[1] - system.of_z])
         dp = clamp(scale(x, -(exponent - factor.g + bits)), STEP_MAX)
         self._move(dp, updated & ~at_rest)
-        self.counters["at_rest"] += at_rest
+        self.counters["in_dead_zone"] += at_rest
         self.counters["updates"] += updated & ~at_rest
         self.counters["held_not_excited"] += reason == Reason.HELD_NOT_EXCITED
-        self.counters["held_pivot"] += reason == Reason.HELD_PIVOT
+        self.counters["held_singular"] += reason == Reason.HELD_SINGULAR
         return reason
 
     def _driven(self, system: _System) -> Int:

@@ -246,7 +246,7 @@ class StrongEstimator(Estimator):
         own = pivot0 >= _F(2) * self.prior[0]
         excited = (pivot0 >= self.kappa_min * s00) & (own | ~(self.kappa_min > 0))
         reason = np.where(excited, Reason.UPDATED, Reason.HELD_NOT_EXCITED)
-        reason = np.where(solvable, reason, Reason.HELD_PIVOT).astype(np.uint8)
+        reason = np.where(solvable, reason, Reason.HELD_SINGULAR).astype(np.uint8)
         return _Factor(l01, l02, l12, inverse1, inverse2, pivot0, reason)
 
     def _solve_system(self, due: Mask, s: Float32, rhs: Float32, reason: Reasons) -> None:
@@ -260,7 +260,7 @@ class StrongEstimator(Estimator):
         limited = largest > self.step_limit.view(np.uint32)
         found = factor.reason.copy()
         finite = largest < np.uint32(0x7F800000)
-        found[(found == Reason.UPDATED) & ~finite] = Reason.HELD_PIVOT
+        found[(found == Reason.UPDATED) & ~finite] = Reason.HELD_SINGULAR
         moving = due & (found == Reason.UPDATED)
         part = np.where(limited, self.step_limit / largest.view(np.float32), _F(1)).astype(np.float32, copy=False)
         x = self.p + part * dp
@@ -273,7 +273,7 @@ class StrongEstimator(Estimator):
         self.counters["limited"] += moving & limited
         self.counters["bounded"] += moving & bounded
         self.counters["updates"] += moving
-        self.counters["held_pivot"] += due & (found == Reason.HELD_PIVOT)
+        self.counters["held_singular"] += due & (found == Reason.HELD_SINGULAR)
         self.counters["held_not_excited"] += due & (found == Reason.HELD_NOT_EXCITED)
 
     def _in_zone(self, due: Mask, g: Float32, e: Float32, innovation: Float32, reason: Reasons) -> None:
@@ -291,7 +291,7 @@ class StrongEstimator(Estimator):
         noise = np.where(found < self.row_variance, found, self.row_variance)
         rests = due & (factor.reason == Reason.UPDATED) & (square <= self.dead_zone * (self.correlation * noise))
         reason[rests] = Reason.UPDATED
-        self.counters["at_rest"] += rests
+        self.counters["in_dead_zone"] += rests
         force = (self.gain * force) + ((_F(1) - self.gain) * innovation)
         self._solve_system(due & ~rests, s, force, reason)
 

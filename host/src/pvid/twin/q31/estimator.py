@@ -489,7 +489,7 @@ class EstimatorQ31:
         excited = (factor.first_pivot >= self.kappa_min) & (own | (self.kappa_min == 0))
         reason = np.full(self.lanes, Reason.UPDATED, np.uint8)
         reason[~(excited & above_noise)] = Reason.HELD_NOT_EXCITED
-        reason[~factor.ok] = Reason.HELD_PIVOT
+        reason[~factor.ok] = Reason.HELD_SINGULAR
 
         b = self.sums[model.moments : model.moments + model.n_theta]
         in_dead_zone = (reason == Reason.UPDATED) & self._at_rest(factor, c, scale(b, h), g)
@@ -500,7 +500,7 @@ class EstimatorQ31:
         _, x, x_h = self._solve_for(factor, c, force, g)
         dp = clamp(scale(x, f + g - x_h - force_h + 62), STEP_MAX)
         steps = reason == Reason.UPDATED
-        self.counters["at_rest"] += in_dead_zone
+        self.counters["in_dead_zone"] += in_dead_zone
         p = self._limited(dp, steps & ~in_dead_zone)
         falls_back = np.zeros(self.lanes, np.bool_)
         if fallback is not None:
@@ -572,7 +572,7 @@ class EstimatorQ31:
         fall = (v * w).sum(axis=0)
         residual = self.sums[-2] - clamp(scale(fall, -(v_h + w_h)), HELD_LIMIT)
         overflow = (residual > HELD_LIMIT) | (np.abs(b - moved) > HELD_LIMIT).any(axis=0)
-        reason[overflow & (reason == Reason.UPDATED) & ~in_dead_zone] = Reason.HELD_PIVOT
+        reason[overflow & (reason == Reason.UPDATED) & ~in_dead_zone] = Reason.HELD_SINGULAR
         stepping = (reason == Reason.UPDATED) & ~in_dead_zone
         moving = stepping | (falls_back & ~overflow)
         kept = self.sums[model.moments : -2]
@@ -582,7 +582,7 @@ class EstimatorQ31:
         self.p = np.where(moving, p, self.p)
         self.counters["updates"] += stepping
         self.counters["held_not_excited"] += reason == Reason.HELD_NOT_EXCITED
-        self.counters["held_pivot"] += reason == Reason.HELD_PIVOT
+        self.counters["held_singular"] += reason == Reason.HELD_SINGULAR
         return reason
 
     # ---- what is published ----

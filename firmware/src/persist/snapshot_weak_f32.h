@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "keep/snapshot.h"
+#include "persist/snapshot.h"
 #include "pvid/weak.h"
 
 extern const pvid_snapshot_shape pvid_snapshot_weak_shape_f32;

@@ -1,8 +1,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "keep/fingerprint_weak_q31.h"
-#include "keep/snapshot.h"
+#include "persist/fingerprint_weak_q31.h"
+#include "persist/snapshot.h"
 #include "pvid/snapshot_weak_q31.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_weak_q31, field))

@@ -3,8 +3,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "keep/fingerprint_weak_f32.h"
-#include "keep/snapshot_weak_f32.h"
+#include "persist/fingerprint_weak_f32.h"
+#include "persist/snapshot_weak_f32.h"
 #include "pvid/snapshot_weak.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_weak_f32, field))

@@ -1,9 +1,9 @@
-#include "keep/fingerprint_q31.h"
+#include "persist/fingerprint_q31.h"
 
 #include <stddef.h>
 
-#include "keep/fingerprint_parts_q31.h"
-#include "keep/fingerprint_tables.h"
+#include "persist/fingerprint_parts_q31.h"
+#include "persist/fingerprint_tables.h"
 #include "pvid/fnv_word.h"
 
 static uint32_t bank_of(uint32_t hash, const pvid_fir_bank_q31 *bank)

@@ -1,4 +1,4 @@
-#include "keep/fingerprint_parts_q31.h"
+#include "persist/fingerprint_parts_q31.h"
 
 #include "pvid/fnv_word.h"
 

@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
-#include "keep/fingerprint_refine_f32.h"
-#include "keep/snapshot_weak_f32.h"
+#include "persist/fingerprint_refine_f32.h"
+#include "persist/snapshot_weak_f32.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_refine_f32, field))
 

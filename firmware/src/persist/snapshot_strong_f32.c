@@ -3,8 +3,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "keep/fingerprint_f32.h"
-#include "keep/snapshot.h"
+#include "persist/fingerprint_f32.h"
+#include "persist/snapshot.h"
 #include "pvid/snapshot.h"
 
 #define PLACE(field) ((uint32_t)offsetof(pvid_strong_f32, field))

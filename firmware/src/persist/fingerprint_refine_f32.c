@@ -1,11 +1,11 @@
 #include "number/uncontracted.h"
 
-#include "keep/fingerprint_refine_f32.h"
+#include "persist/fingerprint_refine_f32.h"
 
 #include <stddef.h>
 
-#include "keep/fingerprint_parts_f32.h"
-#include "keep/fingerprint_tables.h"
+#include "persist/fingerprint_parts_f32.h"
+#include "persist/fingerprint_tables.h"
 #include "number/finite_f32.h"
 #include "pvid/fnv_word.h"
 #include "refine_model_f32.h"

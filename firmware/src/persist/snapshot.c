@@ -1,4 +1,4 @@
-#include "keep/snapshot.h"
+#include "persist/snapshot.h"
 
 #include <string.h>
 

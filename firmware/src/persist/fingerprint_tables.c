@@ -1,4 +1,4 @@
-#include "keep/fingerprint_tables.h"
+#include "persist/fingerprint_tables.h"
 
 #include "pvid/fnv_word.h"
 

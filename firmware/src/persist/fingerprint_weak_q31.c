@@ -1,10 +1,10 @@
-#include "keep/fingerprint_weak_q31.h"
+#include "persist/fingerprint_weak_q31.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "keep/fingerprint_parts_q31.h"
-#include "keep/fingerprint_tables.h"
+#include "persist/fingerprint_parts_q31.h"
+#include "persist/fingerprint_tables.h"
 #include "pvid/fnv_word.h"
 
 /* ---- the functions of a model, by their results ---- */

@@ -1,10 +1,10 @@
 #include "number/uncontracted.h"
 
-#include "keep/fingerprint_f32.h"
+#include "persist/fingerprint_f32.h"
 
 #include <stddef.h>
 
-#include "keep/fingerprint_parts_f32.h"
+#include "persist/fingerprint_parts_f32.h"
 #include "pvid/fnv_word.h"
 
 uint32_t pvid_fingerprint_strong_f32(const pvid_strong_config_f32 *config)

@@ -1,6 +1,6 @@
 #include "number/uncontracted.h"
 
-#include "keep/fingerprint_parts_f32.h"
+#include "persist/fingerprint_parts_f32.h"
 
 #include "number/finite_f32.h"
 #include "pvid/fnv_word.h"

@@ -1,12 +1,12 @@
 #include "number/uncontracted.h"
 
-#include "keep/fingerprint_weak_f32.h"
+#include "persist/fingerprint_weak_f32.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "keep/fingerprint_parts_f32.h"
-#include "keep/fingerprint_tables.h"
+#include "persist/fingerprint_parts_f32.h"
+#include "persist/fingerprint_tables.h"
 #include "number/finite_f32.h"
 #include "pvid/fnv_word.h"
 
