@@ -17,7 +17,7 @@ import numpy as np
 from block_models import BlockModel, EstimatorInC
 from weak_rig import engine_rig
 
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native_q31
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core import snapshot
 from pvid.core.headers import Headers, Scalar, default_library

@@ -18,10 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.board.refined_image import RefinedRun, refined_run
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.configuration.weak import simulated_run_of
-from pvid.configuration.weak_q31 import FixedEngine, engine_for_simulated_rig
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core import snapshot
 from pvid.core.model_library import core_of
 from pvid.core.native import Publisher

@@ -12,8 +12,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "host" / "src"))
-from pvid.codegen.build import refine_functions  # noqa: E402
 from pvid.codegen.files_refine import header, shape  # noqa: E402
+from pvid.codegen.refine import refine_functions  # noqa: E402
 from pvid.models.mechanisms import compiled_of  # noqa: E402
 
 NAME = "kapitza"

@@ -10,7 +10,7 @@ import pytest
 
 from bench.refine_mechanisms import HEADER, IMPERFECT, NAMES, Case, cases, imperfect_rows, rows_of, run_case
 from pvid.base.errors import PvidError
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.configuration.refine import refine_settings
 from pvid.models.simulated_rig import simulated_rig

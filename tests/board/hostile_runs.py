@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.weak import config_for_simulated_rig
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core import snapshot

@@ -11,6 +11,7 @@ from conftest import ROOT
 
 from pvid.board.boards import BOARDS, BUILD, build, run
 from pvid.codegen.build import build as generate
+from pvid.codegen.generated import GeneratedModel
 from pvid.models import mechanisms
 
 TIMEOUT_S = 120.0
@@ -70,7 +71,7 @@ def sources() -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     names = mechanisms.names()
     for name in names:
-        generate(mechanisms.compiled_of(name), folder / name)
+        generate(GeneratedModel(mechanisms.compiled_of(name), "test"), folder / name)
     lists = LISTS.format(root=ROOT, names=" ".join(names), names_spaced=" ".join(names))
     (folder / "CMakeLists.txt").write_text(lists, encoding="utf-8")
     calls = []

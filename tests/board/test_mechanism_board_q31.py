@@ -17,7 +17,7 @@ from pvid.board.mechanism_board import board_of
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.stream_image import settings_number
 from pvid.board.target import HOST_TARGET, open_target
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native_q31
 from pvid.link.frames import Code, Core, EstimateQ31, Form, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader

@@ -15,6 +15,7 @@ from described import CHAIN, MOTOR, ODDLY_NAMED
 
 from pvid.codegen.build import files_of
 from pvid.codegen.functions import Function, ModelFunctions, functions_of
+from pvid.codegen.generated import GeneratedModel
 from pvid.core.sources import INCLUDES, source
 from pvid.models import mechanisms
 
@@ -66,7 +67,7 @@ class Generated:
 
     def __init__(self, functions: ModelFunctions, folder: Path) -> None:
         self.functions = functions
-        self.files = files_of(functions.model, "test")
+        self.files = files_of(GeneratedModel(functions.model, "test"))
         for name, text in {**self.files, "loop.c": _LOOP}.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,18 +14,20 @@ from conftest import ROOT
 from described import CHAIN, MOTOR
 
 from pvid.base.errors import PvidError
-from pvid.codegen.build import Options, build, check, files_of, fixed_point_refusal, refine_functions
+from pvid.codegen.build import build, check, files_of
+from pvid.codegen.files_weak_q31 import fitted_of
+from pvid.codegen.generated import GeneratedModel, Options
 from pvid.codegen.reaches import Reaches
+from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.refine import refine_design, refine_settings
 from pvid.configuration.weak import config_for_simulated_rig, samples_of, simulated_run_of
-from pvid.configuration.weak_files_q31 import files_of as fixed_files_of
-from pvid.configuration.weak_files_q31 import fitted_of
 from pvid.configuration.weak_q31 import engine_for_rig_like_the_shipped
 from pvid.core.host_compiler import host_compiler
 from pvid.core.sizes import default_sizes, raised
 from pvid.core.sources import INCLUDES, source
 from pvid.model import Integral, Model
+from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
 from pvid.setup.weak_sizes import sizes_of_design
 
@@ -97,6 +100,10 @@ int main() { return (motor_model_f32.n_theta == MOTOR_THETA && chain_model_f32.n
 """
 
 
+def generated_model(model: CompiledModel, **options: Any) -> GeneratedModel:
+    return GeneratedModel(model, "test", Options(**options))
+
+
 def run(*command: str | Path) -> str:
     done = subprocess.run([str(one) for one in command], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -105,7 +112,7 @@ def run(*command: str | Path) -> str:
 
 def test_two_lines_of_cmake_make_a_library_whose_test_passes(tmp_path: Path) -> None:
     for model in (MOTOR, CHAIN):
-        build(model, tmp_path / model.name)
+        build(generated_model(model), tmp_path / model.name)
     (tmp_path / "CMakeLists.txt").write_text(USER.format(root=ROOT, folder=tmp_path), encoding="utf-8")
     (tmp_path / "user.cpp").write_text(PROGRAM, encoding="utf-8")
     run("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug")
@@ -114,15 +121,15 @@ def test_two_lines_of_cmake_make_a_library_whose_test_passes(tmp_path: Path) -> 
 
 
 def test_the_twins_file_is_a_module_that_needs_nothing_but_pvid(tmp_path: Path) -> None:
-    build(MOTOR, tmp_path)
+    build(generated_model(MOTOR), tmp_path)
     program = "import motor_twin, numpy as np; print(motor_twin.theta_f32(np.ones((5, 2), np.float32))[2])"
     assert run(sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {program}") == "[1. 1.]\n"
 
 
 def test_the_strong_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
     """With the sizes that its header names."""
-    build(compiled_of("rigid_body"), tmp_path / "rigid_body", options=Options(strong=True))
-    check(compiled_of("rigid_body"), tmp_path / "rigid_body", options=Options(strong=True))
+    build(generated_model(compiled_of("rigid_body"), strong=True), tmp_path / "rigid_body")
+    check(generated_model(compiled_of("rigid_body"), strong=True), tmp_path / "rigid_body")
     (tmp_path / "CMakeLists.txt").write_text(STRONG.format(root=ROOT), encoding="utf-8")
     command = ("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_STRONG=ON")
     run(*command, "-DPVID_MAX_P=6", "-DPVID_MAX_THETA=15", "-DPVID_MAX_MOMENTS=45")
@@ -138,9 +145,9 @@ def test_the_weak_form_and_its_refinement_are_options_of_the_folder(tmp_path: Pa
     compiled = compiled_of("rigid_body")
     design, (run_of_rig, _, p_of_rig) = config_for_simulated_rig(compiled), simulated_run_of(compiled)
     refined = refine_design(compiled, design, run_of_rig, p_of_rig)
-    options = Options(design=design, refine_design=refined)
-    build(compiled, tmp_path / "rigid_body", options=options)
-    check(compiled, tmp_path / "rigid_body", options=options)
+    whole = generated_model(compiled, design=design, refine_design=refined)
+    build(whole, tmp_path / "rigid_body")
+    check(whole, tmp_path / "rigid_body")
     (tmp_path / "CMakeLists.txt").write_text(WEAK.format(root=ROOT), encoding="utf-8")
     (tmp_path / "main.c").write_text(WEAK_PROGRAM, encoding="utf-8")
     debug = ["-DCMAKE_BUILD_TYPE=Debug"]
@@ -168,7 +175,7 @@ def test_both_arithmetics_of_mechanisms_are_in_one_c_file(names: tuple[str, ...]
     for name in names:
         compiled = compiled_of(name)
         engine, config = engine_for_rig_like_the_shipped(compiled), config_for_simulated_rig(compiled)
-        build(compiled, tmp_path / name, options=Options(design=config, fixed_weak=fixed_files_of(engine, "test")))
+        build(generated_model(compiled, design=config, fixed_engine=engine), tmp_path / name)
         for needed in (sizes_of_design(config.design), fitted_of(engine)):
             sizes |= {macro: max(size, sizes.get(macro, 0)) for macro, size in needed.items()}
         headers = sorted(one.name for one in (tmp_path / name).glob(f"{name}*.h"))
@@ -209,14 +216,14 @@ def test_what_the_refinement_in_c_lacks_is_a_sentence() -> None:
 
 def test_a_soft_sign_is_one_of_the_design_too() -> None:
     compiled = compiled_of("two_link_arm")
-    options = Options(design=config_for_simulated_rig(compiled), soft_signs={"q2_1": 0.25})
-    text = files_of(compiled, "test", options)["two_link_arm_design_f32.h"]
+    whole = generated_model(compiled, design=config_for_simulated_rig(compiled), soft_signs={"q2_1": 0.25})
+    text = files_of(whole)["two_link_arm_design_f32.h"]
     widths = text.split("two_link_arm_sign_width[2] = {")[1].split("};")[0]
     assert widths.split() == ["0.0f,", "0.25f,"]
 
 
 def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:
-    files = files_of(MOTOR, "test")
+    files = files_of(generated_model(MOTOR))
     wrong = files["motor_f32.c"].replace("pvid_sign_f32", "pvid_magnitude_f32")
     for name, text in {**files, "motor_f32.c": wrong}.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -233,30 +240,30 @@ def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:
 
 
 def test_check_finds_a_changed_and_a_missing_file(tmp_path: Path) -> None:
-    build(MOTOR, tmp_path)
-    check(MOTOR, tmp_path)
+    build(generated_model(MOTOR), tmp_path)
+    check(generated_model(MOTOR), tmp_path)
     header = tmp_path / "motor.h"
     text = header.read_text(encoding="utf-8")
     header.write_text(text.replace("rad", "deg"), encoding="utf-8")
     with pytest.raises(PvidError, match=r"motor\.h is not what motor generates now"):
-        check(MOTOR, tmp_path)
+        check(generated_model(MOTOR), tmp_path)
     header.unlink()
     with pytest.raises(PvidError, match=r"motor\.h is missing"):
-        check(MOTOR, tmp_path)
+        check(generated_model(MOTOR), tmp_path)
 
 
 def test_files_name_their_command_and_input_and_no_date(tmp_path: Path) -> None:
-    first, again = build(MOTOR, tmp_path / "a"), build(MOTOR, tmp_path / "b")
+    first, again = build(generated_model(MOTOR), tmp_path / "a"), build(generated_model(MOTOR), tmp_path / "b")
     for one, other in zip(first, again, strict=True):
         text = one.read_text(encoding="utf-8")
         assert text == other.read_text(encoding="utf-8")
-        assert "Generated by `pvid model build motor`: do not edit." in text
+        assert "Generated by `test`: do not edit." in text
     hashes = {line for path in first for line in path.read_text(encoding="utf-8").splitlines() if "Input " in line}
     assert len({line.split()[-1] for line in hashes}) == 1
 
 
 def test_the_header_names_every_parameter_theta_regressor_and_unit() -> None:
-    header = " ".join(files_of(MOTOR, "test")["motor.h"].split())
+    header = " ".join(files_of(generated_model(MOTOR))["motor.h"].split())
     for line in (
         "p[0] R [1] 0.1..10",
         "in[1] i [A]",
@@ -268,22 +275,23 @@ def test_the_header_names_every_parameter_theta_regressor_and_unit() -> None:
 
 
 def test_options_change_formats_and_signs_and_the_hash() -> None:
-    plain = files_of(MOTOR, "test")
-    soft = files_of(MOTOR, "test", Options(soft_signs={"phi_1": 0.5}))
+    plain = files_of(generated_model(MOTOR))
+    soft = files_of(generated_model(MOTOR, soft_signs={"phi_1": 0.5}))
     assert "pvid_soft_sign_f32(phi_1, 0.5f)" in soft["motor_f32.c"] and "pvid_soft_sign" not in plain["motor_f32.c"]
-    near = files_of(MOTOR, "test", Options(Reaches(of={"phi_1": 40.0})))
+    near = files_of(generated_model(MOTOR, reaches=Reaches(of={"phi_1": 40.0})))
     assert "|in[3]| <= 40 rad/s" in near["motor_q31.h"] and plain["motor_q31.c"] != near["motor_q31.c"]
     with pytest.raises(PvidError, match="motor has no sign of speed: its signs are of phi_1"):
-        files_of(MOTOR, "test", Options(soft_signs={"speed": 1.0}))
+        files_of(generated_model(MOTOR, soft_signs={"speed": 1.0}))
     with pytest.raises(PvidError, match="motor has no input speed"):
-        files_of(MOTOR, "test", Options(Reaches(of={"speed": 1.0})))
+        files_of(generated_model(MOTOR, reaches=Reaches(of={"speed": 1.0})))
 
 
 def test_a_model_that_fixed_point_cannot_compute_gets_the_float_files_alone() -> None:
-    wide = Options(Reaches(of={"phi": 1000.0}))  # tan(phi / 200) then has a divisor that may be 0
-    reason = fixed_point_refusal(MOTOR, wide)
+    reaches = Reaches(of={"phi": 1000.0})  # tan(phi / 200) then has a divisor that may be 0
+    wide = generated_model(MOTOR, reaches=reaches)
+    reason = wide.fixed.refusal
     assert reason is not None and "motor, channels: a divisor lies in -1..1 and may be 0" in reason
-    assert fixed_point_refusal(MOTOR) is None
-    files = files_of(MOTOR, "test", wide)
+    assert generated_model(MOTOR).fixed.refusal is None
+    files = files_of(wide)
     assert "motor_f32.c" in files and not [name for name in files if "q31" in name]
     assert "q31" not in files["motor_test.c"] and "q31" not in files["CMakeLists.txt"]

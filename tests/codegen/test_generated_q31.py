@@ -16,11 +16,11 @@ from generated import SCALED as SCALED_TYPE
 from rounding import SCALED, bounds_of, fixed_bounds_of, values_of
 
 from pvid.base.errors import PvidError
-from pvid.codegen.build import refusal
 from pvid.codegen.c_q31 import scaled_literal
 from pvid.codegen.fixed_model import FixedModel, fixed_model
 from pvid.codegen.formats import bits_of, fixed
 from pvid.codegen.functions import functions_of
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.intervals import bounds_of as interval_bounds_of
 from pvid.codegen.operations import program_of
 from pvid.codegen.reaches import Reaches, reaches_of
@@ -158,7 +158,7 @@ def test_reaches_follow_from_the_description_or_are_given() -> None:
     with pytest.raises(PvidError, match="motor has no input speed: its inputs are V, i, phi, phi_1"):
         reaches_of(functions, Reaches(of={"speed": 1.0}))
     # no reach of the motor allows a divisor of 0
-    assert refusal(functions) is None
+    assert GeneratedModel(functions.model, "test").fixed.refusal is None
 
 
 def test_integrals_reach_what_their_integrands_and_time_allow() -> None:

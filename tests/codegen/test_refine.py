@@ -18,9 +18,8 @@ from conftest import ROOT
 
 from pvid.base.errors import PvidError
 from pvid.codegen import files_refine, refine_twin
-from pvid.codegen.build import refine_functions
 from pvid.codegen.operations import Argument, Literal, Operation
-from pvid.codegen.refine import RefineFunctions, refine_functions_of
+from pvid.codegen.refine import RefineFunctions, refine_functions, refine_functions_of
 from pvid.core.host_compiler import host_compiler
 from pvid.core.model_library import NATIVE, core_of, of_second_stage
 from pvid.core.sources import INCLUDES, source

@@ -9,7 +9,7 @@ import sympy as sp
 from weak_forms import NAMES, WeakForm, weak_form
 
 from pvid.base.errors import PvidError
-from pvid.codegen.build import weak_refusal
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak import weak_functions_of
 from pvid.model import Integral, Model
 from pvid.oracle.weak.channels import running_integrals
@@ -231,4 +231,4 @@ def test_a_model_that_the_engine_cannot_sum_is_refused_in_one_sentence() -> None
     compiled = _twice().compiled("twice")
     with pytest.raises(PvidError, match="since the start of the run: the weak engine integrates once"):
         weak_functions_of(compiled)
-    assert "integrates once" in (weak_refusal(compiled) or "")
+    assert "integrates once" in (GeneratedModel(compiled, "test").weak.refusal or "")

@@ -47,11 +47,10 @@ class WeakForm:
     def files(self) -> dict[str, str]:
         """Name -> text of the generated C."""
         name, needed = self.made.name, sizes_of_design(self.config.design)
-        title, units = self.made.model.title, self.made.model.p_names
         return {
             f"{name}_weak.h": files_weak.header(self.made, self.model, needed, "test"),
             f"{name}_weak_f32.c": files_weak.source(self.made, self.model, "test"),
-            f"{name}_design_f32.h": files_design.header(self.config, needed, "test", title, units),
+            f"{name}_design_f32.h": files_design.header(self.config, self.made.model, "test"),
         }
 
 

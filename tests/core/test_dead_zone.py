@@ -14,7 +14,7 @@ from weak_rig import engine_rig
 
 from pvid.base.errors import PvidError
 from pvid.cases import CASES, Case
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native_q31
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core.native import Native
 from pvid.models.mechanisms import compiled_of

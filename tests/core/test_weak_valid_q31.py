@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native_q31
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.models.mechanisms import compiled_of

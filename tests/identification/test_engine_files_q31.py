@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from pvid.codegen.build import Options, files_of
-from pvid.configuration import weak_files_q31 as engine_files_q31
+from pvid.codegen import files_weak_q31
+from pvid.codegen.build import files_of
+from pvid.codegen.generated import GeneratedModel, Options
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core.sources import PUBLIC_INCLUDES
 from pvid.models.mechanisms import compiled_of
@@ -31,7 +32,7 @@ pvid_reason step(const int32_t reading[])
 
 @pytest.fixture(scope="module")
 def files() -> dict[str, str]:
-    return engine_files_q31.files_of(engine_for_simulated_rig(compiled_of("rigid_body")), "a test")
+    return files_weak_q31.files_of(engine_for_simulated_rig(compiled_of("rigid_body")), "a test")
 
 
 def test_they_compile_without_a_warning_and_contain_no_float(files: dict[str, str], tmp_path: Path) -> None:
@@ -54,8 +55,8 @@ def test_the_header_has_counts_and_formats_in_words(files: dict[str, str]) -> No
 
 
 def test_they_belong_to_the_folder_of_a_model(files: dict[str, str]) -> None:
-    compiled = compiled_of("rigid_body")
-    whole = files_of(compiled, "a test", Options(fixed_weak=files))
+    options = Options(fixed_engine=engine_for_simulated_rig(compiled_of("rigid_body")))
+    whole = files_of(GeneratedModel(compiled_of("rigid_body"), "a test", options))
     assert set(files) < set(whole)
     target = re.search(r"add_library\(rigid_body STATIC (.*)\)", whole["CMakeLists.txt"])
     assert target is not None and "weak" not in target[1]  # an option: its library needs larger arrays

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from pvid.cli.main import commands
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.configuration.refine import refine_settings
 from pvid.configuration.weak import config_for_simulated_rig, simulated_run_of
 from pvid.configuration.weak_q31 import engine_for_simulated_rig

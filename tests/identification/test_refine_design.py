@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.configuration.refine import full_pendulum, refine_settings
 from pvid.models.mechanisms import compiled_of
 from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM

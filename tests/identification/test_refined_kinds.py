@@ -12,7 +12,9 @@ import sympy as sp
 from test_own_mechanisms import errors_over_se, held_at_random, motion, of_core, read, recorded
 
 from pvid.base.errors import PvidError
-from pvid.codegen.build import files_of, refine_functions, refine_refusal
+from pvid.codegen.build import files_of
+from pvid.codegen.generated import GeneratedModel
+from pvid.codegen.refine import refine_functions
 from pvid.configuration.refine import refine_settings
 from pvid.configuration.weak import config_to_identify
 from pvid.identification.analysis import analysed
@@ -286,8 +288,9 @@ def test_a_configuration_that_the_core_refuses_is_named_with_its_value() -> None
 
 def refused(model: Model) -> str:
     compiled = model.compiled("m")
-    reason = refine_refusal(compiled)
-    assert reason is not None and files_of(compiled, "test")  # the other files are written without the second stage
+    whole = GeneratedModel(compiled, "test")
+    reason = whole.refinement.refusal
+    assert reason is not None and files_of(whole)  # the other files are written without the second stage
     return reason
 
 
@@ -308,7 +311,7 @@ def test_what_has_no_second_stage_is_a_sentence() -> None:
     tied.equation(m * x.d(2) + k * (x - y) - F)
     tied.equation(m * x.d(2) - k * y)
     assert "equations 1 and 2 do not determine x_2 and y" in refused(tied)
-    assert "i depends on" in (refine_refusal(motor_without_inductance()) or "")
+    assert "i depends on" in (GeneratedModel(motor_without_inductance(), "test").refinement.refusal or "")
 
 
 def test_many_equations_that_are_solved_in_turn_are_no_coupled_ones() -> None:

@@ -12,6 +12,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.codegen.build import files_of
+from pvid.codegen.generated import GeneratedModel
 from pvid.model import Integral, Model, cos, sgn, sin
 from pvid.model.corners import OfInput, with_corners
 from pvid.model.signals import Jet
@@ -282,7 +283,7 @@ def test_a_title_ends_no_comment_and_no_string_of_what_is_generated(title: str) 
     x = model.sensor("x", "m", resolution=1e-4)
     u, m = model.input("u", "N", hold="zoh"), model.unknown("m", "kg", 1.0)
     model.equation(m * x.d(2) - u)
-    for name, text in files_of(model.compiled("mine"), "pvid model build mine").items():
+    for name, text in files_of(GeneratedModel(model.compiled("mine"), "pvid model build mine")).items():
         if name.endswith(".py"):
             text = ast.unparse(ast.parse(text).body[1:])  # type: ignore[arg-type]
         else:
@@ -296,4 +297,4 @@ def test_a_model_of_the_librarys_name_is_not_built(tmp_path: Path) -> None:
     path = written(tmp_path, FINE_LINES + FINE_EQUATION).rename(tmp_path / "pvid.py")
     assert compiled_of(path).name == "pvid"
     with pytest.raises(PvidError, match="pvid is the library's name, whose macros the C of this model"):
-        files_of(compiled_of(path), "a command")
+        files_of(GeneratedModel(compiled_of(path), "a command"))

@@ -13,7 +13,7 @@ import pytest
 from conftest import ROOT
 
 from pvid.codegen import files_refine
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.models.mechanisms import compiled_of
 
 CODE = """/* a < b + 1 */

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.core.native import Native
 from pvid.core.refine_native import RefineNative, RefineRecord

@@ -13,7 +13,7 @@ from weak_rig import EngineRig, engine_rig
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.refined_image import refined_pendulum
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of

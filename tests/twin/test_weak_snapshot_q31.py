@@ -15,7 +15,7 @@ from engine_snapshots import (
 )
 from weak_q31 import rig
 
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native_q31
 from pvid.core.weak_native_q31 import WeakIdentifierQ31
 from pvid.settings.enums import Reason
 

@@ -11,9 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen import files_weak_q31
-from pvid.codegen.parameters_q31 import fixed_parameters
 from pvid.codegen.weak import weak_functions_of
-from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_weak
+from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_parameters, fixed_weak
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.sources import INCLUDES, sources_of
 from pvid.design.weak_q31 import DOWN, FINE_DOWN, Sensing, fixed_design

@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.configuration.weak import engine_config, samples_of
-from pvid.configuration.weak_q31 import FixedEngine, fixed_engine, with_neglected
+from pvid.configuration.weak_q31 import fixed_engine, with_neglected
 from pvid.core.native import Publisher
 from pvid.core.weak_native import WeakIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31

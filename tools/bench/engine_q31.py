@@ -9,8 +9,7 @@ import numpy as np
 
 from bench.engine import Case, cases, rms
 from bench.mechanisms import design_of, size_of
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.weak import engine_config, samples_of
 from pvid.configuration.weak_q31 import fixed_engine
 from pvid.oracle.weak.functions import Float

@@ -22,11 +22,11 @@ import numpy.typing as npt
 
 from bench.longevity_signals import CHUNK, L1, RATE_HZ, Disturbance, Sensing, Signals
 from pvid.base.errors import PvidError
-from pvid.codegen.build import refine_functions
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.refine import refine_functions
+from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.configuration.weak import config_for_simulated_rig
-from pvid.configuration.weak_q31 import FixedEngine, engine_for_simulated_rig
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.core.headers import Filled, Headers, default_library
 from pvid.core.native import Identifier, Native, Publisher
 from pvid.core.sources import PUBLIC_FOLDERS, ROOT

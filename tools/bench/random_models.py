@@ -30,13 +30,14 @@ from bench.random_motion import RandomRun, random_run
 from bench.random_rigs import IN_C, random_rig
 from pvid.base.errors import PvidError
 from pvid.cli.mechanism import recording_of
-from pvid.codegen import build as generated
+from pvid.codegen.build import build
+from pvid.codegen.generated import GeneratedModel, Options
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.compare.bits import Comparison
 from pvid.compare.weak import compare_recording
 from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import config_for_recording
-from pvid.configuration.weak_files_q31 import config_of, files_of
-from pvid.configuration.weak_q31 import FixedEngine, engine_for_recording
+from pvid.configuration.weak_q31 import engine_for_recording
 from pvid.core.host_compiler import compiled_once, host_compiler
 from pvid.core.sources import INCLUDES, core_sources
 from pvid.deploy.deployment import Deployment
@@ -275,14 +276,13 @@ def _built(road: Road, answer: Answer, folder: Path) -> None:
         design = config_for_recording(compiled, recording, ranking=ranking)
     with road.stage("fixed design"):
         engine = engine_for_recording(compiled, recording, ranking=ranking)
-    if design is not None and generated.refine_refusal(compiled) is None:
+    if design is not None and GeneratedModel(compiled, "bench").refinement.made is not None:
         with road.stage("second design"):
             refine = refine_design(compiled, design, recording.signals)
     files = folder / "generated"
     with road.stage("build"):
-        fixed = {} if engine is None else files_of(engine, "bench") | config_of(engine, "bench")
-        options = generated.Options(design=design, fixed_weak=fixed, refine_design=refine)
-        generated.build(compiled, files, "bench", options)
+        options = Options(design=design, fixed_engine=engine, refine_design=refine)
+        build(GeneratedModel(compiled, "bench", options), files)
     if "build" in road.reached:
         with road.stage("compile"):
             _compile(road, files, compiled.name, design is not None, engine is not None, refine is not None)

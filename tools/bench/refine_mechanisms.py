@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.mechanisms import CASES, size_of, start_of
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import engine_config, samples_of

@@ -16,9 +16,10 @@ from pvid.board.mechanism_image import build_mechanism_image, long_run, refuse_f
 from pvid.board.mechanism_image_q31 import FixedRun, build_fixed_image
 from pvid.board.refined_image import RefinedRun, build_refined_image, light_work
 from pvid.board.sizes import REFINED, WEAK, BuiltImage, Footprint, built_engine, figures_of, measured
-from pvid.codegen.build import refine_functions, refine_refusal
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.generated import GeneratedModel
+from pvid.codegen.refine import refine_functions
+from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.configuration.refine import full_motion_of, refine_design, refine_for_simulated_rig
 from pvid.configuration.weak import (
     Run,
@@ -27,7 +28,7 @@ from pvid.configuration.weak import (
     samples_of,
     simulated_run_of,
 )
-from pvid.configuration.weak_q31 import FixedEngine, engine_for_recording, engine_for_rig_like_the_shipped
+from pvid.configuration.weak_q31 import engine_for_recording, engine_for_rig_like_the_shipped
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
 from pvid.settings.engine_cores import FLOAT
@@ -163,7 +164,7 @@ class CostedDesign:
     def _with_refinement(self, asked: Asked, made: Callable[[], RefineConfig]) -> CostedDesign:
         if not asked.refined:
             return self
-        reason = refine_refusal(self.compiled)
+        reason = GeneratedModel(self.compiled, "").refinement.refusal
         if reason is None:
             try:
                 return replace(self, refine=made())

@@ -20,10 +20,9 @@ from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
-from pvid.codegen.build import refine_functions
-from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.generated import GeneratedModel
+from pvid.codegen.refine import RefineFunctions, refine_functions, widths
 from pvid.codegen.refine_twin import GeneratedRefine
-from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.nominal_run import nominal_run
@@ -58,7 +57,7 @@ from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.refine import RefineConfig, RefineSignal
 from pvid.settings.weak import Source as SignalSource
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
+from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.both_stages import BothStagesTwin
 from pvid.twin.refine import RefineTwin
@@ -200,7 +199,7 @@ class MechanismBoard:
         if self.refine is None:
             return ()
         made = self.equations
-        return shown_of_refined(len(made.parameters), len(files_refine.widths(made)), made.places_of_p)
+        return shown_of_refined(len(made.parameters), len(widths(made)), made.places_of_p)
 
     @property
     def p_names(self) -> tuple[str, ...]:
@@ -224,26 +223,16 @@ class MechanismBoard:
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         model, design = self.config.design.model, self.config.design
-        made = weak_functions_of(self.compiled)
-        listed = [f"{one.name} [{one.unit or '1'}]" for one in self.compiled.unknowns]
-        code = {
-            f"{made.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), _COMMAND),
-            f"{made.name}_weak_f32.c": files_weak.source(made, model, _COMMAND),
-            "stream_tables.h": files_design.header(
-                self._shared, sizes_of_design(design), _COMMAND, self.compiled.title, listed
-            ),
-        }
+        code = files_weak.printed(GeneratedModel(self.compiled, _COMMAND))
+        code["stream_tables.h"] = files_design.header(self._shared, self.compiled, _COMMAND)
         if self.refine is not None:
-            code |= {
-                "pvid/refine_shape.h": files_refine.shape(self.equations, _COMMAND),
-                "refine_model_f32.h": files_refine.header(self.equations, _COMMAND),
-                "stream_refine.h": _refine_header(self.refine, self._shown),
-            }
+            code |= files_refine.files_of(self.equations, _COMMAND)
+            code["stream_refine.h"] = _refine_header(self.refine, self._shown)
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
         macros = [
             f"#define STREAM_CORE {int(Core.F32)}",
             f"#define STREAM_FORM {int(Form.WEAK)}",
-            f"#define STREAM_CONFIG {made.name}_config_f32",
+            f"#define STREAM_CONFIG {model.name}_config_f32",
             f"#define STREAM_N_P {len(self.compiled.unknowns)}u",
             f"#define STREAM_SAMPLES {model.samples}u",
             f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",

@@ -16,12 +16,11 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
-from pvid.codegen.weak_library_q31 import weak_native_q31
-from pvid.codegen.weak_q31 import JetReaches, fixed_weak
+from pvid.codegen.weak_library import weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine, JetReaches, fixed_weak
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.weak import neglected_part
 from pvid.configuration.weak_q31 import (
-    FixedEngine,
     engine_for_recording,
     engine_for_simulated_rig,
     engine_of_parts,
@@ -43,7 +42,6 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak_q31 import Rescale, WeakConfigQ31, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakNoiseQ31
-from pvid.setup.weak_sizes import sizes_of_q31
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.weak_q31 import WeakTwinQ31
 
@@ -150,14 +148,9 @@ class MechanismBoardQ31:
         return identifier.run_samples(self.readings(*signals), sums=False).hash
 
     @property
-    def _sizes(self) -> dict[str, int]:
-        model = self.engine.parameters.model
-        return sizes_of_q31(self.config.design, model.n_p, len(model.c_row))
-
-    @property
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
-        engine, name, sizes = self.engine, self.engine.name, self._sizes
+        engine, name, sizes = self.engine, self.engine.name, files_weak_q31.sizes_of(self.engine)
         code = {
             f"{name}_weak_q31.h": files_weak_q31.header(engine.made, sizes, _COMMAND),
             f"{name}_weak_q31.c": files_weak_q31.source(engine.made, engine.parameters, _COMMAND),

@@ -16,7 +16,7 @@ from pvid.board.boards import BUILD, Board, build, keep_header
 from pvid.board.replay_image import REPORT_EVERY
 from pvid.codegen import files_design, files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
-from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.weak import config_for_simulated_rig, samples_of
 from pvid.core.sizes import smallest
@@ -27,7 +27,6 @@ from pvid.models import mechanisms
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.enums import Core
 from pvid.settings.weak import WeakConfig
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin import fnv
 from pvid.twin.trust import EARLY_WINDOWS
@@ -185,13 +184,8 @@ def header(run: MechanismRun) -> str:
 
 def files_of(run: MechanismRun) -> dict[str, str]:
     """What the image consists of besides the core: name -> text."""
-    made, model = weak_functions_of(run.compiled), run.config.design.model
-    names = [f"{one.name} [{one.unit or '1'}]" for one in run.compiled.unknowns]
-    needed = sizes_of_design(run.config.design)
-    return {
-        f"{run.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), MADE_BY),
-        f"{run.name}_weak_f32.c": files_weak.source(made, model, MADE_BY),
-        f"{run.name}_design_f32.h": files_design.header(run.config, needed, MADE_BY, run.compiled.title, names),
+    return files_weak.printed(GeneratedModel(run.compiled, MADE_BY)) | {
+        f"{run.name}_design_f32.h": files_design.header(run.config, run.compiled, MADE_BY),
         "replay_run.h": header(run),
     }
 

@@ -13,10 +13,11 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with, long_run, measured_from
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
-from pvid.codegen.weak_library_q31 import weak_native_q31
-from pvid.configuration import weak_files_q31 as engine_files_q31
+from pvid.codegen import files_weak_q31
+from pvid.codegen.weak_library import weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.configuration.weak import simulated_run_of
-from pvid.configuration.weak_q31 import FixedEngine, engine_for_simulated_rig
+from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.models import mechanisms
 from pvid.twin import fnv
 from pvid.twin.weak_q31 import WeakTwinQ31
@@ -58,7 +59,7 @@ class FixedRun:
     @property
     def sizes(self) -> dict[str, int]:
         """Of the core's arrays."""
-        return engine_files_q31.fitted_of(self.engine)
+        return files_weak_q31.fitted_of(self.engine)
 
 
 @cache
@@ -139,7 +140,7 @@ def header(run: FixedRun) -> str:
 
 def files_of(run: FixedRun) -> dict[str, str]:
     """What the image consists of besides the core: name -> text."""
-    return engine_files_q31.files_of(run.engine, MADE_BY) | {"replay_run.h": header(run)}
+    return files_weak_q31.files_of(run.engine, MADE_BY) | {"replay_run.h": header(run)}
 
 
 def build_fixed_image(target: Board, run: FixedRun) -> tuple[Path, Path]:

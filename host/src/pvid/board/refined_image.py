@@ -20,9 +20,8 @@ from pvid.board.mechanism_image import (
     mechanism_run,
 )
 from pvid.codegen import files_refine, files_refine_design
-from pvid.codegen.build import refine_functions
 from pvid.codegen.fitted_sizes import fitted_sizes
-from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.refine import RefineFunctions, refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.refine import full_pendulum, refine_settings
 from pvid.core.weak_native import RefinedIdentifier
@@ -133,10 +132,8 @@ def build_refined_image(
     target: Board, run: RefinedRun, name: str = "", choices: Mapping[str, str] | None = None
 ) -> tuple[Path, Path]:
     """Builds the image; see `build_mechanism_image`. `choices`: further variables of CMake, of a build of that name."""
-    files = files_of(run.weak)
+    files = files_of(run.weak) | files_refine.files_of(run.made, MADE_BY)
     files["replay_run.h"] = header(run, files["replay_run.h"])
-    files["pvid/refine_shape.h"] = files_refine.shape(run.made, MADE_BY)
-    files["refine_model_f32.h"] = files_refine.header(run.made, MADE_BY)
     whole = name or f"{run.weak.name}-refined-f32-{len(run.weak.counts)}"
     sizes = fitted_sizes(run.weak.config, refined=True)
     return build_with(target, whole, files, sizes, "f32", refined=True, choices=choices)

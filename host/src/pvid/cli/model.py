@@ -19,6 +19,7 @@ from pvid.cli.rig_design import model_of_rig, recorded
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.codegen.strong_twin import StrongModelConfig
+    from pvid.codegen.weak_q31 import FixedEngine
     from pvid.model.compiled import CompiledModel
     from pvid.models.simulated_rig import SimulatedRig
     from pvid.rig.run import Recording
@@ -187,6 +188,7 @@ def build(
     NAME_strong_design_f32.h has the differentiators and settings of the strong form.
     """
     from pvid.codegen import build as generated
+    from pvid.codegen.generated import GeneratedModel, Options
     from pvid.codegen.reaches import Reaches
     from pvid.oracle.weak.edges import with_edges
     from pvid.setup.weak_sizes import refuse_too_many_unknowns
@@ -210,33 +212,36 @@ def build(
     given += [f"--run {run_path.name}"] if run_path is not None else []
     given += [f"--functions {functions}"] if functions is not None else []
     title = " ".join(["pvid model build", compiled.name, *given])
-    fixed_weak: dict[str, str] = {}
+    options = Options(limits, soft, strong)
+    whole = GeneratedModel(compiled, title, options)
     no_fixed_weak = None
     if design is not None:
-        fixed_weak, no_fixed_weak = _fixed_weak(compiled, recording, functions, soft, title)
-    strong_design = _strong_design_of(compiled, model, recording) if strong else None
-    refine_design, no_refinement = None, generated.refine_refusal(compiled)
+        engine, no_fixed_weak = _fixed_engine(compiled, recording, functions, soft)
+        options = replace(options, design=design, fixed_engine=engine)
+    if strong:
+        options = replace(options, strong_design=_strong_design_of(compiled, model, recording))
+    no_refinement = whole.refinement.refusal
     if design is not None and no_refinement is None:
         refine_design, no_refinement = _refine_design_of(compiled, recording, design, soft)
-    options = generated.Options(limits, soft, strong, design, fixed_weak, strong_design, refine_design)
+        options = replace(options, refine_design=refine_design)
+    whole = replace(whole, options=options)
     if not only_check:
-        for path in generated.build(compiled, out, title, options):
+        for path in generated.build(whole, out):
             click.echo(path)
-        reason = generated.fixed_point_refusal(compiled, options)
-        if reason is not None:
-            write_stderr(f"pvid: no fixed point: {reason}")
-        reason = generated.weak_refusal(compiled)
-        if reason is not None:
-            write_stderr(f"pvid: no weak form in C: {reason}")
-        if no_fixed_weak is not None:
-            write_stderr(f"pvid: no weak form in fixed point: {no_fixed_weak}")
-        if no_refinement is not None:
-            write_stderr(f"pvid: no refinement in C: {no_refinement}")
-        if reason is None and design is None:
+        refusals = {
+            "fixed point": whole.fixed.refusal,
+            "weak form in C": whole.weak.refusal,
+            "weak form in fixed point": no_fixed_weak,
+            "refinement in C": no_refinement,
+        }
+        for what, reason in refusals.items():
+            if reason is not None:
+                write_stderr(f"pvid: no {what}: {reason}")
+        if whole.weak.refusal is None and design is None:
             write_stderr("pvid: no design of a rig: give a recording of it with --run")
         return DONE
     try:
-        generated.check(compiled, out, title, options)
+        generated.check(whole, out)
     except PvidError as error:
         write_stderr(f"pvid: {error}")
         return DIFFERENT
@@ -372,11 +377,11 @@ def _design_of(
     recording: Recording | None,
     functions: int | None,
 ) -> WeakConfig | None:
-    from pvid.codegen.build import weak_refusal
+    from pvid.codegen.generated import GeneratedModel
     from pvid.configuration.weak import config_for_recording, config_for_rig_like_the_shipped
     from pvid.models.mechanisms import names as names_of_shipped
 
-    if weak_refusal(compiled) is not None:
+    if GeneratedModel(compiled, "").weak.made is None:
         return None
     if recording is not None:
         return config_for_recording(compiled, recording, functions)
@@ -387,25 +392,18 @@ def _design_of(
     return None
 
 
-def _fixed_weak(
-    compiled: CompiledModel,
-    recording: Recording | None,
-    functions: int | None,
-    soft_signs: dict[str, float],
-    title: str,
-) -> tuple[dict[str, str], str | None]:
-    """Files of the fixed-point weak form, or why there are none."""
-    from pvid.configuration.weak_files_q31 import config_of, files_of
+def _fixed_engine(
+    compiled: CompiledModel, recording: Recording | None, functions: int | None, soft_signs: dict[str, float]
+) -> tuple[FixedEngine | None, str | None]:
+    """The fixed-point weak form for the rig, or why there is none."""
     from pvid.configuration.weak_q31 import engine_for_recording, engine_for_rig_like_the_shipped
 
     try:
         if recording is None:
-            engine = engine_for_rig_like_the_shipped(compiled, functions, soft_signs)
-        else:
-            engine = engine_for_recording(compiled, recording, functions, soft_signs)
+            return engine_for_rig_like_the_shipped(compiled, functions, soft_signs), None
+        return engine_for_recording(compiled, recording, functions, soft_signs), None
     except PvidError as error:
-        return {}, str(error)
-    return files_of(engine, title) | config_of(engine, title), None
+        return None, str(error)
 
 
 def _numbers(given: tuple[str, ...], option: str, example: str = "--reach phi_1=40") -> dict[str, float]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pvid.codegen import c_f32, describe
 from pvid.codegen.banner import banner, c_comment
 from pvid.codegen.functions import Function, ModelFunctions
+from pvid.codegen.generated import GeneratedModel
 
 UNCONTRACTED = """\
 /* No fused multiply-add in this file, whatever the compiler's options: it would change the bits. */
@@ -31,6 +32,16 @@ MEANING = {
     "theta": "From p: theta.",
     "jacobian": "From p: the non-zeros of d theta / d p by columns, in the order of c_row and c_column.",
 }
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_sizes.h, NAME.h and NAME_f32.c."""
+    functions, name = model.functions, model.name
+    return {
+        f"{name}_sizes.h": sizes(functions, model.command),
+        f"{name}.h": header(functions, model.command),
+        f"{name}_f32.c": source(functions, model.command),
+    }
 
 
 def sizes(functions: ModelFunctions, command: str) -> str:

@@ -7,6 +7,15 @@ from pvid.codegen.banner import banner, c_comment
 from pvid.codegen.files_f32 import MEANING, SIZES, for_cpp, guarded
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import Function, ModelFunctions
+from pvid.codegen.generated import GeneratedModel
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_q31.h and NAME_q31.c, where fixed point can compute all functions."""
+    fixed, name = model.fixed.made, model.name
+    if fixed is None:
+        return {}
+    return {f"{name}_q31.h": header(fixed, model.command), f"{name}_q31.c": source(fixed, model.command)}
 
 
 def header(fixed: FixedModel, command: str) -> str:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from pvid.codegen.files_design import initialised, number
 from pvid.codegen.files_f32 import guarded
-from pvid.codegen.files_refine import refine_id
-from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.generated import GeneratedModel
+from pvid.codegen.refine import RefineFunctions, refine_id
 from pvid.settings.refine import BIG_STEP, RefineConfig
 
 
@@ -27,6 +27,14 @@ _OPTIONAL: Mapping[str, Callable[[Any], str]] = {
     "observer": _row,
     "width": _row,
 }
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_refine_design_f32.h, where there is a rig and a second stage."""
+    made, settings = model.refinement.made, model.options.refine_design
+    if made is None or settings is None:
+        return {}
+    return {f"{made.name}_refine_design_f32.h": header(made, settings, model.command)}
 
 
 def header(made: RefineFunctions, settings: RefineConfig, command: str) -> str:

@@ -6,6 +6,7 @@ from pvid.codegen import c_f32, describe
 from pvid.codegen.banner import banner, c_comment
 from pvid.codegen.files_f32 import UNCONTRACTED, for_cpp, guarded, includes_of, model_struct
 from pvid.codegen.functions import Function
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
 
 _HEADER = """\
@@ -169,6 +170,16 @@ pvid_reason {name}_step_f32({name}_f32 *self, const float sample[{upper}_SIGNALS
     }}
     return pvid_estimator_update_f32(&self->estimator);
 }}"""
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_strong.h and NAME_strong_f32.c, where they are chosen."""
+    if not model.options.strong:
+        return {}
+    return {
+        f"{model.name}_strong.h": header(model.strong, model.command),
+        f"{model.name}_strong_f32.c": source(model.strong, model.command),
+    }
 
 
 def header(strong: StrongFunctions, command: str) -> str:

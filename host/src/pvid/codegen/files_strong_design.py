@@ -5,9 +5,18 @@ from __future__ import annotations
 from pvid.codegen import describe
 from pvid.codegen.files_design import estimator_fields, initialised, inner, number
 from pvid.codegen.files_f32 import guarded
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
 from pvid.codegen.strong_twin import StrongModelConfig
 from pvid.design.c_tables import float_array
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_strong_design_f32.h, where there is a rig."""
+    config = model.options.strong_design
+    if not model.options.strong or config is None:
+        return {}
+    return {f"{model.name}_strong_design_f32.h": header(model.strong, config, model.command)}
 
 
 def header(strong: StrongFunctions, config: StrongModelConfig, command: str) -> str:

@@ -10,13 +10,27 @@ from pvid.codegen import c_f32, describe
 from pvid.codegen.banner import banner, c_comment
 from pvid.codegen.files_f32 import UNCONTRACTED, for_cpp, guarded, includes_of, model_struct
 from pvid.codegen.functions import Function
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak import WeakFunctions
 from pvid.codegen.weak_twin import functions_in
 from pvid.core.sizes import raised, smallest
 from pvid.design.c_tables import float_literal
 from pvid.settings.weak import NONE, Source, WeakModel
+from pvid.setup.weak_sizes import sizes_of_model
 
 _SOURCES = {Source.SAMPLED: "", Source.HELD: "held until the next", Source.JUMP: "", Source.LAST: ""}
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_weak.h and NAME_weak_f32.c, where there is a weak form."""
+    made = model.weak.made
+    if made is None:
+        return {}
+    tables = model.weak_model
+    return {
+        f"{made.name}_weak.h": header(made, tables, sizes_of_model(tables), model.command),
+        f"{made.name}_weak_f32.c": source(made, tables, model.command),
+    }
 
 
 def header(made: WeakFunctions, model: WeakModel, needed: Mapping[str, int], command: str) -> str:

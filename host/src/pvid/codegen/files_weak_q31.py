@@ -4,17 +4,55 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from pvid.codegen import describe
+from pvid.codegen import c_q31, describe
 from pvid.codegen.banner import banner, c_comment
 from pvid.codegen.files_f32 import for_cpp, guarded
 from pvid.codegen.files_weak import size_check
-from pvid.codegen.parameters_q31 import ParametersQ31, c_parameters
-from pvid.codegen.weak_q31 import FixedWeak, c_functions
+from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
+from pvid.codegen.generated import GeneratedModel
+from pvid.codegen.weak_q31 import FixedEngine, FixedWeak, ParametersQ31
 from pvid.core.sizes import smallest
 from pvid.settings.weak import NONE
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
+from pvid.setup.weak_sizes import sizes_of_q31
 
 _WIDTH = 12  # numbers a line
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_weak_q31.h and .c, NAME_design_q31.h and NAME_config_q31.h, where there is a rig."""
+    engine = model.options.fixed_engine
+    if engine is None:
+        return {}
+    name = f"{engine.name}_config_q31"
+    return files_of(engine, model.command) | {f"{name}.h": config_header(name, fitted_of(engine), model.command)}
+
+
+def files_of(engine: FixedEngine, command: str) -> dict[str, str]:
+    """NAME_weak_q31.h and .c, NAME_design_q31.h.
+
+    Parameters
+    ----------
+    command : that makes them; no date, so that the same command makes the same files
+    """
+    sizes, name = sizes_of(engine), engine.name
+    return {
+        f"{name}_weak_q31.h": header(engine.made, sizes, command),
+        f"{name}_weak_q31.c": source(engine.made, engine.parameters, command),
+        f"{name}_design_q31.h": design_header(engine.config, name, sizes, command, _about(engine)),
+    }
+
+
+def fitted_of(engine: FixedEngine) -> dict[str, int]:
+    """Sizes of the core for this design alone."""
+    model = engine.parameters.model
+    return fitted_sizes_q31(engine.config, model.n_p, len(model.c_row))
+
+
+def sizes_of(engine: FixedEngine) -> dict[str, int]:
+    """Sizes of the core that hold this design."""
+    model = engine.parameters.model
+    return sizes_of_q31(engine.config.design, model.n_p, len(model.c_row))
 
 
 def header(made: FixedWeak, needed: Mapping[str, int], command: str) -> str:
@@ -65,8 +103,8 @@ def source(made: FixedWeak, parameters: ParametersQ31, command: str) -> str:
         [
             c_comment(banner(made.functions.functions, command)),
             f'#include "{name}_weak_q31.h"\n\n#include <stddef.h>\n\n#include "pvid/elementary_q31.h"',
-            c_functions(made, name).rstrip(),
-            c_parameters(parameters, name).rstrip(),
+            _functions(made, name).rstrip(),
+            _parameters(parameters, name).rstrip(),
             *(one for one in _model(made, name) if one),
             "",
         ]
@@ -78,8 +116,8 @@ def together(made: FixedWeak, parameters: ParametersQ31, design: WeakDesignQ31, 
     return "\n\n".join(
         [
             '#include "pvid/weak_q31.h"\n#include "pvid/elementary_q31.h"\n\n#include <stddef.h>',
-            c_functions(made, prefix).rstrip(),
-            c_parameters(parameters, prefix).rstrip(),
+            _functions(made, prefix).rstrip(),
+            _parameters(parameters, prefix).rstrip(),
             *_model(made, prefix),
             *_design(design, prefix),
         ]
@@ -244,3 +282,155 @@ def configuration(config: WeakConfigQ31, prefix: str) -> str:
 def _literal(value: int) -> str:
     """Also of the least int32."""
     return "INT32_MIN" if value == -(2**31) else str(value)
+
+
+def _functions(made: FixedWeak, prefix: str) -> str:
+    """PREFIX_prepare_q31 and PREFIX_values_q31."""
+    parts = []
+    for name, one, limits in (
+        ("prepare", made.prepare, made.prepare_limits),
+        ("values", made.values, made.values_limits),
+    ):
+        if one is not None:
+            signature = f"static bool {prefix}_{name}_q31(const int32_t in[], int32_t out[])"
+            parts.append(c_q31.fixed_function(signature, one, limits))
+    return "\n\n".join(parts) + "\n"
+
+
+_C = """\
+static const int8_t {prefix}_p_bits[{n_p}] = {{{p_bits}}};
+static const int16_t {prefix}_theta_bits[{n_theta}] = {{{theta_bits}}};
+static const int16_t {prefix}_c_bits[{n_c}] = {{{c_bits}}};
+static const uint8_t {prefix}_kind_end[{n_kinds}] = {{{kind_end}}};
+static const uint8_t {prefix}_c_row[{n_c}] = {{{c_row}}};
+static const uint8_t {prefix}_c_column[{n_c}] = {{{c_column}}};
+
+/* x as an integer of this format, saturated at 2^60. */
+static int64_t {prefix}_fixed(pvid_scaled_q31 x, int32_t bits)
+{{
+    const int32_t shift = -(x.e + bits);
+    if (shift >= 0) {{
+        return pvid_round_shift_q31(x.m, (uint32_t)shift);
+    }}
+    if (shift < -30) {{
+        return (x.m > 0) ? ((int64_t)1 << 60) : ((x.m < 0) ? -((int64_t)1 << 60) : 0);
+    }}
+    return x.m * ((int64_t)1 << (uint32_t)-shift);
+}}
+
+static void {prefix}_numbers(const int32_t p[], pvid_scaled_q31 x[])
+{{
+    for (size_t i = 0; i < {n_p}u; i++) {{
+        x[i] = pvid_scaled_of_q31(p[i], -(int32_t){prefix}_p_bits[i]);
+    }}
+}}
+
+static void {prefix}_theta_fixed(const int32_t p[], int64_t theta[])
+{{
+    pvid_scaled_q31 x[{n_p}];
+    pvid_scaled_q31 found[{n_theta}];
+    {prefix}_numbers(p, x);
+    {prefix}_theta_q31(x, found);
+    for (size_t i = 0; i < {n_theta}u; i++) {{
+        theta[i] = {prefix}_fixed(found[i], {prefix}_theta_bits[i]);
+    }}
+}}
+
+static void {prefix}_jacobian_fixed(const int32_t p[], int64_t c[])
+{{
+    pvid_scaled_q31 x[{n_p}];
+    pvid_scaled_q31 found[{n_c}];
+    {prefix}_numbers(p, x);
+    {prefix}_jacobian_q31(x, found);
+    for (size_t i = 0; i < {n_c}u; i++) {{
+        c[i] = {prefix}_fixed(found[i], {prefix}_c_bits[i]);
+    }}
+}}
+
+/* Those of the configuration's p_bits, which must be {prefix}_p_bits. */
+static void {prefix}_formats(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
+{{
+    (void)p_bits;
+    for (size_t i = 0; i < {n_theta}u; i++) {{
+        theta_bits[i] = {prefix}_theta_bits[i];
+    }}
+    for (size_t i = 0; i < {n_c}u; i++) {{
+        c_bits[i] = {prefix}_c_bits[i];
+    }}
+}}
+
+static const pvid_model_q31 {prefix}_model_q31 = {{
+    .n_theta = {n_theta},
+    .n_p = {n_p},
+    .n_kinds = {n_kinds},
+    .n_c = {n_c},
+    .positive = {positive}u,
+    .kind_end = {prefix}_kind_end,
+    .c_row = {prefix}_c_row,
+    .c_column = {prefix}_c_column,
+    .theta = {prefix}_theta_fixed,
+    .jacobian = {prefix}_jacobian_fixed,
+    .formats = {prefix}_formats,
+}};
+"""
+
+
+def _parameters(made: ParametersQ31, prefix: str) -> str:
+    """PREFIX_model_q31 and its functions."""
+    functions = made.functions
+    generated = [
+        c_q31.scaled_function(f"static void {prefix}_{name}_q31(const pvid_scaled_q31 in[], pvid_scaled_q31 out[])", x)
+        for name, x in (("theta", functions.theta.program), ("jacobian", functions.jacobian.program))
+    ]
+
+    def listed(values: Sequence[int]) -> str:
+        return ", ".join(map(str, values))
+
+    own = _C.format(
+        prefix=prefix,
+        n_p=len(made.p_bits),
+        n_theta=len(made.theta_bits),
+        n_c=len(made.c_bits),
+        n_kinds=len(functions.kinds),
+        kind_end=listed([one.theta.stop for one in functions.kinds]),
+        p_bits=listed(made.p_bits),
+        theta_bits=listed(made.theta_bits),
+        c_bits=listed(made.c_bits),
+        c_row=listed(functions.c_row),
+        c_column=listed(functions.c_column),
+        positive=sum(1 << k for k, one in enumerate(functions.model.unknowns) if one.positive),
+    )
+    return "\n\n".join([*generated, own])
+
+
+def _about(engine: FixedEngine) -> list[str]:
+    """The rig and the settings in words."""
+    design, own = engine.config.design, engine.config.estimator
+    compiled = engine.compiled
+    units = {one.name: one.unit or "1" for one in compiled.signals}
+    readings = [
+        (f"reading[{k}]", name, f"{lsb:.6g} {units[name]} a count,", f"within +-{full} of its offset")
+        for k, (name, lsb, full) in enumerate(zip(engine.sample_names, engine.lsb, design.full_scale, strict=True))
+    ]
+    parameters = [
+        (
+            f"{one.name} [{one.unit or '1'}]",
+            f"= integer 2^{-bits},",
+            f"start {engine.values(own.start)[k]:.6g},",
+            f"{engine.values(own.lower)[k]:.6g} to {engine.values(own.upper)[k]:.6g}",
+        )
+        for k, (one, bits) in enumerate(zip(compiled.unknowns, own.p_bits, strict=True))
+    ]
+    first = f"at most {engine.ticks_needed} samples, {engine.ticks_needed / engine.sample_rate:.3g} s"
+    return [
+        f"{compiled.title}: {design.functions} test functions sin^{design.power} on windows of "
+        f"{2 * engine.hop_s:.6g} s, one every {engine.hop_s:.6g} s;",
+        f"{engine.sample_rate:.6g} samples a second, {design.decimation} make a step. The first estimate comes after "
+        f"{first}.",
+        "",
+        "Readings [counts]:",
+        *describe.table(readings),
+        "",
+        "Parameters:",
+        *describe.table(parameters),
+    ]

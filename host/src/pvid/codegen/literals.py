@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from pvid.base.errors import PvidError
+from pvid.codegen.operations import Literal, Program
 from pvid.design.c_tables import float_literal
 
 
@@ -36,3 +37,10 @@ def c_literal(value: Fraction) -> str:
 def python_literal(value: Fraction) -> str:
     """As in _F(0.25)."""
     return f"_F({float_literal(float32_of(value)).removesuffix('f')})"
+
+
+def check_literals(program: Program) -> None:
+    """PvidError for a constant of the list that float32 does not have."""
+    for one in program.values:
+        if isinstance(one, Literal):
+            float32_of(one.value)

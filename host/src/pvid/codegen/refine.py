@@ -21,12 +21,14 @@ solution: with A h = b, A dh = db - dA h for every column, so that A is inverted
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
 from pvid.base.errors import PvidError
+from pvid.base.recent import Recent
 from pvid.base.wording import listed
 from pvid.codegen.functions import with_values
 from pvid.codegen.names import identifiers
@@ -195,6 +197,74 @@ def refine_functions_of(
         Where the equations do not determine a motion.
     """
     return _Refine(model, widths, skew).functions()
+
+
+def refine_hash(made: RefineFunctions) -> str:
+    """Eight digits that change with anything that the files are made from."""
+    parts = [repr(made.parameters), repr(made.inputs), repr(made.outputs), str(made.order), repr(made.coordinates)]
+    parts += [f"{name} {one.program!r}" for name, one in made.functions.items()]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:8]
+
+
+def refine_id(made: RefineFunctions) -> str:
+    """The same in C: PVID_REFINE_MODEL_ID."""
+    return f"0x{refine_hash(made).upper()}u"
+
+
+def ring_of(made: RefineFunctions) -> int:
+    """PVID_REFINE_RING: where a step may be a tick the ring is longer."""
+    return 2048 if made.runge_kutta else 512
+
+
+def check_outputs(made: RefineFunctions) -> None:
+    """The kernel has columns of the motion, and those of outputs alone."""
+    n, moving = len(made.parameters), made.moving - made.skew
+    shown = is_nonzero(made, "Zr")
+    width = n - made.skew
+    for row in range(len(made.outputs)):
+        for k in range(moving):
+            if shown[row * width + k]:
+                raise PvidError(
+                    f"{made.model.name}: the second stage in C needs readings without parameters of the motion; "
+                    f"{made.outputs[row]} depends on {made.parameters[k].name}, which changes the motion too"
+                )
+
+
+def widths(made: RefineFunctions) -> list[str]:
+    """Arguments of the signs whose widths are refined, in the order of r."""
+    return [one.sign for one in made.parameters if one.sign]
+
+
+def has_integrals(made: RefineFunctions) -> bool:
+    """Whether an input is the integral of a sample."""
+    opaque = made.model.opaque
+    return any(jet in opaque and opaque[jet].has(Integral) for jet in made.inputs)
+
+
+def is_nonzero(made: RefineFunctions, key: str) -> list[bool]:
+    """Which entries of a derivative of the outputs are not constantly 0."""
+    one = made.functions["output_jacobian"]
+    at = 0
+    for name, n in one.written:
+        if name == key:
+            values = [one.program.values[place] for place in one.program.results[at : at + n]]
+            return [not (isinstance(value, Literal) and value.value == 0) for value in values]
+        at += n
+    return []
+
+
+def refine_functions(model: CompiledModel, widths: Mapping[str, float] | None = None) -> RefineFunctions:
+    """What the core's second stage takes: without optional extras; with a skew where inputs are measured and derived.
+
+    Parameters as of `refine_functions_of`; widths that are not given are refined.
+    """
+    return _refined((model, tuple(sorted((widths or {}).items()))))
+
+
+@Recent
+def _refined(given: tuple[CompiledModel, tuple[tuple[str, float], ...]]) -> RefineFunctions:
+    plain = without_optional(given[0])
+    return refine_functions_of(plain, dict(given[1]), has_skew(plain))
 
 
 def without_optional(model: CompiledModel, kept: Collection[str] = ()) -> CompiledModel:

@@ -11,6 +11,7 @@ from pvid.codegen.banner import banner, c_comment
 from pvid.codegen.files_f32 import SIZES
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import Function, ModelFunctions
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.twin_file import loaded, loaded_q31
 from pvid.twin.q31.integer import Int
 from pvid.twin.q31.scaled import Scaled
@@ -100,6 +101,11 @@ def scaled_of(values: Float) -> Scaled:
     m = np.rint(fraction * 2.0**30).astype(np.int64)
     full = np.abs(m) == 2**30
     return Scaled(np.where(full, m >> 1, m), np.where(m == 0, 0, exponent.astype(np.int64) - 30 + full))
+
+
+def printed(model: GeneratedModel) -> dict[str, str]:
+    """NAME_test.c."""
+    return {f"{model.name}_test.c": source(model.functions, model.command, model.fixed.made)}
 
 
 def source(functions: ModelFunctions, command: str, fixed: FixedModel | None = None) -> str:

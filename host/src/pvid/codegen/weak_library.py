@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from pvid.codegen import files_refine, files_weak
+from pvid.codegen import files_refine, files_weak, files_weak_q31
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions
-from pvid.codegen.weak import weak_functions_of
-from pvid.codegen.weak_twin import weak_model_of
+from pvid.codegen.weak_q31 import FixedWeak, ParametersQ31
 from pvid.core.model_library import model_library
 from pvid.core.sizes import roomy
 from pvid.core.weak_native import WeakNative
+from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.model.compiled import CompiledModel
+from pvid.settings.engine_cores import FIXED
 from pvid.settings.weak import WeakDesign32
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
+from pvid.settings.weak_q31 import WeakConfigQ31
+from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model, sizes_of_q31
+
+_MADE_BY = "identification"
 
 
 def weak_native(
@@ -24,13 +29,32 @@ def weak_native(
     PvidError
         When there is no compiler, or the engine does not have what the model needs.
     """
-    made, model = weak_functions_of(compiled), weak_model_of(compiled)
-    needed = sizes_of_model(model) if design is None else sizes_of_design(design)
-    texts = {
-        f"{made.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), "identification"),
-        f"{made.name}_weak_f32.c": files_weak.source(made, model, "identification"),
-    }
+    model = GeneratedModel(compiled, _MADE_BY)
+    name = model.weak.needed.name
+    needed = sizes_of_model(model.weak_model) if design is None else sizes_of_design(design)
+    texts = files_weak.printed(model)
     if refine is not None:
-        texts["pvid/refine_shape.h"] = files_refine.shape(refine, "identification")
-        texts["refine_model_f32.h"] = files_refine.header(refine, "identification")
-    return WeakNative(made.name, model_library(made.name, texts, roomy(needed)))
+        texts |= files_refine.files_of(refine, _MADE_BY)
+    return WeakNative(name, model_library(name, texts, roomy(needed)))
+
+
+def weak_native_q31(made: FixedWeak, parameters: ParametersQ31, config: WeakConfigQ31) -> WeakNativeQ31:
+    """The library of a model in fixed point, a design and its settings.
+
+    Raises
+    ------
+    PvidError
+        When there is no compiler.
+    """
+    name = made.functions.name
+    needed = sizes_of_q31(config.design, parameters.model.n_p, len(parameters.model.c_row))
+    texts = {
+        f"{name}_weak_q31.h": files_weak_q31.header(made, needed, _MADE_BY),
+        f"{name}_weak_q31.c": files_weak_q31.source(made, parameters, _MADE_BY),
+        f"{name}_design_q31.h": files_weak_q31.design_header(config, name, needed, _MADE_BY, []),
+        "configuration.c": f'#include "{name}_design_q31.h"\n#include "configuration.h"\n\n'
+        f"const pvid_weak_config_q31 *{name}_settings_q31 = &{name}_config_q31;\n",
+        "configuration.h": f'#include "pvid/weak_q31.h"\nextern const pvid_weak_config_q31 *{name}_settings_q31;\n',
+    }
+    headers = ("configuration.h",)
+    return WeakNativeQ31(name, model_library(name, texts, roomy(needed), FIXED, headers), config)

@@ -1,4 +1,4 @@
-"""The generated functions of the fixed-point weak engine: formats from the reach of each jet, C, and their twins."""
+"""The fixed-point weak engine of a model: formats from the reach of each jet and the bounds of p, and their twins."""
 
 from __future__ import annotations
 
@@ -6,15 +6,23 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+import numpy.typing as npt
+
 from pvid.base.errors import PvidError
 from pvid.codegen import c_q31, numpy_q31
 from pvid.codegen.formats import FixedProgram, bits_of, fixed
-from pvid.codegen.intervals import Interval
+from pvid.codegen.functions import Function, ModelFunctions
+from pvid.codegen.intervals import Interval, bounds_of
 from pvid.codegen.reaches import symmetric
 from pvid.codegen.twin_file import namespace
 from pvid.codegen.weak import WeakFunctions
 from pvid.design.weak_q31 import Formats
-from pvid.settings.weak_q31 import WeakModelQ31, WeakTermQ31
+from pvid.model.compiled import CompiledModel
+from pvid.settings.weak_q31 import WeakConfigQ31, WeakModelQ31, WeakTermQ31
+from pvid.twin.q31.integer import Int, integers, round_shift
+from pvid.twin.q31.model import ModelQ31
+from pvid.twin.q31.scaled import Scaled, scaled
 
 _PARTS = """\
 import numpy as np
@@ -23,6 +31,12 @@ import numpy.typing as npt
 from pvid.twin.q31 import elementary as elementary_q31
 from pvid.twin.q31.integer import Int
 """
+
+
+_BITS = 58  # of theta and of C: they fit 2^60
+_LARGEST = 1 << 60
+_LEFT = 30  # shift to the left, at most
+_FORMAT_MAX = 200
 
 
 @dataclass(frozen=True)
@@ -173,14 +187,138 @@ def _model(
     )
 
 
-def c_functions(made: FixedWeak, prefix: str) -> str:
-    """PREFIX_prepare_q31 and PREFIX_values_q31."""
-    parts = []
-    for name, one, limits in (
-        ("prepare", made.prepare, made.prepare_limits),
-        ("values", made.values, made.values_limits),
-    ):
-        if one is not None:
-            signature = f"static bool {prefix}_{name}_q31(const int32_t in[], int32_t out[])"
-            parts.append(c_q31.fixed_function(signature, one, limits))
-    return "\n\n".join(parts) + "\n"
+@dataclass(frozen=True)
+class ParametersQ31:
+    """Formats and functions of p.
+
+    Attributes
+    ----------
+    p_bits, theta_bits, c_bits : formats
+    model : the twin
+    functions : what is generated
+    """
+
+    p_bits: tuple[int, ...]
+    theta_bits: tuple[int, ...]
+    c_bits: tuple[int, ...]
+    model: ModelQ31
+    functions: ModelFunctions
+
+
+def fixed_of(x: Scaled, bits: Sequence[int]) -> Int:
+    """Numbers [n, ...] as integers of these formats, saturated at 2^60."""
+    shift = -(x.e + integers(bits).reshape(-1, *[1] * (x.e.ndim - 1)))
+    left = np.minimum(np.maximum(-shift, 0), _LEFT)
+    up = np.where(-shift > _LEFT, np.sign(x.m) * _LARGEST, x.m << left)
+    return np.where(shift >= 0, round_shift(x.m, np.maximum(shift, 0)), up)
+
+
+def fixed_parameters(functions: ModelFunctions, bounds: Sequence[Interval]) -> ParametersQ31:
+    """Formats from the bounds of p.
+
+    Raises
+    ------
+    PvidError
+        Where theta or C may be infinite within the bounds, with its name.
+    """
+    p_bits = tuple(bits_of(one) for one in bounds)
+    theta_bits = _bits_of_p(functions, functions.theta, bounds)
+    c_bits = _bits_of_p(functions, functions.jacobian, bounds)
+    parts = [
+        "import numpy as np\nimport numpy.typing as npt\n\nfrom pvid.twin.q31 import elementary as elementary_q31\n"
+        "from pvid.twin.q31.scaled import Scaled\n",
+        numpy_q31.scaled_function("theta", functions.theta.program, "theta"),
+        numpy_q31.scaled_function("jacobian", functions.jacobian.program, "C"),
+    ]
+    space = namespace("\n\n".join(parts), functions.name)
+
+    def numbers(p: Int) -> Scaled:
+        return scaled(p, -integers(p_bits).reshape(-1, *[1] * (p.ndim - 1)))
+
+    def theta(p: Int) -> Int:
+        return fixed_of(space["theta"](numbers(p)), theta_bits)
+
+    def jacobian(p: Int) -> Int:
+        return fixed_of(space["jacobian"](numbers(p)), c_bits)
+
+    model = ModelQ31(
+        n_theta=len(theta_bits),
+        n_p=len(p_bits),
+        positive=tuple(one.positive for one in functions.model.unknowns),
+        c_row=functions.c_row,
+        c_column=functions.c_column,
+        theta=theta,
+        jacobian=jacobian,
+        formats=lambda _: (list(theta_bits), list(c_bits)),
+        kind_end=tuple(one.theta.stop for one in functions.kinds),
+    )
+    return ParametersQ31(p_bits, theta_bits, c_bits, model, functions)
+
+
+def _bits_of_p(functions: ModelFunctions, function: Function, bounds: Sequence[Interval]) -> tuple[int, ...]:
+    c_q31.require_scaled(function.program, f"{functions.name}, {function.name}")
+    found = bounds_of(function.program, bounds, f"{functions.name}, {function.name}")
+    out = []
+    for place, label in zip(function.program.results, function.labels, strict=True):
+        size = max(map(abs, found[place]))
+        if not size < math.inf:
+            raise PvidError(f"{functions.name}: {label} may be infinite within the bounds of its parameters")
+        out.append(_FORMAT_MAX if size == 0 else min(_BITS - math.frexp(size)[1], _FORMAT_MAX))
+    return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class FixedEngine:
+    """A mechanism's fixed-point engine for a rig.
+
+    Attributes
+    ----------
+    compiled : the mechanism
+    made : functions of the rows, with their formats
+    parameters : functions of p
+    config : settings and tables
+    sample_rate : [Hz]
+    lsb : value of a count of each sample [samples]
+    """
+
+    compiled: CompiledModel
+    made: FixedWeak
+    parameters: ParametersQ31
+    config: WeakConfigQ31
+    sample_rate: float
+    lsb: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the mechanism, in C."""
+        return self.made.functions.name
+
+    @property
+    def sample_names(self) -> tuple[str, ...]:
+        """In the argument of step."""
+        return self.made.functions.samples
+
+    @property
+    def hop_s(self) -> float:
+        """Half a window."""
+        return self.config.design.hop * self.config.design.decimation / self.sample_rate
+
+    @property
+    def ticks_needed(self) -> int:
+        """Samples up to the first estimate, at most: as in float32."""
+        return self.config.design.ticks_needed
+
+    def counts_of(self, run: Mapping[str, npt.ArrayLike]) -> npt.NDArray[np.int32]:
+        """The argument of step at every tick [ticks, samples]."""
+        columns = [np.rint(np.asarray(run[name]) / lsb) for name, lsb in zip(self.sample_names, self.lsb, strict=True)]
+        most = float(np.iinfo(np.int32).max)
+        columns = [np.where(np.isnan(one), most, one) for one in columns]  # beyond every range: a gap
+        return np.asarray(np.clip(np.stack(columns, axis=1), -most, most), np.int32)
+
+    def values(self, p: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Parameters, or standard errors, from their integers [..., n_p]."""
+        return np.asarray(p, np.float64) * 2.0 ** -np.array(self.parameters.p_bits, np.float64)
+
+    def integers(self, p: npt.ArrayLike) -> npt.NDArray[np.int32]:
+        """The nearest integers of parameters [n_p]."""
+        return np.rint(np.asarray(p, np.float64) * 2.0 ** np.array(self.parameters.p_bits, np.float64)).astype(np.int32)

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.compare.bits import Comparison, first_difference
 from pvid.configuration.weak import config_to_identify, samples_of
-from pvid.configuration.weak_q31 import FixedEngine, engine_to_identify
+from pvid.configuration.weak_q31 import engine_to_identify
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording

@@ -12,9 +12,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
-from pvid.codegen import files_refine
-from pvid.codegen.build import Options, refine_functions
-from pvid.codegen.refine import RefineFunctions, is_measured, signs_of
+from pvid.codegen.refine import RefineFunctions, check_outputs, is_measured, refine_functions, ring_of, signs_of
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.weak import Run, simulated_run_of
@@ -78,8 +76,8 @@ def refine_design(
             f"{compiled.name}: the recording has {listed(before)} before the jumps of the inputs, and the second stage"
             " in C reads samples behind them"
         )
-    made = refine_functions(compiled, Options(soft_signs=soft_signs or {}))
-    files_refine.check_outputs(made)
+    made = refine_functions(compiled, soft_signs)
+    check_outputs(made)
     near = config.estimator.start if p is None else p
     settings = refine_settings(made, run, config.sample_rate, near, 4 * config.hop_s)
     own = made.model.refinement.equations
@@ -193,7 +191,7 @@ def _with_steps(rig: RefineRig, made: RefineFunctions, jumps: Sequence[float], b
     return replace(
         rig,
         runge_kutta=made.runge_kutta,
-        ring=files_refine.ring_of(made),
+        ring=ring_of(made),
         fine_s=_fine_s(made, jumps, block_s),
         jumps=jumps,
         step_fine=_step_fine(made),

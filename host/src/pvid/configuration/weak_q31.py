@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.parameters_q31 import ParametersQ31, fixed_parameters
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
-from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_weak
+from pvid.codegen.weak_q31 import FixedEngine, FixedWeak, JetReaches, ParametersQ31, fixed_parameters, fixed_weak
 from pvid.configuration.weak import Run, design_and_p, engine_tables, neglected_part, simulated_run_of
 from pvid.design.weak_q31 import Sensing, fixed_design, most_counts
 from pvid.model.compiled import CompiledModel
@@ -33,63 +32,6 @@ _PART_BITS = 30  # of neglected
 _ON_GRID = 1e-3  # of a count: digits of a file
 _FINER_BITS = 10  # at most
 _LONGEST_RUN_S = 3600.0  # of integrals since the start of the run, at least
-
-
-@dataclass(frozen=True, eq=False)
-class FixedEngine:
-    """A mechanism's fixed-point engine for a rig.
-
-    Attributes
-    ----------
-    compiled : the mechanism
-    made : functions of the rows, with their formats
-    parameters : functions of p
-    config : settings and tables
-    sample_rate : [Hz]
-    lsb : value of a count of each sample [samples]
-    """
-
-    compiled: CompiledModel
-    made: FixedWeak
-    parameters: ParametersQ31
-    config: WeakConfigQ31
-    sample_rate: float
-    lsb: tuple[float, ...]
-
-    @property
-    def name(self) -> str:
-        """Of the mechanism, in C."""
-        return self.made.functions.name
-
-    @property
-    def sample_names(self) -> tuple[str, ...]:
-        """In the argument of step."""
-        return self.made.functions.samples
-
-    @property
-    def hop_s(self) -> float:
-        """Half a window."""
-        return self.config.design.hop * self.config.design.decimation / self.sample_rate
-
-    @property
-    def ticks_needed(self) -> int:
-        """Samples up to the first estimate, at most: as in float32."""
-        return self.config.design.ticks_needed
-
-    def counts_of(self, run: Run) -> npt.NDArray[np.int32]:
-        """The argument of step at every tick [ticks, samples]."""
-        columns = [np.rint(np.asarray(run[name]) / lsb) for name, lsb in zip(self.sample_names, self.lsb, strict=True)]
-        most = float(np.iinfo(np.int32).max)
-        columns = [np.where(np.isnan(one), most, one) for one in columns]  # beyond every range: a gap
-        return np.asarray(np.clip(np.stack(columns, axis=1), -most, most), np.int32)
-
-    def values(self, p: npt.ArrayLike) -> Float:
-        """Parameters, or standard errors, from their integers [..., n_p]."""
-        return np.asarray(p, np.float64) * 2.0 ** -np.array(self.parameters.p_bits, np.float64)
-
-    def integers(self, p: npt.ArrayLike) -> npt.NDArray[np.int32]:
-        """The nearest integers of parameters [n_p]."""
-        return np.rint(np.asarray(p, np.float64) * 2.0 ** np.array(self.parameters.p_bits, np.float64)).astype(np.int32)
 
 
 def fixed_engine(

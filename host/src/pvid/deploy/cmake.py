@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pvid.codegen.build import COMPILE_OPTIONS
+from pvid.codegen.cmake import COMPILE_OPTIONS
 from pvid.deploy.deployment import Deployment, Files
 from pvid.deploy.example import example_files
 from pvid.deploy.library import indented, library_files, licence, sources, under

@@ -8,15 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
-from pvid.codegen.build import refine_functions
+from pvid.codegen.files_weak_q31 import files_of, fitted_of
 from pvid.codegen.fitted_sizes import fitted_sizes
+from pvid.codegen.generated import GeneratedModel, Options
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.codegen.weak_q31 import FixedEngine
 from pvid.configuration.weak import Run, samples_of
-from pvid.configuration.weak_files_q31 import files_of, fitted_of
-from pvid.configuration.weak_q31 import FixedEngine
 from pvid.core.weak_native import RefinedRecord
 from pvid.deploy.arithmetic import FIXED, FLOAT
 from pvid.deploy.deployment import Deployment, Playback, Quantity, SecondStage
@@ -25,7 +24,6 @@ from pvid.settings.enums import Reason
 from pvid.settings.record import Record
 from pvid.settings.refine import BIG_STEP, RefineConfig
 from pvid.settings.weak import Source, WeakConfig
-from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
 
 _MOST_NUMBERS = 30_000  # of the example's motion: 60 kB of flash
 _LONGER = 3  # half windows behind the first estimate
@@ -54,8 +52,6 @@ def deployment_f32(
     model, name = design.model, design.model.name
     units = {one.name: one.unit for one in compiled.signals}
     resolution = {one.name: one.resolution for one in compiled.signals}
-    titles = [f"{one.name} [{one.unit or '1'}]" for one in compiled.unknowns]
-    needed = sizes_of_design(design)
     samples = samples_of(config, run)
     largest = np.abs(samples).max(axis=0)
     lsb = np.array(
@@ -67,19 +63,13 @@ def deployment_f32(
     record = weak_native(compiled, design).identifier_of(config).run_samples(values, sums=False, hashes=False)
     hop = design.hop * design.decimation
     playback = _playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns)))
-    generated = {
-        f"{name}_weak.h": files_weak.header(made, model, sizes_of_model(model), command),
-        f"{name}_weak_f32.c": files_weak.source(made, model, command),
-        f"{name}_design_f32.h": files_design.header(config, needed, command, compiled.title, titles),
-    }
+    whole = GeneratedModel(compiled, command, Options(refine_design=refine))
+    generated = files_weak.printed(whole)
+    generated[f"{name}_design_f32.h"] = files_design.header(config, compiled, command)
     second = None
     if refine is not None:
-        functions = refine_functions(compiled)
-        generated |= {
-            "pvid/refine_shape.h": files_refine.shape(functions, command),
-            "refine_model_f32.h": files_refine.header(functions, command),
-            f"{name}_refine_design_f32.h": files_refine_design.header(functions, refine, command),
-        }
+        functions = whole.refinement.needed
+        generated |= files_refine.printed(whole) | files_refine_design.printed(whole)
         refined = weak_native(compiled, design, functions).refined_of(config, refine).run_both(values)
         ticks = _ticks_of(refined, refine, len(playback.counts), len(counts))
         playback = _playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns)), ticks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from pvid.base.version import __version__
-from pvid.codegen.build import COMPILE_OPTIONS
+from pvid.codegen.cmake import COMPILE_OPTIONS
 from pvid.deploy.arduino import sketch
 from pvid.deploy.deployment import Deployment, Files
 from pvid.deploy.library import library_files, licence

@@ -15,8 +15,7 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed, with_unit
-from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_library_q31 import weak_native_q31
+from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.configuration.weak_q31 import engine_to_identify
 from pvid.core.native import Publisher

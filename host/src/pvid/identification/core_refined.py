@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.build import refine_functions
-from pvid.codegen.refine import RefineFunctions
+from pvid.codegen.refine import RefineFunctions, refine_functions
 from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak_library import weak_native
 from pvid.compare.bits import Comparison, Difference
