@@ -16,8 +16,8 @@ from described import CHAIN, MOTOR
 from pvid.base.errors import PvidError
 from pvid.codegen.build import build, check, files_of
 from pvid.codegen.files_weak_q31 import fitted_of
+from pvid.codegen.fixed_model import Reaches
 from pvid.codegen.generated import GeneratedModel, Options
-from pvid.codegen.reaches import Reaches
 from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.refine import refine_design, refine_settings

@@ -16,14 +16,13 @@ from generated import SCALED as SCALED_TYPE
 from rounding import SCALED, bounds_of, fixed_bounds_of, values_of
 
 from pvid.base.errors import PvidError
-from pvid.codegen.c_q31 import scaled_literal
-from pvid.codegen.fixed_model import FixedModel, fixed_model
+from pvid.codegen.c_functions import scaled_literal
+from pvid.codegen.fixed_model import FixedModel, Reaches, fixed_model, reaches_of
 from pvid.codegen.formats import bits_of, fixed
+from pvid.codegen.formats import bounds_of as interval_bounds_of
 from pvid.codegen.functions import functions_of
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.intervals import bounds_of as interval_bounds_of
 from pvid.codegen.operations import program_of
-from pvid.codegen.reaches import Reaches, reaches_of
 from pvid.codegen.self_test import scaled_of
 from pvid.codegen.twin_file import loaded_q31
 from pvid.core.sources import FIRMWARE, INCLUDES

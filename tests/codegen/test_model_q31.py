@@ -12,9 +12,10 @@ import pytest
 from block_models import Q31InC
 from generated import WARNINGS, exactly, functions_by_name
 
-from pvid.codegen import files_f32, files_q31
+from pvid.codegen import files_functions
 from pvid.codegen.fixed_model import FixedModel, fixed_model
 from pvid.codegen.formats import bits_of
+from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.twin_file import loaded_q31
 from pvid.core.native import Native
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources
@@ -44,9 +45,9 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 def native_of(fixed: FixedModel, core: list[str], folder: Path) -> Native:
     """The core with the generated model in it."""
     name = fixed.functions.name
-    (folder / f"{name}_q31.h").write_text(files_q31.header(fixed, "test"), encoding="utf-8")
-    (folder / f"{name}_q31.c").write_text(files_q31.source(fixed, "test"), encoding="utf-8")
-    (folder / f"{name}_sizes.h").write_text(files_f32.sizes(fixed.functions, "test"), encoding="utf-8")
+    model = GeneratedModel(fixed.functions.model, "test")
+    for file, text in (files_functions.printed_f32(model) | files_functions.printed_q31(model)).items():
+        (folder / file).write_text(text, encoding="utf-8")
     library = folder / "libmodel.so"
     made = [*OPTIONS, *WARNINGS, "-O1", "-shared", "-fPIC", *INCLUDES, str(folder / f"{name}_q31.c"), *core]
     subprocess.run(["gcc", *made, "-o", str(library)], check=True)

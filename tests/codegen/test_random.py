@@ -14,7 +14,7 @@ import sympy as sp
 from generated import WARNINGS
 from rounding import FLOAT32, bounds_of, fixed_bounds_of
 
-from pvid.codegen import c_f32, c_q31, numpy_f32, numpy_q31
+from pvid.codegen import c_functions, numpy_f32, numpy_q31
 from pvid.codegen.formats import bits_of, fixed
 from pvid.codegen.operations import program_of
 from pvid.codegen.twin_file import namespace
@@ -80,8 +80,8 @@ class Case:
         return "\n".join(
             [
                 f"{floats};\n{integers};",
-                c_f32.function(floats, self.program),
-                c_q31.fixed_function(integers, self.fixed, limits),
+                c_functions.float_function(floats, self.program),
+                c_functions.fixed_function(integers, self.fixed, limits),
             ]
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from pvid.codegen import files_design, files_weak
+from pvid.codegen import files_weak
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.model_library import model_library
@@ -50,7 +50,7 @@ class WeakForm:
         return {
             f"{name}_weak.h": files_weak.header(self.made, self.model, needed, "test"),
             f"{name}_weak_f32.c": files_weak.source(self.made, self.model, "test"),
-            f"{name}_design_f32.h": files_design.header(self.config, self.made.model, "test"),
+            f"{name}_design_f32.h": files_weak.design_header(self.config, self.made.model, "test"),
         }
 
 

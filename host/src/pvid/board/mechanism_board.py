@@ -19,7 +19,7 @@ from pvid.base.wording import printable
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import MOST_TICKS, SLOWEST
-from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
+from pvid.codegen import files_refine, files_weak
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions, refine_functions, widths
 from pvid.codegen.refine_twin import GeneratedRefine
@@ -224,7 +224,7 @@ class MechanismBoard:
         """Headers, generated C and sizes."""
         model, design = self.config.design.model, self.config.design
         code = files_weak.printed(GeneratedModel(self.compiled, _COMMAND))
-        code["stream_tables.h"] = files_design.header(self._shared, self.compiled, _COMMAND)
+        code["stream_tables.h"] = files_weak.design_header(self._shared, self.compiled, _COMMAND)
         if self.refine is not None:
             code |= files_refine.files_of(self.equations, _COMMAND)
             code["stream_refine.h"] = _refine_header(self.refine, self._shown)
@@ -351,7 +351,7 @@ class MechanismBoard:
 
 def _refine_header(settings: RefineConfig, shown: Sequence[int]) -> str:
     """stream_refine.h: `stream_refine_config`, and which entries of r the board sends."""
-    lines = ['#include "pvid/refine.h"', "", *files_refine_design.tables(settings, "stream_refine_config"), ""]
+    lines = ['#include "pvid/refine.h"', "", *files_refine.design_tables(settings, "stream_refine_config"), ""]
     lines += [f"#define STREAM_SHOWN {len(shown)}", "/* Entries of r that the board sends. */"]
     lines += [f"static const uint8_t stream_shown[STREAM_SHOWN] = {{{', '.join(map(str, shown))}}};"]
     return "\n".join(["#ifndef STREAM_REFINE_H", "#define STREAM_REFINE_H", "", *lines, "", "#endif", ""])

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header
 from pvid.board.replay_image import REPORT_EVERY
-from pvid.codegen import files_design, files_weak
+from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak_library import weak_native
@@ -185,7 +185,7 @@ def header(run: MechanismRun) -> str:
 def files_of(run: MechanismRun) -> dict[str, str]:
     """What the image consists of besides the core: name -> text."""
     return files_weak.printed(GeneratedModel(run.compiled, MADE_BY)) | {
-        f"{run.name}_design_f32.h": files_design.header(run.config, run.compiled, MADE_BY),
+        f"{run.name}_design_f32.h": files_weak.design_header(run.config, run.compiled, MADE_BY),
         "replay_run.h": header(run),
     }
 

@@ -19,7 +19,7 @@ from pvid.board.mechanism_image import (
     measured_from,
     mechanism_run,
 )
-from pvid.codegen import files_refine, files_refine_design
+from pvid.codegen import files_refine
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.refine import RefineFunctions, refine_functions
 from pvid.codegen.weak_library import weak_native
@@ -104,7 +104,7 @@ def header(run: RefinedRun, text: str) -> str:
             '#include "pvid/fnv_refine.h"',
             '#include "pvid/refine.h"',
             "",
-            *files_refine_design.tables(run.settings, "replay_refine_config"),
+            *files_refine.design_tables(run.settings, "replay_refine_config"),
             "static pvid_refine_f32 replay_refinement;",
             "static const pvid_weak_refine_f32 replay_second = {",
             "    &pvid_refine_stage_f32, &replay_refinement, &replay_refine_config};",

@@ -188,8 +188,8 @@ def build(
     NAME_strong_design_f32.h has the differentiators and settings of the strong form.
     """
     from pvid.codegen import build as generated
+    from pvid.codegen.fixed_model import Reaches
     from pvid.codegen.generated import GeneratedModel, Options
-    from pvid.codegen.reaches import Reaches
     from pvid.oracle.weak.edges import with_edges
     from pvid.setup.weak_sizes import refuse_too_many_unknowns
 

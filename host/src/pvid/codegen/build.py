@@ -8,11 +8,8 @@ from pvid.base.atomic_write import write_files
 from pvid.base.errors import PvidError
 from pvid.codegen import (
     cmake,
-    files_design,
-    files_f32,
-    files_q31,
+    files_functions,
     files_refine,
-    files_refine_design,
     files_strong,
     files_strong_design,
     files_weak,
@@ -25,15 +22,15 @@ from pvid.codegen.generated import GeneratedModel
 # Each takes the generated model and returns name -> text of its files, none where the model or the order has no such
 # part.
 PRINTERS = (
-    files_f32.printed,
-    files_q31.printed,
+    files_functions.printed_f32,
+    files_functions.printed_q31,
     files_weak.printed,
-    files_design.printed,
+    files_weak.printed_design,
     files_weak_q31.printed,
     files_strong.printed,
     files_strong_design.printed,
     files_refine.printed,
-    files_refine_design.printed,
+    files_refine.printed_design,
     twins.printed,
     self_test.printed,
     cmake.printed,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pvid.codegen.banner import banner
+from pvid.codegen.c_text import banner
 from pvid.codegen.generated import GeneratedModel
 
 COMPILE_OPTIONS = "-ffp-contract=off -fno-fast-math -fno-delete-null-pointer-checks"  # as PvidCompile.cmake

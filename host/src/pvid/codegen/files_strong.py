@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pvid.codegen import c_f32, describe
-from pvid.codegen.banner import banner, c_comment
-from pvid.codegen.files_f32 import UNCONTRACTED, for_cpp, guarded, includes_of, model_struct
+from pvid.codegen import c_functions, describe
+from pvid.codegen.c_text import UNCONTRACTED, banner, c_comment, for_cpp, guarded
+from pvid.codegen.files_functions import includes_of, model_struct
 from pvid.codegen.functions import Function
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
@@ -260,7 +260,7 @@ def source(strong: StrongFunctions, command: str) -> str:
         c_comment(banner(functions, command)),
         UNCONTRACTED,
         includes_of(f"{name}.h", used, ("stdbool.h", "stddef.h", "string.h")),
-        *(c_f32.function(_signature(strong, one), one.program) for one in used),
+        *(c_functions.float_function(_signature(strong, one), one.program) for one in used),
         model_struct(functions, "theta", "jacobian"),
         _INIT.format(
             settings="    self->half_period = 0.5f / config->sample_rate_hz;\n" if strong.integrals else "", **words

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pvid.codegen import describe
-from pvid.codegen.files_design import estimator_fields, initialised, inner, number
-from pvid.codegen.files_f32 import guarded
+from pvid.codegen.c_text import guarded, initialised, inner, number
+from pvid.codegen.files_weak import estimator_fields
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
 from pvid.codegen.strong_twin import StrongModelConfig

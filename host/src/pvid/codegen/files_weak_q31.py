@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from pvid.codegen import c_q31, describe
-from pvid.codegen.banner import banner, c_comment
-from pvid.codegen.files_f32 import for_cpp, guarded
+from pvid.codegen import describe
+from pvid.codegen.c_functions import fixed_function, scaled_function
+from pvid.codegen.c_text import banner, c_comment, for_cpp, guarded
 from pvid.codegen.files_weak import size_check
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.codegen.generated import GeneratedModel
@@ -293,7 +293,7 @@ def _functions(made: FixedWeak, prefix: str) -> str:
     ):
         if one is not None:
             signature = f"static bool {prefix}_{name}_q31(const int32_t in[], int32_t out[])"
-            parts.append(c_q31.fixed_function(signature, one, limits))
+            parts.append(fixed_function(signature, one, limits))
     return "\n\n".join(parts) + "\n"
 
 
@@ -379,7 +379,7 @@ def _parameters(made: ParametersQ31, prefix: str) -> str:
     """PREFIX_model_q31 and its functions."""
     functions = made.functions
     generated = [
-        c_q31.scaled_function(f"static void {prefix}_{name}_q31(const pvid_scaled_q31 in[], pvid_scaled_q31 out[])", x)
+        scaled_function(f"static void {prefix}_{name}_q31(const pvid_scaled_q31 in[], pvid_scaled_q31 out[])", x)
         for name, x in (("theta", functions.theta.program), ("jacobian", functions.jacobian.program))
     ]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from pvid.codegen.files_f32 import guarded
+from pvid.codegen.c_text import guarded
 from pvid.core.sizes import smallest
 from pvid.settings.enums import Law
 from pvid.settings.weak import NONE, WeakChannel, WeakConfig

@@ -9,10 +9,9 @@ from functools import cached_property
 from typing import Generic, TypeVar
 
 from pvid.base.errors import PvidError
-from pvid.codegen.fixed_model import FixedModel, fixed_model
+from pvid.codegen.c_functions import check_literals
+from pvid.codegen.fixed_model import FixedModel, Reaches, fixed_model, reaches_of
 from pvid.codegen.functions import ModelFunctions, functions_of
-from pvid.codegen.literals import check_literals
-from pvid.codegen.reaches import Reaches, reaches_of
 from pvid.codegen.refine import RefineFunctions, check_outputs, refine_functions
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
 from pvid.codegen.strong_twin import StrongModelConfig

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pvid.codegen.literals import python_literal
+from pvid.codegen.c_functions import Language, call_of, python_literal, statements
 from pvid.codegen.operations import Program
-from pvid.codegen.statements import Language, call_of, statements
 
 _CALLS = {
     "sin": "elementary.sine({})",

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pvid.codegen.c_q31 import scaled_literal
+from pvid.codegen.c_functions import Language, fixed_call_of, scaled_literal, statements
 from pvid.codegen.formats import FixedProgram
 from pvid.codegen.operations import Program
-from pvid.codegen.statements import Language, fixed_call_of, statements
 
 _CALLS = {
     "*": "elementary_q31.product({}, {}, {})",

@@ -30,8 +30,7 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.base.wording import listed
-from pvid.codegen.functions import with_values
-from pvid.codegen.names import identifiers
+from pvid.codegen.functions import identifiers, with_values
 from pvid.codegen.operations import Argument, Builder, Literal, Operation, Program, Value
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Integral, Jet, jets, sgn

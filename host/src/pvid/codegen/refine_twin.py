@@ -8,17 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.literals import python_literal
-from pvid.codegen.refine import (
-    RefineFunction,
-    RefineFunctions,
-    is_nonzero,
-    refine_hash,
-    ring_of,
-    signs_of,
-    widths,
-)
-from pvid.codegen.statements import Language, call_of, statements
+from pvid.codegen.c_functions import Language, call_of, python_literal, statements
+from pvid.codegen.refine import RefineFunction, RefineFunctions, is_nonzero, refine_hash, ring_of, signs_of, widths
 from pvid.codegen.twin_file import namespace
 from pvid.twin.f32.refine_model import Derivatives, RefineShape
 

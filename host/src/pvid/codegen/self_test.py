@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen.banner import banner, c_comment
-from pvid.codegen.files_f32 import SIZES
+from pvid.codegen.c_text import banner, c_comment
+from pvid.codegen.files_functions import SIZES
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import Function, ModelFunctions
 from pvid.codegen.generated import GeneratedModel

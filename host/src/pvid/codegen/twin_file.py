@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen import numpy_f32, numpy_q31
-from pvid.codegen.banner import banner
+from pvid.codegen.c_text import banner
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import ModelFunctions
 from pvid.twin.f32.pattern import PatternModel

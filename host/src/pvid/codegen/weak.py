@@ -17,8 +17,7 @@ import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
-from pvid.codegen.functions import Function, ModelFunctions, functions_of
-from pvid.codegen.names import identifiers
+from pvid.codegen.functions import Function, ModelFunctions, functions_of, identifiers
 from pvid.codegen.operations import program_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import OfInput
@@ -76,6 +75,12 @@ class WeakFunctions:
     def name(self) -> str:
         """Of the model, in C."""
         return self.functions.name
+
+    @property
+    def with_results(self) -> tuple[Function, ...]:
+        """The functions that have results."""
+        own = (self.prepare, self.values, self.functions.theta, self.functions.jacobian)
+        return tuple(one for one in own if one.labels)
 
     @property
     def model(self) -> CompiledModel:

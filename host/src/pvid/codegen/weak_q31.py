@@ -10,11 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen import c_q31, numpy_q31
-from pvid.codegen.formats import FixedProgram, bits_of, fixed
+from pvid.codegen import c_functions, numpy_q31
+from pvid.codegen.fixed_model import symmetric
+from pvid.codegen.formats import FixedProgram, Interval, bits_of, bounds_of, fixed
 from pvid.codegen.functions import Function, ModelFunctions
-from pvid.codegen.intervals import Interval, bounds_of
-from pvid.codegen.reaches import symmetric
 from pvid.codegen.twin_file import namespace
 from pvid.codegen.weak import WeakFunctions
 from pvid.design.weak_q31 import Formats
@@ -256,7 +255,7 @@ def fixed_parameters(functions: ModelFunctions, bounds: Sequence[Interval]) -> P
 
 
 def _bits_of_p(functions: ModelFunctions, function: Function, bounds: Sequence[Interval]) -> tuple[int, ...]:
-    c_q31.require_scaled(function.program, f"{functions.name}, {function.name}")
+    c_functions.require_scaled(function.program, f"{functions.name}, {function.name}")
     found = bounds_of(function.program, bounds, f"{functions.name}, {function.name}")
     out = []
     for place, label in zip(function.program.results, function.labels, strict=True):

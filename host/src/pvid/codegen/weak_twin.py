@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pvid.base.recent import Recent
 from pvid.codegen import numpy_f32
-from pvid.codegen.banner import banner
-from pvid.codegen.functions import Function
+from pvid.codegen.c_text import banner
 from pvid.codegen.twin_file import namespace, pattern_of
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.model.compiled import CompiledModel
@@ -20,12 +19,6 @@ _SUMMARIES = {
 }
 
 
-def functions_in(made: WeakFunctions) -> tuple[Function, ...]:
-    """Those that have results."""
-    own = (made.prepare, made.values, made.functions.theta, made.functions.jacobian)
-    return tuple(one for one in own if one.labels)
-
-
 def text(made: WeakFunctions, command: str) -> str:
     """NAME_weak_twin.py."""
     parts = [
@@ -37,7 +30,7 @@ def text(made: WeakFunctions, command: str) -> str:
         "Float32 = npt.NDArray[np.float32]\n_F = np.float32",
     ]
     definitions = [
-        numpy_f32.function(f"{one.name}_f32", one.program, _SUMMARIES[one.name]) for one in functions_in(made)
+        numpy_f32.function(f"{one.name}_f32", one.program, _SUMMARIES[one.name]) for one in made.with_results
     ]
     return "\n\n".join(parts) + "\n\n\n" + "\n\n\n".join(definitions) + "\n"
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pvid.codegen import files_design, files_refine, files_refine_design, files_weak
+from pvid.codegen import files_refine, files_weak
 from pvid.codegen.files_weak_q31 import files_of, fitted_of
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.generated import GeneratedModel, Options
@@ -65,11 +65,11 @@ def deployment_f32(
     playback = _playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns)))
     whole = GeneratedModel(compiled, command, Options(refine_design=refine))
     generated = files_weak.printed(whole)
-    generated[f"{name}_design_f32.h"] = files_design.header(config, compiled, command)
+    generated[f"{name}_design_f32.h"] = files_weak.design_header(config, compiled, command)
     second = None
     if refine is not None:
         functions = whole.refinement.needed
-        generated |= files_refine.printed(whole) | files_refine_design.printed(whole)
+        generated |= files_refine.printed(whole) | files_refine.printed_design(whole)
         refined = weak_native(compiled, design, functions).refined_of(config, refine).run_both(values)
         ticks = _ticks_of(refined, refine, len(playback.counts), len(counts))
         playback = _playback(counts, lsb.tolist(), record, hop, np.ones(len(compiled.unknowns)), ticks)

@@ -8,14 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.refine import (
-    LOG_SD,
-    SKEW,
-    WIDTH_SD,
-    RefinedParameter,
-    is_driven_by_derivatives,
-    width_name,
-)
+from pvid.codegen.refine import LOG_SD, SKEW, WIDTH_SD, RefinedParameter, is_driven_by_derivatives, width_name
 from pvid.identification.refinement.fit import Budget, Inputs, Measured, Prior, Problem, Refined
 from pvid.identification.refinement.inputs import LateInputs, inputs_of, is_late, without_jumps
 from pvid.identification.refinement.kernel import PlayedKernel, kernel_of, play_of
