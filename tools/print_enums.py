@@ -21,10 +21,10 @@ TEXTS = ROOT / "firmware" / "src" / "judge" / "text.c"
 STATUS = ROOT / "firmware" / "include" / "pvid" / "status.h"
 ENUMS = {
     "Reason": ("pvid_reason", "Outcome of a tick"),
-    "Status": ("pvid_status", "Answer of an init"),
+    "Status": ("pvid_status", "Analysis of an init"),
     "Stage": ("pvid_stage", "Whose estimate is published"),
     "Law": ("pvid_law", "How the estimate follows the data"),
-    "SnapshotStatus": ("pvid_snapshot_status", "Answer of a snapshot's restore"),
+    "SnapshotStatus": ("pvid_snapshot_status", "Analysis of a snapshot's restore"),
 }
 HEAD = '''"""Enumerations of the public C headers. Printed by tools/print_enums.py: do not edit."""
 

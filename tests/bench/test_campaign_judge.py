@@ -16,7 +16,7 @@ from bench.campaign.population import shipped
 from bench.campaign.truth import SimulatedRig, rig_file, simulate_rig
 from pvid.base.errors import PvidError
 from pvid.core.native import Native
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.core import CoreAnswer, Publications
 from pvid.rig.run import Run
 from pvid.settings.forms import AnyCore
@@ -136,7 +136,7 @@ def test_the_weak_form_answers_the_standard_rig_and_the_refinement_sharpens_it(n
     weak, _ = identify_rig(rig, refine=False)
     record, result = identify_rig(rig)
     assert flags(weak) >= {"published", "answered", "within_5"}
-    assert isinstance(result, Answer) and result.refinement is not None and result.refinement.adopted
+    assert isinstance(result, Analysis) and result.refinement is not None and result.refinement.adopted
     assert flags(record) >= {"published", "answered", "within_1", "right"} and not record["warned"]
     for name in NAMES:
         assert 0 < float(str(record[f"{name}_se"])) < float(str(weak[f"{name}_se"]))
@@ -237,6 +237,6 @@ def test_a_rig_with_viscous_friction_is_answered_by_the_refinement() -> None:
     rig = simulate_rig(native, shipped(), 33, 30)
     record, result = identify_rig(rig)
     assert rig.rig.condition == "damp" and record["suffices"]
-    assert isinstance(result, Answer) and result.refinement is not None and result.refinement.adopted
+    assert isinstance(result, Analysis) and result.refinement is not None and result.refinement.adopted
     assert record["published"] and record["answered"] and not record["silently_wrong"]
     assert isinstance(record["worst_error"], float) and record["worst_error"] < 2.5e-3

@@ -14,7 +14,7 @@ from bench.campaign.motion import accelerations, integrate, step_of
 from bench.campaign.population import RandomRig
 from bench.campaign.truth import SimulatedRig, measure, rig_file
 from pvid.core.native import Native
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.rig.run import Run
 
 _PENDULUM = RIG.pendulum
@@ -54,7 +54,7 @@ def test_an_imperfection_is_fitted_and_the_answer_is_right(
     """Without its equation each is refused, or moves w, d1 and d2 by many standard errors."""
     record, answer = identify_rig(recorded(native, replace(RIG, **imperfections)))  # type: ignore[arg-type]
     assert record["published"] and record["answered"] and not record["silently_wrong"]
-    assert isinstance(answer, Answer) and answer.refinement is not None and answer.refinement.adopted
+    assert isinstance(answer, Analysis) and answer.refinement is not None and answer.refinement.adopted
     assert isinstance(record["worst_error"], float) and record["worst_error"] < 0.005
     extras = answer.refinement.as_json()["parameters"]
     for name, truth in found.items():

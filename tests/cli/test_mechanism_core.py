@@ -136,8 +136,8 @@ def test_values_that_float32_does_not_resolve_are_alike(recorded: dict[str, Path
     exact = replace(one, value=float(np.float32(one.value)), se_noise=1e-12 * abs(one.value))
     assert exact.value is not None
     apart = replace(exact, value=exact.value + steps * float(np.spacing(np.float32(abs(one.value)))))
-    oracle = replace(core.oracle, values={**core.oracle.values, "Iyz": exact})
-    assert replace(core, oracle=oracle, values={**core.values, "Iyz": apart}).verdict.status == status
+    analysis = replace(core.analysis, values={**core.analysis.values, "Iyz": exact})
+    assert replace(core, analysis=analysis, values={**core.values, "Iyz": apart}).verdict.status == status
 
 
 def test_without_a_second_stage_the_answer_is_that_of_the_first(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from test_own_mechanisms import read, recorded
 
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.refinement.problem import RefinedMechanism
 from pvid.identification.refinement.search import refine
 from pvid.model import Model
@@ -99,13 +99,13 @@ def run_of(name: str, skew: float = 0.0) -> Recording:
 
 
 @cache
-def _weak(name: str) -> Answer:
+def _weak(name: str) -> Analysis:
     return analysed(run_of(name), subject(name).model)
 
 
 def answer_of(
     name: str, recording: Recording | None = None, factor: float = 1.05, lacking: tuple[str, ...] = ()
-) -> Answer:
+) -> Analysis:
     """An answer of the weak form with parameters off by a factor or its inverse in turn; it determines all but those
     of `lacking`."""
     weak, of = _weak(name), subject(name)

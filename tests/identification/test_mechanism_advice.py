@@ -11,7 +11,7 @@ import pytest
 
 from pvid.identification.advice import advice_on
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.model import Model, sgn, sin
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
@@ -108,7 +108,7 @@ CASES = {"spring": _spring(), "pendulum": _pendulum(), "vehicle": _vehicle()}
 def advice_of(case: Case, signals: Mapping[str, Float]) -> tuple[str, ...]:
     found = identify(case.model, signals, case.rate, design=WeakDesign(case.rate, 1.0, 12, 6))
     times = np.arange(len(next(iter(signals.values())))) / case.rate
-    return advice_on(Answer(case.model, found, {}, Recording(times, dict(signals), case.rate)))
+    return advice_on(Analysis(case.model, found, {}, Recording(times, dict(signals), case.rate)))
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from lag_plant import DRAG, RATE, K, T, lag, signals
 
-from pvid.api.result import of_mechanism
+from pvid.api.result import result_of
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.rig.run import Recording
 
 
 @cache
-def answer(drag: float) -> Answer:
+def answer(drag: float) -> Analysis:
     samples = signals(drag)
     return analysed(Recording(np.arange(len(samples["u"])) / RATE, samples, RATE), lag(2))
 
@@ -42,7 +42,7 @@ def test_output_has_the_model_part_of_what_it_is_made_of() -> None:
 
 
 def test_result_in_python_has_what_is_missing() -> None:
-    result = of_mechanism(answer(DRAG))
+    result = result_of(answer(DRAG))
     assert result.missing is not None and result.missing["terms"][0]["law"] == "abs(y)*y"
 
 
@@ -50,4 +50,4 @@ def test_answer_that_lacks_nothing_has_no_model_part() -> None:
     found = answer(0.0).as_json()
     assert found["status"] == "good" and found["missing"] is None
     assert all(one["se_model"] < 0.3 * one["se"] for one in found["parameters"].values())
-    assert of_mechanism(answer(0.0)).missing is None
+    assert result_of(answer(0.0)).missing is None

@@ -12,7 +12,7 @@ import pytest
 from pvid.configuration.weak_q31 import engine_to_identify
 from pvid.identification.advice import advice_on
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.core import CoreAnswer, identify_in_c
 from pvid.identification.core_refined import RefinedCoreAnswer, refined_in_c
 from pvid.identification.refinement.inputs import smooth
@@ -120,7 +120,7 @@ def drag_model() -> CompiledModel:
     return model.compiled("water")
 
 
-def drag_answer() -> Answer:
+def drag_answer() -> Analysis:
     """Driven by steps, 24 s at 500 Hz."""
     dt = 1 / 500
     u = held_at_random(12_000, 60, 500, 0.9, 3)
@@ -208,7 +208,7 @@ def spring_run(friction: float = 0.0) -> dict[str, Float]:
     return {"F": force, "x": read(motion(rate, np.zeros(2), force, 1e-3, 2)[:, 0], 0.1 / 2**12, 12)}
 
 
-def spring_answer(signals: dict[str, Float], step: float = 1e-3) -> Answer:
+def spring_answer(signals: dict[str, Float], step: float = 1e-3) -> Analysis:
     model = Model("mass and spring")
     F = model.input("F", "N", hold="zoh", reach=10, gain_sd=0)
     x = model.sensor("x", "m", resolution=0.1 / 2**12, reach=0.1)

@@ -19,7 +19,7 @@ from refinements import (
     subject,
 )
 
-from pvid.identification.answer import Answer, Refinement
+from pvid.identification.answer import Analysis, Refinement
 from pvid.identification.reading import aligned
 from pvid.identification.refinement.adoption import (
     AGREE,
@@ -41,7 +41,7 @@ ALL = (*NAMES, "c")
 NOTHING = Verdict((Reason("not_identified", "The run does not determine w, d1, d2 and c: for a test."),))
 
 
-def held(answer: Answer) -> Answer:
+def held(answer: Analysis) -> Analysis:
     """An answer in which nothing is identified."""
     return replace(answer, found=replace(answer.found, verdict=NOTHING))
 

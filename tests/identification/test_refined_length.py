@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.refinement import problem as refinement
 from pvid.identification.refinement.adoption import refined_answer
 from pvid.identification.refinement.fit import Cut, Prior, Problem, Refined, refined
@@ -34,7 +34,7 @@ def test_the_longest_block_that_fits_is_taken(slow: float, converged: bool, take
     assert longest_that_fits((outcome(300, 7.0), outcome(900, slow, converged))).cut.samples == 900
 
 
-def answer_of(name: str) -> Answer:
+def answer_of(name: str) -> Analysis:
     simulation = simulation_of(name)
     run = simulation.run(1)
     rate = simulation.rig.sample_rate

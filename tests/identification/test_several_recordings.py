@@ -13,7 +13,7 @@ from scipy.signal import cont2discrete, dlsim
 from pvid.base.errors import PvidError
 from pvid.identification.advice import advice_on
 from pvid.identification.analysis import analysed, own_of
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.judge import judged
 from pvid.identification.refinement.adoption import refined_answer
 from pvid.identification.refinement.inputs import inputs_of
@@ -79,7 +79,7 @@ def both(first: Recording, second: Recording, model: CompiledModel = SPRING) -> 
     return joined([first, second], ("A", "B"), Columns(channels=channels_of(model)))
 
 
-def assert_near(answer: Answer, truth: dict[str, float], most: float = 4.0) -> None:
+def assert_near(answer: Analysis, truth: dict[str, float], most: float = 4.0) -> None:
     """Within so many of its standard errors, none of which hides a failure."""
     for name, value in truth.items():
         one = answer.values[name]

@@ -9,7 +9,7 @@ from bench.campaign.judge import identify_rig
 from bench.campaign.population import shipped
 from bench.campaign.truth import simulate_rig
 from pvid.core.native import Native
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.reading import aligned
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.mechanism_file import MechanismRig
@@ -31,7 +31,7 @@ def test_a_shift_and_its_opposite_leave_a_straight_line_as_it_was(name: str, sen
 def test_delay_that_moves_the_estimate_is_estimated(native: Native) -> None:
     """2.4 ms took 27 % off d2 in the weak form: the refinement finds them."""
     record, result = identify_rig(simulate_rig(native, shipped(), 1, 41))
-    assert isinstance(result, Answer) and result.identified
+    assert isinstance(result, Analysis) and result.identified
     assert not record["silently_wrong"] and abs(record["d2_error"]) < 0.01  # type: ignore[arg-type]
     assert result.refinement is not None and result.refinement.adopted
     tau = result.refinement.as_json()["parameters"]["tau"]["value"]

@@ -11,10 +11,10 @@ from program import pvid
 
 from bench.lacking import EFFECTS, recording
 from bench.plants import PLANTS
-from pvid.api.result import of_mechanism
+from pvid.api.result import result_of
 from pvid.base.errors import PvidError
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.road import identified
 from pvid.identification.validation import Validation, validated
 from pvid.rig.run import Recording
@@ -31,7 +31,7 @@ def recorded(seed: int, drag: float = 0.0, samples: int = 4000) -> Recording:
 
 
 @cache
-def answer() -> Answer:
+def answer() -> Analysis:
     return analysed(recorded(1), CART.model())
 
 
@@ -80,7 +80,7 @@ def test_explained_run_is_predicted_half_by_half_and_keeps_its_estimate(plant: s
 
 
 def test_result_predicts_the_sensors_of_a_whole_recording() -> None:
-    result, run = of_mechanism(answer()), recorded(2)
+    result, run = result_of(answer()), recorded(2)
     found = result.predict({"t": run.t, **run.signals})
     assert set(found) == {"t", "x"} and found["x"].shape == found["t"].shape == run.t.shape
     assert np.std(found["x"] - run.signals["x"]) < 1e-3 * np.std(run.signals["x"])

@@ -13,13 +13,13 @@ from conftest import ROOT
 from lag_plant import DRAG, RATE, K, T, lag, signals
 from rich.console import Console
 
-from pvid.api.result import of_mechanism
+from pvid.api.result import result_of
 from pvid.base.rounding import percent
 from pvid.cli.mechanism import table_of
 from pvid.cli.page_table import table_in
 from pvid.cli.verdict_table import ROWS, verdict_table
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.judge import PREDICTED
 from pvid.identification.road import identified
 from pvid.oracle.weak.parameters import UNKNOWN
@@ -29,7 +29,7 @@ from pvid.rig.run import Recording
 
 
 @cache
-def answer(drag: float = 0.0, noise: float = 1e-3, hand: float = 0.0, judged: bool = False) -> Answer:
+def answer(drag: float = 0.0, noise: float = 1e-3, hand: float = 0.0, judged: bool = False) -> Analysis:
     """T y' + y + drag |y| y = K u + a random push, in 20 steps a sample."""
     samples, model = signals(drag, noise, hand), lag()
     noisy = tuple(replace(one, noise=noise) if one.name == "y" else one for one in model.signals)
@@ -68,7 +68,7 @@ def test_reason_leaves_a_word_to_the_parameters_that_it_concerns(
 
 def test_every_printer_has_the_word_of_the_answer_and_of_each_parameter() -> None:
     for found, words in ((answer(), ("good", "good")), (answer(DRAG), ("usable", "usable"))):
-        shown, result = found.as_json(), of_mechanism(found)
+        shown, result = found.as_json(), result_of(found)
         assert shown["verdict"] == result.verdict == words[0]
         assert {one["verdict"] for one in shown["parameters"].values()} == {words[1]}
         assert result["T"].verdict == found.values["pole"].word == words[1]

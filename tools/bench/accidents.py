@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pvid.core.native import Native
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
 from pvid.identification.wild_samples import without_wild_samples
@@ -194,7 +194,7 @@ def motor_with(accident: Accident, seed: int) -> Outcome:
     return outcome_of(_known(found, truth), truth, found.found.verdict.warning is not None)
 
 
-def _known(found: Answer, names: Collection[str]) -> dict[str, tuple[float, float]]:
+def _known(found: Analysis, names: Collection[str]) -> dict[str, tuple[float, float]]:
     """Values and standard errors of these, where they are identified."""
     values = {name: one for name, one in found.values.items() if name in names}
     return {name: (one.value, one.se) for name, one in values.items() if one.value is not None and one.se is not None}

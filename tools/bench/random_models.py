@@ -46,7 +46,7 @@ from pvid.deploy.of_rig import deployment_f32, deployment_q31
 from pvid.deploy.targets import write_package
 from pvid.identification.advice import advised
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer, Value
+from pvid.identification.answer import Analysis, Value
 from pvid.identification.core import identify_in_c
 from pvid.identification.core_refined import compare_both, refined_in_c
 from pvid.identification.refinement.adoption import refined_answer
@@ -177,7 +177,7 @@ def _processor_s() -> float:
     return own.user + own.system + own.children_user + own.children_system
 
 
-def _analysed(road: Road, run: RandomRun, folder: Path) -> Answer | None:
+def _analysed(road: Road, run: RandomRun, folder: Path) -> Analysis | None:
     """Check, identification and refinement in float64; None: it is refused."""
     path, recorded = folder / "rig.py", folder / "run.csv"
     path.write_text(run.rig.text, encoding="utf-8")
@@ -237,7 +237,7 @@ def _judge(road: Road, run: RandomRun, values: dict[str, Value] | Any, *, good: 
         road.failures.append(f"{stage}: good and wrong: {', '.join(wrong)}")
 
 
-def _in_c(road: Road, run: RandomRun, answer: Answer) -> None:
+def _in_c(road: Road, run: RandomRun, answer: Analysis) -> None:
     """Both cores and the second stage, and their bits beside those of the twins."""
     model, recording, ranking = answer.model, answer.recording, answer.ranking
     core: Core
@@ -266,7 +266,7 @@ def _equal(road: Road, stage: str, found: Comparison) -> None:
         road.failures.append(f"{stage}: bits differ: {found.difference}")
 
 
-def _built(road: Road, answer: Answer, folder: Path) -> None:
+def _built(road: Road, answer: Analysis, folder: Path) -> None:
     """Generated files and packages, compiled with the project's warnings as errors, and what they print."""
     compiled, recording, ranking = answer.model, answer.recording, answer.ranking
     design: WeakConfig | None = None

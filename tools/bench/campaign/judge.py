@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.campaign.truth import SimulatedRig
 from pvid.base.errors import PvidError
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.core import CoreAnswer, Publications, identify_in_c
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
@@ -80,7 +80,7 @@ class Judgement:
 
 def identify_rig(
     simulated: SimulatedRig, core: AnyCore = "f64", *, refine: bool = True
-) -> tuple[Record, Answer | CoreAnswer | None]:
+) -> tuple[Record, Analysis | CoreAnswer | None]:
     """Identifies a rig as `pvid identify` does; the record of `judge`, and the answer.
 
     A crash is no refusal: it is recorded as one, with its exception as the reason.
@@ -89,7 +89,7 @@ def identify_rig(
     try:
         recording, model = read_all(simulated.file, [lambda _: simulated.run.recording], (), None)
         if core == "f64":
-            result: Answer | CoreAnswer = identified(recording, model, refine=refine)
+            result: Analysis | CoreAnswer = identified(recording, model, refine=refine)
         else:
             result = identify_in_c(identified(recording, model, refine=False), core)
     except PvidError as error:
@@ -121,7 +121,7 @@ class Told:
     publications: Publications | None = None
 
     @classmethod
-    def of(cls, result: Answer | CoreAnswer) -> Told:
+    def of(cls, result: Analysis | CoreAnswer) -> Told:
         """An answer of `identify`."""
         if isinstance(result, CoreAnswer):
             verdict, misfit, text, publications = result.verdict, result.misfit, "", result.publications

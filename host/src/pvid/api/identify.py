@@ -11,7 +11,7 @@ from typing import Any, Literal
 from threadpoolctl import threadpool_limits
 
 from pvid.api.data import Data, named
-from pvid.api.result import Result, of_core, of_mechanism
+from pvid.api.result import Result, result_of
 from pvid.base.errors import PvidError
 from pvid.identification.analysis import own_of
 from pvid.identification.core import identify_in_c
@@ -112,8 +112,8 @@ def _identify(
     engine = ENGINE_CORES.get(core or "")
     of_each = own_of(compiled, recording, own, shared, in_c=engine is not None)
     if engine is None:
-        return of_mechanism(identified(recording, compiled, refine=refine, own=of_each))
-    return of_core(identify_in_c(identified(recording, compiled, refine=False, own=of_each), engine.name))
+        return result_of(identified(recording, compiled, refine=refine, own=of_each))
+    return result_of(identify_in_c(identified(recording, compiled, refine=False, own=of_each), engine.name))
 
 
 def _names(paths: Sequence[Path | None]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pvid.api.data import Data, recording_of
 from pvid.base.replacing import replacing
 from pvid.base.rounding import with_error
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.core import CoreAnswer
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.words import Word
@@ -73,7 +73,7 @@ class Result:
     advice: tuple[str, ...]
     notes: tuple[str, ...]
     details: Mapping[str, Any]
-    _answer: Answer | CoreAnswer
+    _answer: Analysis | CoreAnswer
     _model: CompiledModel
 
     def __getitem__(self, name: str) -> Parameter:
@@ -196,34 +196,24 @@ class Result:
         return self[name].se if noise is None else math.hypot(noise, model or 0.0)
 
 
-def of_mechanism(found: Answer) -> Result:
-    """Of the analysis."""
-    verdict = found.found.verdict
-    notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
-    return _result(found, found.as_json(), found.identified, verdict.status, verdict.warning, notes, found.model)
-
-
-def of_core(found: CoreAnswer) -> Result:
-    """Of the C core."""
-    verdict = found.verdict
-    notes = (*found.oracle.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
-    status = verdict.status if found.published else found.reason.text
-    return _result(found, found.as_json(), found.identified, status, verdict.warning, notes, found.oracle.model)
-
-
-def _result(
-    found: Answer | CoreAnswer,
-    details: Mapping[str, Any],
-    identified: bool,
-    status: str,
-    warning: str | None,
-    notes: tuple[str, ...],
-    model: CompiledModel,
-) -> Result:
+def result_of(found: Analysis | CoreAnswer) -> Result:
+    """What a user sees of an answer."""
+    details, verdict = found.as_json(), found.verdict
     known = {
         name: Parameter(one["value"], one["se"], one["unit"], one["verdict"])
         for name, one in details["parameters"].items()
-        if identified and one["value"] is not None
+        if found.identified and one["value"] is not None
     }
-    word, advice = details["verdict"], tuple(details["advice"])
-    return Result(identified, known, word, status, warning, advice, tuple(notes), details, found, model)
+    notes = (*found.recording.notes, *(one.text for one in verdict.reasons if not one.alarm))
+    return Result(
+        found.identified,
+        known,
+        verdict.word,
+        found.status,
+        verdict.warning,
+        found.advice,
+        notes,
+        details,
+        found,
+        found.model,
+    )

@@ -19,7 +19,7 @@ from pvid.base.rounding import with_error
 from pvid.base.wording import listed
 from pvid.cli.input import print_notes
 from pvid.identification.analysis import analysed, own_of
-from pvid.identification.answer import Answer, Value
+from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.reading import read_all
 from pvid.identification.road import identified
 from pvid.log.rig import source_of
@@ -131,7 +131,7 @@ def identify_run(
     if on is not None and not _streamed(on, rig, recording, (in_c or FLOAT).name, bool(refine)):
         return DIFFERENT
     of_each = own_of(model, recording, own, shared, in_c=in_c is not None)
-    without: Answer | None = None
+    without: Analysis | None = None
     if add:
         from pvid.identification.additions import added
 
@@ -165,29 +165,16 @@ def identify_run(
         except PvidError as error:  # the answer is that of the first stage
             no_second = {"refinement": {"adopted": False, "text": f"not refined: {error}"}}
             write_stderr(f"pvid: note: not refined: {error}")
-    shown = core or answer
+    shown: Analysis | CoreAnswer = core or answer
     validation = _predicted(other, rig, columns, shown)
-    if as_json:
-        extra = no_second | _validation_json(validation) | ({} if without is None else with_them)
-        click.echo(json.dumps(shown.as_json() | extra | ({} if on is None else {"on": on})))
-    elif core is not None:
-        _print_core(core)
-    else:
-        _print(answer)
-    if validation is not None and not as_json:
-        click.echo(f"{other}: the answer {validation.text}")
+    entries = no_second | _validation_json(validation) | ({} if without is None else with_them)
+    lines = [] if validation is None else [f"{other}: the answer {validation.text}"]
+    done = _told(shown, as_json=as_json, more=entries | ({} if on is None else {"on": on}), lines=lines)
     if core is None and not model.following.is_usual:
         write_stderr("pvid: note: the analysis in float64 takes all windows alike: [identifier] has no effect")
     if figure is not None:
         _draw(shown, figure)
-    for one in (core.verdict if core is not None else answer.found.verdict).reasons:
-        write_stderr(f"pvid: {'warning' if one.alarm and shown.identified else 'note'}: {one.text}")
-    _print_advice(answer)
-    if not shown.identified:
-        reason = f": {core.reason.text}" if core is not None and not core.published else ""
-        write_stderr(f"pvid: nothing identified{reason}")
-        return NOTHING_IDENTIFIED
-    return DONE
+    return done
 
 
 def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> None:
@@ -212,24 +199,7 @@ def _identified_by_strong_form(
     if core == STRONG.name:
         refuse_too_many_unknowns(model)
     answer = identify_strong_mechanism(recording, model, core == STRONG.name, _LAWS[given.get("law") or "stationary"])
-    if as_json:
-        click.echo(json.dumps(answer.as_json()))
-    else:
-        arithmetic = "float64" if answer.hash is None else "C in float32"
-        if answer.identified:
-            _table(answer.values, f"{model.title}: strong form, {arithmetic}")
-        config = answer.design.config
-        ends = "" if answer.hash is None or answer.reason is None else f"; {answer.reason.text}; hash {answer.hash:08x}"
-        click.echo(
-            f"verdict {answer.verdict.word}; derivatives over {config.window} samples, "
-            f"{config.window / config.sample_rate:.3g} s{ends}"
-        )
-    for one in answer.verdict.reasons:
-        write_stderr(f"pvid: {'warning' if answer.identified else 'note'}: {one.text}")
-    if not answer.identified:
-        write_stderr("pvid: nothing identified")
-        return NOTHING_IDENTIFIED
-    return DONE
+    return _told(answer, as_json=as_json)
 
 
 def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
@@ -240,7 +210,7 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
     return core
 
 
-def _draw(answer: Answer | CoreAnswer, figure: Path) -> None:
+def _draw(answer: Analysis | CoreAnswer, figure: Path) -> None:
     """What was printed, as a figure."""
     from pvid.show.mechanism_figure import write_figure  # loads matplotlib
 
@@ -260,7 +230,7 @@ def plot_run(path: Path, rig: MechanismRig, columns: str | None, figure: Path, *
     recording, model = recording_of(path, rig, columns, whole=False)
     answer = identified(recording, model, refine=refine)
     verdict, refinement = answer.found.verdict, answer.refinement
-    text = f"{_stage(answer)}, float64; verdict {verdict.word}; chi2 {answer.found.chi2:.2g}"
+    text = f"{answer.identifier}; verdict {verdict.word}; chi2 {answer.found.chi2:.2g}"
     lines = [f"{path.name}: {model.title}", text if answer.identified else f"nothing identified; {text}"]
     lines += [] if refinement is None else [refinement.text]
     if answer.prediction:
@@ -284,7 +254,7 @@ def _streamed(target: str, rig: MechanismRig, recording: Recording, core: Core, 
 
 
 def _predicted(
-    other: Path | None, rig: MechanismRig, columns: str | None, answer: Answer | CoreAnswer
+    other: Path | None, rig: MechanismRig, columns: str | None, answer: Analysis | CoreAnswer
 ) -> Validation | None:
     """How well an answer predicts another recording of the rig; None: none was given."""
     from pvid.identification.validation import predicted
@@ -292,16 +262,15 @@ def _predicted(
     if other is None:
         return None
     recording, model = recording_of(other, rig, columns, whole=False)
-    oracle = answer if isinstance(answer, Answer) else answer.oracle
     values = {name: one.value for name, one in answer.values.items()}
-    return predicted(model, recording, values, oracle.found.design.window_s)
+    return predicted(model, recording, values, answer.analysis.found.design.window_s)
 
 
 def _validation_json(validation: Validation | None) -> dict[str, Any]:
     return {} if validation is None else {"validation": validation.as_json()}
 
 
-def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> Answer | None:
+def refined_reference(model: CompiledModel, recording: Recording, figure: Path | None) -> Analysis | None:
     """The refined answer of a recording, or that of the weak form; None: neither identifies it. A sentence on standard
     error says which and why.
 
@@ -333,21 +302,8 @@ def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
     from pvid.identification.core_refined import refined_in_c
 
     with working(f"refining in {FLOAT.words}"):
-        answer, found = core.oracle, refined_in_c(core)
-    if as_json:
-        click.echo(json.dumps(found.as_json() | ({} if on is None else {"on": on})))
-    else:
-        if found.identified:
-            stage = "refined" if found.adopted else "weak form"
-            _table(found.values, f"{answer.model.title}: {stage}, C in {FLOAT.words}")
-        click.echo(f"{found.text}; hash of both stages {found.hash:08x}")
-    for one in () if found.adopted else found.weak.verdict.reasons:
-        write_stderr(f"pvid: {'warning' if one.alarm and found.identified else 'note'}: {one.text}")
-    _print_advice(answer)
-    if not found.identified:
-        write_stderr(f"pvid: nothing identified: {found.weak.reason.text}")
-        return NOTHING_IDENTIFIED
-    return DONE
+        found = refined_in_c(core)
+    return _told(found, as_json=as_json, more={} if on is None else {"on": on})
 
 
 def compare_recording(
@@ -438,41 +394,28 @@ def _compared_strong(
     return outcomes
 
 
-def _stage(answer: Answer) -> str:
-    return "refined" if answer.refinement is not None and answer.refinement.adopted else "weak form"
+def _told(answer: Answer, *, as_json: bool, more: Mapping[str, Any] | None = None, lines: Sequence[str] = ()) -> int:
+    """Prints an answer and what is doubted of it; the exit code.
 
-
-def _print(answer: Answer) -> None:
-    found = answer.found
-    if answer.identified:
-        _table(answer.values, f"{answer.model.title}: {_stage(answer)}, float64")
-    explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
-    of_weak = "" if _stage(answer) == "weak form" else "weak form: "
-    click.echo(
-        f"verdict {found.verdict.word}; {of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "
-        f"{found.design.window_s:.3g} s; R^2 {explained}"
-    )
-    if answer.refinement is not None and answer.identified:
-        shown = answer.refinement.as_json().get("parameters", {}) if answer.refinement.adopted else {}
-        extras = [f"{name} {one['value']:.3g} ± {one['se']:.1g}" for name, one in shown.items()]
-        click.echo("; ".join([answer.refinement.text, *([", ".join(extras)] if extras else [])]))
-    if answer.prediction:
-        click.echo(f"predicts motion that was not fitted: {listed(answer.prediction)}")
-
-
-def _print_advice(answer: Answer) -> None:
+    Parameters
+    ----------
+    more, lines : further entries of the JSON object; further lines below the values
+    """
+    if as_json:
+        click.echo(json.dumps(answer.as_json() | dict(more or {})))
+    else:
+        if answer.identified:
+            _table(answer.values, f"{answer.model.title}: {answer.identifier}")
+        for line in (*answer.lines, *lines):
+            click.echo(line)
+    for one in answer.doubts:
+        write_stderr(f"pvid: {'warning' if one.alarm and answer.identified else 'note'}: {one.text}")
     for sentence in answer.advice:
         write_stderr(f"pvid: advice: {sentence}")
-
-
-def _print_core(core: CoreAnswer) -> None:
-    if core.identified:
-        _table(core.values, f"{core.oracle.model.title}: weak form, C in {ENGINE_CORES[core.core].words}")
-    misfit = "not judged" if core.misfit is None else f"{core.misfit:.2g}"
-    click.echo(
-        f"verdict {core.verdict.word}; last window: {core.reason.text}; chi2 {misfit}; {core.windows} "
-        f"windows of {2 * core.hop_s:.3g} s; hash {core.hash:08x}"
-    )
+    if answer.identified:
+        return DONE
+    write_stderr(f"pvid: nothing identified{f': {answer.why_nothing}' if answer.why_nothing else ''}")
+    return NOTHING_IDENTIFIED
 
 
 def _values_json(values: Mapping[str, Value]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from pvid.compare.bits import Comparison
 from pvid.compare.weak import compare_recording
 from pvid.configuration.refine import full_motion_of
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer, Value
+from pvid.identification.answer import Analysis, Value
 from pvid.identification.core import CoreAnswer, identify_in_c
 from pvid.identification.core_refined import RefinedCoreAnswer, compare_both, refined_in_c
 from pvid.identification.strong import identify_strong_mechanism
@@ -59,7 +59,7 @@ class Demonstrated:
     rig: MechanismRig
     recording: Recording
     truth: Mapping[str, float]
-    answer: Answer
+    answer: Analysis
 
     @classmethod
     def of(cls, model: str, seed: int) -> Demonstrated:

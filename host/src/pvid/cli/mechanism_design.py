@@ -16,7 +16,7 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar,
 from pvid.base.errors import PvidError
 from pvid.base.rounding import with_error
 from pvid.configuration.design_report import EngineReport, designs_tried, report_for_recording, report_for_rig
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
@@ -136,7 +136,7 @@ def _print_report(report: EngineReport) -> None:
         write_stderr("pvid: the run does not determine every parameter with this design: see identify")
 
 
-def print_tuning(model: CompiledModel, recording: Recording, reference: Answer | None = None) -> int:
+def print_tuning(model: CompiledModel, recording: Recording, reference: Analysis | None = None) -> int:
     """The designs that were tried on a recording, the best first, and the engine's own.
 
     Parameters
@@ -163,7 +163,7 @@ def print_tuning(model: CompiledModel, recording: Recording, reference: Answer |
     return DONE if engine.known else NOTHING_IDENTIFIED
 
 
-def _distance(model: CompiledModel, one: Scored, reference: Answer | None) -> tuple[str, ...]:
+def _distance(model: CompiledModel, one: Scored, reference: Analysis | None) -> tuple[str, ...]:
     """Of a design's estimate from the reference: RMS over the parameters, in its expected errors."""
     if reference is None:
         return ()

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from pvid.base.errors import PvidError
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import described, path_of, text_with
 from pvid.oracle.weak.failures import attempted
@@ -40,7 +40,7 @@ class Additions:
         """With the values of the rig."""
         return _compiled(self.rig, self.terms, self.sd)
 
-    def text_of(self, answer: Answer) -> str:
+    def text_of(self, answer: Analysis) -> str:
         """The model file with the terms; the values of an answer with them are the guesses."""
         lines, places = (
             [],
@@ -55,7 +55,7 @@ class Additions:
         return text_with(self.rig.model, lines)
 
 
-def added(answer: Answer, rig: MechanismRig, terms: Sequence[str]) -> Additions:
+def added(answer: Analysis, rig: MechanismRig, terms: Sequence[str]) -> Additions:
     """Terms for the mechanism of an answer without them.
 
     A term without its equation goes to the one in which it leaves the smallest residuals.
@@ -89,7 +89,7 @@ def _compiled(rig: MechanismRig, terms: Sequence[str] = (), sd: Sequence[float] 
     return rig.applied(description.compiled(path_of(rig.model)[0]))
 
 
-def _scaled(answer: Answer, before: Additions, term: str) -> Additions:
+def _scaled(answer: Analysis, before: Additions, term: str) -> Additions:
     """With one more term, whose size is scaled by the recording."""
     terms = (*before.terms, term)
     model = _compiled(before.rig, terms, (*before.sd, 1.0))
@@ -115,13 +115,13 @@ def _scaled(answer: Answer, before: Additions, term: str) -> Additions:
     return replace(before, terms=terms, sd=(*before.sd, max(sizes)))
 
 
-def _misfit(answer: Answer, one: Additions) -> float:
+def _misfit(answer: Analysis, one: Additions) -> float:
     recording = answer.recording
     found = attempted(lambda: identify(one.model, recording.run, recording.sample_rate, design=answer.found.design))
     return np.inf if found is None else found.chi2
 
 
-def to_type(answer: Answer) -> Iterator[str]:
+def to_type(answer: Analysis) -> Iterator[str]:
     """A sentence with the options that add what an answer names as missing; none where it names nothing."""
     named = answer.found.named
     if named is None or not named.complete:

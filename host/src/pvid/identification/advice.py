@@ -10,7 +10,7 @@ import numpy as np
 
 from pvid.base.wording import with_unit
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.together import with_own
 from pvid.oracle.weak.choice import score_of
@@ -42,7 +42,7 @@ _UNITS = {
 }
 
 
-def advised(answer: Answer) -> Answer:
+def advised(answer: Analysis) -> Analysis:
     """The answer with its advice: a column that is wrong, else what to type for the terms that seem to lack."""
     found = advice_on(answer)
     if answer.found.named is not None and answer.identified:
@@ -53,7 +53,7 @@ def advised(answer: Answer) -> Answer:
 
 
 @np.errstate(all="ignore")  # what diverges is judged and left out
-def advice_on(answer: Answer) -> tuple[str, ...]:
+def advice_on(answer: Analysis) -> tuple[str, ...]:
     """A sentence with what to type, or none; some tenths of a second, where the answer is bad alone.
 
     Each signal in turn has the other sign or another usual unit, with the design of the answer.
@@ -81,7 +81,7 @@ def advice_on(answer: Answer) -> tuple[str, ...]:
     return (f"{alike[0][0]}: --columns {alike[0][1]}" + "".join(other),)
 
 
-def _unit_of_time(answer: Answer) -> str | None:
+def _unit_of_time(answer: Analysis) -> str | None:
     """In which the parameters come near their guesses; None where they are near as it is, or in no unit.
 
     Residuals contain nothing of it: another unit of time gives a linear mechanism other parameters and the same motion.
@@ -98,18 +98,18 @@ def _unit_of_time(answer: Answer) -> str | None:
     return None
 
 
-def _distance(answer: Answer, p: Float) -> float:
+def _distance(answer: Analysis, p: Float) -> float:
     """The largest factor between a positive parameter and its guess."""
     of = [value / one.guess for value, one in zip(p, answer.model.unknowns, strict=True) if one.positive]
     return max((max(ratio, 1 / ratio) if ratio > 0 else np.inf for ratio in of), default=1.0)
 
 
-def _is_beyond_equations(answer: Answer) -> bool:
+def _is_beyond_equations(answer: Analysis) -> bool:
     """Whether a signal is so large that linearised equations mean nothing: they fit it in any unit."""
     return neglected(answer.model, answer.recording.run) > 1
 
 
-def _turned(answer: Answer) -> Iterator[tuple[float, str, str]]:
+def _turned(answer: Analysis) -> Iterator[tuple[float, str, str]]:
     """The same of a drive with the other sign, which makes another mechanism of it: by designs of its own."""
     if max(answer.found.r2.values(), default=0.0) > _EXPLAINS:
         return
@@ -125,7 +125,7 @@ def _turned(answer: Answer) -> Iterator[tuple[float, str, str]]:
                 yield again.found.chi2, said, f"{signal.name}={signal.name}:{unit}"
 
 
-def _tried(answer: Answer) -> Iterator[tuple[float, str, str]]:
+def _tried(answer: Analysis) -> Iterator[tuple[float, str, str]]:
     """Part of the residuals that is left by a mistake which explains the run, its sentence, and what to type."""
     model, signals, design = ready(answer.model), answer.recording.run, answer.found.design
     before = score_of(model, signals, design, None, False)
@@ -146,7 +146,7 @@ def _tried(answer: Answer) -> Iterator[tuple[float, str, str]]:
                 yield left, said, typed
 
 
-def _of_own(answer: Answer) -> str | None:
+def _of_own(answer: Analysis) -> str | None:
     """Of several recordings: which parameter explains them if each has its own; the one that leaves least."""
     model, run, design = answer.model, answer.recording.run, answer.found.design
     before = score_of(ready(model), run, design, None, False)

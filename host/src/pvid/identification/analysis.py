@@ -10,7 +10,7 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.values import values_of_found
 from pvid.model.compiled import CompiledModel
 from pvid.model.corners import feedthroughs
@@ -32,7 +32,7 @@ _NOTHING = 1e-6  # of its guess: a positive parameter that has shrunk
 @np.errstate(all="ignore")  # what diverges is judged, and told in words
 def analysed(
     recording: Recording, model: CompiledModel, weights: Weights = "residuals", own: Collection[str] = ()
-) -> Answer:
+) -> Analysis:
     """Parameters of a mechanism from all segments of a recording.
 
     Parameters
@@ -58,7 +58,7 @@ def analysed(
     model = whole
     notes = *_of_own(model, own), *_of_edges(model), *_of_segments(recording, found)
     noted = replace(recording, notes=(*recording.notes, *notes))
-    return Answer(model, found, values_of_found(model, found), noted, weights)
+    return Analysis(model, found, values_of_found(model, found), noted, weights)
 
 
 def _determined(found: Identified) -> int:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.wording import listed
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.identify import Identified
 from pvid.oracle.weak.naming import terms_of
-from pvid.oracle.weak.verdict import ParameterStatus
+from pvid.oracle.weak.verdict import ParameterStatus, Reason, Verdict
 from pvid.oracle.weak.weights import Weights
 from pvid.oracle.weak.words import Word
 from pvid.rig.run import Recording
@@ -62,6 +64,74 @@ class Value:
         return out | ({} if self.below is None else {"below": self.below})
 
 
+class Answer(ABC):
+    """What an identification of a recording found, by any identifier: what is printed, drawn and returned.
+
+    Attributes
+    ----------
+    model : with the values of the rig file
+    recording : the samples
+    values : by name: outputs of the model, then p
+    verdict : what they may be used for
+    identified : whether there is a value
+    identifier : which one it is: form and arithmetic
+    lines : what is said of it below the values
+    advice : sentences with what to type, where a column seems to be wrong
+    """
+
+    model: CompiledModel
+    recording: Recording
+    values: Mapping[str, Value]
+    advice: tuple[str, ...]
+
+    @property
+    @abstractmethod
+    def verdict(self) -> Verdict: ...
+
+    @property
+    @abstractmethod
+    def identified(self) -> bool: ...
+
+    @property
+    @abstractmethod
+    def identifier(self) -> str: ...
+
+    @property
+    @abstractmethod
+    def lines(self) -> list[str]: ...
+
+    @property
+    def status(self) -> str:
+        """The last word of the identifier."""
+        return self.verdict.status
+
+    @property
+    def doubts(self) -> Sequence[Reason]:
+        """What is told of the values beside them."""
+        return self.verdict.reasons
+
+    @property
+    def why_nothing(self) -> str:
+        """Why there is no value, in a clause; "": the doubts say it."""
+        return ""
+
+    def as_json(self) -> dict[str, Any]:
+        """The object of `identify --json` (host/docs/index.md)."""
+        verdict = self.verdict
+        return {
+            "identified": self.identified,
+            "verdict": verdict.word,
+            "status": verdict.status,
+            "warning": verdict.warning,
+            "advice": list(self.advice),
+            "reasons": {one.name: one.text for one in verdict.reasons},
+            "parameters": {name: one.as_json() for name, one in self.values.items()},
+            "input": list(self.recording.notes),
+            "samples": len(self.recording),
+            "model": self.model.name,
+        }
+
+
 class RefinedFit(Protocol):
     """An outcome of a refinement, as pvid.identification.refinement.problem makes it."""
 
@@ -102,8 +172,8 @@ class Refinement:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """An identification of a recording.
+class Analysis(Answer):
+    """An identification in float64.
 
     Attributes
     ----------
@@ -134,6 +204,44 @@ class Answer:
         return self.found.verdict.identified
 
     @property
+    def verdict(self) -> Verdict:
+        """That of the estimate."""
+        return self.found.verdict
+
+    @property
+    def analysis(self) -> Analysis:
+        """Itself: an answer of the C core has one beside it."""
+        return self
+
+    @property
+    def stage(self) -> str:
+        """Whose the values are."""
+        return "refined" if self.refinement is not None and self.refinement.adopted else "weak form"
+
+    @property
+    def identifier(self) -> str:
+        """Form and arithmetic."""
+        return f"{self.stage}, float64"
+
+    @property
+    def lines(self) -> list[str]:
+        """Residuals, the refinement, and the prediction."""
+        found = self.found
+        explained = ", ".join(f"{name} {value:.6f}" for name, value in found.r2.items())
+        of_weak = "" if self.stage == "weak form" else "weak form: "
+        lines = [
+            f"verdict {found.verdict.word}; {of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "
+            f"{found.design.window_s:.3g} s; R^2 {explained}"
+        ]
+        if self.refinement is not None and self.identified:
+            extras = self.refinement.fit.extras if self.refinement.fit is not None and self.refinement.adopted else {}
+            shown = [f"{name} {value:.3g} ± {se:.1g}" for name, (value, se) in extras.items()]
+            lines.append("; ".join([self.refinement.text, *([", ".join(shown)] if shown else [])]))
+        if self.prediction:
+            lines.append(f"predicts motion that was not fitted: {listed(self.prediction)}")
+        return lines
+
+    @property
     def is_explained(self) -> bool:
         """Whether the residuals are those of the sensors' noise, or a named term explains the rest of them: estimates
         of the same equations are then alike, or all lack the same."""
@@ -148,32 +256,25 @@ class Answer:
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
         found = self.found
-        parameters = {name: one.as_json() for name, one in self.values.items()}
-        return {
-            "identified": self.identified,
-            "verdict": found.verdict.word,
-            "status": found.verdict.status,
-            "warning": found.verdict.warning,
-            "advice": list(self.advice),
-            "reasons": {one.name: one.text for one in found.verdict.reasons},
-            "parameters": parameters,
-            "missing": missing_of(found),
-            "chi2": found.chi2,
-            "r2": found.r2,
-            "prediction": {one.name: one.as_json() for one in self.prediction},
-            **recordings_of(self),
-            "window_s": found.design.window_s,
-            "windows": len(found.times),
-            "weights": self.weights,
-            "input": list(self.recording.notes),
-            "samples": len(self.recording),
-            "model": self.model.name,
-            "core": "f64",
-            "form": "weak",
-        } | ({} if self.refinement is None else {"refinement": self.refinement.as_json()})
+        return (
+            super().as_json()
+            | {
+                "missing": missing_of(found),
+                "chi2": found.chi2,
+                "r2": found.r2,
+                "prediction": {one.name: one.as_json() for one in self.prediction},
+                **recordings_of(self),
+                "window_s": found.design.window_s,
+                "windows": len(found.times),
+                "weights": self.weights,
+                "core": "f64",
+                "form": "weak",
+            }
+            | ({} if self.refinement is None else {"refinement": self.refinement.as_json()})
+        )
 
 
-def recordings_of(answer: Answer) -> dict[str, Any]:
+def recordings_of(answer: Analysis) -> dict[str, Any]:
     """Of several recordings: samples of each, begin on the common time axis [s], and how well it is predicted."""
     recording = answer.recording
     if not recording.origins:

@@ -19,11 +19,13 @@ from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.configuration.weak_q31 import engine_to_identify
 from pvid.core.native import Publisher
-from pvid.identification.answer import Answer, Value
+from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.values import gains_of, noise_of, shifts_of, unless_held, values_of
+from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.verdict import Reason, Verdict
+from pvid.rig.run import Recording
 from pvid.settings.engine_cores import ENGINE_CORES
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
@@ -44,12 +46,13 @@ class Publications:
 
 
 @dataclass(frozen=True, eq=False)
-class CoreAnswer:
-    """An identification by the C core, beside that of the oracle.
+class CoreAnswer(Answer):
+    """An identification by the C core, beside the analysis in float64.
 
     Attributes
     ----------
-    oracle : of the same recording
+    model, recording, advice : of the analysis
+    analysis : of the same recording
     core : arithmetic
     functions, decimation, hop_s : of the engine's design
     averages_signs : whether signs are averaged over a step
@@ -60,10 +63,13 @@ class CoreAnswer:
     windows : how many the engine has judged
     hash : running hash of its state after the last tick
     publications : every estimate that was published; their standard errors contain what `values` contains
-    by_analysis : nothing is published, because a parameter may be 0; the values are those of the oracle
+    by_analysis : nothing is published, because a parameter may be 0; the values are those of the analysis
     """
 
-    oracle: Answer
+    model: CompiledModel
+    recording: Recording
+    advice: tuple[str, ...]
+    analysis: Analysis
     core: Core
     functions: int
     decimation: int
@@ -81,14 +87,14 @@ class CoreAnswer:
     @property
     def identified(self) -> bool:
         """Whether the core has published, or need not, and the recording shows a parameter."""
-        return (self.published or self.by_analysis) and self.oracle.identified
+        return (self.published or self.by_analysis) and self.analysis.identified
 
     def history(self) -> list[tuple[float, Mapping[str, Value]]]:
         """Time [s] and values of every publication; correlations are those of the analysis."""
-        own, model = self.publications, self.oracle.model
-        sd = np.sqrt(np.diag(self.oracle.found.covariance))
-        correlation = self.oracle.found.covariance / np.outer(sd, sd)
-        none, judged, verdict = np.zeros((1, len(sd))), self.oracle.found.judged, self.verdict
+        own, model = self.publications, self.model
+        sd = np.sqrt(np.diag(self.analysis.found.covariance))
+        correlation = self.analysis.found.covariance / np.outer(sd, sd)
+        none, judged, verdict = np.zeros((1, len(sd))), self.analysis.found.judged, self.verdict
         return [
             (float(t), values_of(model, p, correlation * np.outer(se, se), none, judged, verdict, of_known=False))
             for t, p, se in zip(own.t, own.p, own.se, strict=True)
@@ -97,11 +103,11 @@ class CoreAnswer:
     @property
     def verdict(self) -> Verdict:
         """The doubts of the core's own answer, then those of the analysis."""
-        return Verdict((*self._doubts(), *self.oracle.found.verdict.reasons))
+        return Verdict((*self._doubts(), *self.analysis.found.verdict.reasons))
 
     def _doubts(self) -> Iterator[Reason]:
         if not self.identified:
-            if self.oracle.identified:
+            if self.analysis.identified:
                 yield Reason("not_identified", f"The C core has published no estimate: {self.reason.text}.")
             return
         if self.by_analysis:
@@ -111,8 +117,8 @@ class CoreAnswer:
                 "the float64 analysis.",
             )
             return
-        if apart := [name for name in self.oracle.model.p_names if self._clashes(name)]:
-            first = [values[apart[0]] for values in (self.values, self.oracle.values)]
+        if apart := [name for name in self.model.p_names if self._clashes(name)]:
+            first = [values[apart[0]] for values in (self.values, self.analysis.values)]
             one, other = (with_unit(found.value or 0.0, found.unit, 4) for found in first)
             of_signs = " The core takes the mean of a friction's sign over a step, the analysis locates its reversals."
             yield Reason(
@@ -134,32 +140,53 @@ class CoreAnswer:
             )
 
     def _clashes(self, name: str) -> bool:
-        one, other = self.values[name], self.oracle.values[name]
+        one, other = self.values[name], self.analysis.values[name]
         if one.value is None or one.se_noise is None or other.value is None or other.se_noise is None:
             return False
         # What gains and constants are off by is the same in both. No core resolves more than float32 does.
         resolved = float(np.spacing(np.float32(abs(other.value))))
         return abs(one.value - other.value) > _CLASH * math.hypot(one.se_noise, other.se_noise, resolved)
 
+    @property
+    def identifier(self) -> str:
+        """Form and arithmetic."""
+        return f"weak form, C in {ENGINE_CORES[self.core].words}"
+
+    @property
+    def lines(self) -> list[str]:
+        """Its last window, and the hash."""
+        misfit = "not judged" if self.misfit is None else f"{self.misfit:.2g}"
+        return [
+            f"verdict {self.verdict.word}; last window: {self.reason.text}; chi2 {misfit}; {self.windows} "
+            f"windows of {2 * self.hop_s:.3g} s; hash {self.hash:08x}"
+        ]
+
+    @property
+    def status(self) -> str:
+        """The last word of the core, where it publishes nothing."""
+        return self.verdict.status if self.published else self.reason.text
+
+    @property
+    def why_nothing(self) -> str:
+        """The reason of the last window."""
+        return "" if self.published else self.reason.text
+
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
-        parameters = {name: one.as_json() for name, one in self.values.items()}
-        return self.oracle.as_json() | {
-            "identified": self.identified,
-            "parameters": parameters,
-            "verdict": self.verdict.word,
-            "status": self.verdict.status,
-            "warning": self.verdict.warning,
-            "reasons": {one.name: one.text for one in self.verdict.reasons},
-            "chi2": self.misfit,
-            "reason": self.reason.text,
-            "window_s": 2 * self.hop_s,
-            "windows": self.windows,
-            "functions": self.functions,
-            "decimation": self.decimation,
-            "hash": f"{self.hash:08x}",
-            "core": self.core,
-        }
+        return (
+            self.analysis.as_json()
+            | super().as_json()
+            | {
+                "chi2": self.misfit,
+                "reason": self.reason.text,
+                "window_s": 2 * self.hop_s,
+                "windows": self.windows,
+                "functions": self.functions,
+                "decimation": self.decimation,
+                "hash": f"{self.hash:08x}",
+                "core": self.core,
+            }
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +209,7 @@ class _Run:
     published: tuple[Float, Float]
 
 
-def identify_in_c(answer: Answer, core: Core = "f32") -> CoreAnswer:
+def identify_in_c(answer: Analysis, core: Core = "f32") -> CoreAnswer:
     """The same recording by the C core.
 
     Raises
@@ -197,7 +224,7 @@ def identify_in_c(answer: Answer, core: Core = "f32") -> CoreAnswer:
     return _answer(answer, run)
 
 
-def _in_float(answer: Answer) -> _Run:
+def _in_float(answer: Analysis) -> _Run:
     config = config_to_identify(answer.model, answer.recording, answer.ranking)
     design = config.design
     identifier = weak_native(answer.model, design).identifier_of(config)
@@ -217,7 +244,7 @@ def _in_float(answer: Answer) -> _Run:
     )
 
 
-def _in_fixed_point(answer: Answer) -> _Run:
+def _in_fixed_point(answer: Analysis) -> _Run:
     engine = engine_to_identify(answer.model, answer.recording, answer.ranking)
     design = engine.config.design
     identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
@@ -242,7 +269,7 @@ def _in_fixed_point(answer: Answer) -> _Run:
 _RUNS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
 
 
-def _answer(answer: Answer, run: _Run) -> CoreAnswer:
+def _answer(answer: Analysis, run: _Run) -> CoreAnswer:
     identifier, record = run.identifier, run.record
     published = identifier.is_published
     ends = record.reason[~np.isin(record.reason, _WITHIN)]
@@ -268,7 +295,10 @@ def _answer(answer: Answer, run: _Run) -> CoreAnswer:
 
     misfit = identifier.misfit
     core = CoreAnswer(
-        oracle=answer,
+        model=model,
+        recording=answer.recording,
+        advice=answer.advice,
+        analysis=answer,
         core=run.core,
         functions=run.functions,
         decimation=run.decimation,
@@ -286,7 +316,7 @@ def _answer(answer: Answer, run: _Run) -> CoreAnswer:
     return replace(core, values=values(core.verdict))
 
 
-def _published(answer: Answer, run: _Run, gains: Float, wider: Float) -> Publications:
+def _published(answer: Analysis, run: _Run, gains: Float, wider: Float) -> Publications:
     """All publications of a run: their own errors, times what the analysis found, and those of gains and constants."""
     ticks = np.flatnonzero(np.isin(run.record.reason, (Outcome.UPDATED, Outcome.MISFIT)))
     n_p = len(wider)

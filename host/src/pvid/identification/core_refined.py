@@ -18,12 +18,15 @@ from pvid.compare.weak import compare_samples
 from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import config_to_identify, samples_of
 from pvid.core.weak_native import RefinedIdentifier, RefinedRecord
-from pvid.identification.answer import Answer, Value
+from pvid.identification.answer import Analysis, Answer, Value
 from pvid.identification.core import CoreAnswer
 from pvid.identification.values import refined_gains_of, refined_shifts_of, values_of
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
+from pvid.oracle.weak.verdict import Reason as Doubt
+from pvid.oracle.weak.verdict import Verdict
 from pvid.rig.run import Recording
+from pvid.settings.engine_cores import FLOAT
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig
@@ -70,11 +73,12 @@ class BothStages:
 
 
 @dataclass(frozen=True, eq=False)
-class RefinedCoreAnswer:
+class RefinedCoreAnswer(Answer):
     """An identification by both stages in C.
 
     Attributes
     ----------
+    model, recording, advice : of the analysis
     weak : of the first stage
     values : by name: outputs of the model, p, then what the refinement has beside p; of the last refined estimate, or
         those of the first stage where there is none
@@ -87,6 +91,9 @@ class RefinedCoreAnswer:
     covariance : of the last refined estimate, as the core has it; None: there is none
     """
 
+    model: CompiledModel
+    recording: Recording
+    advice: tuple[str, ...]
     weak: CoreAnswer
     values: Mapping[str, Value]
     adopted: bool
@@ -103,7 +110,7 @@ class RefinedCoreAnswer:
         """Time [s] and values of every refined estimate; correlations are those of the last one."""
         if self.covariance is None:
             return []
-        answer, places = self.weak.oracle, list(self.made.places_of_p)
+        answer, places = self.weak.analysis, list(self.made.places_of_p)
         sd = np.sqrt(np.diag(self.covariance))
         correlation = (self.covariance / np.outer(sd, sd))[np.ix_(places, places)]
         gains = refined_gains_of(answer.model, answer.found)
@@ -122,13 +129,13 @@ class RefinedCoreAnswer:
     @property
     def identified(self) -> bool:
         """Whether a stage has published, and the recording shows a parameter."""
-        return (self.adopted and self.weak.oracle.identified) or self.weak.identified
+        return (self.adopted and self.weak.analysis.identified) or self.weak.identified
 
     @property
     def text(self) -> str:
         """Which estimate it is, in a clause."""
         if not self.adopted:
-            own = self.weak.oracle.model.refinement.equations
+            own = self.weak.analysis.model.refinement.equations
             beaten = self.reason == Reason.HELD_UNCERTAIN and self.first_s is not None and not own
             why = ", the weak form's standard errors are smaller" if beaten else ""
             return f"not refined: {self.reason.text}{why}; the estimate is that of the weak form"
@@ -138,9 +145,33 @@ class RefinedCoreAnswer:
             f"clash {self.clash:.2g}"
         )
 
+    @property
+    def verdict(self) -> Verdict:
+        """That of the first stage."""
+        return self.weak.verdict
+
+    @property
+    def doubts(self) -> Sequence[Doubt]:
+        """Those of the first stage, where its values are shown."""
+        return () if self.adopted else self.verdict.reasons
+
+    @property
+    def identifier(self) -> str:
+        """Form and arithmetic."""
+        return f"{'refined' if self.adopted else 'weak form'}, C in {FLOAT.words}"
+
+    @property
+    def lines(self) -> list[str]:
+        """Which estimate it is, and the hash."""
+        return [f"{self.text}; hash of both stages {self.hash:08x}"]
+
+    @property
+    def why_nothing(self) -> str:
+        """The reason of the first stage's last window."""
+        return self.weak.reason.text
+
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
-        parameters = {name: one.as_json() for name, one in self.values.items()}
         refinement = {
             "adopted": self.adopted,
             "text": self.text,
@@ -149,12 +180,7 @@ class RefinedCoreAnswer:
             "level": self.level,
             "clash": self.clash,
         }
-        return self.weak.as_json() | {
-            "identified": self.identified,
-            "parameters": parameters,
-            "hash": f"{self.hash:08x}",
-            "refinement": refinement,
-        }
+        return self.weak.as_json() | super().as_json() | {"hash": f"{self.hash:08x}", "refinement": refinement}
 
 
 def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
@@ -165,13 +191,16 @@ def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
     PvidError
         When there is no C compiler, or the second stage does not have what the model needs.
     """
-    answer = weak.oracle
+    answer = weak.analysis
     config = config_to_identify(answer.model, answer.recording, answer.ranking)
     stages = BothStages.of(answer.model, answer.recording, config)
     identifier, record = stages.run()
     last, t = identifier.refined, answer.recording.t
     published = np.flatnonzero(record.told == Reason.UPDATED)
     return RefinedCoreAnswer(
+        model=answer.model,
+        recording=answer.recording,
+        advice=answer.advice,
         weak=weak,
         values=weak.values if last is None else _values(answer, stages.made, last),
         adopted=last is not None,
@@ -186,7 +215,7 @@ def refined_in_c(weak: CoreAnswer) -> RefinedCoreAnswer:
     )
 
 
-def _values(answer: Answer, made: RefineFunctions, estimate: npt.NDArray[np.void]) -> dict[str, Value]:
+def _values(answer: Analysis, made: RefineFunctions, estimate: npt.NDArray[np.void]) -> dict[str, Value]:
     """Of the model's outputs and of p; then those that the weak form does not have."""
     parameters = made.parameters
     r = np.asarray(estimate["r"], np.float64)

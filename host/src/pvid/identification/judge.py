@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.wording import listed
-from pvid.identification.answer import Answer, RefinedFit
+from pvid.identification.answer import Analysis, RefinedFit
 from pvid.identification.refinement.fit import Problem, Refined, Stretch, refined
 from pvid.identification.refinement.problem import prior_about
 from pvid.identification.sensor_prediction import SensorPrediction
@@ -90,7 +90,7 @@ class Candidate:
     score: float = np.inf
 
 
-def judged(answer: Answer) -> Answer:
+def judged(answer: Analysis) -> Analysis:
     """The answer, or that of the estimate that predicts best. Its standard errors include the spread of the estimates
     that predict about equally well.
 
@@ -105,7 +105,7 @@ def judged(answer: Answer) -> Answer:
         return answer
 
 
-def with_prediction(answer: Answer) -> Answer:
+def with_prediction(answer: Analysis) -> Analysis:
     """The same answer with how well its equations predict motion that was not fitted: each half of the run the other's,
     after a refinement of each where the answer is refined.
 
@@ -123,7 +123,7 @@ def with_prediction(answer: Answer) -> Answer:
     return replace(answer, prediction=usual[0].sensors) if usual else answer
 
 
-def _judged(answer: Answer) -> Answer:
+def _judged(answer: Analysis) -> Analysis:
     trial = _Trial(answer)
     designs = {name: (design, start) for name, design, start in _designs(answer)}
     found = [one for name, given in designs.items() for one in trial.estimates(name, *given, _WEIGHTS[:1])]
@@ -145,7 +145,7 @@ def _judged(answer: Answer) -> Answer:
     return _published(answer, chosen, usual, alike)
 
 
-def _designs(answer: Answer) -> Iterator[tuple[str, WeakDesign, Float]]:
+def _designs(answer: Analysis) -> Iterator[tuple[str, WeakDesign, Float]]:
     """Of windows: the chosen one and others, in words, and where to search from."""
     design, start = answer.found.design, answer.found.fit.start
     for factor, name in _LENGTHS.items():
@@ -180,7 +180,7 @@ def _parts(recording: Recording) -> tuple[list[Stretch], list[Stretch]]:
 class _Trial:
     """Estimates from one recording, and how well they predict."""
 
-    def __init__(self, answer: Answer) -> None:
+    def __init__(self, answer: Analysis) -> None:
         self._answer, self._compiled = answer, ready(answer.model)
         self._parts = _parts(answer.recording)
         refinement, rate = answer.refinement, answer.recording.sample_rate
@@ -317,7 +317,7 @@ class _Fitted:
         return gated(rows.only(within), fit.p, self.equation_error, self.compensate, _NEAR).p
 
 
-def _published(answer: Answer, chosen: Candidate, usual: Candidate | None, alike: Sequence[Candidate]) -> Answer:
+def _published(answer: Analysis, chosen: Candidate, usual: Candidate | None, alike: Sequence[Candidate]) -> Analysis:
     """The answer with the chosen estimate; its standard errors contain how far the estimates that predict alike are."""
     found, model = answer.found, answer.model
     fit = chosen.fit.at(chosen.p)

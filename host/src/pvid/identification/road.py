@@ -8,7 +8,7 @@ from dataclasses import replace
 from pvid.base.console import working
 from pvid.identification.advice import advised
 from pvid.identification.analysis import analysed
-from pvid.identification.answer import Answer, Refinement
+from pvid.identification.answer import Analysis, Refinement
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.weights import Weights
 from pvid.rig.run import Recording
@@ -22,7 +22,7 @@ def identified(
     refine: bool | None = None,
     predict: bool = True,
     own: Collection[str] = (),
-) -> Answer:
+) -> Analysis:
     """The answer that `identify` prints.
 
     Parameters
@@ -57,7 +57,7 @@ def identified(
     return judged_by_prediction(answer) if predict else answer
 
 
-def judged_by_prediction(answer: Answer) -> Answer:
+def judged_by_prediction(answer: Analysis) -> Analysis:
     """The answer with how well it predicts motion that was not fitted; where the equations do not explain the recording
     and no refinement has been adopted, the estimate that predicts it best."""
     if not answer.identified and answer.is_explained:

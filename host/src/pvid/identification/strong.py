@@ -12,7 +12,7 @@ from pvid.base.wording import listed
 from pvid.codegen.strong_library import strong_native
 from pvid.configuration.strong import StrongDesign, strong_design
 from pvid.identification.analysis import refuse_constant
-from pvid.identification.answer import Value
+from pvid.identification.answer import Answer, Value
 from pvid.identification.values import unless_held, values_of
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.functions import Float
@@ -20,7 +20,7 @@ from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Verdict
 from pvid.oracle.weak.verdict import Reason as Doubt
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import STRONG_CORES
+from pvid.settings.engine_cores import FLOAT, STRONG_CORES
 from pvid.settings.enums import Law, Reason
 
 _UNKNOWN_OF_RANGE = 0.5  # as in the verdict of the weak form
@@ -33,7 +33,7 @@ _BIAS = (
 
 
 @dataclass(frozen=True, eq=False)
-class StrongAnswer:
+class StrongAnswer(Answer):
     """An identification by the strong form.
 
     Attributes
@@ -44,7 +44,7 @@ class StrongAnswer:
     core : arithmetic
     reason : of the last tick; None in float64
     hash : running hash after the last tick; None in float64
-    verdict : what it may be used for
+    judged : what it may be used for
     unknown : parameters that the recording does not determine
     recording : the samples
     """
@@ -55,35 +55,43 @@ class StrongAnswer:
     core: str
     reason: Reason | None
     hash: int | None
-    verdict: Verdict
+    judged: Verdict
     unknown: tuple[str, ...]
     recording: Recording
+    advice: tuple[str, ...] = ()
 
     @property
     def identified(self) -> bool:
         """Whether every parameter is."""
         return not self.unknown and (self.reason is None or self.reason in _GOOD)
 
+    @property
+    def verdict(self) -> Verdict:
+        """What the values may be used for."""
+        return self.judged
+
+    @property
+    def identifier(self) -> str:
+        """Form and arithmetic."""
+        return f"strong form, {'float64' if self.hash is None else f'C in {FLOAT.words}'}"
+
+    @property
+    def lines(self) -> list[str]:
+        """The differentiators, and the end of the core's run."""
+        config = self.design.config
+        ends = "" if self.hash is None or self.reason is None else f"; {self.reason.text}; hash {self.hash:08x}"
+        return [
+            f"verdict {self.verdict.word}; derivatives over {config.window} samples, "
+            f"{config.window / config.sample_rate:.3g} s{ends}"
+        ]
+
     def as_json(self) -> dict[str, Any]:
         """The object of `identify --json` (host/docs/index.md)."""
-        parameters = {
-            name: {"value": one.value, "se": one.se, "unit": one.unit, "se_noise": one.se_noise, "verdict": one.word}
-            for name, one in self.values.items()
-        }
         config = self.design.config
-        return {
-            "identified": self.identified,
-            "verdict": self.verdict.word,
-            "status": self.verdict.status,
-            "warning": self.verdict.warning,
-            "reasons": {one.name: one.text for one in self.verdict.reasons},
-            "parameters": parameters,
+        return super().as_json() | {
             "window_s": config.window / config.sample_rate,
             "reason": None if self.reason is None else self.reason.text,
             "hash": None if self.hash is None else f"{self.hash:08x}",
-            "input": list(self.recording.notes),
-            "samples": len(self.recording),
-            "model": self.model.name,
             "core": self.core,
             "form": "strong",
         }

@@ -38,7 +38,7 @@ class Reason(_Named):
 
 
 class Status(_Named):
-    """Answer of an init (pvid_status)."""
+    """Analysis of an init (pvid_status)."""
 
     OK = 0
     BAD_MODEL = 1
@@ -103,7 +103,7 @@ class Law(_Named):
 
 
 class SnapshotStatus(_Named):
-    """Answer of a snapshot's restore (pvid_snapshot_status)."""
+    """Analysis of a snapshot's restore (pvid_snapshot_status)."""
 
     RESTORED = 0
     NONE = 1

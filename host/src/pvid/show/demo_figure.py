@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from pvid.base.figure_file import save
 from pvid.base.rounding import with_prefix
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.core import CoreAnswer
 from pvid.identification.core_refined import RefinedCoreAnswer
 
@@ -25,7 +25,7 @@ _IN_A_COLUMN = 3  # parameters
 
 
 def convergence(
-    answer: Answer,
+    answer: Analysis,
     weak: CoreAnswer,
     refined: RefinedCoreAnswer | None,
     truth: Mapping[str, float],

@@ -19,7 +19,7 @@ from matplotlib.figure import SubFigure
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import drawable, save
 from pvid.base.rounding import with_error
-from pvid.identification.answer import Answer, RefinedFit
+from pvid.identification.answer import Analysis, RefinedFit
 from pvid.identification.core import CoreAnswer
 from pvid.identification.refinement.fit import Problem, Refined
 from pvid.identification.refinement.problem import simulated_at
@@ -31,10 +31,8 @@ _SETTLED = 3  # the axis shows the estimates behind the first third
 _LINE = 110  # characters of the title
 _PANEL = 1.9  # inches
 
-AnyAnswer = Answer | CoreAnswer
 
-
-def write_figure(answer: AnyAnswer, path: Path, title: str = "") -> None:
+def write_figure(answer: Analysis | CoreAnswer, path: Path, title: str = "") -> None:
     """Writes the estimates after each window with the answer and +-2 of its standard errors; below them, for each
     sensor, the measured against the simulated signal and their difference: of the refinement where it gave the answer,
     else at the answer's values, where the model's equations can be simulated. png, svg or pdf by suffix.
@@ -48,46 +46,40 @@ def write_figure(answer: AnyAnswer, path: Path, title: str = "") -> None:
     PvidError
         When it cannot be written.
     """
-    refinement = _oracle(answer).refinement if isinstance(answer, Answer) else None
+    refinement = answer.refinement if isinstance(answer, Analysis) else None
     fit = refinement.fit if refinement is not None and refinement.adopted else _motion(answer)
     _write(answer, fit, path, title)
 
 
-def convergence(answer: AnyAnswer, path: Path) -> None:
+def convergence(answer: Analysis | CoreAnswer, path: Path) -> None:
     """Writes the first part of it alone."""
     _write(answer, None, path, "")
 
 
-def _motion(answer: AnyAnswer) -> RefinedFit | None:
-    oracle = _oracle(answer)
-    p = [answer.values[name].value for name in oracle.model.p_names]
+def _motion(answer: Analysis | CoreAnswer) -> RefinedFit | None:
+    p = [answer.values[name].value for name in answer.model.p_names]
     if None in p:
         return None
     try:
-        fit = simulated_at(oracle, np.array(p, np.float64))
+        fit = simulated_at(answer.analysis, np.array(p, np.float64))
     except PvidError:
         return None
     return fit if np.isfinite(fit.found.sum_of_squares) else None
 
 
-def _oracle(answer: AnyAnswer) -> Answer:
-    return answer.oracle if isinstance(answer, CoreAnswer) else answer
-
-
-def _write(answer: AnyAnswer, fit: RefinedFit | None, path: Path, title: str) -> None:
-    oracle = _oracle(answer)
-    heights = [_PANEL * -(-len(oracle.model.p_names) // _COLUMNS)]
+def _write(answer: Analysis | CoreAnswer, fit: RefinedFit | None, path: Path, title: str) -> None:
+    heights = [_PANEL * -(-len(answer.model.p_names) // _COLUMNS)]
     if fit is not None:
         heights.append(2 * _PANEL * len(fit.problem.kernel.made.outputs))
     lines = [
-        part for line in (title or oracle.model.title).split("\n") for part in textwrap.wrap(drawable(line), _LINE)
+        part for line in (title or answer.model.title).split("\n") for part in textwrap.wrap(drawable(line), _LINE)
     ]
     figure = plt.figure(figsize=(10, sum(heights) + 0.3 + 0.25 * len(lines)), layout="constrained")
     try:
         parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-        _converge(answer, oracle, parts[0])
+        _converge(answer, parts[0])
         if fit is not None:
-            _compare(fit.problem, fit.found, float(oracle.recording.t[0]), parts[1])
+            _compare(fit.problem, fit.found, float(answer.recording.t[0]), parts[1])
         figure.suptitle("\n".join(lines), parse_math=False)
         save(figure, path, dpi=110)
     finally:
@@ -104,15 +96,15 @@ def write_comparison(fit: RefinedFit, path: Path) -> None:
         plt.close(figure)
 
 
-def _history(answer: AnyAnswer, k: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], str]:
+def _history(answer: Analysis | CoreAnswer, k: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], str]:
     """Times and estimates of the k-th unknown, and whose they are."""
     if isinstance(answer, CoreAnswer):
         return answer.publications.t, answer.publications.p[:, k], "each window, in C"
     return answer.found.times, answer.found.history[:, k], "weak form, each window"
 
 
-def _converge(answer: AnyAnswer, oracle: Answer, place: SubFigure) -> None:
-    names = oracle.model.p_names
+def _converge(answer: Analysis | CoreAnswer, place: SubFigure) -> None:
+    names = answer.model.p_names
     rows = -(-len(names) // _COLUMNS)
     grid = place.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
     for k, (name, axis) in enumerate(zip(names, grid.T.flat, strict=False)):

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.codegen.refine import SKEW
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.refinement.fit import GOOD, NOISE
 from pvid.identification.refinement.problem import RefinedMechanism
 from pvid.identification.refinement.scales import scales_of
@@ -36,7 +36,7 @@ _APART = 3.0  # standard errors of the difference: two answers that differ by mo
 _OF_RECORDING: tuple[Name, ...] = ("clipped", "resting", "rate", "feedback", "sensor", "scale", "guesses", "core")
 
 
-def refined_answer(answer: Answer) -> tuple[Answer, RefinedMechanism | None, str]:
+def refined_answer(answer: Analysis) -> tuple[Analysis, RefinedMechanism | None, str]:
     """The answer after a refinement that starts from it, the refinement, and what became of it in a clause; the same
     answer where it is not adopted."""
     try:
@@ -64,7 +64,7 @@ def _estimate(refined: RefinedMechanism) -> tuple[Float, Float]:
     return refined.problem.values(refined.found, refined.problem.kernel.made.places_of_p)
 
 
-def _determined(answer: Answer, refined: RefinedMechanism) -> Bool:
+def _determined(answer: Analysis, refined: RefinedMechanism) -> Bool:
     """Which parameters have a standard error that is small beside their value, or beside the range of a guess, and are
     within their bounds [n_p]."""
     p, covariance = _estimate(refined)
@@ -74,16 +74,16 @@ def _determined(answer: Answer, refined: RefinedMechanism) -> Bool:
     return np.asarray((se > 0) & (se <= limit) & inside)
 
 
-def _with(p: Float, answer: Answer) -> Iterator[tuple[float, Any]]:
+def _with(p: Float, answer: Analysis) -> Iterator[tuple[float, Any]]:
     return zip(map(float, p), answer.model.unknowns, strict=True)
 
 
-def _lacks(answer: Answer) -> Bool:
+def _lacks(answer: Analysis) -> Bool:
     """Which parameters the weak form does not determine [n_p]."""
     return np.array([one.status == "not_identified" for one in answer.found.judged])
 
 
-def _not_adopted(answer: Answer, refined: RefinedMechanism) -> str | None:
+def _not_adopted(answer: Analysis, refined: RefinedMechanism) -> str | None:
     """Why a refinement is not the answer, in a clause; None: it is."""
     found, weak = refined.found, answer.found
     if not found.converged:
@@ -117,7 +117,7 @@ def _spread(refined: RefinedMechanism, se: Float) -> float:
     return float(np.exp(np.mean(np.log(ratio[there])))) if there.any() else np.inf
 
 
-def _better(answer: Answer, refined: RefinedMechanism) -> bool:
+def _better(answer: Analysis, refined: RefinedMechanism) -> bool:
     """Whether the refined answer agrees with the weak one, from the same equations, and its standard errors are
     smaller: what these lack moves both."""
     if answer.model.refinement.equations or _lacks(answer).any():
@@ -127,7 +127,7 @@ def _better(answer: Answer, refined: RefinedMechanism) -> bool:
     return bool((np.abs(value - weak.p) <= _APART * np.hypot(error, weak.se)).all() and (error <= weak.se).all())
 
 
-def _apart(answer: Answer, refined: RefinedMechanism) -> str:
+def _apart(answer: Analysis, refined: RefinedMechanism) -> str:
     """How far the two answers are apart, where that is more than both standard errors explain."""
     p, covariance = _estimate(refined)
     both = np.hypot(np.sqrt(np.diag(covariance)), answer.found.se)
@@ -139,7 +139,7 @@ def _apart(answer: Answer, refined: RefinedMechanism) -> str:
     return f"; the two differ in {', '.join(far)}" if far else ""
 
 
-def _adopted(answer: Answer, refined: RefinedMechanism) -> Answer:
+def _adopted(answer: Analysis, refined: RefinedMechanism) -> Analysis:
     """The answer with the refined parameters; those that the weak form did not determine are identified."""
     weak, model = answer.found, answer.model
     p, covariance = _estimate(refined)
@@ -157,7 +157,7 @@ def _adopted(answer: Answer, refined: RefinedMechanism) -> Answer:
     return replace(answer, found=found, values=values_of(model, p, covariance, gains, judged, found.verdict, shifts))
 
 
-def _kept(answer: Answer, fresh: Bool) -> Iterator[Reason]:
+def _kept(answer: Analysis, fresh: Bool) -> Iterator[Reason]:
     """Doubts that a refined answer has too: not those about parameters that it determines and the weak form did not."""
     names, lacks = answer.model.p_names, _lacks(answer)
     new = {name for name, one in zip(names, fresh, strict=True) if one}
@@ -174,7 +174,7 @@ def _kept(answer: Answer, fresh: Bool) -> Iterator[Reason]:
             yield one
 
 
-def _doubts(answer: Answer, refined: RefinedMechanism) -> Iterator[Reason]:
+def _doubts(answer: Analysis, refined: RefinedMechanism) -> Iterator[Reason]:
     """On what was found beside the parameters, on residuals above noise, and on a weak answer that they contradict."""
     found = refined.found
     if found.slow_chi2 > GOOD and _lacks(answer).any():
@@ -192,12 +192,12 @@ def _doubts(answer: Answer, refined: RefinedMechanism) -> Iterator[Reason]:
         yield Reason("skew", text)
 
 
-def _differentiated(answer: Answer) -> list[str]:
+def _differentiated(answer: Analysis) -> list[str]:
     """Driven sensors."""
     return [one.name for one in answer.model.signals if one.driven and one.kind == "sensor"]
 
 
-def _of_skew(answer: Answer, refined: RefinedMechanism) -> Iterator[str]:
+def _of_skew(answer: Analysis, refined: RefinedMechanism) -> Iterator[str]:
     """A sentence with what to type, where the one differentiated sensor is read half a sample or more too late or too
     early, and by no more than sensors are."""
     skew, se = refined.extras.get(SKEW, (0.0, 0.0))
@@ -211,7 +211,7 @@ def _of_skew(answer: Answer, refined: RefinedMechanism) -> Iterator[str]:
         )
 
 
-def _of_breaks(answer: Answer, refined: RefinedMechanism) -> Iterator[str]:
+def _of_breaks(answer: Analysis, refined: RefinedMechanism) -> Iterator[str]:
     """A sentence on jumps of a signal whose derivatives drive the mechanism."""
     if refined.breaks:
         began = float(answer.recording.t[0])

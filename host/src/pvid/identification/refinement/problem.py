@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.refine import LOG_SD
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.refinement.fit import (
     NOISE,
     Cut,
@@ -244,7 +244,7 @@ def prior_about(problem: Problem, r: Float) -> Prior:
     return Prior(r, np.maximum(3 * sd, 0.5 * problem.log), ~problem.is_width)
 
 
-def simulated_at(answer: Answer, p: Float) -> RefinedMechanism:
+def simulated_at(answer: Analysis, p: Float) -> RefinedMechanism:
     """The motion of a recording at p [n_p]: the starts of its blocks, of two windows each, are fitted to it.
 
     Raises

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.refine import is_driven_by_derivatives
-from pvid.identification.answer import Answer
+from pvid.identification.answer import Analysis
 from pvid.identification.refinement.fit import (
     GOOD,
     NOISE,
@@ -54,7 +54,7 @@ _UNSURE = 0.05  # standard error of a logarithm from which friction is searched 
 TOO_LONG = "the refinement needs too many steps: the recording is long, or the guess has too fast a motion"
 
 
-def refine(answer: Answer) -> RefinedMechanism:
+def refine(answer: Analysis) -> RefinedMechanism:
     """Refines the weak form's answer.
 
     Raises
