@@ -14,7 +14,7 @@ from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native
-from pvid.core.model_library import model_library
+from pvid.core.model_library import ModelSources
 from pvid.core.weak_native import WeakNative
 from pvid.settings.enums import Reason
 from pvid.setup.weak_sizes import sizes_of_model
@@ -31,7 +31,8 @@ def fitted() -> WeakNative:
         f"{made.name}_weak.h": files_weak.header(made, model, sizes_of_model(model), "test"),
         f"{made.name}_weak_f32.c": files_weak.source(made, model, "test"),
     }
-    return WeakNative(made.name, model_library(made.name, texts, fitted_sizes(pendulum().config)))
+    sources = ModelSources(made.name, texts, fitted_sizes(pendulum().config))
+    return WeakNative(made.name, sources.library(), sources)
 
 
 def test_a_window_and_a_block_share_places_where_there_is_time() -> None:

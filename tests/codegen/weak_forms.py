@@ -8,7 +8,7 @@ from functools import cache
 from pvid.codegen import files_weak
 from pvid.codegen.weak import WeakFunctions, weak_functions_of
 from pvid.codegen.weak_twin import weak_model_of
-from pvid.core.model_library import model_library
+from pvid.core.model_library import ModelSources
 from pvid.core.sizes import raised
 from pvid.core.weak_native import WeakNative
 from pvid.models import mechanisms
@@ -87,4 +87,5 @@ def native(name: str) -> WeakNative:
     texts = {
         file: text for one in NAMES for file, text in weak_form(one).files.items() if not file.endswith("_design_f32.h")
     }
-    return WeakNative(name, model_library("all", texts, raised(sizes_of_all())))
+    sources = ModelSources("all", texts, raised(sizes_of_all()))
+    return WeakNative(name, sources.library(), sources)

@@ -107,7 +107,7 @@ def test_integers_have_the_values_of_c(name: str, compiled: Any) -> None:
     random = np.random.default_rng(1)
     edges = [0, 1, 2, 3, 7, 255, 256, 65535, 65536, 2**31 - 2**20]
     pairs = [(a, b) for a in edges for b in edges]
-    pairs += [tuple(int(x) for x in random.integers(0, 2**30, 2)) for _ in range(200)]
+    pairs += [(int(a), int(b)) for a, b in random.integers(0, 2**30, (200, 2))]
     pairs += [(-a, b) for a, b in pairs[:60]] + [(a, -b) for a, b in pairs[60:120]] if signed else []
     for a, b in pairs:
         assert getattr(module, name)(a, b) == own(kind(a), kind(b)), (a, b)
@@ -192,11 +192,11 @@ def test_floats_have_the_bits_of_c_also_without_a_value(compiled: Any) -> None:
     f32 = np.float32
     values = [f32(x) for x in (0, -0.0, 1, -2.5, 1e-45, 3e38, np.inf, -np.inf, np.nan, 0.1, 16777217)]
     for a in values:
-        assert f32(library.bits(ctypes.c_float(a))).tobytes() == f32(module.bits_(a)).tobytes()
+        assert f32(library.bits(ctypes.c_float(float(a)))).tobytes() == f32(module.bits_(a)).tobytes()
         for b in values:
-            own, found = f32(library.f(ctypes.c_float(a), ctypes.c_float(b))), module.f(a, b)
+            own, found = f32(library.f(ctypes.c_float(float(a)), ctypes.c_float(float(b)))), module.f(a, b)
             assert own.tobytes() == found.tobytes() or (np.isnan(own) and np.isnan(found))
-            assert library.order(ctypes.c_float(a), ctypes.c_float(b)) == module.order(a, b)
+            assert library.order(ctypes.c_float(float(a)), ctypes.c_float(float(b))) == module.order(a, b)
     for n in (0, 16777217, 33554435, 2**31 - 1, -(2**31) + 129):
         assert f32(library.of_int(n)) == module.of_int(n)
 

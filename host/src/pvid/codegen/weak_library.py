@@ -6,7 +6,7 @@ from pvid.codegen import files_refine, files_weak, files_weak_q31
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions
 from pvid.codegen.weak_q31 import FixedWeak, ParametersQ31
-from pvid.core.model_library import model_library
+from pvid.core.model_library import ModelSources
 from pvid.core.sizes import roomy
 from pvid.core.weak_native import WeakNative
 from pvid.core.weak_native_q31 import WeakNativeQ31
@@ -19,15 +19,15 @@ from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model, sizes_of_q31
 _MADE_BY = "identification"
 
 
-def weak_native(
+def weak_sources(
     compiled: CompiledModel, design: WeakDesign32 | None = None, refine: RefineFunctions | None = None
-) -> WeakNative:
-    """The library of a model, with arrays that hold a design; `refine`: with the second stage.
+) -> ModelSources:
+    """C of a model, with arrays that hold a design; `refine`: with the second stage.
 
     Raises
     ------
     PvidError
-        When there is no compiler, or the engine does not have what the model needs.
+        When the engine does not have what the model needs.
     """
     model = GeneratedModel(compiled, _MADE_BY)
     name = model.weak.needed.name
@@ -35,17 +35,19 @@ def weak_native(
     texts = files_weak.printed(model)
     if refine is not None:
         texts |= files_refine.files_of(refine, _MADE_BY)
-    return WeakNative(name, model_library(name, texts, roomy(needed)))
+    return ModelSources(name, texts, roomy(needed))
 
 
-def weak_native_q31(made: FixedWeak, parameters: ParametersQ31, config: WeakConfigQ31) -> WeakNativeQ31:
-    """The library of a model in fixed point, a design and its settings.
+def weak_native(
+    compiled: CompiledModel, design: WeakDesign32 | None = None, refine: RefineFunctions | None = None
+) -> WeakNative:
+    """The library of a model: as `weak_sources`; PvidError as well when there is no compiler."""
+    sources = weak_sources(compiled, design, refine)
+    return WeakNative(sources.name, sources.library(), sources)
 
-    Raises
-    ------
-    PvidError
-        When there is no compiler.
-    """
+
+def weak_sources_q31(made: FixedWeak, parameters: ParametersQ31, config: WeakConfigQ31) -> ModelSources:
+    """C of a model in fixed point, a design and its settings."""
     name = made.functions.name
     needed = sizes_of_q31(config.design, parameters.model.n_p, len(parameters.model.c_row))
     texts = {
@@ -56,5 +58,10 @@ def weak_native_q31(made: FixedWeak, parameters: ParametersQ31, config: WeakConf
         f"const pvid_weak_config_q31 *{name}_settings_q31 = &{name}_config_q31;\n",
         "configuration.h": f'#include "pvid/weak_q31.h"\nextern const pvid_weak_config_q31 *{name}_settings_q31;\n',
     }
-    headers = ("configuration.h",)
-    return WeakNativeQ31(name, model_library(name, texts, roomy(needed), FIXED, headers), config)
+    return ModelSources(name, texts, roomy(needed), FIXED, ("configuration.h",))
+
+
+def weak_native_q31(made: FixedWeak, parameters: ParametersQ31, config: WeakConfigQ31) -> WeakNativeQ31:
+    """The library of a model in fixed point, a design and its settings; PvidError when there is no compiler."""
+    sources = weak_sources_q31(made, parameters, config)
+    return WeakNativeQ31(sources.name, sources.library(), config, sources)

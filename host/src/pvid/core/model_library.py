@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +26,26 @@ _ROOMS = ("number", "solve", "judge", "persist")  # of every form
 _REFINED = "refine_model_f32.h"  # a text that comes with the second stage
 _STANDARD = ("math", "stdbool", "stddef", "stdint", "string")
 _WHAT = "identification in C of a described mechanism"
+
+
+@dataclass(frozen=True, eq=False)
+class ModelSources:
+    """What a library of a mechanism and its twin are made of; the arguments of `model_library`."""
+
+    name: str
+    texts: Mapping[str, str]
+    sizes: Mapping[str, int]
+    engine: EngineCore = FLOAT
+    headers: Sequence[str] | None = None
+
+    @property
+    def refined(self) -> bool:
+        """With the second stage."""
+        return _REFINED in self.texts
+
+    def library(self) -> Path:
+        """The shared library; raises as `model_library`."""
+        return model_library(self.name, self.texts, self.sizes, self.engine, self.headers)
 
 
 def model_library(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.core.model_library import ModelSources
 from pvid.core.native import Native, Publisher
 from pvid.settings.enums import Stage
 from pvid.settings.record import Record
@@ -23,10 +24,12 @@ class WeakNative(Native):
     ----------
     name : of the mechanism, in C
     path : of the library
+    sources : what it was made of
     """
 
-    def __init__(self, name: str, path: Path) -> None:
+    def __init__(self, name: str, path: Path, sources: ModelSources) -> None:
         super().__init__(path)
+        self.sources = sources
         self.model: Any = self.headers.ffi.addressof(self.library, f"{name}_weak_f32")
 
     def identifier_of(self, config: WeakConfig) -> WeakIdentifier:

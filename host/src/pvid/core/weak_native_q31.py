@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.core.headers import Filled
+from pvid.core.model_library import ModelSources
 from pvid.core.native import Native, Publisher
 from pvid.settings.record import Record
 from pvid.settings.weak_q31 import WeakConfigQ31
@@ -21,11 +22,12 @@ class WeakNativeQ31(Native):
     name : of the mechanism, in C
     path : of the library
     config : the configuration that it contains
+    sources : what it was made of
     """
 
-    def __init__(self, name: str, path: Path, config: WeakConfigQ31) -> None:
+    def __init__(self, name: str, path: Path, config: WeakConfigQ31, sources: ModelSources) -> None:
         super().__init__(path)
-        self.name, self.config = name, config
+        self.name, self.config, self.sources = name, config, sources
 
     def identifier(self, start: npt.ArrayLike | None = None) -> WeakIdentifierQ31:  # type: ignore[override]
         """An initialised identifier.

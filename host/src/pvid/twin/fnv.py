@@ -74,6 +74,11 @@ def sample_hashes(samples: npt.NDArray[np.float32] | npt.NDArray[np.int32]) -> n
     return _running(np.ascontiguousarray(samples, samples.dtype.newbyteorder("<")).view(np.uint8), START)
 
 
+def of_words(words: npt.NDArray[np.uint32], start: int = START) -> npt.NDArray[np.uint32]:
+    """Hash after every row of words [ticks, n]."""
+    return _running(np.ascontiguousarray(words, "<u4").view(np.uint8), start)
+
+
 def running_hashes(record: Record, start: int = START) -> npt.NDArray[np.uint32]:
     """Hash after every tick of a record (pvid/fnv.h, pvid/fnv_q31.h)."""
     return _running(record.hashed(), start)

@@ -1,7 +1,8 @@
 """Reads C with its includes, conditions and macros, and keeps what a preprocessor loses: comments and names.
 
-A macro without parameters whose value is a number stays in the text as a name (`Unit.constants` has its value); all
-others are replaced. The text has the lines of each file one after the other, and `Unit.places` leads back to them.
+A macro without parameters whose value is a number stays in the text as a name, with KEPT behind it (`Unit.constants`
+has its value); all others are replaced. The text has the lines of each file one after the other, and `Unit.places`
+leads back to them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ _TOKEN = re.compile(
     r"""|(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|(?P<sign>\#\#|<<=|>>=|->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|.)""",
     re.VERBOSE,
 )
+KEPT = "__macro"  # behind the name of a macro that stays one, in the text
 _COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*"|/\*.*?\*/|//[^\n]*', re.DOTALL)
 _OF_A_NUMBER = re.compile(r"[-+*/%()<>&|^~!=?: ]|<<|>>|<=|>=|==|!=|&&|\|\||\d[\w.]*|\.\d\w*|[ \t]+")
 _CASTS = re.compile(r"\(\s*(?:u?int(?:8|16|32|64)_t|float|size_t)\s*\)")
@@ -245,10 +247,10 @@ class Reader:
         if not text or not any(c.isalnum() for c in text):
             return False
         for token in _tokens(text):
-            known = token in self.unit.constants or (token in self._macros and self._macros[token].number)
+            known = token in self._macros and self._macros[token].number
             if not (known or _OF_A_NUMBER.fullmatch(token)):
                 return False
-        whole = "".join(body)
+        whole = "".join(one + KEPT if one in self._macros and self._macros[one].number else one for one in body)
         if self.unit.constants.setdefault(name, whole) != whole:
             return False  # another file has another value
         return True
@@ -262,7 +264,7 @@ class Reader:
             at += 1
             macro = self._macros.get(token)
             if macro is None or token in hidden or (macro.number and not numbers):
-                out.append(token)
+                out.append(token + KEPT if macro is not None and macro.number else token)
                 continue
             if macro.parameters is None:
                 out += self._expanded(_pasted(macro.body), hidden | {token}, numbers)
@@ -352,13 +354,22 @@ def _with_arguments(macro: Macro, given: list[list[str]], expanded: object) -> l
     body = [token for token in macro.body]
     out: list[str] = []
     for k, token in enumerate(body):
-        if token in places:
+        if token == "#" and _near(body, k, 1) in places:
+            out.append(_as_text("".join(_trimmed(given[places[_near(body, k, 1)]]))))
+        elif token in places and _near(body, k, -1) == "#":
+            continue
+        elif token in places:
             pasted = "##" in (_near(body, k, -1), _near(body, k, 1))
             one = _trimmed(given[places[token]]) if places[token] < len(given) else []
             out += one if pasted else expanded(one)
         else:
             out.append(token)
     return _pasted(out)
+
+
+def _as_text(code: str) -> str:
+    """#: an argument as a string."""
+    return '"' + code.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _trimmed(tokens: list[str]) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from pycparser import c_ast, c_parser
 
 from pvid.twin.printer import machine
-from pvid.twin.printer.directives import Unit, UntranslatedError
+from pvid.twin.printer.directives import KEPT, Unit, UntranslatedError
 
 # A name of _INTEGERS, "float", "_Bool", "void"; ("enum", low, high), ("ptr", type), ("arr", type, length, its code),
 # ("struct", name), ("fn", node, name).
@@ -140,6 +140,7 @@ class Translator:
         self.links: dict[Any, Any] = {}
         self._file = ""
         self._function: Function | None = None
+        self.macro_names: dict[str, str] = {}  # by the names in Python
         self.macros = {node.name: node.init for node in nodes if _file_of(node) == "macros"}
         for node in nodes:
             if _file_of(node) != "macros":
@@ -357,8 +358,8 @@ class Translator:
             t = t[1]
         code = " * ".join(codes) or "1"
         for name in re.findall(r"[A-Za-z_]\w*", code):
-            if name in self.macros:
-                self._macro(name)
+            if name in self.macro_names:
+                self._macro(self.macro_names[name])
             elif name in self.anywhere:
                 self.used_enumerators[name] = str(self.anywhere[name])
         return code
@@ -561,6 +562,8 @@ class Translator:
 
     def _of_id(self, node: Any, scope: Scope) -> Value:
         name = node.name
+        if name.endswith(KEPT):
+            return self._macro(name.removesuffix(KEPT))
         if name in scope.names:
             return self._variable(*scope.names[name])
         if name in ("true", "false"):
@@ -575,8 +578,6 @@ class Translator:
             if hasattr(self, "used_enumerators"):
                 self.used_enumerators[code] = str(number)
             return self._constant_value(number, "int32_t", code)
-        if name in self.macros:
-            return self._macro(name)
         function = self._found(name, file)
         if function is not None or name in self.prototypes:
             key = function.file + ":" + name if function and len(self.functions[name]) > 1 else name
@@ -592,9 +593,11 @@ class Translator:
         value = self.expression(self.macros[name], Scope())
         if value.const is None:
             raise self.refuse(self.macros[name], f"the macro {name}")
+        code = f"{name}_" if name in self.anywhere or name in self.functions or name in self.tables else name
+        self.macro_names[code] = name
         if hasattr(self, "used_constants"):
-            self.used_constants[name] = value.code
-        return replace(value, code=name, level=_ATOM)
+            self.used_constants[code] = value.code
+        return replace(value, code=code, level=_ATOM)
 
     def _variable(self, name: str, t: Type, slot: Any, boxed: bool) -> Value:
         if boxed:
@@ -742,7 +745,9 @@ class Translator:
             return replace(value, type=to if not isinstance(to, tuple) else "int32_t")
         bits, signed = _INTEGERS[to]
         if to == "size_t":
-            return self._wrapped(value, 64, to)
+            return (
+                self._wrapped(value, 64, to) if value.low < 0 else replace(value, type=to, high=min(value.high, high))
+            )
         if not signed:
             return self._wrapped(value, bits, to)
         if isinstance(value.const, int):
@@ -1101,7 +1106,7 @@ class Translator:
         types = [] if types == ["void"] else types
         codes: list[str] = []
         for place, (one, t) in enumerate(zip(given, types, strict=True)):
-            slot = ("param", key, place)
+            slot: Any = ("param", key, place)
             t = ("ptr", t[1]) if isinstance(t, tuple) and t[0] == "arr" else t
             value = self.expression(one, scope)
             if value.at == "*" and (slot, "inside") in self.flags:
@@ -1588,7 +1593,7 @@ class Translator:
         ):
             number = self.expression(step.rvalue, scope).const
             by = (number if step.op == "+=" else -number) if isinstance(number, int) else 0
-        if by == 0 or (by < 0) != (condition.op == ">") or one.name in _changed(node.stmt) or one.name in self._boxed:
+        if by == 0 or (by < 0) != (condition.op == ">") or one.name in _assigned(node.stmt) or one.name in self._boxed:
             return ""
         if self._may_change(condition.right, node.stmt, scope) or not isinstance(self.type_of(one.type), str):
             return ""
@@ -1766,18 +1771,12 @@ def _is_number(value: Value) -> bool:
 
 
 def _nearest(text: str) -> float:
-    """The float32 next to a decimal number, as a double."""
-    exact = Fraction(text)
-    near = np.float32(float(text))
-    return float(
-        min(
-            (np.nextafter(near, np.float32(-np.inf)), near, np.nextafter(near, np.float32(np.inf))),
-            key=lambda x: (
-                abs(Fraction(float(x)) - exact) if np.isfinite(x) else Fraction(2) ** 200,
-                int(np.float32(x).view(np.uint32)) & 1,
-            ),
-        )
-    )
+    """The float32 next to a decimal number, as a double: rounded once."""
+    exact, near = Fraction(text), np.float32(float(text))
+    with np.errstate(over="ignore"):
+        close = [np.nextafter(near, end) for end in (np.float32(-np.inf), np.float32(np.inf))]
+    finite = [one for one in (near, *close) if np.isfinite(one)]
+    return float(min(finite, key=lambda one: (abs(Fraction(float(one)) - exact), int(one.view(np.uint32)) & 1)))
 
 
 def _bounds(op: str, a: Value, b: Value) -> tuple[int, int]:

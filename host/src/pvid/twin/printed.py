@@ -1,0 +1,237 @@
+"""The twin of a C core: its C printed as Python, stepped through runs, beside what the C is compiled to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from operator import is_
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.base.errors import PvidError
+from pvid.core.model_library import NATIVE, ModelSources, core_of
+from pvid.core.refusals import refused
+from pvid.core.sources import FOLDERS
+from pvid.settings.enums import Stage, Status
+from pvid.settings.record import Record
+from pvid.settings.refine import RefineConfig
+from pvid.twin import fnv
+from pvid.twin.printer.program import printed_module
+from pvid.twin.printer.values import filled, numbers
+
+Progress = Callable[[int], None]
+Words = npt.NDArray[np.uint32]
+
+_PROGRESS_TICKS = 512
+_VERBS = ("init", "step", "gap", "freeze", "estimate", "candidate")
+_REFINE = ("pvid_refine_stage_f32", "pvid_refine_best_f32", "pvid_refine_latest_f32", "pvid_refine_reason_f32")
+
+
+def printed(sources: ModelSources) -> ModuleType:
+    """The printed module of a mechanism's core: the functions of its identifier and what they need."""
+    core, room = sources.engine.name, sources.engine.room
+    roots = [f"pvid_{room}_{verb}_{core}" for verb in _VERBS] + [f"pvid_fnv_estimator_{core}"]
+    if sources.refined:
+        roots += [*_REFINE, "pvid_fnv_refine_f32"]
+    roots += [f"{sources.name}_{room}_{core}", f"{sources.name}_settings_{core}", f"{sources.name}_config_{core}"]
+    macros = {"PVID_PLAIN_NAMES": "", **{name: str(value) for name, value in sources.sizes.items()}}
+    return printed_module(core_of(sources.engine, sources.refined), [*FOLDERS, NATIVE], macros, roots, sources.texts)
+
+
+class PrintedTwin:
+    """An identifier of the weak form, in either arithmetic, with or without its second stage.
+
+    Parameters
+    ----------
+    sources : of its library
+    config : its settings, as the library's identifier gets them
+    refine : settings of the second stage; None: without
+    start : p in the formats of the fixed-point core [n_p]; None: that of the settings
+
+    Attributes
+    ----------
+    state : pvid_weak_<core> as printed
+    samples : numbers of a tick
+    reach : ticks from a sample until the identifier has processed it completely, at most
+
+    Raises
+    ------
+    PvidError
+        When the core refuses the settings.
+    """
+
+    def __init__(
+        self, sources: ModelSources, config: Any, refine: RefineConfig | None = None, start: Sequence[int] | None = None
+    ) -> None:
+        self._core = core = sources.engine.name
+        self.module = module = printed(sources)
+        self.fixed = core == "q31"
+        kind = f"pvid_weak_config_{core}"
+        self.refinement: Any = None
+        if self.fixed:
+            given = getattr(module, f"{sources.name}_config_q31").copy()
+            settings = filled(module, type(given.estimator).__name__, config.estimator)
+            given.estimator.assign(settings)
+            if start is not None:
+                given.estimator.start[: len(start)] = [int(one) for one in start]
+        else:
+            given = filled(module, kind, config)
+            given.design.model = getattr(module, f"{sources.name}_weak_f32")
+        if refine is not None:
+            self.refinement = module.pvid_refine_f32()
+            second = filled(module, "pvid_refine_config_f32", refine)
+            given.refine = module.pvid_weak_refine_f32(module.pvid_refine_stage_f32, self.refinement, second)
+        self.state = getattr(module, f"pvid_weak_{core}")()
+        self._step = getattr(module, f"pvid_weak_step_{core}")
+        status = Status(getattr(module, f"pvid_weak_init_{core}")(self.state, given))
+        if status is not Status.OK:
+            raise PvidError(refused(status, config, in_counts=self.fixed))
+        self.samples = int(config.design.model.samples)
+        self.reach = int(config.design.ticks_needed if self.fixed else config.ticks_needed)
+        self._hash = fnv.START
+
+    @property
+    def estimator(self) -> Any:
+        """pvid_estimator_<core> in it."""
+        return self.state.estimator
+
+    @property
+    def n_p(self) -> int:
+        """Parameters."""
+        return int(self.estimator.model.n_p)
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """pvid_counters by name."""
+        counters = self.estimator.counters
+        return {name: int(getattr(counters, name)) for name in type(counters).__slots__}
+
+    @property
+    def is_published(self) -> bool:
+        """Whether an estimate has been published yet."""
+        return bool(self.state.trust.published)
+
+    @property
+    def estimate(self) -> Any:
+        """The published estimate (before the first one the start): pvid_estimate_<core> as printed."""
+        return self.state.trust.estimate
+
+    @property
+    def best(self) -> tuple[Stage, Any]:
+        """pvid_refine_best_f32: whose estimate is published, and the estimate."""
+        estimate = self.module.pvid_estimate_f32()
+        stage = self.module.pvid_refine_best_f32(self.refinement, self.estimate, estimate)
+        return Stage(stage), estimate
+
+    def freeze(self, frozen: bool) -> None:
+        """pvid_weak_freeze_<core>."""
+        getattr(self.module, f"pvid_weak_freeze_{self._core}")(self.state, frozen)
+
+    def gap(self) -> None:
+        """pvid_weak_gap_<core>."""
+        getattr(self.module, f"pvid_weak_gap_{self._core}")(self.state)
+
+    def run(self, samples: npt.ArrayLike, progress: Progress | None = None) -> Record:
+        """Steps through samples [ticks, samples]: floats as a board would read them, in fixed point counts.
+
+        Returns
+        -------
+        Record
+            As that of the compiled core: p, sums, reasons, published p and standard errors, and the running hash, which
+            goes on from one call to the next.
+        """
+        given = np.asarray(samples)
+        flat = numbers(given, 0 if self.fixed else np.float32(0))
+        step, state, width = self._step, self.state, given.shape[1]
+        core, second, published = _Watched(self._of_core), _Watched(self._of_second), _Watched(self._of_published)
+        places = np.empty((len(given), 3), np.int64)
+        reasons, told = np.empty(len(given), np.uint8), np.zeros(len(given), np.uint8)
+        estimator, refinement = self.estimator, self.refinement
+        of_sums = (
+            [estimator.information.sums] if self.fixed else [estimator.information.high, estimator.information.low]
+        )
+        watched = [estimator.p, *of_sums]
+        of_second = [] if refinement is None else [refinement.linear, refinement.work.state]
+        with np.errstate(all="ignore"):
+            for tick in range(len(given)):
+                reasons[tick] = step(state, flat[tick * width : (tick + 1) * width])
+                places[tick] = (
+                    core.place(watched, estimator.information.exponent if self.fixed else 0),
+                    second.place(of_second, refinement.level) if of_second else 0,
+                    published.place([], state.trust.mark.version),
+                )
+                if of_second:
+                    told[tick] = self.module.pvid_refine_reason_f32(refinement)
+                if progress is not None and tick % _PROGRESS_TICKS == 0:
+                    progress(tick)
+        return self._record(core, second, published, places, reasons, told)
+
+    # ---- words of the state, where it has changed
+
+    def _hashed(self, function: str, *given: Any) -> list[int]:
+        """The words that a hash of the core covers, but for the reason at its end."""
+        words: list[int] = []
+        module = vars(self.module)
+        own = module["pvid_fnv_word"]
+
+        def keep(_: int, word: int) -> int:
+            words.append(word)
+            return 0
+
+        try:
+            module["pvid_fnv_word"] = keep
+            module[function](0, *given, 0)
+        finally:
+            module["pvid_fnv_word"] = own
+        return words[:-1]
+
+    def _of_core(self) -> list[int]:
+        return self._hashed(f"pvid_fnv_estimator_{self._core}", self.estimator)
+
+    def _of_second(self) -> list[int]:
+        return self._hashed("pvid_fnv_refine_f32", self.refinement)
+
+    def _of_published(self) -> list[Any]:
+        return [*self.estimate.p[: self.n_p], *self.estimate.se[: self.n_p]]
+
+    def _record(
+        self, core: _Watched, second: _Watched, published: _Watched, places: Any, reasons: Any, told: Any
+    ) -> Record:
+        words = np.array(core.rows, np.uint32)[places[:, 0]] if len(places) else np.empty((0, self.n_p), np.uint32)
+        number = np.int32 if self.fixed else np.float32
+        shown = np.array(published.rows, number)[places[:, 2]] if len(places) else np.empty((0, 2 * self.n_p), number)
+        end = words.shape[1] - self.fixed
+        sums = np.ascontiguousarray(words[:, self.n_p : end])
+        hashed = [words, reasons[:, None].astype(np.uint32)]
+        if self.refinement is not None and len(places):
+            hashed += [np.array(second.rows, np.uint32)[places[:, 1]], told[:, None].astype(np.uint32)]
+        whole = np.ascontiguousarray(np.concatenate(hashed, axis=1).astype("<u4"))
+        hashes = fnv.of_words(whole, self._hash)
+        self._hash = int(hashes[-1]) if len(hashes) else self._hash
+        return Record(
+            p=np.ascontiguousarray(words[:, : self.n_p]).view(number),
+            sums=sums.view(np.int64 if self.fixed else np.float32),
+            reason=reasons,
+            exponent=words[:, -1].astype(np.uint8) if self.fixed else np.empty(0, np.uint8),
+            published=shown[:, : self.n_p],
+            published_se=shown[:, self.n_p :],
+            hash=hashes,
+        )
+
+
+class _Watched:
+    """Rows of a state that changes at few ticks. `made` returns the present one."""
+
+    def __init__(self, made: Callable[[], list[Any]]) -> None:
+        self.rows: list[list[Any]] = []
+        self._made, self._last, self._mark = made, list[list[Any]](), object()
+
+    def place(self, lists: list[list[Any]], mark: Any) -> int:
+        """The row's place: a new row where a number has been written, or the mark is not what it was."""
+        same = self._mark is mark or self._mark == mark
+        if not (same and all(all(map(is_, now, last)) for now, last in zip(lists, self._last, strict=True))):
+            self._last, self._mark = [one[:] for one in lists], mark
+            self.rows.append(self._made())
+        return len(self.rows) - 1
