@@ -11,7 +11,7 @@ import pytest
 from weak_q31 import DESIGNS, rig
 from weak_rig import engine_rig
 
-from pvid.codegen.build import refine_functions
+from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.refine import refine_settings
 from pvid.models import mechanisms

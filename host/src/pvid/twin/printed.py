@@ -36,7 +36,7 @@ def printed(sources: ModelSources) -> ModuleType:
     if sources.refined:
         roots += [*_REFINE, "pvid_fnv_refine_f32"]
     roots += [f"{sources.name}_{room}_{core}", f"{sources.name}_settings_{core}", f"{sources.name}_config_{core}"]
-    macros = {"PVID_PLAIN_NAMES": "", **{name: str(value) for name, value in sources.sizes.items()}}
+    macros = {name: str(value) for name, value in sources.sizes.items()}
     return printed_module(core_of(sources.engine, sources.refined), [*FOLDERS, NATIVE], macros, roots, sources.texts)
 
 
@@ -82,7 +82,8 @@ class PrintedTwin:
         if refine is not None:
             self.refinement = module.pvid_refine_f32()
             second = filled(module, "pvid_refine_config_f32", refine)
-            given.refine = module.pvid_weak_refine_f32(module.pvid_refine_stage_f32, self.refinement, second)
+            stage = next(one for name, one in vars(module).items() if name.startswith("pvid_refine_stage_f32"))
+            given.refine = module.pvid_weak_refine_f32(stage, self.refinement, second)
         self.state = getattr(module, f"pvid_weak_{core}")()
         self._step = getattr(module, f"pvid_weak_step_{core}")
         status = Status(getattr(module, f"pvid_weak_init_{core}")(self.state, given))

@@ -138,6 +138,10 @@ class Reader:
             else:
                 self._macros.pop(name, None)
 
+    def renamed(self, name: str) -> str:
+        """What macros make of a name."""
+        return "".join(self._expanded([name], frozenset()))
+
     # ---- lines
 
     def _file(self, path: Path, own: set[str] | None) -> None:

@@ -55,7 +55,7 @@ def text_of(
     reader = Reader(folders, macros, texts)
     for one in [*sources, *(Path(name) for name in texts or () if name.endswith(".c"))]:
         reader.read(one)
-    return _HEAD + Translator(reader.unit, roots).printed()
+    return _HEAD + Translator(reader.unit, [reader.renamed(one) for one in roots]).printed()
 
 
 def printed_module(

@@ -172,12 +172,16 @@ class Translator:
         return self._python(name)
 
     def _found(self, name: str, file: str) -> Function | None:
+        """A function that a file sees."""
         many = self.functions.get(name, [])
-        return next((one for one in many if one.file == file), many[0] if many else None)
+        own = (one for one in many if one.file == file)
+        return next(own, next((one for one in many if _is_seen(one.file, one.node.decl)), None))
 
     def _table(self, name: str, file: str) -> tuple[str, Any] | None:
+        """A table that a file sees, and its own file."""
         many = self.tables.get(name, [])
-        return next((one for one in many if one[0] == file), many[0] if many else None)
+        own = (one for one in many if one[0] == file)
+        return next(own, next((one for one in many if _is_seen(*one)), None))
 
     # ---- declarations
 
@@ -252,7 +256,8 @@ class Translator:
         every = {id(one.node if kind == "function" else one) for kind, _, one in self.order}
         if not self.roots:
             return every
-        todo: list[tuple[str, str]] = [(name, "") for name in self.roots]
+        todo = [(name, one.file) for name in self.roots for one in self.functions.get(name, [])]
+        todo += [(name, file) for name in self.roots for file, _ in self.tables.get(name, [])]
         found: set[int] = set()
         while todo:
             name, file = todo.pop()
@@ -1733,6 +1738,11 @@ class Translator:
 
 
 _ENTRY, _EVERYTHING = "[]", "*"  # beside names of fields: an entry of an array; a whole struct
+
+
+def _is_seen(file: str, decl: Any) -> bool:
+    """Whether other files see a function or a table."""
+    return file.endswith(".h") or "static" not in decl.storage
 
 
 def _file_of(node: Any) -> str:
