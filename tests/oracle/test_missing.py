@@ -123,12 +123,37 @@ def found_of(plant: str, effect: str, size: float) -> Told:
     [
         ("pendulum", "offset (q)", 0.25, r"q has an offset of 0\.1[56]\d* rad"),
         ("cart", "even spring (x)", 0.1, r"lack 7[5-8]\.?\d*\*x\*\*2"),
+        (
+            "shaft",
+            "another gain to one side (M)",
+            0.1,
+            r"M seems to be 10 % smaller than recorded where it is negative",
+        ),
+        ("servo", "saturation of one side (V)", 0.6, r"V saturates at [\d.]+ V on that side alone"),
+        ("motor", "damping of one direction (i)", 0.3, r"equation 1 seems to lack [\d.]+\*abs\(i\)"),
     ],
 )
-def test_offset_and_even_law_are_named(plant: str, effect: str, size: float, words: str) -> None:
-    """0.25 of the angle's rms of 0.64 rad; 0.4 N at the rms of 0.072 m."""
+def test_even_and_one_sided_terms_are_named(plant: str, effect: str, size: float, words: str) -> None:
+    """0.25 of the angle's rms of 0.64 rad; 0.4 N at the rms of 0.072 m; the others in parts of the motion or drive."""
     found = found_of(plant, effect, size)
     assert found.right and not found.silent and re.search(words, found.found.named[0].text)
+
+
+@pytest.mark.parametrize(
+    ("plant", "effect"),
+    [("tank", "friction of two sizes (w)"), ("tank", "square drag (w)"), ("swing", "unbalance (q)")],
+)
+def test_what_a_run_does_not_distinguish_is_listed(plant: str, effect: str) -> None:
+    """A tank whose flow never turns: a friction is a constant, a dead band and a drop of the drive as well. A swing's
+    unbalance is an offset of its sensor; it moves no parameter by more than its error, and is named all the same."""
+    found = found_of(plant, effect, 0.1)
+    assert found.found.named and not found.named_wrongly
+
+
+def test_imitation_that_is_the_parameters_in_another_guise_has_no_name() -> None:
+    """A cell's dead band is, to a 5000th of its square, the cubic of v that its parameters make up."""
+    found = found_of("cell", "E steps", 0.01)
+    assert not found.found.named and found.found.found.verdict.status != "good"
 
 
 @pytest.mark.parametrize("effect", ["R steps", "R warms up"])
@@ -242,7 +267,8 @@ def cell(change: Callable[[dict[str, Float]], dict[str, Float]]) -> Identified:
 @pytest.mark.parametrize("samples", [0.3, 0.5, 1.0])
 def test_delay_is_named_with_what_explains_the_run_alike(samples: float) -> None:
     """Of one input and one output no residual shows which is late. A delay of a sample has moved R1 by a fifth and is
-    half hidden: its size is that beside the parameters that it moved."""
+    half hidden: its size is that beside the parameters that it moved. Both shifts interpolate linearly between samples,
+    which shortens the smallest by a seventh."""
 
     def late(run: dict[str, Float]) -> dict[str, Float]:
         place = np.arange(len(run["v"]), dtype=np.float64)
@@ -251,7 +277,7 @@ def test_delay_is_named_with_what_explains_the_run_alike(samples: float) -> None
     text = next(one.text for one in cell(late).verdict.reasons if one.name == "sensor")
     named = re.match(r"v seems to be delayed by ([\d.]+) s.* these: i seems to be advanced by", text)
     delay = samples / simulation_of("battery_2rc").rig.sample_rate
-    assert named is not None and 0.9 * delay < float(named[1]) < 1.4 * delay
+    assert named is not None and 0.85 * delay < float(named[1]) < 1.4 * delay
 
 
 def test_what_no_term_explains_has_no_name() -> None:

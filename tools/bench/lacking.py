@@ -166,7 +166,7 @@ _MOTIONS: tuple[tuple[str, tuple[str, ...], Shape], ...] = (
     ("friction of two sizes", ("sgn({m})",), lambda x, v, t: _sgn(v) * (1 if v > 0 else 0.4)),
     ("friction at low speed", ("sgn({m})", "sgn({m})/(1 +"), lambda x, v, t: _sgn(v) / (1 + (v / 0.15) ** 2)),
     ("Stribeck friction", ("sgn({m})", "sgn({m})/(1 +"), lambda x, v, t: _sgn(v) * (0.5 + 0.5 / (1 + (v / 0.15) ** 2))),
-    ("soft friction", ("sgn({m})",), lambda x, v, t: tanh(v / 0.2)),
+    ("soft friction", ("sgn({m})", "the friction is soft"), lambda x, v, t: tanh(v / 0.2)),
     ("friction of a place", ("sgn({m})",), lambda x, v, t: _sgn(v) * (1 + 0.5 * x)),
     ("friction that runs in", ("sgn({m})",), lambda x, v, t: _sgn(v) * exp(-3 * t)),
     ("square drag", ("abs({m})*{m}",), lambda x, v, t: abs(v) * v),
@@ -271,7 +271,7 @@ _INPUTS: tuple[tuple[str, tuple[str, ...], tuple[float, ...], Callable[[Float, f
     ("drift of the gain", (), (0.01, 0.03, 0.1, 0.2, 0.4), lambda u, part: u * (1 - part * np.linspace(0, 1, len(u)))),
     (
         "another gain to one side",
-        ("abs({u})",),
+        ("where it is negative",),
         (0.01, 0.03, 0.1, 0.2, 0.4),
         lambda u, part: np.where(u > 0, u, (1 - part) * u),
     ),
@@ -550,7 +550,10 @@ def outcome(plant: Plant, seed: int, *acting: tuple[Effect, float]) -> Outcome:
 
 
 def _is_named(term: Term, parts: Sequence[str]) -> bool:
-    return any(part in term.text for part in parts) if term.law is None else term.law in parts
+    """Of a law with a width the part before it is the name."""
+    if term.law is None:
+        return any(part in term.text for part in parts)
+    return any(term.law == part or (part.endswith("+") and term.law.startswith(part)) for part in parts)
 
 
 @dataclass(frozen=True)

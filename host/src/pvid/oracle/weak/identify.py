@@ -24,7 +24,7 @@ from pvid.oracle.weak.feedback import of_feedback
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.library import Library
-from pvid.oracle.weak.missing import Explained, Missing, explained
+from pvid.oracle.weak.missing import MOST, Explained, Missing, explained
 from pvid.oracle.weak.naming import of_missing, of_unexplained
 from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
 from pvid.oracle.weak.samples import explains, of_samples
@@ -201,12 +201,19 @@ def identify(
     lacking = None if fit.diverged else attempt("what is missing", lambda: Missing.of(library, se))
     if not fit.diverged:
         reasons += attempt.reasons(_checks(rows, run, fit, found, halves, judged, with_error))
-        if lacking is not None and lacking.visible.any() and not explains(reasons, lacking.there[0], sample_rate):
+        if (
+            lacking is not None
+            and (lacking.visible.any() or lacking.is_large)
+            and not explains(reasons, lacking.there[0], sample_rate)
+        ):
             named = attempt("what is missing", partial(explained, library, lacking))
+            if named is not None and not lacking.visible.any() and named.share < MOST:
+                named = None  # what moves nothing is named where the name is sure
             if named is not None and any(one.name == "halves" for one in reasons):
                 named = replace(named, complete=named.complete and _halves_agree(compiled, named.fit))
             if named is not None:
-                lacking = lacking.also(named.fit.p - fit.p) if named.complete else lacking
+                for other in (named.fit, named.further) if named.complete else ():
+                    lacking = lacking.also(other.p - fit.p)
                 reasons += of_missing(fit, lacking, named)
         if lacking is not None and (unknown := of_unexplained(compiled, found, lacking)):
             lacking = lacking.also(library.scores.by_parts())

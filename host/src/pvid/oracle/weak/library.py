@@ -85,8 +85,9 @@ class Library:
                 continue
             x, v = (np.nan_to_num(each[grid.places]) for each in (one.values, filtered(one.values, rate)))
             turns = one.signal.unit == "rad" and float(np.ptp(x)) > np.pi / 2
+            changes = float(np.min(x)) < 0 < float(np.max(x))
             for law in LAWS:
-                if law.angle and not turns:
+                if (law.angle and not turns) or (law.signs and not changes):
                     continue
                 width = float(f"{law.width * float(np.sqrt(np.mean(v**2))):.2g}")
                 named.append((one.signal.name, law, width))

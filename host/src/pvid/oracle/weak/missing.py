@@ -18,9 +18,10 @@ from pvid.base.errors import PvidError
 from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.library import Library
+from pvid.oracle.weak.rows import EquationError
 from pvid.oracle.weak.scores import FOLDS, Scores
 from pvid.oracle.weak.solve import Fit, resumed, unlikely
-from pvid.oracle.weak.terms import UNUSUAL, Act, Candidate
+from pvid.oracle.weak.terms import UNUSUAL, UNUSUAL_LAWS, Act, Candidate
 
 # A term is there. The verdicts of 100 recordings stay the same for 4 to 20 standard errors, for shares from 0.003 to
 # 0.05, and with 0.3 to 0.8 of the best. What p imitates needs more, as what is small beside it is amplified.
@@ -34,14 +35,20 @@ VISIBLE = 0.01  # of the value
 
 # Terms are named by fits with them.
 _MOST_TERMS = 3
+_LARGE = 0.25  # share of a term that is named even if it moves no parameter
 _FAMILIES = 4  # that are fitted for each
 _TRIED = 0.3  # of the best share
 _DISTINCT = 0.01  # of a column's square, that is its own: a term with less is the parameters in another guise
+_OF_BEST = 0.001  # the same of the term that explains most
+_SAME = 0.999  # cosine of two columns, beside all parameters, that no run tells apart
 _RIVAL = 0.9  # of the best gain of likelihood
+_MOST_RIVALS = 5
 _NOISE = 2.0  # chi^2 that is the sensors'
-_ALL, _MOST = 0.95, 0.5  # of the residuals beyond it
+# Of the residuals beyond it: a law that imitates the missing one explains half to nine tenths of them.
+_ALL, MOST = 0.95, 0.9
 _ROUNDS = 6  # of a size
 _SETTLED = 0.01  # of a size
+_AT_REST = 0.05  # of the variance of an equation's error
 _FACTORS, _STEPS = (1.25, 1.08, 1.025), 4  # of a level, as often as it gets better
 _PART = 0.01  # of a level: a step that gives its slope
 _PASSES = 3  # of whitening in a fit that begins near its end
@@ -67,11 +74,13 @@ class Missing:
     there : candidates that count, that of the largest share first
     shifts : what p moves by with each plausible one [plausible, n_p]
     visible : parameters that it moves by more than their standard errors cover and by more than is tolerated [n_p]
+    scores : of the estimate
     """
 
     there: tuple[Candidate, ...]
     shifts: Float
     visible: npt.NDArray[np.bool_]
+    scores: Scores
 
     @classmethod
     def of(cls, library: Library, se: Float, fit: Fit | None = None) -> Missing:
@@ -97,7 +106,7 @@ class Missing:
             -1, len(p)
         )
         error = np.max(np.abs(shifts), axis=0, initial=0.0)
-        return cls(there, shifts, (error > MOVES * se) & (error > VISIBLE * np.abs(p)))
+        return cls(there, shifts, (error > MOVES * se) & (error > VISIBLE * np.abs(p)), scores)
 
     def also(self, shift: Float) -> Missing:
         """With one more plausible shift of p [n_p]."""
@@ -108,14 +117,34 @@ class Missing:
         """The model's part of the standard errors: largest of the shifts [n_p]."""
         return np.asarray(np.max(np.abs(self.shifts), axis=0, initial=0.0))
 
-    def families(self) -> list[Candidate]:
-        """The best of each family that may be meant."""
+    @property
+    def is_large(self) -> bool:
+        """Whether a term explains much of what the sensors' noise does not, whether or not it moves a parameter."""
+        return bool(self.there) and self.there[0].share > _LARGE and chi2_of_sensors(self.scores.fit) > _NOISE
+
+    def groups(self) -> list[list[Candidate]]:
+        """Families that may be meant, of each its best, those together that no run tells apart; in each group, and of
+        the groups, the one of the largest share first.
+
+        What p imitates leads no group: it would take p's place.
+        """
         best: dict[tuple[str, str, str], Candidate] = {}
         for one in self.there:
-            best_share = self.there[0].share
-            if one.share >= _TRIED * best_share and (one.own > _DISTINCT or one.share == best_share):
+            if one.share >= _TRIED * self.there[0].share:
                 best.setdefault(one.family, one)
-        return list(best.values())[:_FAMILIES]
+        families = list(best.values())
+        if not families:
+            return []
+        columns = self.scores.rests(families)
+        same = np.abs(columns @ columns.T) > _SAME
+        out: list[list[int]] = []
+        for place in range(len(families)):
+            own = next((group for group in out if same[group[0], place]), None)
+            if own is None:
+                out.append([place])
+            else:
+                own.append(place)
+        return [[families[place] for place in group] for group in out]
 
 
 @dataclass(frozen=True)
@@ -142,12 +171,14 @@ class Explained:
     ----------
     named : in this order
     fit : with all of them
+    further : with what still seems to be lacking then and moves a parameter visibly, as far as it could be found
     share : of the residuals beyond the sensors' noise, that they remove
     complete : what is left of them moves no parameter by what is visible, or is next to nothing
     """
 
     named: tuple[Named, ...]
     fit: Fit
+    further: Fit
     share: float
     complete: bool
 
@@ -159,23 +190,51 @@ def explained(library: Library, found: Missing) -> Explained:
     likelihood of the residuals with weights of their own decides between them.
     """
     fit, named, share, complete = library.fit, list[Named](), 0.0, False
-    excess = chi2_of_sensors(fit) - 1
-    while len(named) < _MOST_TERMS and not complete:
+    with_named, excess = fit, chi2_of_sensors(fit) - 1
+    for _ in range(_MOST_TERMS):
         before = unlikelihood(fit)
-        tried = [_refitted(library, fit, one) for one in found.families()]
-        gains = [(before - unlikelihood(with_it), one, with_it) for one, with_it in filter(None, tried)]
-        gains = sorted((one for one in gains if one[0] > 0), key=lambda one: -one[0])
+        groups = found.groups()
+        distinct = [one for one in groups if one[0].own > (_OF_BEST if one is groups[0] else _DISTINCT)][:_FAMILIES]
+        gains = _gains(library, fit, before, [group[0] for group in distinct])
         if not gains:
             break
+        best = next(group for group in distinct if group[0].family == gains[0][1].family)
+        gains = sorted(gains + _gains(library, fit, before, best[1:_FAMILIES]), key=lambda one: -one[0])
         alike = [one for one in gains if one[0] > _RIVAL * gains[0][0]]
-        best = min(alike, key=lambda one: word_of(one[1]) in UNUSUAL)
-        fit = best[2]
-        named.append(Named(best[1], _error_of(library, *best[1:]), tuple(one[1] for one in alike if one is not best)))
+        _, chosen, fit = min(alike, key=lambda one: _is_unusual(one[1]))
+        # Beside those: what is the same column as one of them, and what explains as much and was not tried.
+        families = [one.family for _, one, _ in alike]
+        untried = [
+            one
+            for group in groups
+            for one in group
+            if (group[0].family in families if group in distinct else one.share > _RIVAL * best[0].share)
+        ]
+        rivals = [one for _, one, _ in alike if one.family != chosen.family]
+        rivals += [one for one in untried if one.family not in families]
         found = Missing.of(library, uncertainty(fit).se, fit)
-        left = chi2_of_sensors(fit)
-        share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
-        complete = left < _NOISE or share > _ALL or share > _MOST and not found.visible.any()
-    return Explained(tuple(named), fit, share, complete)
+        if not complete:
+            with_named, left = fit, chi2_of_sensors(fit)
+            named.append(Named(chosen, _error_of(library, chosen, fit), tuple(rivals[:_MOST_RIVALS])))
+            share = 1 - max(left - 1, 0.0) / excess if excess > 0 else 1.0
+            complete = left < _NOISE or share > _ALL or share > MOST and not found.visible.any()
+        if complete and not found.visible.any():
+            break
+    return Explained(tuple(named), with_named, fit, share, complete)
+
+
+def _gains(
+    library: Library, fit: Fit, before: float, candidates: Sequence[Candidate]
+) -> list[tuple[float, Candidate, Fit]]:
+    """What the likelihood gains by each, if anything, the candidate with its size, and the fit with it; the best first.
+
+    Parameters
+    ----------
+    before : unlikelihood of the fit without it
+    """
+    tried = filter(None, (_refitted(library, fit, one) for one in candidates))
+    gains = [(before - unlikelihood(with_it), one, with_it) for one, with_it in tried]
+    return sorted((one for one in gains if one[0] > 0), key=lambda one: -one[0])
 
 
 def _error_of(library: Library, one: Candidate, with_it: Fit) -> float:
@@ -197,6 +256,12 @@ def _error_of(library: Library, one: Candidate, with_it: Fit) -> float:
 
 def word_of(one: Candidate) -> str:
     return one.kind.words[one.number < 0] if isinstance(one.kind, Act) else ""
+
+
+def _is_unusual(one: Candidate) -> bool:
+    """Of terms that explain a run alike those that are less often the cause: a signal that is early, and the cosine of
+    an angle beside an offset of its sensor."""
+    return word_of(one) in UNUSUAL or one.kind in UNUSUAL_LAWS
 
 
 def unlikelihood(fit: Fit) -> float:
@@ -234,31 +299,40 @@ def _is_nearer(one: Fit, other: Fit) -> bool:
 def _sized(fit: Fit, one: Candidate) -> tuple[Candidate, Fit] | None:
     with_it = fit
     for _ in range(_ROUNDS):
-        with_it = corrected(replace(fit, p=with_it.p), one)
+        before = with_it.errors
+        with_it = corrected(replace(fit, p=with_it.p, errors=before), one)
         more = Scores(with_it).of([one])[0].size
         one = replace(one, size=one.size + more)
         if abs(one.size) > one.most:
             return None
-        if abs(more) < _SETTLED * abs(one.size):
+        if abs(more) < _SETTLED * abs(one.size) and _are_alike(before, with_it.errors):
             break
     return one, with_it
+
+
+def _are_alike(before: Sequence[EquationError], after: Sequence[EquationError]) -> bool:
+    """Whether the errors of the equations, and with them the likelihood, have come to rest."""
+    return all(abs(a.variance - b.variance) <= _AT_REST * b.variance for a, b in zip(before, after, strict=True))
 
 
 def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit]:
     assert isinstance(one.kind, Act)
     act, recorded = one.kind, library.recorded(one.signal)
 
-    def at(level: float) -> tuple[float, Candidate, Fit]:
+    def at(level: float, near: Fit = fit) -> tuple[float, Candidate, Fit]:
         own = replace(one, level=level, size=1.0, change=library.act(recorded, act, level).change)
-        with_it = corrected(fit, own)
+        with_it = corrected(replace(fit, p=near.p, errors=near.errors), own)
         return unlikelihood(with_it) if _is_nearer(with_it, fit) else np.inf, own, with_it
 
     best = at(one.level)
+    best = at(one.level, best[2])
     for factor in _FACTORS:
         for step in (factor, 1 / factor):
             for _ in range(_STEPS):
-                other = at(best[1].level * step)
+                other = at(best[1].level * step, best[2])
                 if not other[0] < best[0]:
                     break
                 best = other
+    while not _are_alike(best[2].errors, (again := at(best[1].level, best[2]))[2].errors) and again[0] < best[0]:
+        best = again
     return best[1], best[2]

@@ -99,6 +99,8 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
     of_visible = of_some(model, [int(k) for k in worst])
     causes = listed([one.text for one in terms] or ["nothing"])
     if not found.complete:
+        if not worst:
+            return []
         biased = listed(f"{model.p_names[k]} by {percent(relative[k])}" for k in worst)
         text = f"The equations lack something, or a signal is not what was recorded: it may bias {biased}. "
         best = f"of what was tried most is explained by this, {percent(found.share)}: {causes}."
@@ -108,14 +110,14 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
         causes = causes[0].upper() + causes[1:]
     now = found.fit.p
     moved = [k for k in worst if abs(now[k] - p[k]) > VISIBLE / 2 * abs(p[k])] or worst[:1]
-    values = listed(
+    values = [
         f"{model.p_names[k]} would be {with_unit(now[k], model.unknowns[k].unit, 4)} in place of {p[k]:.4g}"
         for k in moved
-    )
-    text = f"{causes}: with that {values}."
+    ]
+    text = f"{causes}: with that {listed(values)}." if values else f"{causes}: that moves no parameter visibly."
     if terms[0].instead:
         text += f" The run does not distinguish it from these: {listed(terms[0].instead, 'or')}."
-    return [Reason(_name_of(found.named[0].chosen), text, of=of_visible)]
+    return [Reason(_name_of(found.named[0].chosen), text, alarm=bool(moved), of=of_visible)]
 
 
 def of_unexplained(model: CompiledModel, found: Uncertainty, lacking: Missing) -> list[Reason]:

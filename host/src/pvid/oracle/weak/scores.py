@@ -111,6 +111,14 @@ class Scores:
         without = np.array([self.unit * (inverse(whole - a) @ (b - c)) for a, c in zip(jj, jr, strict=True)])
         return np.asarray(np.sqrt((FOLDS - 1) * np.mean((without - without.mean(axis=0)) ** 2, axis=0)))
 
+    def rests(self, candidates: Sequence[Candidate]) -> Float:
+        """Columns beside all parameters, of length 1 [candidates, windows * rows of all kinds]."""
+        n = self.slopes.shape[-1]
+        c = np.array([self.white(one).ravel() for one in candidates]).reshape(len(candidates), -1)
+        slopes = self.slopes.reshape(-1, n)
+        rest = c - (c @ slopes) @ self.inverse.T @ slopes.T
+        return np.asarray(rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300))
+
     def of(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """With their scores, that of the largest share first."""
         r, slopes = self.residuals, self.slopes

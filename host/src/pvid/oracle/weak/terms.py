@@ -34,6 +34,7 @@ class Law:
     order : see `of`; the test functions take the derivative
     width : w over the root mean square of the rate; 0: the law has none
     angle : of angles that turn alone
+    signs : of signals that change their sign alone
     """
 
     text: str
@@ -41,6 +42,7 @@ class Law:
     order: int = 0
     width: float = 0.0
     angle: bool = False
+    signs: bool = False
 
 
 def _sign(x: Float) -> Float:
@@ -59,12 +61,14 @@ def _stribeck(x: Float, v: Float, w: float) -> Float:
 _STRIBECK = "sgn({x}.d())/(1 + ({x}.d()/{w})**2)"
 
 CONSTANT = Law("1", lambda x, v, w: np.ones(x.shape))
+COSINE = Law("cos({x})", lambda x, v, w: np.cos(x), angle=True)
 LAWS = (
     Law("{x}", lambda x, v, w: x),
     Law("abs({x})*{x}", lambda x, v, w: np.abs(x) * x),
     Law("{x}**2", lambda x, v, w: x**2),
     Law("{x}**3", lambda x, v, w: x**3),
     Law("sgn({x})", lambda x, v, w: _sign(x)),
+    Law("abs({x})", lambda x, v, w: np.abs(x), signs=True),
     Law("{x}**2*{x}.d()", lambda x, v, w: x**3 / 3, order=1),
     Law("{x}.d()", lambda x, v, w: x, order=1),
     Law("abs({x}.d())*{x}.d()", lambda x, v, w: np.abs(v) * v),
@@ -74,7 +78,7 @@ LAWS = (
     *(Law(_STRIBECK, _stribeck, width=width) for width in (0.03, 0.1, 0.3)),
     Law("{x}.d(2)", lambda x, v, w: x, order=2),
     Law("sin({x})", lambda x, v, w: np.sin(x), angle=True),
-    Law("cos({x})", lambda x, v, w: np.cos(x), angle=True),
+    COSINE,
     Law("sin(2*{x})", lambda x, v, w: np.sin(2 * x), angle=True),
     Law("cos(2*{x})", lambda x, v, w: np.cos(2 * x), angle=True),
 )
@@ -217,6 +221,21 @@ def _resolutions(of: Recorded) -> float:
     return 100 * of.signal.resolution
 
 
+def _one_sided(of: Recorded, level: float) -> Float:
+    """Up to a level, or down to one below 0."""
+    return np.asarray(np.minimum(of.values, level) if level > 0 else np.maximum(of.values, level))
+
+
+def _both(levels: Callable[[Recorded], tuple[float, ...]]) -> Callable[[Recorded], tuple[float, ...]]:
+    """On either side of 0, where the signal has both signs."""
+
+    def of_both(of: Recorded) -> tuple[float, ...]:
+        low, high = float(np.nanmin(of.values)), float(np.nanmax(of.values))
+        return tuple(sign * one for one in levels(of) for sign in (1, -1) if low < sign * one < high)
+
+    return of_both
+
+
 GAIN = Act(
     "is {size} {word} than recorded",
     lambda of, _: of.values,
@@ -244,7 +263,7 @@ _LATE = Act(
     levels=_samples(-1, -2, -4, -8, -16),
     applies=_is_input,
 )
-UNUSUAL = ("advanced", "early")
+UNUSUAL, UNUSUAL_LAWS = ("advanced", "early"), (COSINE,)
 
 # Levels lie so close that the column of one fits its neighbours' with a size within 0.4 to 2.5.
 ACTS = (
@@ -253,6 +272,14 @@ ACTS = (
         lambda of, level: np.clip(of.values, -level, level),
         "signal",
         levels=_parts(0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93),
+        applies=_is_input,
+    ),
+    Act(
+        "saturates at {word}{size} on that side alone",
+        _one_sided,
+        "signal",
+        ("", "-"),
+        levels=_both(_parts(0.45, 0.6, 0.75, 0.9)),
         applies=_is_input,
     ),
     Act(
@@ -291,6 +318,15 @@ ACTS = (
         most=lambda of: 0.4 * of.top,
         applies=_is_input,
         typed="{u} + {a}*sgn({u})",
+    ),
+    Act(
+        "is {size} {word} than recorded where it is negative",
+        lambda of, _: np.minimum(of.values, 0),
+        "percent",
+        ("larger", "smaller"),
+        most=lambda _: 0.6,
+        applies=_is_input,
+        typed="{u} + {a}*({u} - abs({u}))/2",
     ),
     GAIN,
     Act(
