@@ -117,6 +117,22 @@ static void quotients_have_the_sign_of_both(void **state)
     assert_true(value_of(pvid_scaled_minus_q31(six, minus_two)) == 8.0);
 }
 
+/* Its error is that of the header, 2^-26; it is odd, and 1 far out. */
+static void the_hyperbolic_tangent_is_that_of_real_numbers(void **state)
+{
+    (void)state;
+    static const int32_t widths[] = {1, 1000, 123456, 300000000, INT32_MAX};
+    for (size_t i = 0; i < sizeof widths / sizeof widths[0]; i++) {
+        const int64_t step = (widths[i] / 97) + 1;
+        for (int64_t v = 0; (v <= (24 * (int64_t)widths[i])) && (v <= INT32_MAX); v += step) {
+            const int32_t found = pvid_tanh_q31((int32_t)v, widths[i]);
+            assert_true(fabs(fixed(found, 30) - tanh((double)v / widths[i])) <= ldexp(1.0, -26));
+            assert_int_equal(pvid_tanh_q31((int32_t)-v, widths[i]), -found);
+        }
+    }
+    assert_int_equal(pvid_tanh_q31(INT32_MAX, 1), ONE);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -126,6 +142,7 @@ int main(void)
         cmocka_unit_test(limits_are_inclusive),
         cmocka_unit_test(scaled_functions_are_those_of_real_numbers),
         cmocka_unit_test(quotients_have_the_sign_of_both),
+        cmocka_unit_test(the_hyperbolic_tangent_is_that_of_real_numbers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

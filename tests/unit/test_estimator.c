@@ -405,6 +405,66 @@ static void a_new_init_equals_a_fresh_object(void **state)
     assert_memory_equal(&used, &fresh, sizeof used);
 }
 
+static void a_place_is_within_the_bounds_and_moves_no_more_than_p(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
+    config.model = &own_model;
+    config.row_sd = 0.1f;
+    config.update_rate_hz = 100.0f;
+    for (int a = 0; a < 2; a++) {
+        config.start[a] = 1.0f;
+        config.start_sd[a] = 1.0f;
+        config.lower[a] = 0.5f;
+        config.upper[a] = 3.0f;
+    }
+    static pvid_estimator_f32 self;
+    assert_int_equal(pvid_estimator_init_f32(&self, &config), PVID_OK);
+    float p[PVID_MAX_P];
+    for (int a = 0; a < PVID_MAX_P; a++) {
+        p[a] = 9.0f;
+        self.p[a] = (a < 2) ? self.p[a] : -7.0f;
+    }
+    p[1] = 0.1f;
+    pvid_estimator_place_f32(&self, p);
+    assert_true((self.p[0] == 3.0f) && (self.p[1] == 0.5f));
+    assert_true((self.theta[0] == 3.0f) && (self.theta[1] == 9.0f) && (self.theta[2] == 0.5f));
+    p[0] = 1.25f;
+    p[1] = NOT_A_NUMBER;
+    pvid_estimator_place_f32(&self, p);
+    assert_true((self.p[0] == 1.25f) && (self.p[1] == 0.5f));
+    for (int a = 2; a < PVID_MAX_P; a++) {
+        assert_true(self.p[a] == -7.0f);
+    }
+}
+
+static void rows_of_a_group_add_their_squares(void **state)
+{
+    (void)state;
+    pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
+    config.model = &own_model;
+    config.row_sd = 0.1f;
+    config.update_rate_hz = 100.0f;
+    config.row_weight = 0.5f;
+    for (int a = 0; a < 2; a++) {
+        config.start[a] = 1.0f;
+        config.start_sd[a] = 1.0f;
+        config.lower[a] = 0.5f;
+        config.upper[a] = 3.0f;
+    }
+    static pvid_estimator_f32 self;
+    assert_int_equal(pvid_estimator_init_f32(&self, &config), PVID_OK);
+    const float n[3] = {1.0f, 2.0f, 4.0f}; /* theta is 1, 1, 1 */
+    const float e[3] = {0.5f, -3.0f, 8.0f};
+    for (int k = 0; k < 3; k++) {
+        assert_int_equal(pvid_estimator_add_f32(&self, n, 7.0f + e[k]), PVID_ACCUMULATED);
+    }
+    assert_true((self.group_rss == 73.25f) && (self.group_weight == 1.5f));
+    pvid_estimator_solve_f32 solve;
+    pvid_estimator_begin_f32(&self, &solve, true);
+    assert_true((solve.group_rss == 73.25f) && (self.group_rss == 0.0f) && (self.group_weight == 0.0f));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -423,6 +483,8 @@ int main(void)
         cmocka_unit_test(estimate_before_data_is_the_start),
         cmocka_unit_test(counters_stop_at_their_end),
         cmocka_unit_test(a_new_init_equals_a_fresh_object),
+        cmocka_unit_test(a_place_is_within_the_bounds_and_moves_no_more_than_p),
+        cmocka_unit_test(rows_of_a_group_add_their_squares),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

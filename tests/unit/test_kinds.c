@@ -504,6 +504,18 @@ static void formats_of_theta_follow_the_start(void **state)
     assert_int_equal(estimator.c_exponent[0], 10 - 24); /* y_bits less p_bits: a number has its own exponent */
 }
 
+static void diagonals_are_where_the_packed_rows_begin(void **state)
+{
+    (void)state;
+    for (size_t n = 1; n <= 12u; n++) {
+        size_t place = 0;
+        for (size_t i = 0; i < n; i++) {
+            assert_int_equal(pvid_pattern_diagonal_f32(n, i), place);
+            place += n - i;
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -518,6 +530,7 @@ int main(void)
         cmocka_unit_test(a_fixed_point_vector_is_added_to_b_or_refused),
         cmocka_unit_test(a_fixed_point_model_is_whole_or_refused),
         cmocka_unit_test(formats_of_theta_follow_the_start),
+        cmocka_unit_test(diagonals_are_where_the_packed_rows_begin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "refine/refine_judge_f32.h"
 #include "number/sincos_f32.h"
 #include "pvid/pvid.h"
 #include "refine/refine_front_f32.h"
@@ -962,6 +963,41 @@ static int prepare(void **state)
     return 0;
 }
 
+/* A mean of so many samples droops by (1 - 1/ratio^2)/24 of the second difference of the means; of a held input, whose
+ * own steps droop too, by (1 + 1/ratio^2)/24. */
+static void test_a_droop_is_that_of_the_samples_of_a_mean(void **state)
+{
+    (void)state;
+    static pvid_refine_front_f32 front;
+    for (uint16_t ratio = 1; ratio <= 8u; ratio++) {
+        pvid_refine_config_f32 config = sampled();
+        pvid_refine_signal_f32 signal[PVID_REFINE_SIGNALS];
+        memcpy(signal, config.signal, sizeof signal);
+        config.signal = signal;
+        config.ratio = ratio;
+        for (size_t i = 0; i < PVID_REFINE_SIGNALS; i++) {
+            signal[i].source = (uint8_t)((i == 0u) ? PVID_SIGNAL_HELD : PVID_SIGNAL_SAMPLED);
+        }
+        pvid_refine_front_init_f32(&front, &config);
+        for (size_t i = 0; i < PVID_REFINE_SIGNALS; i++) {
+            const double part = 1.0 / ((double)ratio * ratio);
+            assert_true(fabs((double)front.droop[i] - ((1.0 + ((i == 0u) ? part : -part)) / 24.0)) < 1e-8);
+        }
+    }
+}
+
+static void test_a_level_below_1_widens_nothing(void **state)
+{
+    (void)state;
+    const float level[] = {0.0f, 0.25f, 1.0f, 1.44f, 4.0f};
+    const float root[] = {1.0f, 1.0f, 1.0f, 1.2f, 2.0f};
+    for (size_t i = 0; i < sizeof level / sizeof level[0]; i++) {
+        assert_float_equal(pvid_refine_root_f32(level[i]), root[i], 1e-6);
+    }
+    assert_true(pvid_refine_within_f32(0.9f, 1.0f) && pvid_refine_within_f32(-0.9f, 1.0f));
+    assert_false(pvid_refine_within_f32(1.0f, 1.0f) || pvid_refine_within_f32(-1.0f, 1.0f));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -989,6 +1025,8 @@ int main(void)
         cmocka_unit_test(test_a_jump_is_no_wild_sample_and_becomes_the_usual),
         cmocka_unit_test(test_a_busy_weak_form_does_not_starve_it),
         cmocka_unit_test(test_it_rests_at_so_many_ticks_in_a_row),
+        cmocka_unit_test(test_a_droop_is_that_of_the_samples_of_a_mean),
+        cmocka_unit_test(test_a_level_below_1_widens_nothing),
     };
     return cmocka_run_group_tests(tests, prepare, NULL);
 }

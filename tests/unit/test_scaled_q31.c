@@ -104,13 +104,36 @@ static void empty_input_changes_nothing(void **state)
     assert_scaled(pvid_scaled_plus_q31(a, dust), a.m, a.e);
 }
 
+/* 20 bits in 2^-19 of it, exponents within +-1000, 0 below. */
+static void a_packed_number_keeps_twenty_bits(void **state)
+{
+    (void)state;
+    static const int32_t m[] = {536870912, 536872960, 805306368, 1073739776, 1073741823, -536870912, -1073739777};
+    static const int32_t e[] = {0, 7, -999, -1000, 999, 31};
+    for (size_t i = 0; i < sizeof m / sizeof m[0]; i++) {
+        for (size_t j = 0; j < sizeof e / sizeof e[0]; j++) {
+            const pvid_scaled_q31 given = {m[i], e[j]};
+            const pvid_scaled_q31 back = pvid_scaled_unpacked_q31(pvid_scaled_packed_q31(given));
+            assert_int_equal(back.e, e[j]);
+            assert_in_range((int64_t)given.m - back.m, 0, 2047); /* rounded down */
+            assert_int_equal(back.m % 2048, 0);
+        }
+    }
+    const pvid_scaled_q31 largest = {1 << 29, 1700};
+    assert_scaled(pvid_scaled_unpacked_q31(pvid_scaled_packed_q31(largest)), 1 << 29, 1000);
+    const pvid_scaled_q31 vanishing = {1 << 29, -1001};
+    const pvid_scaled_q31 nothing = {0, 50};
+    assert_int_equal(pvid_scaled_packed_q31(vanishing), 0);
+    assert_int_equal(pvid_scaled_packed_q31(nothing), 0);
+    assert_int_equal(pvid_scaled_unpacked_q31(0).m, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_integer_keeps_thirty_digits),
-        cmocka_unit_test(a_shift_and_a_fixed_point_are_exact),
-        cmocka_unit_test(operations_are_those_of_real_numbers),
-        cmocka_unit_test(empty_input_changes_nothing),
+        cmocka_unit_test(an_integer_keeps_thirty_digits),       cmocka_unit_test(a_shift_and_a_fixed_point_are_exact),
+        cmocka_unit_test(operations_are_those_of_real_numbers), cmocka_unit_test(empty_input_changes_nothing),
+        cmocka_unit_test(a_packed_number_keeps_twenty_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "first_order.h"
+#include "persist/fingerprint_parts_f32.h"
 #include "persist/fingerprint_parts_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
@@ -316,6 +317,19 @@ static void a_power_cut_at_any_byte_leaves_the_older_snapshot(void **state)
     }
 }
 
+static void every_entry_of_a_list_counts_in_a_fingerprint(void **state)
+{
+    (void)state;
+    float values[5] = {1.0f, 2.0f, 3.0f, 4.0f, 5.0f};
+    const uint32_t hash = pvid_fingerprint_floats(7u, values, 4);
+    for (size_t i = 0; i < 5u; i++) {
+        values[i] += 1.0f;
+        assert_int_equal(pvid_fingerprint_floats(7u, values, 4) == hash, i == 4u);
+        values[i] -= 1.0f;
+    }
+    assert_int_equal(pvid_fingerprint_floats(7u, values, 0), 7u);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -330,6 +344,7 @@ int main(void)
         cmocka_unit_test(slots_are_used_in_turn),
         cmocka_unit_test(generations_go_round),
         cmocka_unit_test(a_power_cut_at_any_byte_leaves_the_older_snapshot),
+        cmocka_unit_test(every_entry_of_a_list_counts_in_a_fingerprint),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -271,6 +271,8 @@ static void rows_have_the_moments_of_generalised_least_squares(void **state)
             assert_true(fabs(found - expected) < 2e-4 * sqrt(sizes[0] * sizes[1]));
         }
     }
+    /* the noise that they are made white against has the variance 1 in them */
+    assert_float_equal(pvid_weak_white_sensors_f32(&self.finish.white, &design), 1.0f, 1e-4);
 }
 
 /* ---- front end ---- */

@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "engine_q31.h"
+#include "weak/weak_front_q31.h"
 #include "weak/collect_q31.h"
 #include "weak/weak_finish_q31.h"
 #include "pvid/little_endian.h"
@@ -368,6 +369,72 @@ static void a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_no
     assert_memory_equal(&before, &identifier, sizeof before);
 }
 
+/* From the first sample to the first step: the longest compensator; of signals that need other ticks two at least; of
+ * block sums one block more. */
+static void the_lead_is_what_the_front_end_needs(void **state)
+{
+    (void)state;
+    for (uint16_t half = 0; half < 5u; half++) {
+        const pvid_weak_front_q31 plain = {.decimation = 1, .half = half};
+        const pvid_weak_front_q31 derived = {.decimation = 1, .half = half, .needs = 1};
+        const pvid_weak_front_q31 summed = {.decimation = 6, .half = half, .needs = 1};
+        assert_int_equal(pvid_weak_front_lead_q31(&plain), half);
+        assert_int_equal(pvid_weak_front_lead_q31(&derived), (half < 2u) ? 2u : half);
+        assert_int_equal(pvid_weak_front_lead_q31(&summed), 6u * (half + 1u));
+    }
+}
+
+/* Of each tick the sum of what the signals are by their definition; a held one needs the tick behind it. */
+static void signals_of_several_ticks_are_those_of_their_definition(void **state)
+{
+    (void)state;
+    static const int32_t counts[8][2] = {{10, -5}, {13, 2}, {-4, 9}, {8, 8}, {0, -7}, {31, 1}, {-2, 4}, {6, 6}};
+    static const int32_t zero[2] = {3, -2};
+    static const int32_t full_scale[2] = {100, 100};
+    static const uint8_t sources[4] = {PVID_SIGNAL_SAMPLED, PVID_SIGNAL_JUMP, PVID_SIGNAL_LAST, PVID_SIGNAL_HELD};
+    for (int held = 0; held < 2; held++) {
+        pvid_weak_signal signal[8];
+        const uint8_t of_each = (held != 0) ? 4u : 3u;
+        for (uint8_t i = 0; i < (2u * of_each); i++) {
+            signal[i].sample = (uint8_t)(i / of_each);
+            signal[i].source = sources[i % of_each];
+        }
+        const pvid_weak_model_q31 model = {.samples = 2, .signals = (uint8_t)(2u * of_each), .signal = signal};
+        const pvid_weak_design_q31 derived = {.model = &model, .decimation = 1, .full_scale = full_scale};
+        pvid_weak_front_q31 front;
+        memset(&front, 0, sizeof front);
+        front.needs = (held != 0) ? 2u : 1u;
+        front.signals = model.signals;
+        front.decimation = 1;
+        front.offset = zero;
+        for (int k = 0; k < 8; k++) {
+            memset(front.line, 0, sizeof front.line);
+            assert_true(pvid_weak_front_derive_q31(&front, &derived, counts[k]));
+            if ((held != 0) && (k == 0)) {
+                assert_int_equal(front.wait, 1); /* its signals are not there yet */
+                continue;
+            }
+            for (size_t i = 0; i < model.signals; i++) {
+                int32_t x[4]; /* this tick and those before it, before the first one as it */
+                for (int back = 0; back < 4; back++) {
+                    const int tick = ((k - back) > 0) ? (k - back) : 0;
+                    x[back] = counts[tick][signal[i].sample] - zero[signal[i].sample];
+                }
+                const int32_t *at = &x[held]; /* the tick that is complete */
+                const int32_t expected[4] = {at[0], at[0] - at[1], at[1], (13 * (x[2] + x[1])) - (x[3] + x[0])};
+                int32_t found = expected[3];
+                for (int source = 0; source < 3; source++) {
+                    found = (signal[i].source == sources[source]) ? expected[source] : found;
+                }
+                assert_int_equal(front.line[2u * i], found);
+                assert_int_equal(front.line[(2u * i) + 1u], found);
+            }
+        }
+        const int32_t beyond[2] = {103, 99};
+        assert_false(pvid_weak_front_derive_q31(&front, &derived, beyond));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -384,6 +451,8 @@ int main(void)
         cmocka_unit_test_setup(ticks_behind_the_join_are_those_without_harmonics, start_again),
         cmocka_unit_test_setup(a_restored_run_continues_bit_for_bit_from_every_tick, start_again),
         cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
+        cmocka_unit_test(the_lead_is_what_the_front_end_needs),
+        cmocka_unit_test(signals_of_several_ticks_are_those_of_their_definition),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "engine_q31.h"
+#include "persist/fingerprint_weak_q31.h"
 #include "pvid/pvid_q31.h"
 #include "weak/valid_q31.h"
 
@@ -294,6 +295,84 @@ static void the_configuration(void **state)
     INIT_GIVES(config.estimator.start[0] = -1, PVID_BAD_START);
 }
 
+static int32_t turns[130];
+
+static uint32_t fingerprint(void)
+{
+    design.circle = turns;
+    return pvid_fingerprint_weak_design_q31(&design) ^ pvid_fingerprint_weak_model_q31(&model);
+}
+
+#define COUNTS(change)                                                                                                 \
+    do {                                                                                                               \
+        start_again();                                                                                                 \
+        memcpy(turns, kapitza_circle_q31, sizeof kapitza_circle_q31);                                                  \
+        const uint32_t as_it_is = fingerprint();                                                                       \
+        change;                                                                                                        \
+        assert_int_not_equal(fingerprint(), as_it_is);                                                                 \
+    } while (0)
+
+/* A restored state belongs to one model and one design: whatever is changed in a table, from its first entry to its
+ * last, is another one. */
+static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
+{
+    (void)state;
+    const size_t length = sizeof kapitza_circle_q31 / sizeof kapitza_circle_q31[0];
+    for (size_t i = 0; i < length; i++) {
+        COUNTS(turns[i]++);
+    }
+    for (size_t i = 0; i < kapitza_weak_q31.samples; i++) {
+        COUNTS(own.full_scale[i]++);
+    }
+    for (size_t i = 0; i < kapitza_weak_q31.signals; i++) {
+        COUNTS(own.down[i]++);
+        COUNTS(own.signal[i].sample++);
+        COUNTS(own.signal[i].source++);
+    }
+    for (size_t i = 0; i < kapitza_weak_q31.jets; i++) {
+        COUNTS(own.jet[i].signal++);
+        COUNTS(own.jet[i].order++);
+        COUNTS(own.filter[i].down++);
+    }
+    for (size_t i = 0; i < kapitza_weak_q31.channels; i++) {
+        COUNTS(own.format[i].value++);
+        COUNTS(own.format[i].lift++);
+        COUNTS(own.format[i].own++);
+        COUNTS(own.format[i].plain++);
+        COUNTS(own.format[i].ramp++);
+        COUNTS(own.channel[i].gain++);
+        COUNTS(own.channel[i].integrand++);
+        COUNTS(own.channel[i].fold++);
+        COUNTS(own.channel[i].plain++);
+        COUNTS(own.channel[i].ramp++);
+    }
+    for (size_t i = 0; i < kapitza_weak_q31.integrands; i++) {
+        COUNTS(own.integral[i].down++);
+        COUNTS(own.integral[i].twice++);
+    }
+    for (size_t i = 0; i < kapitza_kind[0].end; i++) {
+        COUNTS(own.factor[i].m++);
+        COUNTS(own.factor[i].e++);
+        COUNTS(own.term[i].channel++);
+        COUNTS(own.term[i].order++);
+        COUNTS(own.term[i].column++);
+    }
+    for (size_t i = 0; i < kapitza_design_q31.n_noise; i++) {
+        COUNTS(own.noise[i].kind++);
+        COUNTS(own.noise[i].power++);
+        COUNTS(own.noise[i].a++);
+        COUNTS(own.noise[i].b++);
+        COUNTS(own.noise[i].factor.m++);
+    }
+    COUNTS(own.order[0]++);
+    COUNTS(own.variance[0].m++);
+    COUNTS(own.kind[0].nuisances++);
+    COUNTS(design.fine = !design.fine);
+    COUNTS(design.functions++);
+    COUNTS(design.decimation++);
+    COUNTS(design.sum_shift++);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -307,6 +386,7 @@ int main(void)
         cmocka_unit_test(noise_of_the_sensors),
         cmocka_unit_test(shifts),
         cmocka_unit_test(the_configuration),
+        cmocka_unit_test(every_entry_of_a_table_counts_in_the_fingerprint),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
