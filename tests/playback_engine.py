@@ -152,12 +152,12 @@ class BothStages:
 
     def digests(self, library: Path) -> Iterator[tuple[str, str]]:
         native = WeakNative(self.run.weak.name, library)
-        for variant, (weak, refine, samples) in self._variants().items():
+        for variant, (weak, refine, samples) in self.variants().items():
             core = native.refined_of(weak, refine)
             size = len(core.state_bytes) + native.headers.ffi.sizeof(core.refinement[0])
             yield f"{self.name}, {variant}", played(core, "refine_f32", size, core.run_both, samples)
 
-    def _variants(self) -> dict[str, Any]:
+    def variants(self) -> dict[str, Any]:
         """Settings of both stages and samples."""
         own, samples = self.run.weak.config, self.run.weak.samples
         early = TrustConfig(se_max=10.0, groups_min=1, kappa_min=0.0, renewal=0.2)
@@ -225,7 +225,7 @@ class InFixedPoint:
 
     def digests(self, library: Path) -> Iterator[tuple[str, str]]:
         native = WeakNativeQ31(self.native.name, library, self.native.config)
-        for variant, (settings, counts) in self._variants().items():
+        for variant, (settings, counts) in self.variants().items():
             core = native.identifier()
             kept = [set_in(core, name, value) for name, value in settings.items()]
             if core.initialise():
@@ -233,7 +233,7 @@ class InFixedPoint:
             yield f"{self.name}, {variant}", played(core, "weak_q31", len(core.state_bytes), core.run_samples, counts)
             del kept
 
-    def _variants(self) -> dict[str, tuple[dict[str, Any], npt.NDArray[np.int32]]]:
+    def variants(self) -> dict[str, tuple[dict[str, Any], npt.NDArray[np.int32]]]:
         """Settings and readings."""
         counts = self.counts
         sd = np.std(counts, axis=0)
