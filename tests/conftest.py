@@ -26,11 +26,11 @@ settings.load_profile("seeded")
 # end together.
 SLOW = (
     *("tools/pages", "board/targets", "bench/campaign_run", "tools/wheel", "identification/refined"),
-    *("cli/design_cost", "cli/mechanism_core", "log/log", "deploy/deploy", "twin/strong_bits_q31", "cli/cli"),
+    *("cli/design_cost", "cli/identify_in_c", "log/log", "deploy/deploy", "twin/strong_bits_q31", "cli/cli"),
     *("show/report", "board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
     *("bench/refine_bench", "bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
     *("board/ports", "tools/notebooks", "cli/run_input", "identification/wild_samples", "models/scale_errors"),
-    *("bench/campaign_refined", "cli/mechanism", "tools/consumer", "twin/weak_bits_q31"),
+    *("bench/campaign_refined", "cli/identify_run", "tools/consumer", "twin/weak_bits_q31"),
     *("board/refined_stream", "fleet/batch", "twin/misfit", "twin/gate", "twin/weak_f32", "twin/refinement"),
     *("cli/api", "core/strong_q31", "codegen/build", "bench/strong_bytes", "bench/year", "show/view"),
     *("twin/second_stage", "deploy/deploy_avr", "bench/cost", "bench/strong_mechanisms", "bench/side_by_side"),
@@ -48,13 +48,13 @@ SLOW = (
     *("codegen/strong_model", "log/untrusted", "board/field", "twin/weak_rows_q31", "oracle/missing"),
     *("core/bad_config", "model/elimination", "oracle/weak_identify", "link/link", "bench/campaign_judge"),
     *("core/dead_zone", "twin/weak_sums_q31", "oracle/weak_choice", "codegen/weak_c", "oracle/oracle"),
-    *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/mechanism_demo", "bench/model_boards"),
+    *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/demo_run", "bench/model_boards"),
     *("core/dropped_calls", "bench/build_choices", "board/generated", "tools/core_rooms", "board/strong_image"),
     *("codegen/model_q31", "core/freeze", "twin/estimator_q31", "bench/mechanisms"),
     *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
     *("bench/campaign_population", "twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
     *("tools/analysis", "board/engine_boards", "oracle/strong_described", "core/snapshot", "codegen/random"),
-    *("paper/paper", "tools/mutate", "oracle/weak_engine", "show/mechanism_figure"),
+    *("paper/paper", "tools/mutate", "oracle/weak_engine", "show/answer_figure"),
 )
 # Of these, the tests that belong to the inner loop all the same.
 QUICK = ("test_the_host_computes_the_bits_of_the_twin", "test_one_board_of_each_core_computes_the_bits_of_the_host")

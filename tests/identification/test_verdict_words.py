@@ -15,7 +15,7 @@ from rich.console import Console
 
 from pvid.api.result import result_of
 from pvid.base.rounding import percent
-from pvid.cli.mechanism import table_of
+from pvid.cli.identify_run import table_of
 from pvid.cli.page_table import table_in
 from pvid.cli.verdict_table import ROWS, verdict_table
 from pvid.identification.analysis import analysed

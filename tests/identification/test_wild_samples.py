@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT
 
 from pvid.base.errors import PvidError
-from pvid.cli.mechanism import recording_of
+from pvid.cli.identify_run import recording_of
 from pvid.identification.analysis import analysed
 from pvid.identification.wild_samples import without_wild_samples
 from pvid.log.rig_choice import rig_of

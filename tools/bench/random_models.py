@@ -29,7 +29,7 @@ from sympy.core.cache import clear_cache
 from bench.random_motion import RandomRun, random_run
 from bench.random_rigs import IN_C, random_rig
 from pvid.base.errors import PvidError
-from pvid.cli.mechanism import recording_of
+from pvid.cli.identify_run import recording_of
 from pvid.codegen.build import build
 from pvid.codegen.generated import GeneratedModel, Options
 from pvid.codegen.weak_q31 import FixedEngine

@@ -123,7 +123,7 @@ class Result:
         """
         out = Picture(path)
         with replacing(force):
-            from pvid.show.mechanism_figure import write_figure
+            from pvid.show.answer_figure import write_figure
 
             write_figure(self._answer, out)
         return out

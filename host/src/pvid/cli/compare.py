@@ -48,7 +48,7 @@ def command(
     the run is also streamed to targets, and their running hashes are compared with the host's.
     """
     from pvid.board.target import targets_of
-    from pvid.cli.mechanism import compare_recording
+    from pvid.cli.compare_run import compare_recording
 
     rig = rig_of(run_path, rig_path, settings, model, columns)
     law = None if law == "stationary" and form != "strong" else law

@@ -48,7 +48,7 @@ def command(model: str, figure: Path, seed: int) -> int:
 
     MODEL is a mechanism of `pvid models`; kapitza, the two-link pendulum, by default.
     """
-    from pvid.cli.mechanism_demo import demo  # loads SymPy
+    from pvid.cli.demo_run import demo  # loads SymPy
 
     on = target()
     if on.lacking is not None:

@@ -67,8 +67,8 @@ def command(
     longest, and bytes of RAM and flash; with --refine also of both stages. A cost is printed only if the board's hashes
     are those of this computer.
     """
-    from pvid.cli.mechanism import recording_of  # loads SymPy
-    from pvid.cli.mechanism_design import print_design
+    from pvid.cli.design_run import print_design
+    from pvid.cli.identify_run import recording_of  # loads SymPy
     from pvid.configuration.nominal_run import nominal_run
     from pvid.models.mechanisms import compiled_of
 

@@ -111,7 +111,7 @@ def command(
     reported tick and at the end. It is then the answer of the target's form; with --core f32 --refine that of both
     stages.
     """
-    from pvid.cli.mechanism import identify_run  # loads SymPy
+    from pvid.cli.identify_run import identify_run  # loads SymPy
     from pvid.log.rig_choice import common_rig
 
     if refine and target is not None and core != FLOAT.name:

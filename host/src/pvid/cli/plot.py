@@ -44,7 +44,7 @@ def command(
         if write_log_figure(log, mechanism_of_log(log), place):
             click.echo(place)
             return DONE
-    from pvid.cli.mechanism import plot_run  # loads SymPy
+    from pvid.cli.identify_run import plot_run  # loads SymPy
     from pvid.log.rig_choice import rig_of
 
     plot_run(log, rig_of(log, rig_path, settings, model, columns), columns, place, refine=refine)

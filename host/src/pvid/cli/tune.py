@@ -36,8 +36,8 @@ def command(
 
     `identify` chooses the best by itself on each run, so no file is written.
     """
-    from pvid.cli.mechanism import recording_of, refined_reference  # loads SymPy
-    from pvid.cli.mechanism_design import print_tuning
+    from pvid.cli.design_run import print_tuning
+    from pvid.cli.identify_run import recording_of, refined_reference  # loads SymPy
     from pvid.log.rig_choice import rig_of
 
     if figure is not None and not refine:

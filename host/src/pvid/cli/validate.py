@@ -43,7 +43,7 @@ def command(
     printed, over its motion and over its noise. An answer that is right predicts a run that it has not seen to little
     more than the noise, whatever warnings it has.
     """
-    from pvid.cli.mechanism import recording_of  # loads SymPy
+    from pvid.cli.identify_run import recording_of  # loads SymPy
     from pvid.identification.validation import predicted
     from pvid.log.rig_choice import rig_of
 

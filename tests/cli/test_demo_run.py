@@ -12,7 +12,7 @@ import pytest
 from pvid.base.console import DONE
 from pvid.base.errors import PvidError
 from pvid.board.target import HOST_TARGET
-from pvid.cli.mechanism_demo import demo
+from pvid.cli.demo_run import demo
 from pvid.identification.values import refined_shifts_of
 
 

@@ -32,18 +32,13 @@ from pvid.settings.enums import Core, Law
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 if TYPE_CHECKING:
-    from pvid.board.compare_on import Outcome
-    from pvid.compare.bits import Comparison
     from pvid.identification.core import CoreAnswer
     from pvid.identification.validation import Validation
     from pvid.model.compiled import CompiledModel
 
-_FORM = ("form", "weak")
-_IN_C = tuple(("core", name) for name in ENGINE_CORES)
-_POSSIBLE = (("core", "f64"), *_IN_C, _FORM)
-_COMPARED = (("core", "all"), *_IN_C, _FORM)
-_STRONG = "strong"  # as --form
-_LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
+IN_C = (*(("core", name) for name in ENGINE_CORES), ("form", "weak"))  # options of the weak form, and their values
+STRONG_FORM = "strong"  # as --form
+LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
 
 def recording_of(
@@ -101,12 +96,12 @@ def identify_run(
     name = rig.compiled().name
     if len(paths) > 1:
         _refuse_several(on=on, refine=bool(refine), **only_in_c)
-    if only_in_c.get("form") == _STRONG:
+    if only_in_c.get("form") == STRONG_FORM:
         if figure is not None or refine or weights != "residuals" or add:
             raise PvidError("--figure, --refine, --weights and --add are for the weak form; omit --form strong")
         return _identified_by_strong_form(paths[0], rig, columns, as_json=as_json, on=on, **only_in_c)
     for option, value in only_in_c.items():
-        if value is not None and (option, value) not in _POSSIBLE:
+        if value is not None and (option, value) not in (("core", "f64"), *IN_C):
             raise PvidError(
                 f"--{option} {value}: {name} is identified in float64, or in C by --core f32 or q31, by the weak form; "
                 f"omit --{option}"
@@ -179,7 +174,7 @@ def identify_run(
 
 def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> None:
     """PvidError for what takes one recording."""
-    one = {"--form strong": given.get("form") == _STRONG, "--on": on is not None}
+    one = {"--form strong": given.get("form") == STRONG_FORM, "--on": on is not None}
     one["--refine in C"] = refine and given.get("core") in ENGINE_CORES
     for option, chosen in one.items():
         if chosen:
@@ -192,17 +187,17 @@ def _identified_by_strong_form(
     """Identifies a recording by the strong form and prints the answer."""
     from pvid.identification.strong import identify_strong_mechanism
 
-    core = _strong_core(rig.compiled().name, given)
+    core = strong_core(rig.compiled().name, given)
     if given.get("on") is not None:
         raise PvidError("--on with the strong form of a described mechanism is for `compare`")
     recording, model = recording_of(path, rig, columns)
     if core == STRONG.name:
         refuse_too_many_unknowns(model)
-    answer = identify_strong_mechanism(recording, model, core == STRONG.name, _LAWS[given.get("law") or "stationary"])
+    answer = identify_strong_mechanism(recording, model, core == STRONG.name, LAWS[given.get("law") or "stationary"])
     return _told(answer, as_json=as_json)
 
 
-def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
+def strong_core(name: str, given: Mapping[str, str | None]) -> str:
     """The arithmetic of the strong form: float32 unless given."""
     core = given.get("core") or STRONG.name
     if core not in STRONG_CORES:
@@ -212,7 +207,7 @@ def _strong_core(name: str, given: Mapping[str, str | None]) -> str:
 
 def _draw(answer: Analysis | CoreAnswer, figure: Path) -> None:
     """What was printed, as a figure."""
-    from pvid.show.mechanism_figure import write_figure  # loads matplotlib
+    from pvid.show.answer_figure import write_figure  # loads matplotlib
 
     write_figure(answer, figure)
     click.echo(f"figure: {figure}")
@@ -225,7 +220,7 @@ def plot_run(path: Path, rig: MechanismRig, columns: str | None, figure: Path, *
     ----------
     refine : the equations are fitted to the whole run, as `identify --refine` does
     """
-    from pvid.show.mechanism_figure import write_figure
+    from pvid.show.answer_figure import write_figure
 
     recording, model = recording_of(path, rig, columns, whole=False)
     answer = identified(recording, model, refine=refine)
@@ -283,7 +278,7 @@ def refined_reference(model: CompiledModel, recording: Recording, figure: Path |
     answer, refined, text = refined_answer(analysed(recording, model))
     write_stderr(f"pvid: {text}")
     if figure is not None and refined is not None:
-        from pvid.show.mechanism_figure import write_comparison  # loads matplotlib
+        from pvid.show.answer_figure import write_comparison  # loads matplotlib
 
         write_comparison(refined, figure)
         click.echo(f"figure: {figure}")
@@ -304,94 +299,6 @@ def _refined_in_c(core: CoreAnswer, *, as_json: bool, on: str | None) -> int:
     with working(f"refining in {FLOAT.words}"):
         found = refined_in_c(core)
     return _told(found, as_json=as_json, more={} if on is None else {"on": on})
-
-
-def compare_recording(
-    path: Path,
-    rig: MechanismRig,
-    columns: str | None,
-    targets: Sequence[str] = (),
-    **given: str | None,
-) -> list[Outcome]:
-    """The C core against its twin on a recording of a described mechanism, in float32 by default, with the second stage
-    where a board has it; then targets against the C core, which stream the first stage alone.
-
-    Parameters
-    ----------
-    targets : the recording is streamed to them; of the strong form emulated boards, which replay it
-    given : options, by name; a value that the form does not have is refused
-    """
-    from pvid.board.compare_on import Outcome
-    from pvid.board.engine_board import verify_recording
-    from pvid.compare.bits import Comparison
-    from pvid.compare.weak import compare_recording as compared
-    from pvid.identification.core_refined import compare_both
-
-    if given.get("form") == _STRONG:
-        return _compared_strong(path, rig, columns, targets, given)
-    name = rig.compiled().name
-    for option, value in given.items():
-        if value is not None and (option, value) not in _COMPARED:
-            raise PvidError(
-                f"--{option} {value}: {name} is compared in float32 or fixed point by the weak form; omit --{option}"
-            )
-    recording, model = recording_of(path, rig, columns)
-    refuse_too_many_unknowns(model)
-    outcomes = []
-    chosen = given.get("core") or FLOAT.name
-    for core in [one.name for one in ENGINE_CORES.values() if chosen in (one.name, "all")]:
-        with progress_bar(core, len(recording)) as advance:
-            if core == FLOAT.name:
-                found, second = compare_both(model, recording, advance)
-            else:
-                found, second = compared(model, recording, core, advance), None
-        outcomes.append(_compared("weak", core, found))
-        if isinstance(second, Comparison):
-            outcomes.append(_compared("refined", core, second))
-        elif second is not None:
-            write_stderr(f"pvid: note: no second stage: {second}")
-        for target in targets:
-            with progress_bar(f"{core} on {target}", len(recording)) as advance:
-                there = verify_recording(target, rig, recording, core, advance)
-            ticks, last = there.playback.done, there.playback.hash
-            outcomes.append(Outcome(target, core, "weak", "stationary", ticks, last, there.equal, there.text))
-    return outcomes
-
-
-def _compared(form: str, core: Core, found: Comparison) -> Outcome:
-    from pvid.board.compare_on import Outcome
-
-    verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
-    return Outcome("host", core, form, "stationary", found.ticks, found.core_hash, found.equal, verdict)
-
-
-def _compared_strong(
-    path: Path,
-    rig: MechanismRig,
-    columns: str | None,
-    targets: Sequence[str],
-    given: Mapping[str, str | None],
-) -> list[Outcome]:
-    """The same by the strong form, on this computer and on emulated boards."""
-    from pvid.board.compare_on import Outcome
-    from pvid.board.strong_image import compare_on_board
-    from pvid.compare.strong import StrongComparison
-
-    core = _strong_core(rig.compiled().name, given)
-    if core != STRONG.name:
-        raise PvidError(f"--core {core} has no twin; omit it")
-    recording, model = recording_of(path, rig, columns)
-    refuse_too_many_unknowns(model)
-    outcomes = []
-    for law in [given["law"]] if given.get("law") else ["stationary"]:
-        assert law is not None
-        with progress_bar(f"{law} law, {FLOAT.name}", len(recording)) as advance:
-            run = StrongComparison.of(model, recording, _LAWS[law], advance)
-        found = run.found
-        verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
-        outcomes.append(Outcome("host", core, _STRONG, law, found.ticks, found.core_hash, found.equal, verdict))
-        outcomes += [compare_on_board(target, run, law) for target in targets]
-    return outcomes
 
 
 def _told(answer: Answer, *, as_json: bool, more: Mapping[str, Any] | None = None, lines: Sequence[str] = ()) -> int:

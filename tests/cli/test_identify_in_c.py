@@ -17,8 +17,8 @@ from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.target import HOST_TARGET
+from pvid.cli.identify_run import recording_of
 from pvid.cli.main import commands
-from pvid.cli.mechanism import recording_of
 from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import config_to_identify
 from pvid.identification.analysis import analysed
