@@ -161,7 +161,7 @@ class Engine:
     def initialise(self) -> None:
         """Of memory that contains anything."""
         self.memory[:] = b"\xa5" * len(self.memory)
-        assert self._call("weak_init", self.config) == 0
+        assert self._call("weak_init_layout", self.config, self._library.pvid_layout()) == 0
 
     @property
     def memory(self) -> Any:

@@ -337,10 +337,10 @@ PROOFS = (
         (
             *(
                 "src/persist/fingerprint_q31.c",
-                "src/persist/fingerprint_parts_q31.c",
+                *("src/number/fingerprint_numbers_q31.c", "src/judge/gate_q31.c", "src/solve/settings_q31.c"),
                 "src/persist/fingerprint_tables.c",
                 "src/persist/fnv_q31.c",
-                "src/persist/fnv.c",
+                "src/number/fnv.c",
             ),
         ),
         ("-eva-auto-loop-unroll", "20"),
@@ -384,7 +384,7 @@ PROOFS = (
     Proof(
         "snapshot",
         "two slots with any bytes in them, any lengths and identities; sealing one",
-        ("src/persist/snapshot.c", "src/persist/crc32.c", "src/persist/fnv.c"),
+        ("src/persist/snapshot.c", "src/persist/crc32.c", "src/number/fnv.c"),
         ("-eva-auto-loop-unroll", "10"),
     ),
     Proof(
@@ -395,7 +395,7 @@ PROOFS = (
             "src/persist/snapshot_strong_q31.c",
             "src/persist/snapshot.c",
             "src/persist/crc32.c",
-            "src/persist/fnv.c",
+            "src/number/fnv.c",
         ),
         ("-eva-min-loop-unroll", "6", "-eva-auto-loop-unroll", "50"),
         taken=(

@@ -18,7 +18,7 @@ from pvid.twin import estimates
 
 def test_the_enumerations_are_those_of_the_headers() -> None:
     done = subprocess.run(
-        [sys.executable, ROOT / "tools" / "print_enums.py", "--check"], capture_output=True, text=True, check=False
+        [sys.executable, ROOT / "tools" / "print_headers.py", "--check"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
 

@@ -97,7 +97,7 @@ def test_required_rule_is_not_deviated_from_more_often_than_written(copy: Path) 
     text, changes = re.subn(r'(rule = "10\.3"\nmost =) \d+', r"\1 0", text)
     assert changes == 1
     deviations.write_text(text, encoding="utf-8")
-    done = run(copy, "firmware/src/persist/fnv.c")
+    done = run(copy, "firmware/src/number/fnv.c")
     assert "1 findings, analysis.toml says 0" in done.stdout
 
 

@@ -9,8 +9,8 @@
 #include <cmocka.h>
 
 #include "first_order.h"
-#include "persist/fingerprint_parts_f32.h"
-#include "persist/fingerprint_parts_q31.h"
+#include "number/fingerprint_numbers_f32.h"
+#include "solve/settings_q31.h"
 #include "plant.h"
 #include "pvid/pvid.h"
 

@@ -54,6 +54,9 @@ typedef struct {
     uint16_t divider;           /* groups of rows per solve, 1..65535 */
 } pvid_estimator_config_q31;
 
+/* Those of estimator.h, without a noise margin. */
+extern const pvid_estimator_config_q31 pvid_estimator_defaults_q31;
+
 /* An estimate. */
 typedef struct {
     int32_t p[PVID_MAX_P];                       /* in the formats p_bits */

@@ -29,6 +29,9 @@ typedef struct {
         neglected; /* relative error of the positive parameters because the equations are approximate, Q30, 0..2^30 */
 } pvid_trust_config_q31;
 
+/* Those of trust.h. */
+extern const pvid_trust_config_q31 pvid_trust_defaults_q31;
+
 /* State: detail/trust_state_q31.h, not API. Only the functions below write to it. */
 typedef struct pvid_trust_q31 pvid_trust_q31;
 

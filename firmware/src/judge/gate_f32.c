@@ -4,8 +4,10 @@
 
 #include <stddef.h>
 
+#include "number/fingerprint_numbers_f32.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
+#include "pvid/fnv_word.h"
 
 #define GROWTH 9.21034f /* ln 1e4: consecutive outliers multiply the scale by 1e4 within patience_s */
 #define WIDEST 1.0e3f   /* largest relative growth of the scale by one outlier */
@@ -67,4 +69,9 @@ PVID_COLD pvid_gate_verdict pvid_gate_judge_f32(pvid_gate_f32 *self, float squar
     const bool opens = widened && (square > (self->limit * self->usual));
     self->usual = self->scale;
     return opens ? PVID_GATE_OPENS : PVID_GATE_ACCEPTS;
+}
+
+uint32_t pvid_fingerprint_gate_f32(uint32_t hash, const pvid_gate_config_f32 *config)
+{
+    return pvid_fingerprint_float(pvid_fingerprint_float(hash, config->sigmas), config->patience_s);
 }

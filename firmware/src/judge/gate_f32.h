@@ -52,4 +52,7 @@ static inline bool pvid_gate_judges_f32(pvid_gate_f32 *self, float square)
     return pvid_gate_passes_f32(self, square);
 }
 
+/* The hash of a gate's settings, continued from `hash`. */
+uint32_t pvid_fingerprint_gate_f32(uint32_t hash, const pvid_gate_config_f32 *config);
+
 #endif

@@ -1,10 +1,12 @@
-#include "pvid/gate_q31.h"
+#include "judge/gate_q31.h"
 
 #include <stddef.h>
 
+#include "number/fingerprint_numbers_q31.h"
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
 #include "number/unroll.h"
+#include "pvid/fnv_word.h"
 
 #define SIGMAS_MIN ((uint32_t)2 << 16)
 #define SIGMAS_MAX ((uint32_t)1000 << 16)
@@ -92,4 +94,9 @@ pvid_gate_verdict pvid_gate_judge_q31(pvid_gate_q31 *self, pvid_scaled_q31 squar
     const bool opens = widened && pvid_scaled_exceeds_q31(square, pvid_scaled_times_q31(self->limit, self->usual));
     self->usual = self->scale;
     return opens ? PVID_GATE_OPENS : PVID_GATE_ACCEPTS;
+}
+
+uint32_t pvid_fingerprint_gate_q31(uint32_t hash, const pvid_gate_config_q31 *config)
+{
+    return pvid_fnv_word(pvid_fnv_word(hash, config->sigmas), config->patience_groups);
 }

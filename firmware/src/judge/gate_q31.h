@@ -10,4 +10,7 @@ static inline void pvid_gate_begin_anew_q31(pvid_gate_q31 *self)
     self->judged = 0;
 }
 
+/* The hash of a gate's settings, continued from `hash`. */
+uint32_t pvid_fingerprint_gate_q31(uint32_t hash, const pvid_gate_config_q31 *config);
+
 #endif

@@ -1,4 +1,4 @@
-/* pvid/text.h. Printed by tools/print_enums.py from pvid/status.h: do not edit. */
+/* pvid/text.h. Printed by tools/print_headers.py from pvid/status.h: do not edit. */
 #include "pvid/text.h"
 
 #include <stddef.h>

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "number/count.h"
+#include "number/fingerprint_numbers_f32.h"
 #include "solve/settings_f32.h"
 #include "solve/staged_f32.h"
 #include "solve/state_f32.h"
@@ -15,6 +16,7 @@
 #include "judge/trust_f32.h"
 #include "judge/verdict.h"
 #include "number/unroll.h"
+#include "pvid/fnv_word.h"
 
 const pvid_trust_config_f32 pvid_trust_defaults_f32 = {
     .kappa_min = 3.0e-5f,
@@ -326,4 +328,15 @@ pvid_reason pvid_trust_judge_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estim
     const pvid_reason verdict =
         pvid_trust_decide_f32(self, estimator, reason, size, above_noise, variance_ratio, candidate);
     return pvid_trust_publish_f32(self, estimator, verdict, reason, candidate);
+}
+
+uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config)
+{
+    uint32_t running = pvid_fingerprint_float(hash, config->kappa_min);
+    running = pvid_fingerprint_float(running, config->se_max);
+    running = pvid_fingerprint_float(running, config->misfit_max);
+    running = pvid_fnv_word(running, config->groups_min);
+    running = pvid_fnv_word(running, config->revert_after);
+    running = pvid_fingerprint_float(running, config->renewal);
+    return pvid_fingerprint_float(running, config->neglected);
 }

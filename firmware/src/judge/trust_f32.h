@@ -14,4 +14,7 @@ pvid_reason pvid_trust_decide_f32(pvid_trust_f32 *self, const pvid_estimator_f32
 pvid_reason pvid_trust_publish_f32(pvid_trust_f32 *self, pvid_estimator_f32 *estimator, pvid_reason verdict,
                                    pvid_reason reason, pvid_estimate_f32 *candidate);
 
+/* The hash of the conditions, continued from `hash`. */
+uint32_t pvid_fingerprint_trust_f32(uint32_t hash, const pvid_trust_config_f32 *config);
+
 #endif

@@ -4,10 +4,13 @@
 #include <string.h>
 
 #include "number/count.h"
+#include "number/fingerprint_numbers_q31.h"
 #include "solve/state_q31.h"
 #include "judge/publication.h"
+#include "judge/trust_q31.h"
 #include "judge/verdict.h"
 #include "number/unroll.h"
+#include "pvid/fnv_word.h"
 
 /* p has arrived if its last step, relative, is at most this part of the largest relative standard error, or 1e-4. */
 #define ARRIVED 19661 /* 0.3, Q16 */
@@ -26,6 +29,16 @@
 #define REMAINS 214748 /* 1e-4, Q31 */
 
 #define CHANCE_MAX 92682 /* sqrt(2), Q16: of one degree of freedom */
+
+const pvid_trust_config_q31 pvid_trust_defaults_q31 = {
+    .kappa_min = 32212,   /* 3e-5 */
+    .se_max = 838861,     /* 5 % */
+    .misfit_max = 262144, /* 4 */
+    .groups_min = 3,
+    .revert_after = 16,
+    .renewal = 13107, /* 20 % */
+    .neglected = 0,
+};
 
 #define RENEWAL_MIN 655u /* 0.01, Q16 */
 #define RENEWAL_MAX ((uint32_t)1000 << 16)
@@ -314,4 +327,15 @@ pvid_reason pvid_trust_judge_q31(pvid_trust_q31 *self, pvid_estimator_q31 *estim
         self->published = true;
     }
     return pvid_trust_report(&estimator->counters, judged, reason, self->misfit);
+}
+
+uint32_t pvid_fingerprint_trust_q31(uint32_t hash, const pvid_trust_config_q31 *config)
+{
+    const int32_t limits[] = {config->kappa_min, config->se_max};
+    uint32_t running = pvid_fingerprint_words(hash, limits, sizeof limits / sizeof limits[0]);
+    running = pvid_fnv_word(running, config->misfit_max);
+    running = pvid_fnv_word(running, config->groups_min);
+    running = pvid_fnv_word(running, config->revert_after);
+    running = pvid_fnv_word(running, config->renewal);
+    return pvid_fnv_word(running, (uint32_t)config->neglected);
 }

@@ -4,7 +4,9 @@
 
 #include <stddef.h>
 
-#include "persist/fingerprint_parts_f32.h"
+#include "judge/gate_f32.h"
+#include "number/fingerprint_numbers_f32.h"
+#include "solve/settings_f32.h"
 #include "pvid/fnv_word.h"
 
 uint32_t pvid_fingerprint_strong_f32(const pvid_strong_config_f32 *config)

@@ -2,7 +2,9 @@
 
 #include <stddef.h>
 
-#include "persist/fingerprint_parts_q31.h"
+#include "judge/gate_q31.h"
+#include "number/fingerprint_numbers_q31.h"
+#include "solve/settings_q31.h"
 #include "persist/fingerprint_tables.h"
 #include "pvid/fnv_word.h"
 

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#include "persist/fingerprint_parts_f32.h"
+#include "number/fingerprint_numbers_f32.h"
 #include "persist/fingerprint_tables.h"
 #include "number/finite_f32.h"
 #include "pvid/fnv_word.h"

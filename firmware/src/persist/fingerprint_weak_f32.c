@@ -5,7 +5,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "persist/fingerprint_parts_f32.h"
+#include "judge/gate_f32.h"
+#include "judge/trust_f32.h"
+#include "number/fingerprint_numbers_f32.h"
+#include "solve/settings_f32.h"
 #include "persist/fingerprint_tables.h"
 #include "number/finite_f32.h"
 #include "pvid/fnv_word.h"

@@ -43,6 +43,15 @@ static bool model_is_valid(const pvid_model_q31 *model)
            moments_are_valid(pvid_kinds_moments(model->n_theta, model->n_kinds, model->kind_end));
 }
 
+const pvid_estimator_config_q31 pvid_estimator_defaults_q31 = {
+    .gain = PVID_ONE_Q30,
+    .correlation = 65536,
+    .row_weight = 65536,
+    .step_limit = 19661, /* 0.3 */
+    .kappa_min = 10737,  /* 1e-5 */
+    .divider = 1,
+};
+
 static bool formats_are_valid(const pvid_estimator_config_q31 *config)
 {
     const pvid_model_q31 *model = config->model;

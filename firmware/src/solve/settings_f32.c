@@ -1,12 +1,14 @@
 #include "number/uncontracted.h"
 
+#include "solve/settings_f32.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "solve/settings_f32.h"
-
+#include "number/fingerprint_numbers_f32.h"
 #include "number/finite_f32.h"
 #include "number/unroll.h"
+#include "pvid/fnv_word.h"
 
 #define GROUPS_MIN 4.0f
 
@@ -97,4 +99,21 @@ PVID_COLD float pvid_settings_decay_f32(float x)
         sum = 1.0f + ((x / (float)k) * sum);
     }
     return 1.0f / sum;
+}
+
+uint32_t pvid_fingerprint_estimator_f32(uint32_t hash, const pvid_estimator_config_f32 *config, size_t n_p)
+{
+    uint32_t running = pvid_fingerprint_floats(hash, config->start, n_p);
+    running = pvid_fingerprint_floats(running, config->start_sd, n_p);
+    running = pvid_fingerprint_floats(running, config->lower, n_p);
+    running = pvid_fingerprint_floats(running, config->upper, n_p);
+    running = pvid_fingerprint_float(running, config->row_sd);
+    running = pvid_fingerprint_float(running, config->forgetting_s);
+    running = pvid_fingerprint_float(running, config->feedback_hz);
+    running = pvid_fingerprint_float(running, config->step_limit);
+    running = pvid_fingerprint_float(running, config->kappa_min);
+    running = pvid_fingerprint_float(running, config->noise_margin);
+    running = pvid_fingerprint_float(running, config->dead_zone);
+    running = pvid_fnv_word(running, (uint32_t)config->law);
+    return pvid_fnv_word(running, config->divider);
 }

@@ -30,4 +30,7 @@ float pvid_settings_gain_f32(const pvid_estimator_config_f32 *config, float upda
 /* exp(-x), 0 <= x <= 4: the core has no libm but sqrtf. */
 float pvid_settings_decay_f32(float x);
 
+/* The hash of these settings, without those that an identifier fills in, continued from `hash`. */
+uint32_t pvid_fingerprint_estimator_f32(uint32_t hash, const pvid_estimator_config_f32 *config, size_t n_p);
+
 #endif

@@ -4,10 +4,12 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "number/fingerprint_numbers_q31.h"
 #include "number/integer_q31.h"
 #include "number/unroll.h"
 #include "solve/state_q31.h"
 #include "solve/system_q31.h"
+#include "pvid/fnv_word.h"
 
 #define NOISE_MARGIN_MAX ((uint32_t)1 << 30)
 #define DEAD_ZONE_MAX ((uint32_t)100 << 16)
@@ -88,4 +90,26 @@ PVID_COLD void pvid_settings_init_q31(pvid_solve_settings_q31 *self, const pvid_
     self->dead_zone = config->dead_zone;
     self->n_p = n_p;
     self->positive = (uint8_t)(positive & 0xFFu);
+}
+
+uint32_t pvid_fingerprint_estimator_q31(uint32_t hash, const pvid_estimator_config_q31 *config, size_t n_theta,
+                                        size_t n_p)
+{
+    uint32_t running = pvid_fingerprint_words(hash, config->start, n_p);
+    running = pvid_fingerprint_words(running, config->start_sd, n_p);
+    running = pvid_fingerprint_words(running, config->lower, n_p);
+    running = pvid_fingerprint_words(running, config->upper, n_p);
+    running = pvid_fingerprint_formats(running, config->p_bits, n_p);
+    running = pvid_fingerprint_formats(running, config->n_bits, n_theta);
+    running = pvid_fingerprint_formats(running, &config->y_bits, (n_theta > 0u) ? 1u : 0u);
+    running = pvid_fingerprint_words(running, &config->row_sd, 1);
+    running = pvid_fnv_word(running, config->forgetting_groups);
+    running = pvid_fingerprint_words(running, &config->gain, 1);
+    running = pvid_fnv_word(running, config->correlation);
+    running = pvid_fnv_word(running, config->row_weight);
+    running = pvid_fnv_word(running, config->step_limit);
+    running = pvid_fingerprint_words(running, &config->kappa_min, 1);
+    running = pvid_fnv_word(running, config->noise_margin);
+    running = pvid_fnv_word(running, config->dead_zone);
+    return pvid_fnv_word(running, config->divider);
 }

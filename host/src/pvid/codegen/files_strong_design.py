@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pvid.codegen import describe
 from pvid.codegen.c_text import guarded, initialised, inner, number
-from pvid.codegen.files_weak import estimator_fields
+from pvid.codegen.files_weak import fields_in_c
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
 from pvid.codegen.strong_twin import StrongModelConfig
@@ -51,7 +51,7 @@ def header(strong: StrongFunctions, config: StrongModelConfig, command: str) -> 
         "bank": inner(bank),
         "sample_rate_hz": number(config.sample_rate),
         "row_sd": "{" + ", ".join(map(number, config.row_sd)) + "}",
-        "estimator": inner(estimator_fields(own)),
+        "estimator": inner(fields_in_c(own)),
     }
     body = [
         f'#include "{name}.h"',

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from pvid.codegen.weak import WeakFunctions
 from pvid.core.sizes import raised, smallest
 from pvid.design.c_tables import float_literal
 from pvid.model.compiled import CompiledModel
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.enums import Law
+from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import NONE, Float32, Source, WeakConfig, WeakDesign32, WeakModel
 from pvid.setup.weak import with_soft_signs
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model
@@ -344,45 +345,29 @@ def _checks(config: WeakConfig) -> list[str]:
 
 def _config(config: WeakConfig) -> str:
     name = config.design.model.name
-    trust, gate = config.trust, config.gate
-    fields = {
+    values = {
         "sample_rate_hz": number(config.sample_rate),
         "design": f"&{name}_design_f32",
         "range": "NULL" if config.range is None else f"{name}_range",
         "drive_min": "NULL" if config.drive_min is None else f"{name}_drive_min",
         "compensation": str(config.compensation).lower(),
         "iterations": config.iterations,
-        "estimator": inner(estimator_fields(config.estimator)),
-        "trust": inner(
-            {
-                "kappa_min": number(trust.kappa_min),
-                "se_max": number(trust.se_max),
-                "misfit_max": number(trust.misfit_max),
-                "groups_min": trust.groups_min,
-                "revert_after": trust.revert_after,
-                "renewal": number(trust.renewal),
-                "neglected": number(trust.neglected),
-            }
-        ),
-        "gate": inner({"sigmas": number(gate.sigmas), "patience_s": number(gate.patience_s)}),
+        "estimator": inner(fields_in_c(config.estimator)),
+        "trust": inner(fields_in_c(config.trust)),
+        "gate": inner(fields_in_c(config.gate)),
     }
-    return initialised(f"static const pvid_weak_config_f32 {name}_config_f32", fields)
+    return initialised(f"static const pvid_weak_config_f32 {name}_config_f32", values)
 
 
-def estimator_fields(config: EstimatorConfig) -> dict[str, object]:
-    """Field -> value in C, in the order of estimator.h."""
-    arrays = {"start": config.start, "start_sd": config.start_sd, "lower": config.lower, "upper": config.upper}
-    return {
-        **{field: "{" + ", ".join(map(float_literal, values)) + "}" for field, values in arrays.items()},
-        "row_sd": number(config.row_sd),
-        "forgetting_s": number(config.forgetting_s),
-        "feedback_hz": number(config.feedback_hz),
-        "correlation": number(config.correlation),
-        "row_weight": number(config.row_weight),
-        "step_limit": number(config.step_limit),
-        "kappa_min": number(config.kappa_min),
-        "noise_margin": number(config.noise_margin),
-        "dead_zone": number(config.dead_zone),
-        "law": f"PVID_LAW_{config.law.name}",
-        "divider": config.divider,
-    }
+def fields_in_c(settings: EstimatorConfig | TrustConfig | GateConfig) -> dict[str, object]:
+    """Field -> value in C, in the order of the header."""
+    out: dict[str, object] = {}
+    for field in fields(settings):
+        value = getattr(settings, field.name)
+        if isinstance(value, np.ndarray):
+            out[field.name] = "{" + ", ".join(map(float_literal, value)) + "}"
+        elif isinstance(value, Law):
+            out[field.name] = f"PVID_LAW_{value.name}"
+        else:
+            out[field.name] = number(value) if field.type == "float" else value
+    return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 
 from pvid.codegen import describe
 from pvid.codegen.c_functions import fixed_function, scaled_function
@@ -12,6 +13,7 @@ from pvid.codegen.fitted_sizes import config_header, fitted_sizes_q31
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.weak_q31 import FixedEngine, FixedWeak, ParametersQ31
 from pvid.core.sizes import smallest
+from pvid.settings.parts import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak import NONE
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
 from pvid.setup.weak_sizes import sizes_of_q31
@@ -252,11 +254,6 @@ def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
 
 def configuration(config: WeakConfigQ31, prefix: str) -> str:
     """PREFIX_config_q31, behind the design."""
-    own, trust, gate = config.estimator, config.trust, config.gate
-    arrays = ("start", "start_sd", "lower", "upper", "p_bits", "n_bits")
-    numbers = ("y_bits", "row_sd", "forgetting_groups", "gain", "correlation", "row_weight", "step_limit")
-    more = ("kappa_min", "noise_margin", "dead_zone", "divider")
-    of_trust = ("kappa_min", "se_max", "misfit_max", "groups_min", "revert_after", "renewal", "neglected")
     parts = [_numbers("int32_t", f"{prefix}_offset_q31", config.offset)]
     if config.drive_min is not None:
         parts.append(_numbers("int32_t", f"{prefix}_drive_min_q31", config.drive_min))
@@ -269,14 +266,22 @@ def configuration(config: WeakConfigQ31, prefix: str) -> str:
         f"    .compensation = {'true' if config.compensation else 'false'},",
         f"    .iterations = {config.iterations},",
         "    .estimator = {",
-        *(f"        .{name} = {{{', '.join(map(_literal, getattr(own, name)))}}}," for name in arrays),
-        *(f"        .{name} = {getattr(own, name)}," for name in (*numbers, *more)),
+        *(f"        {one}," for one in _fields(config.estimator)),
         "    },",
-        "    .trust = {" + ", ".join(f".{name} = {getattr(trust, name)}" for name in of_trust) + "},",
-        f"    .gate = {{.sigmas = {gate.sigmas}, .patience_groups = {gate.patience_groups}}},",
+        f"    .trust = {{{', '.join(_fields(config.trust))}}},",
+        f"    .gate = {{{', '.join(_fields(config.gate))}}},",
         "};",
     ]
     return "\n\n".join([*parts, "\n".join(struct)])
+
+
+def _fields(settings: EstimatorConfigQ31 | TrustConfigQ31 | GateConfigQ31) -> list[str]:
+    """ ".field = value" in C, in the order of the header."""
+    values = {one.name: getattr(settings, one.name) for one in fields(settings)}
+    return [
+        f".{name} = {{{', '.join(map(_literal, value))}}}" if isinstance(value, tuple) else f".{name} = {value}"
+        for name, value in values.items()
+    ]
 
 
 def _literal(value: int) -> str:

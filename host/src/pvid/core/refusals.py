@@ -13,7 +13,8 @@ from pvid.settings.enums import Status
 
 _LARGE = 3.4e38
 
-# Fields of the configurations of both stages that a status stands for, least and largest value of each.
+# Fields of the configurations of both stages that a status stands for, least and largest value of each. Of a status
+# that is not here: the field of its name, without a range.
 _RANGES: Mapping[Status, tuple[tuple[str, float, float], ...]] = {
     Status.BAD_SAMPLE_RATE: (("sample_rate", 1e-3, 1e6),),
     Status.BAD_LENGTH: (("l1", 1e-30, _LARGE),),
@@ -57,7 +58,8 @@ def refused(status: Status, *configs: Any, in_counts: bool = False) -> str:
     """
     text = f"the core refused the configuration: {status.text}"
     of_status = _RANGES.get(status, ())
-    given = {name: list(_values(name, configs)) for name, _, _ in of_status}
+    names = [name for name, _, _ in of_status] or [status.name.removeprefix("BAD_").lower()]
+    given = {name: list(_values(name, configs)) for name in names}
     for name, low, high in () if in_counts else of_status:
         for value in given[name]:
             if not low <= value <= high:

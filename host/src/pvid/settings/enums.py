@@ -1,4 +1,4 @@
-"""Enumerations of the public C headers. Printed by tools/print_enums.py: do not edit."""
+"""Enumerations of the public C headers. Printed by tools/print_headers.py: do not edit."""
 
 from __future__ import annotations
 

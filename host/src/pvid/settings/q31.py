@@ -1,5 +1,4 @@
-"""Settings of the estimator and what judges it, and of the strong form, in fixed point: as in estimator_q31.h,
-strong_q31.h."""
+"""Settings of the strong form in fixed point, as in strong_q31.h, with those of its parts."""
 
 from __future__ import annotations
 
@@ -7,56 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from pvid.settings.enums import Core, Form
+from pvid.settings.parts import EstimatorConfigQ31 as EstimatorConfigQ31
+from pvid.settings.parts import GateConfigQ31 as GateConfigQ31
+from pvid.settings.parts import TrustConfigQ31 as TrustConfigQ31
 from pvid.settings.tables import FirBankQ31, RowFormatQ31, StrongDesignQ31
-
-
-@dataclass(frozen=True)
-class EstimatorConfigQ31:
-    """Settings of the fixed-point estimator, as in estimator_q31.h.
-
-    p in the formats p_bits, Y and N in y_bits and n_bits; row_sd in 2^-8 of Y's unit; correlation, row_weight and
-    step_limit, noise_margin and dead_zone in Q16, gain and kappa_min in Q30.
-    """
-
-    start: tuple[int, ...]
-    start_sd: tuple[int, ...]
-    lower: tuple[int, ...]
-    upper: tuple[int, ...]
-    p_bits: tuple[int, ...]
-    n_bits: tuple[int, ...]
-    y_bits: int
-    row_sd: int
-    forgetting_groups: int = 0
-    gain: int = 2**30
-    correlation: int = 2**16
-    row_weight: int = 2**16
-    step_limit: int = 19661
-    kappa_min: int = 10737
-    noise_margin: int = 0
-    dead_zone: int = 0
-    divider: int = 1
-
-
-@dataclass(frozen=True)
-class TrustConfigQ31:
-    """Which estimates are published, as in trust_q31.h: kappa_min and neglected in Q30, se_max in Q24, misfit_max and
-    renewal in Q16."""
-
-    kappa_min: int = 32212
-    se_max: int = 838861
-    misfit_max: int = 262144
-    groups_min: int = 3
-    revert_after: int = 16
-    renewal: int = 13107
-    neglected: int = 0
-
-
-@dataclass(frozen=True)
-class GateConfigQ31:
-    """Which rows or windows are kept out, as in gate_q31.h: sigmas in Q16, 0: none."""
-
-    sigmas: int = 0
-    patience_groups: int = 0
 
 
 @dataclass(frozen=True)

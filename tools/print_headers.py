@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Prints the enumerations of the public C headers as host/src/pvid/settings/enums.py, and their texts for
-firmware/src/judge/text.c; --check: only compares.
+"""Prints what the host has from the public C headers: the enumerations as host/src/pvid/settings/enums.py, the settings
+of the estimator and of what judges it as host/src/pvid/settings/parts.py; and texts for firmware/src/judge/text.c and
+host/docs/reasons.md. --check: only compares.
 
 Run it with build/venv/bin/python after a change of the headers, when ./tools/pvid has built the C core.
 """
@@ -11,13 +12,20 @@ import argparse
 import re
 import sys
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "host" / "src"))
-from pvid.core.headers import Headers, default_library  # noqa: E402
+from pvid.cli.page_table import markdown, with_table  # noqa: E402
+from pvid.core.headers import Headers  # noqa: E402
+from pvid.core.native import Native  # noqa: E402
 
 FILE = ROOT / "host" / "src" / "pvid" / "settings" / "enums.py"
 TEXTS = ROOT / "firmware" / "src" / "judge" / "text.c"
+PARTS = FILE.with_name("parts.py")
+PAGE = ROOT / "host" / "docs" / "reasons.md"
 STATUS = ROOT / "firmware" / "include" / "pvid" / "status.h"
 ENUMS = {
     "Reason": ("pvid_reason", "Outcome of a tick"),
@@ -26,7 +34,28 @@ ENUMS = {
     "Law": ("pvid_law", "How the estimate follows the data"),
     "SnapshotStatus": ("pvid_snapshot_status", "Analysis of a snapshot's restore"),
 }
-HEAD = '''"""Enumerations of the public C headers. Printed by tools/print_enums.py: do not edit."""
+# Settings: class, its struct without the core, its header, and the fields that every user gives.
+STRUCTS = (
+    ("EstimatorConfig", "pvid_estimator_config", "estimator", ("row_sd", "y_bits")),
+    ("TrustConfig", "pvid_trust_config", "trust", ()),
+    ("GateConfig", "pvid_gate_config", "gate", ()),
+)
+SET_BY_INIT = ("model", "update_rate_hz")
+PARTS_HEAD = '''"""Settings of the estimator and of what judges it, in float32 and fixed point.
+
+Arrays have one entry a free parameter. Printed by tools/print_headers.py: do not edit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pvid.settings.enums import Law
+'''
+
+HEAD = '''"""Enumerations of the public C headers. Printed by tools/print_headers.py: do not edit."""
 
 from __future__ import annotations
 
@@ -46,7 +75,7 @@ class _Named(IntEnum):
 
 
 TEXT_HEAD = """\
-/* pvid/text.h. Printed by tools/print_enums.py from pvid/status.h: do not edit. */
+/* pvid/text.h. Printed by tools/print_headers.py from pvid/status.h: do not edit. */
 #include "pvid/text.h"
 
 #include <stddef.h>
@@ -127,16 +156,58 @@ def printed(headers: Headers) -> str:
     return "\n".join(classes)
 
 
+def field_of(kind: Any, default: Any, required: bool) -> str:
+    """Type and default of a field in Python."""
+    floating = "float" in kind.cname
+    if kind.kind == "array":
+        return "npt.NDArray[np.float32]" if floating else "tuple[int, ...]"
+    if kind.kind == "enum":
+        return f"Law = Law({int(default)})" if isinstance(default, int) else "Law = Law.STATIONARY"
+    if required:
+        return "float" if floating else "int"
+    return f"float = {float(str(np.float32(default)))!r}" if floating else f"int = {int(default)}"
+
+
+def parts(native: Native) -> str:
+    """The text of the module with the settings: the structs' fields in C's order, with C's defaults."""
+    ffi, classes = native.headers.ffi, [PARTS_HEAD]
+    for core in ("f32", "q31"):
+        for name, struct, header, required in STRUCTS:
+            constant = f"{struct.replace('_config', '_defaults')}_{core}"
+            defaults = getattr(native.library, constant, None) or ffi.new(f"{struct}_{core} *")[0]
+            place = f"{header}.h" if core == "f32" else f"{header}_q31.h"
+            lines = [
+                f"    {field}: {field_of(ctype.type, getattr(defaults, field), field in required)}"
+                for field, ctype in ffi.typeof(f"{struct}_{core}").fields
+                if field not in SET_BY_INIT
+            ]
+            own = name if core == "f32" else f"{name}Q31"
+            classes.append(
+                "\n".join(["", "@dataclass(frozen=True)", f"class {own}:", f'    """As in {place}."""', "", *lines, ""])
+            )
+    return "\n".join(classes)
+
+
+def statuses(headers: Headers) -> str:
+    """The table of statuses of the page."""
+    about = comments(STATUS.read_text(encoding="utf-8"))
+    return markdown(
+        ("status", "refused because"), [(f"`{one}`", about[one]) for one in headers.enum("pvid_status") if one in about]
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true")
-    headers = Headers.of(default_library())
+    native = Native()
+    headers = native.headers
     only_check = parser.parse_args().check
-    for file, text in ((FILE, printed(headers)), (TEXTS, texts(headers))):
+    page = with_table(PAGE, "statuses", statuses(headers))
+    for file, text in ((FILE, printed(headers)), (PARTS, parts(native)), (TEXTS, texts(headers)), (PAGE, page)):
         if not only_check:
             file.write_text(text, encoding="utf-8")
         elif file.read_text(encoding="utf-8") != text:
-            sys.exit(f"{file.relative_to(ROOT)} differs from the headers: run tools/print_enums.py")
+            sys.exit(f"{file.relative_to(ROOT)} differs from the headers: run tools/print_headers.py")
 
 
 if __name__ == "__main__":
