@@ -50,7 +50,7 @@ SLOW = (
     *("core/dead_zone", "twin/weak_sums_q31", "oracle/weak_choice", "codegen/weak_c", "oracle/oracle"),
     *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/demo_run", "bench/model_boards"),
     *("core/dropped_calls", "bench/build_choices", "board/generated", "tools/core_rooms", "board/strong_image"),
-    *("codegen/model_q31", "core/freeze", "twin/estimator_q31", "bench/mechanisms"),
+    *("codegen/model_q31", "core/freeze", "core/recorded_hashes", "twin/estimator_q31", "bench/mechanisms"),
     *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
     *("bench/campaign_population", "twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
     *("tools/analysis", "board/engine_boards", "oracle/strong_described", "core/snapshot", "codegen/random"),

@@ -126,6 +126,22 @@ static void blocks_are_the_points_of_a_slower_window(void **state)
     }
 }
 
+static void the_longest_window_is_taken_and_no_longer_one(void **state)
+{
+    (void)state;
+    static float weights[PVID_ORDERS * PVID_MAX_WINDOW];
+    pvid_differentiator_f32 self;
+    const uint16_t most = (PVID_MAX_WINDOW - 1) / 2;
+    const pvid_fir_bank_f32 whole = {.half = most, .stride = 1, .weights = weights};
+    const pvid_fir_bank_f32 wide = {.half = 2, .stride = most / 2u, .weights = weights};
+    const pvid_fir_bank_f32 wider = {.half = 2, .stride = (most / 2u) + 1u, .weights = weights};
+    const pvid_fir_bank_f32 longer = {.half = most + 1u, .stride = 1, .weights = weights};
+    assert_int_equal(pvid_differentiator_init_f32(&self, &whole, 100.0f), PVID_OK);
+    assert_int_equal(pvid_differentiator_init_f32(&self, &wide, 100.0f), PVID_OK);
+    assert_int_equal(pvid_differentiator_init_f32(&self, &wider, 100.0f), PVID_BAD_STRIDE);
+    assert_int_equal(pvid_differentiator_init_f32(&self, &longer, 100.0f), PVID_BAD_HALF);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -133,6 +149,7 @@ int main(void)
         cmocka_unit_test(constant_has_no_derivative_not_even_by_rounding),
         cmocka_unit_test(reset_equals_a_fresh_start),
         cmocka_unit_test(blocks_are_the_points_of_a_slower_window),
+        cmocka_unit_test(the_longest_window_is_taken_and_no_longer_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -465,6 +465,30 @@ static void rows_of_a_group_add_their_squares(void **state)
     assert_true((solve.group_rss == 73.25f) && (self.group_rss == 0.0f) && (self.group_weight == 0.0f));
 }
 
+static void a_start_s_deviation_has_its_range(void **state)
+{
+    (void)state;
+    static const struct {
+        float start_sd;
+        pvid_status status;
+    } cases[] = {{1.0e-12f, PVID_OK}, {0.9e-12f, PVID_BAD_START_SD}, {1.0e12f, PVID_OK}, {1.1e12f, PVID_BAD_START_SD}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        pvid_estimator_config_f32 config = pvid_estimator_defaults_f32;
+        config.model = &own_model;
+        config.row_sd = 0.1f;
+        config.update_rate_hz = 100.0f;
+        for (int a = 0; a < 2; a++) {
+            config.start[a] = 1.0f;
+            config.start_sd[a] = 1.0f;
+            config.lower[a] = 0.5f;
+            config.upper[a] = 3.0f;
+        }
+        config.start_sd[1] = cases[i].start_sd; /* of b, whose steps are relative to it */
+        static pvid_estimator_f32 self;
+        assert_int_equal(pvid_estimator_init_f32(&self, &config), cases[i].status);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -485,6 +509,7 @@ int main(void)
         cmocka_unit_test(a_new_init_equals_a_fresh_object),
         cmocka_unit_test(a_place_is_within_the_bounds_and_moves_no_more_than_p),
         cmocka_unit_test(rows_of_a_group_add_their_squares),
+        cmocka_unit_test(a_start_s_deviation_has_its_range),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
 /* The fixed-point estimator: what init refuses, rows that do not fit, a solve in stages and at once, the way back. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -8,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "number/scaled_q31.h"
 #include "pendulum_model_q31.h"
 #include "pvid/pvid_q31.h"
 
@@ -239,6 +241,101 @@ static void without_rows_the_start_is_published(void **state)
     assert_int_equal(estimate.weight, 0);
 }
 
+/* Identity theta = p: M is S, so that what a step needs is known. */
+static void own_theta(const int32_t p[], int64_t theta[])
+{
+    theta[0] = p[0];
+    theta[1] = p[1];
+}
+
+static void own_jacobian(const int32_t p[], int64_t c[])
+{
+    (void)p;
+    c[0] = 1 << 20;
+    c[1] = 1 << 20;
+}
+
+static void own_formats(const int8_t p_bits[], int16_t theta_bits[], int16_t c_bits[])
+{
+    for (int i = 0; i < 2; i++) {
+        theta_bits[i] = p_bits[i];
+        c_bits[i] = 20;
+    }
+}
+
+static const uint8_t own_places[2] = {0, 1};
+static const pvid_model_q31 own_model = {.n_theta = 2,
+                                         .n_p = 2,
+                                         .n_kinds = 1,
+                                         .n_c = 2,
+                                         .c_row = own_places,
+                                         .c_column = own_places,
+                                         .theta = own_theta,
+                                         .jacobian = own_jacobian,
+                                         .formats = own_formats};
+
+static void begin_own(void)
+{
+    (void)start_again(NULL);
+    config.model = &own_model;
+    for (int i = 0; i < 2; i++) {
+        config.start[i] = ONE_Q26;
+        config.start_sd[i] = ONE_Q26; /* 1: H0 is the square of row_sd, 1 */
+        config.lower[i] = -8 * ONE_Q26;
+        config.upper[i] = 8 * ONE_Q26;
+    }
+    config.row_sd = 256 * ONE_Q20;
+}
+
+/* A row that has the information `part` on p[0] and 9 on p[1]. */
+static void own_row(double part)
+{
+    const int32_t first[2] = {(int32_t)(sqrt(part) * ONE_Q20), 0};
+    const int32_t second[2] = {0, 3 * ONE_Q20};
+    assert_int_equal(pvid_estimator_add_q31(&estimator, first, first[0]), PVID_ACCUMULATED);
+    assert_int_equal(pvid_estimator_add_q31(&estimator, second, second[1]), PVID_ACCUMULATED);
+}
+
+/* S must exceed margin times what noise alone gives so many rows of the same weight; that of `noise_rows` is known. */
+static void information_of_noise_alone_moves_nothing(void **state)
+{
+    (void)state;
+    const double margins[] = {0.9, 1.1};
+    for (int i = 0; i < 2; i++) {
+        begin_own();
+        config.noise_margin = (uint32_t)(margins[i] * 65536.0);
+        begin();
+        estimator.noise_rows =
+            4; /* twice the rows that follow: noise has 4 of p[0] in them; in the integers of Y over p */
+        estimator.noise_table[0] = pvid_scaled_packed_q31(pvid_scaled_of_q31(8, -12));
+        estimator.noise_table[1] = 0;
+        estimator.noise_table[2] = pvid_scaled_packed_q31(pvid_scaled_of_q31(1, -12));
+        own_row(4.0);
+        assert_int_equal(pvid_estimator_update_q31(&estimator), (i == 0) ? PVID_UPDATED : PVID_HELD_NOT_EXCITED);
+    }
+}
+
+/* kappa of p[0] times its information with the prior's must be twice the prior's, that of p[0] and of no other. */
+static void p0_needs_more_information_than_its_start(void **state)
+{
+    (void)state;
+    const double parts[] = {0.9, 1.1};
+    for (int i = 0; i < 2; i++) {
+        begin_own();
+        config.kappa_min = 1;
+        config.start_sd[1] = ONE_Q26 / 16;
+        begin();
+        own_row(parts[i]);
+        assert_int_equal(pvid_estimator_update_q31(&estimator), (i == 0) ? PVID_HELD_NOT_EXCITED : PVID_UPDATED);
+        begin_own();
+        config.kappa_min = 1;
+        config.start_sd[1] = 8 * ONE_Q26;
+        begin();
+        own_row(parts[i]);
+        assert_int_equal(pvid_estimator_update_q31(&estimator), (i == 0) ? PVID_HELD_NOT_EXCITED : PVID_UPDATED);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -249,6 +346,8 @@ int main(void)
         cmocka_unit_test_setup(a_solve_in_stages_is_the_solve_at_once, start_again),
         cmocka_unit_test_setup(p_goes_to_the_fallback_if_it_may_not_step, start_again),
         cmocka_unit_test_setup(without_rows_the_start_is_published, start_again),
+        cmocka_unit_test(information_of_noise_alone_moves_nothing),
+        cmocka_unit_test(p0_needs_more_information_than_its_start),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "pvid/fnv_refine.h"
 #include "refine/refine_judge_f32.h"
 #include "number/sincos_f32.h"
 #include "pvid/pvid.h"
@@ -998,6 +999,34 @@ static void test_a_level_below_1_widens_nothing(void **state)
     assert_false(pvid_refine_within_f32(1.0f, 1.0f) || pvid_refine_within_f32(-1.0f, 1.0f));
 }
 
+/* Parameters, state, level and reason, each of them; all that is no number is one number. */
+static void test_every_number_of_a_refinement_counts_in_its_hash(void **state)
+{
+    (void)state;
+    static pvid_refine_f32 self;
+    memset(&self, 0, sizeof self);
+    const uint32_t hash = pvid_fnv_refine_f32(5u, &self, PVID_UPDATED);
+    for (size_t i = 0; i < PVID_REFINE_PARAMETERS; i++) {
+        self.linear[i] = 1.0f;
+        assert_int_not_equal(pvid_fnv_refine_f32(5u, &self, PVID_UPDATED), hash);
+        self.linear[i] = 0.0f;
+    }
+    for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+        self.work.state[i] = 1.0f;
+        assert_int_not_equal(pvid_fnv_refine_f32(5u, &self, PVID_UPDATED), hash);
+        self.work.state[i] = 0.0f;
+    }
+    self.level = NAN;
+    const uint32_t nowhere = pvid_fnv_refine_f32(5u, &self, PVID_UPDATED);
+    self.level = -INFINITY;
+    assert_int_equal(pvid_fnv_refine_f32(5u, &self, PVID_UPDATED), nowhere);
+    self.level = 1.0f;
+    assert_int_not_equal(pvid_fnv_refine_f32(5u, &self, PVID_UPDATED), nowhere);
+    self.level = 0.0f;
+    assert_int_not_equal(pvid_fnv_refine_f32(5u, &self, PVID_ACCUMULATED), hash);
+    assert_int_equal(pvid_fnv_refine_f32(5u, &self, PVID_UPDATED), hash);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1027,6 +1056,7 @@ int main(void)
         cmocka_unit_test(test_it_rests_at_so_many_ticks_in_a_row),
         cmocka_unit_test(test_a_droop_is_that_of_the_samples_of_a_mean),
         cmocka_unit_test(test_a_level_below_1_widens_nothing),
+        cmocka_unit_test(test_every_number_of_a_refinement_counts_in_its_hash),
     };
     return cmocka_run_group_tests(tests, prepare, NULL);
 }

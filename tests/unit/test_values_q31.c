@@ -172,12 +172,56 @@ static void test_integrals_of_a_cubic_are_those_of_the_rule(void **state)
     }
 }
 
+static void test_a_constant_at_the_end_is_not_summed(void **state)
+{
+    (void)state;
+    pvid_weak_model_q31 other = model;
+    assert_int_equal(pvid_weak_summed_q31(&other), GAINS);
+    const pvid_weak_channel with[GAINS + 1] = {
+        channels[0], channels[1], {PVID_WEAK_NONE, PVID_WEAK_NONE, 0, PVID_WEAK_NONE, PVID_WEAK_NONE}};
+    other.channel = with;
+    other.channels = GAINS + 1;
+    assert_int_equal(pvid_weak_summed_q31(&other), GAINS);
+}
+
+/* Twice a run counts from the first sample, two ticks before the first step, by trapezoids; where it depends on
+ * derivatives of signals, which are not known there, with that of the first step. */
+static void test_a_run_begins_before_the_first_step(void **state)
+{
+    (void)state;
+    static const int32_t hard = 0;
+    static const pvid_weak_jet first_order[1] = {{0, 1}};
+    const pvid_weak_integral_q31 integral[1] = {{0, 1}};
+    for (int derived = 0; derived < 2; derived++) {
+        pvid_weak_model_q31 own = model;
+        own.jet = (derived != 0) ? first_order : jets;
+        const pvid_weak_design_q31 design = {.model = &own,
+                                             .decimation = 1,
+                                             .hop = HOP,
+                                             .run = rescale,
+                                             .sign_width = &hard,
+                                             .integral = integral,
+                                             .format = formats};
+        const int32_t jet = 11;
+        pvid_weak_values_q31 self;
+        pvid_weak_entry_q31 entry[GAINS * PVID_WEAK_BLOCK_Q31];
+        pvid_weak_values_init_q31(&self, 2);
+        const int32_t before[2] = {5, 7};
+        pvid_weak_values_begin_q31(&self, &design, &before[0], true); /* half a step, then whole ones */
+        pvid_weak_values_begin_q31(&self, &design, &before[1], false);
+        (void)pvid_weak_values_step_q31(&self, &design, &jet, entry);
+        assert_int_equal(self.run[0], (derived != 0) ? (2 * 2 * 33) : (15 + (2 * 21) + 33));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_sign_is_its_mean_over_a_step),
         cmocka_unit_test(test_a_run_is_the_sum_of_its_derivative_by_trapezoids),
         cmocka_unit_test(test_integrals_of_a_cubic_are_those_of_the_rule),
+        cmocka_unit_test(test_a_constant_at_the_end_is_not_summed),
+        cmocka_unit_test(test_a_run_begins_before_the_first_step),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
