@@ -1,4 +1,4 @@
-"""A described mechanism on a board: recorded, verified by the twin, exported under its own names."""
+"""Any mechanism on a board, in either arithmetic: recorded, verified by the twin, exported under its own names."""
 
 from __future__ import annotations
 
@@ -9,89 +9,121 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanisms import BOARDS, TICKS, Board, board_of_mechanism, core_record, path_of, samples_in_si
 from program import pvid
 
 from pvid.base.errors import PvidError
 from pvid.board.field import collect
 from pvid.board.mechanism_board import MechanismBoard, board_of
+from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.stream_image import settings_number
 from pvid.board.target import HOST_TARGET, judge, open_target, verify
-from pvid.codegen.weak_library import weak_native
 from pvid.core.native import Native
-from pvid.link.frames import Code, Estimate, Form, Raw, Source
+from pvid.link.frames import Code, Core, Estimate, EstimateQ31, Form, Raw, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader
 from pvid.log.recorder import EmulatorSource, Logger
 from pvid.log.rig import engine_text_of_log, mechanism_of_log, recording_of_log
-from pvid.log.verify import Stretch, Verdict, Verifier
+from pvid.log.verify import Verdict, Verifier
 from pvid.models.mechanisms import names
 from pvid.show.log_figure import write_log_figure
 from pvid.show.page_state import LiveState
 
-TICKS = 3000  # of the motor: some windows more than the first estimate takes
+DAMAGES = {
+    "dc_motor": (("estimator_law", "estimator_lore"), ("design_hop", "design_hip"), ("dc_motor", "nowhere")),
+    "kapitza": (("estimator_gain", "estimator_gait"), ("design_hop", "design_hip"), ("jet_reach", "jet")),
+}
 
 
 @pytest.fixture(scope="module")
 def motor() -> MechanismBoard:
-    board = MechanismBoard.of_shipped_rig("dc_motor")
-    return replace(board, recording=board.recording[:TICKS])
+    board = board_of_mechanism("dc_motor")
+    assert isinstance(board, MechanismBoard)
+    return board
 
 
 @pytest.fixture(scope="module")
-def log(motor: MechanismBoard, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a board on this machine."""
-    out = tmp_path_factory.mktemp("motor") / "a.pvlog"
-    settings = settings_number(motor)
+def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Of boards on this machine, recorded as they are asked for."""
+    folder = tmp_path_factory.mktemp("logs")
+
+    class Logs(dict[str, Path]):
+        def __missing__(self, name: str) -> Path:
+            self[name] = folder / f"{name}.pvlog"
+            _record(board_of_mechanism(name), self[name])
+            return self[name]
+
+    return Logs()
+
+
+def _record(board: Board, out: Path) -> None:
+    settings = settings_number(board)
     logger = Logger(
-        source=EmulatorSource(HOST_TARGET, lambda: open_target(HOST_TARGET, motor)),
+        source=EmulatorSource(HOST_TARGET, lambda: open_target(HOST_TARGET, board)),
         out=out,
-        rig=motor.text(),
+        rig=board.text(),
         samples=TICKS,
-        begin=lambda: motor.configure(settings, 100, 100, Source.SENSOR_PACED),
+        begin=lambda: board.configure(settings, 100, 100, Source.SENSOR_PACED),
     )
     assert logger.run().samples == TICKS and logger.failures == []
-    return out
 
 
-def stretches_of(log: Path) -> list[Stretch]:
+def verifier_of(log: Path) -> Verifier:
     text = engine_text_of_log(log)
     assert text is not None
-    return list(Verifier(board_of(text)).stretches(LogReader(log)))
+    return Verifier(board_of(text, path_of(log.stem)))
 
 
-@pytest.mark.parametrize("name", names())
-def test_text_in_a_log_gives_the_same_board_back(name: str) -> None:
-    board = MechanismBoard.of_shipped_rig(name)
+def read_back(board: Board, model: str | None) -> None:
     text = board.text()
-    again = board_of(text)
-    assert again is not None and again.text() == text and len(text) < 64_000
+    again = board_of(text, model)
+    assert type(again) is type(board) and again.text() == text and len(text) < 64_000
     assert settings_number(again) == settings_number(board) and again.names == board.names
     assert again.names.parse(board.names.text.encode()) == board.names
 
 
-def test_text_that_is_damaged_is_refused(motor: MechanismBoard) -> None:
-    text = motor.text()
+@pytest.mark.parametrize("name", names())
+def test_text_in_a_log_gives_the_same_board_back(name: str) -> None:
+    read_back(MechanismBoard.of_shipped_rig(name), None)
+
+
+@pytest.mark.parametrize("name", ["battery_2rc", *BOARDS])
+def test_text_of_a_board_in_integers_gives_it_back(name: str) -> None:
+    shipped = path_of(name) is None
+    board = MechanismBoardQ31.of_shipped_rig(name) if shipped else board_of_mechanism(name, MechanismBoardQ31)
+    read_back(board, path_of(name))
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_text_that_is_damaged_is_refused(name: str) -> None:
+    text = board_of_mechanism(name).text()
     assert board_of("l1 = 0.3\n") is None
-    for wrong, right in (("estimator_law", "estimator_lore"), ("design_hop", "design_hip"), ("dc_motor", "nowhere")):
+    for wrong, right in DAMAGES[name]:
+        assert wrong in text
         with pytest.raises(PvidError):
             board_of(text.replace(wrong, right))
 
 
-@pytest.mark.parametrize("target", [HOST_TARGET, "mps2-an386"])
-def test_a_board_computes_the_bits_of_this_machine(motor: MechanismBoard, target: str) -> None:
-    with open_target(target, motor) as opened:
-        record = collect(opened, TICKS, begin=motor, hash_every=500, estimate_every=1000)
-    identifier = weak_native(motor.compiled, motor.config.design).identifier_of(motor.config)
-    own = identifier.run_samples(motor.recording)
-    assert record.hello is not None and (record.hello.form, record.hello.samples) == (Form.WEAK, 3)
+@pytest.mark.parametrize(
+    ("name", "target"),
+    [*((one, HOST_TARGET) for one in BOARDS), ("free_pendulum", "mps2-an386"), ("heated_plate", "mps2-an386")],
+)
+def test_a_board_computes_the_bits_of_this_machine(name: str, target: str) -> None:
+    board = board_of_mechanism(name)
+    with open_target(target, board) as opened:
+        record = collect(opened, TICKS, begin=board, hash_every=600, estimate_every=1200)
+    own, kind = core_record(board), (Core.Q31 if isinstance(board, MechanismBoardQ31) else Core.F32)
+    assert record.hello is not None
+    assert (record.hello.form, record.hello.core, record.hello.samples) == (Form.WEAK, kind, board.recording.shape[1])
     assert record.status is not None and record.status.code == Code.RUNNING and record.gaps == []
     sent = np.concatenate([record.raw[first] for first in sorted(record.raw)])
-    assert np.array_equal(sent[:TICKS], motor.recording)
+    assert np.array_equal(sent[:TICKS], board.recording)
     assert len(record.hashes) >= 5
     for tick, found in record.hashes.items():
         assert found == own.hash[tick - 1], tick
-    estimate = record.estimates[2000]
-    assert isinstance(estimate, Estimate) and estimate.p[:7] == tuple(own.published[1999].tolist())
+    estimate = record.estimates[2400]
+    assert isinstance(estimate, Estimate if kind == Core.F32 else EstimateQ31)
+    assert estimate.p[: len(board.p_names)] == tuple(own.published[2399].tolist())
 
 
 def test_samples_that_the_pc_sends_have_the_bits_of_this_machine(motor: MechanismBoard, native: Native) -> None:
@@ -104,72 +136,81 @@ def test_samples_that_the_pc_sends_have_the_bits_of_this_machine(motor: Mechanis
     assert found.first is not None and found.first[0] >= 1000 and "DIFFERENT" in found.text
 
 
-def test_log_of_a_mechanism_is_verified(log: Path) -> None:
-    (stretch,) = stretches_of(log)
+@pytest.mark.parametrize("name", BOARDS)
+def test_log_is_verified_and_exported_under_the_mechanisms_names(
+    name: str, logs: dict[str, Path], tmp_path: Path
+) -> None:
+    board, log = board_of_mechanism(name), logs[name]
+    (stretch,) = verifier_of(log).stretches(LogReader(log))
     verdict = Verdict()
     verdict.add(stretch)
     assert stretch.difference is None and verdict.verified == TICKS and verdict.checked == 2 * TICKS // 100
     assert "no check of them" not in stretch.text
+    mechanism = mechanism_of_log(log)
+    assert set(board.p_names) <= set(mechanism.model.p_names)
+    paths = export_log(log, "csv", tmp_path / "a", mechanism)
+    samples = list(csv.DictReader(paths[0].open()))
+    signals = [one for one, _ in board.names.samples]
+    found = np.array([[float(row[one]) for one in signals] for row in samples])
+    assert np.allclose(found, samples_in_si(board), rtol=1e-6, atol=1e-9)
+    last = list(csv.DictReader(paths[1].open()))[-1]
+    for one, published in zip(board.p_names, core_record(board).published[-1], strict=True):
+        scale = 1.0 if isinstance(board, MechanismBoard) else board.engine.values(np.ones(len(board.p_names)))
+        value = float(published) * np.broadcast_to(scale, len(board.p_names))[board.p_names.index(one)]
+        assert float(last[one]) == pytest.approx(value, rel=1e-6) and float(last[f"{one}_se"]) > 0
 
 
-def test_a_changed_sample_and_a_changed_estimate_are_found(log: Path, tmp_path: Path) -> None:
-    text = engine_text_of_log(log)
-    assert text is not None
-    board = board_of(text)
-    records = list(LogReader(log))
+def test_a_log_in_integers_is_a_recording_for_identify(logs: dict[str, Path], tmp_path: Path) -> None:
+    given = path_of("heated_plate") or ""
+    done = pvid(tmp_path, "identify", str(logs["heated_plate"]), "--json", "--model", given)
+    answer = json.loads(done.stdout)
+    assert done.returncode == 0 and answer["samples"] == TICKS, done.stderr
+    assert answer["parameters"]["C"]["value"] == pytest.approx(40.0, rel=0.01)
+
+
+def test_a_changed_sample_and_a_changed_estimate_are_found(logs: dict[str, Path]) -> None:
+    verifier, records = verifier_of(logs["dc_motor"]), list(LogReader(logs["dc_motor"]))
     at = next(i for i, one in enumerate(records) if isinstance(one.item, Raw) and one.tick > 1000)
     raw = records[at].item
     assert isinstance(raw, Raw)
     changed = bytes([raw.data[0] ^ 1]) + raw.data[1:]
     wrong = [*records[:at], replace(records[at], item=replace(raw, data=changed)), *records[at + 1 :]]
-    (stretch,) = Verifier(board).stretches(wrong)
+    (stretch,) = verifier.stretches(wrong)
     assert stretch.difference is not None and stretch.difference.variable == "hash of the samples"
     at = next(i for i, one in enumerate(records) if isinstance(one.item, Estimate) and one.tick == 2000)
     estimate = records[at].item
     assert isinstance(estimate, Estimate)
     p = (*estimate.p[:2], float(np.nextafter(np.float32(estimate.p[2]), np.float32(1))), *estimate.p[3:])
     wrong = [*records[:at], replace(records[at], item=replace(estimate, p=p)), *records[at + 1 :]]
-    (stretch,) = Verifier(board).stretches(wrong)
+    (stretch,) = verifier_of(logs["dc_motor"]).stretches(wrong)
     assert stretch.difference is not None and stretch.difference.variable == "k"
 
 
-def test_samples_of_another_number_a_tick_are_not_verified(log: Path) -> None:
-    text = engine_text_of_log(log)
-    assert text is not None
+def test_samples_of_another_number_a_tick_are_not_verified(logs: dict[str, Path]) -> None:
     records = [
         replace(one, item=Raw(one.item.data[: 8 * one.item.count], session=one.item.session))
         if isinstance(one.item, Raw)
         else one
-        for one in LogReader(log)
+        for one in LogReader(logs["dc_motor"])
     ]
     verdict = Verdict()
-    for stretch in Verifier(board_of(text)).stretches(records):
+    for stretch in verifier_of(logs["dc_motor"]).stretches(records):
         verdict.add(stretch)
         assert stretch.why_not is not None and "2 a tick, and the identifier takes 3" in stretch.why_not
     assert verdict.verified == 0 and verdict.samples == TICKS
 
 
-def test_log_of_a_mechanism_is_exported_under_its_names(log: Path, motor: MechanismBoard, tmp_path: Path) -> None:
-    mechanism = mechanism_of_log(log)
-    assert mechanism.model.p_names == motor.p_names
-    paths = export_log(log, "csv", tmp_path / "a", mechanism)
-    samples = list(csv.DictReader(paths[0].open()))
-    assert len(samples) == TICKS
-    found = np.array([[row[name] for name in ("V", "i", "phi")] for row in samples], np.float32)
-    assert np.array_equal(found, motor.recording)
-    last = list(csv.DictReader(paths[1].open()))[-1]
-    truth = dict(zip(motor.p_names, motor.compiled.p_names, strict=True))
-    assert set(truth) <= set(last) and float(last["R"]) == pytest.approx(1.2, rel=0.01) and float(last["R_se"]) > 0
-    recording = recording_of_log(log, ["phi", "V"])
+def test_signals_of_a_log_are_read_by_name(logs: dict[str, Path], motor: MechanismBoard) -> None:
+    recording = recording_of_log(logs["dc_motor"], ["phi", "V"])
     assert np.array_equal(np.float32(recording.signals["V"]), motor.recording[:, 0])
     assert list(recording.signals) == ["phi", "V"] and recording.sample_rate == 1000.0
     with pytest.raises(PvidError, match="a log of dc_motor: it has V, i and phi, and not x"):
-        recording_of_log(log, ["x"])
+        recording_of_log(logs["dc_motor"], ["x"])
 
 
-def test_page_shows_the_names_and_units_of_the_mechanism(log: Path) -> None:
-    state = LiveState(log, "the motor")
-    data = log.read_bytes()
+def test_page_shows_the_names_and_units_of_the_mechanism(logs: dict[str, Path]) -> None:
+    state = LiveState(logs["dc_motor"], "the motor")
+    data = logs["dc_motor"].read_bytes()
     for first in range(0, len(data), 5000):
         state.take(data[first : first + 5000])
     shown = json.loads(state.as_json())
@@ -181,12 +222,19 @@ def test_page_shows_the_names_and_units_of_the_mechanism(log: Path) -> None:
     assert len(shown["estimates"]["curves"]) == 7 and "noise of the sensors" in shown["residual"]
 
 
-def test_log_of_a_mechanism_is_plotted(log: Path, tmp_path: Path) -> None:
-    out = tmp_path / "motor.svg"
-    write_log_figure(log, mechanism_of_log(log), out)
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("dc_motor", ("Tc [N*m]", "phi [rad]", "kappa of R", "weak form of dc_motor", f"{TICKS} samples")),
+        ("heated_plate", ("C [J/K]", "T [K]", f"{TICKS} samples")),
+    ],
+)
+def test_log_is_plotted(name: str, words: tuple[str, ...], logs: dict[str, Path], tmp_path: Path) -> None:
+    out = tmp_path / "log.svg"
+    write_log_figure(logs[name], mechanism_of_log(logs[name]), out)
     drawn = out.read_text()
-    for words in ("Tc [N*m]", "phi [rad]", "kappa of R", "weak form of dc_motor", f"{TICKS} samples"):
-        assert f"<!-- {words}" in drawn or words in drawn, words
+    for one in words:
+        assert f"<!-- {one}" in drawn or one in drawn, one
 
 
 def test_options_that_do_not_fit_are_refused(tmp_path: Path) -> None:
