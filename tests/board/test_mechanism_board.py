@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import BOARDS, TICKS, Board, board_of_mechanism, core_record, path_of, samples_in_si
+from mechanisms import BOARDS, Board, board_of_mechanism, core_record, path_of, samples_in_si
+from own_mechanisms import OWN, TICKS
 from program import pvid
 
 from pvid.base.errors import PvidError
@@ -161,11 +162,10 @@ def test_log_is_verified_and_exported_under_the_mechanisms_names(
 
 
 def test_a_log_in_integers_is_a_recording_for_identify(logs: dict[str, Path], tmp_path: Path) -> None:
-    given = path_of("heated_plate") or ""
-    done = pvid(tmp_path, "identify", str(logs["heated_plate"]), "--json", "--model", given)
+    done = pvid(tmp_path, "identify", str(logs["heated_plate"]), "--json", "--model", str(OWN["heated_plate"].path))
     answer = json.loads(done.stdout)
     assert done.returncode == 0 and answer["samples"] == TICKS, done.stderr
-    assert answer["parameters"]["C"]["value"] == pytest.approx(40.0, rel=0.01)
+    assert answer["parameters"]["C"]["value"] == pytest.approx(100.0, rel=0.01)
 
 
 def test_a_changed_sample_and_a_changed_estimate_are_found(logs: dict[str, Path]) -> None:

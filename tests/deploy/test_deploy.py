@@ -12,6 +12,7 @@ import pytest
 import yaml  # type: ignore[import-untyped]
 from conftest import ROOT
 from ecosystems import newlib, packer
+from own_mechanisms import OWN, own_recording
 from packages import STUBS, built, run
 from program import pvid
 
@@ -19,8 +20,8 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.boards import run as run_on
 from pvid.configuration.refine import full_motion_of, refine_for_simulated_rig
-from pvid.configuration.weak import config_for_simulated_rig, simulated_run_of
-from pvid.configuration.weak_q31 import engine_for_simulated_rig
+from pvid.configuration.weak import config_for_recording, config_for_simulated_rig, simulated_run_of
+from pvid.configuration.weak_q31 import engine_for_recording, engine_for_simulated_rig
 from pvid.deploy.deployment import Deployment
 from pvid.deploy.example import expected
 from pvid.deploy.of_rig import deployment_f32, deployment_q31
@@ -57,18 +58,38 @@ def written(deployment: Deployment, target: str, folder: Path) -> Path:
     return folder
 
 
-def test_the_example_comes_near_the_truth(motor: Deployment, fixed_motor: Deployment) -> None:
-    truth = simulated_rig("dc_motor").truth
-    for one in (motor, fixed_motor):
-        assert one.playback.value is not None and one.playback.error is not None
-        for parameter, value, error in zip(one.parameters, one.playback.value, one.playback.error, strict=True):
-            assert abs(value - truth[parameter.name]) < 4 * error  # one seed, seven parameters: 3 would be met by 98 %
-            assert error < 0.05 * abs(truth[parameter.name])  # se_max of the publication
+@pytest.fixture(scope="module")
+def deployments(motor: Deployment, fixed_motor: Deployment) -> dict[str, Deployment]:
+    """Of a shipped mechanism in either arithmetic, of one without an input and of one of the user's own."""
+    free, plate = OWN["free_pendulum"].compiled, OWN["heated_plate"].compiled
+    swing, steps = own_recording("free_pendulum"), own_recording("heated_plate")
+    return {
+        "dc_motor": motor,
+        "dc_motor in integers": fixed_motor,
+        "free_pendulum": deployment_f32(free, config_for_recording(free, swing), swing.signals, "a test"),
+        "heated_plate in integers": deployment_q31(engine_for_recording(plate, steps), steps.signals, "a test"),
+    }
 
 
-def test_cmake(motor: Deployment, tmp_path: Path) -> None:
-    tree = built(written(motor, "cmake", tmp_path / "p"), tmp_path / "b")
-    assert run(tree / "dc_motor_example").splitlines() == expected(motor)
+DEPLOYED = ("dc_motor", "dc_motor in integers", "free_pendulum", "heated_plate in integers")
+
+
+@pytest.mark.parametrize("name", DEPLOYED)
+def test_the_example_comes_near_the_truth(name: str, deployments: dict[str, Deployment]) -> None:
+    one = deployments[name]
+    own = OWN.get(one.name)
+    truth = simulated_rig(one.name).truth if own is None else {x.name: x.guess for x in own.compiled.unknowns}
+    assert one.playback.value is not None and one.playback.error is not None
+    for parameter, value, error in zip(one.parameters, one.playback.value, one.playback.error, strict=True):
+        assert abs(value - truth[parameter.name]) < 4 * error  # one seed, seven parameters: 3 would be met by 98 %
+        assert error < 0.05 * (abs(truth[parameter.name]) or 1.0)  # se_max of the publication
+
+
+@pytest.mark.parametrize("name", DEPLOYED[::2] + DEPLOYED[3:])
+def test_cmake(name: str, deployments: dict[str, Deployment], tmp_path: Path) -> None:
+    one = deployments[name]
+    tree = built(written(one, "cmake", tmp_path / "p"), tmp_path / "b")
+    assert run(tree / f"{one.name}_example").splitlines() == expected(one)
 
 
 def test_the_example_of_a_refined_mechanism_prints_the_refined_estimate(pendulum: Deployment, tmp_path: Path) -> None:

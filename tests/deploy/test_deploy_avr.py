@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from ecosystems import arduino
+from own_mechanisms import OWN
 from packages import STUBS, run
 from program import pvid
 from test_examples import ESTIMATOR, PRINTED
@@ -98,21 +99,9 @@ def test_the_readme_tells_that_an_uno_has_too_little_ram(pendulum: Deployment) -
     assert sentence in package(pendulum)["README.md"]
 
 
-HEATER = """
-from pvid import Model
-
-model = Model("heated plate")
-P = model.input("P", "W", hold="zoh", reach=50)
-T = model.sensor("T", "K", resolution=0.0625, reach=100)
-C = model.unknown("C", "J/K", 100.0)
-h = model.unknown("h", "W/K", 0.5)
-model.equation(C * T.d() + h * T - P)
-"""
-
-
 def test_the_least_mechanism_is_too_large_for_an_uno_and_a_poor_recording_is_named(tmp_path: Path) -> None:
     """One input, one sensor, two unknowns; the run is a tenth of the plate's time constant."""
-    (tmp_path / "heater.py").write_text(HEATER, encoding="utf-8")
+    shutil.copy(OWN["heated_plate"].path, tmp_path / "heater.py")
     assert pvid(tmp_path, "model", "simulate", "heater.py", "run.csv", "--drive", "steps").returncode == 0
     done = pvid(tmp_path, *"deploy heater.py --for arduino --core q31 --run run.csv -o out".split())
     assert done.returncode == 0, done.stderr
