@@ -53,7 +53,6 @@ MOTOR = Model(
     gradient_of=_gradient,
     mapped_of=lambda of, _: np.array([np.asarray(of)[0], 1.0]) / np.asarray(of)[1],
     is_plausible=lambda p: bool((p > 0).all()),
-    modes_hz=lambda p: (float(p[0]) / 6.28,),
     scales=(Scale("v_gain", "v_gain_sd", "the gain of v", (0.0, -1.0), (0.0, 0.0)),),
 )
 MECHANISM = Mechanism(MOTOR, {"k": 0.1})

@@ -61,5 +61,4 @@ def _model(names: BoardNames) -> Model:
         gradient_of=none,
         mapped_of=none,
         is_plausible=lambda p: True,
-        modes_hz=lambda p: (),
     )

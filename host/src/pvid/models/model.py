@@ -133,7 +133,6 @@ class Model:
     gradient_of : likewise, d physical / d p [..., n_physical, n_mapped]
     mapped_of : (physical [n_physical], constants) -> mapped p, the inverse
     is_plausible : whether p, at least the mapped ones, can be that of a rig
-    modes_hz : of p, at least the mapped ones: natural frequencies [Hz], the slowest first; () where there are none
     scales : scales whose errors are part of the standard errors
     """
 
@@ -147,7 +146,6 @@ class Model:
     gradient_of: Callable[[npt.ArrayLike, Constants], Float]
     mapped_of: Callable[[npt.ArrayLike, Constants], Float]
     is_plausible: Callable[[Float], bool]
-    modes_hz: Callable[[Float], tuple[float, ...]]
     scales: tuple[Scale, ...] = ()
 
     @property

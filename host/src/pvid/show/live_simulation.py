@@ -1,7 +1,8 @@
-"""What the newest estimate predicts for the motion of the last seconds: beside the measured angle on the live page.
+"""What the newest estimate predicts for the motion of the last seconds: beside the measured signals on the live page.
 
-The pendulum is simulated (sim/simulated_angle.py) in a thread of its own, at most once in `PERIOD_S`: a second of
-processor time. Other mechanisms are not simulated here.
+The equations of a shipped mechanism are simulated in blocks (identification/validation.py) in a thread of its own, at
+most once in `PERIOD_S`: a second of processor time. A mechanism of the user's own has its model file where its board is
+made, not here: it is not simulated.
 """
 
 from __future__ import annotations
@@ -9,22 +10,27 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.base.wording import listed
 from pvid.log.history import History
-from pvid.models.kapitza.model import MODEL
-from pvid.rig.run import Run
-from pvid.sim.simulated_angle import SimulatedAngle, simulated_angle
+from pvid.models.registry import names
+
+if TYPE_CHECKING:
+    from pvid.identification.validation import Validation
+    from pvid.model.compiled import CompiledModel
 
 Float = npt.NDArray[np.float64]
 
 PERIOD_S = 10.0
 _LONGEST_GAP = 1.5  # of the median time between samples
-_MOST_UNEXPLAINED = 1.0  # of the variance: worse than no model
 
 
 class LiveSimulation:
@@ -33,51 +39,63 @@ class LiveSimulation:
     def __init__(self) -> None:
         self._began = -math.inf
         self._busy: threading.Thread | None = None
-        self._newest: SimulatedAngle | None = None
+        self._newest: Validation | None = None
 
     @property
     def words(self) -> str:
-        """How well the estimate explains the last seconds; empty before the first simulation."""
+        """How well the estimate predicts the last seconds; empty before the first simulation, and where no sensor is
+        predicted better than by its mean."""
         found = self._newest
-        if found is None or found.unexplained > _MOST_UNEXPLAINED:
-            return ""
-        return f"R² {found.r2_words}, simulated angle off by {1e3 * found.rms:.2g} mrad rms (at {found.t[-1]:.0f} s)"
+        told = [] if found is None else [one for one in found.sensors if one.r2 > 0]
+        return f"{listed(told)} (at {found.t[-1]:.0f} s)" if found is not None and told else ""
 
     def offer(self, history: History, t: Float, signals: list[Float]) -> None:
         """Starts a simulation of samples [n] at t [n, s] with the newest estimate, if one is due."""
         now = time.monotonic()
-        constants = history.constants
         if now < self._began + PERIOD_S or (self._busy is not None and self._busy.is_alive()):
             return
-        if history.model.name != MODEL.name or constants is None or not history.newest or len(t) < 100:
+        if history.model.name not in names() or not history.newest or len(t) < 100:
             return
-        newest = history.published
-        p = np.array([newest.get(name, math.nan) for name in history.model.mapped_names])
-        offset = next(one.name for one in history.model.parameters if one.role == "offset")
-        rest = newest.get(offset, math.nan)
-        if not np.isfinite(p).all():
-            return
-        whole = np.append(p, rest) if math.isfinite(rest) else p
         self._began = now
-        self._busy = threading.Thread(
-            target=self._simulate, args=(t, signals[0], signals[1], whole, constants["l1"]), daemon=True
-        )
+        known = {} if history.constants is None else dict(history.constants)
+        samples = dict(zip((one.name for one in history.model.channels), signals, strict=True))
+        given = (history.model.name, known, t, samples, dict(history.published))
+        self._busy = threading.Thread(target=self._simulate, args=given, daemon=True)
         self._busy.start()
 
-    def at(self, t: Float) -> Float | None:
-        """The simulated angle at t [n], NaN where there is none; None before the first simulation."""
+    def at(self, name: str, t: Float) -> Float | None:
+        """The simulated sensor at t [n], NaN where there is none; None: it is not simulated."""
         found = self._newest
-        if found is None:
+        if found is None or name not in found.simulated:
             return None
         inside = (t >= found.t[0]) & (t <= found.t[-1])
-        return np.where(inside, np.interp(t, found.t, found.simulated), np.nan)
+        return np.where(inside, np.interp(t, found.t, found.simulated[name]), np.nan)
 
-    def _simulate(self, t: Float, phi: Float, y: Float, p: Float, l1: float) -> None:
+    def _simulate(
+        self, name: str, known: Mapping[str, float], t: Float, samples: Mapping[str, Float], newest: Mapping[str, float]
+    ) -> None:
+        from pvid.identification.validation import predicted  # loads SymPy
+        from pvid.models.mechanisms import compiled_of
+        from pvid.rig.run import Recording
+
         step = float(np.median(np.diff(t)))
         breaks = np.flatnonzero(np.diff(t) > _LONGEST_GAP * step)
-        first = int(breaks[-1]) + 1 if len(breaks) else 0
-        if step <= 0 or len(t) - first < 100:
+        part = slice(int(breaks[-1]) + 1 if len(breaks) else 0, None)
+        if step <= 0:
             return
         with suppress(PvidError, np.linalg.LinAlgError):
-            run = Run(t[first:], phi[first:], y[first:], 1.0 / step)
-            self._newest = simulated_angle(run, p, l1)
+            model = compiled_of(name)
+            model = replace(
+                model, knowns=tuple(replace(one, value=known.get(one.name, one.value)) for one in model.knowns)
+            )
+            run = Recording(t[part], {key: x[part] for key, x in samples.items()}, 1.0 / step)
+            self._newest = predicted(model, run, _values(model, newest), None)
+
+
+def _values(model: CompiledModel, newest: Mapping[str, float]) -> dict[str, float | None]:
+    """Of every parameter; an offset that is not estimated is that of the guess."""
+    found: dict[str, float | None] = {}
+    for one in model.unknowns:
+        value = newest.get(one.name, math.nan)
+        found[one.name] = value if math.isfinite(value) else None if one.positive else one.guess
+    return found

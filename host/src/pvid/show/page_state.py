@@ -188,15 +188,15 @@ class LiveState(threading.Thread):
         return np.array([known.get(t, math.nan) for t in history.estimates("t").tolist()], np.float64)
 
     def _motion(self) -> list[dict[str, Any]]:
-        """Of each channel its curve over the last seconds; of the pendulum's angle what the estimate predicts, too."""
+        """Of each channel its curve over the last seconds; of a sensor what the estimate predicts, too."""
         history = self._history
         t, *signals = history.samples()
         self._simulation.offer(history, t, signals)
         curves = []
-        for k, (one, x) in enumerate(zip(history.model.channels, signals, strict=True)):
+        for one, x in zip(history.model.channels, signals, strict=True):
             times, values = envelope(t, one.shown_in[1] * x, _BINS)
             curve: dict[str, Any] = {"label": one.label, "t": _numbers(times), "x": _numbers(values)}
-            if k == 0 and (modelled := self._simulation.at(times)) is not None:
+            if (modelled := self._simulation.at(one.name, times)) is not None:
                 curve["modelled"] = _numbers(one.shown_in[1] * modelled)
             curves.append(curve)
         return curves

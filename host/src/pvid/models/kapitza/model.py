@@ -14,7 +14,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pvid.models.kapitza.modes import modes_hz
 from pvid.models.kapitza.physical import is_plausible, linear, physical, physical_gradient
 from pvid.models.model import Channel, Constant, Constants, Float, Model, Parameter, Quantity, Scale
 
@@ -62,7 +61,6 @@ MODEL = Model(
     gradient_of=lambda p, constants: physical_gradient(p, constants["l1"]),
     mapped_of=_mapped_of,
     is_plausible=is_plausible,
-    modes_hz=modes_hz,
     scales=(
         Scale("y_gain", "sensor.y_gain_sd", "the gain of y", p=(1.0, -1.0, -2.0), physical=(0.0, 0.0, 0.0)),
         Scale("l1", "l1_sd", "l1", p=(-1.0, 1.0, 2.0), physical=(1.0, 1.0, 1.0)),
