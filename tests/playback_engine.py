@@ -8,6 +8,7 @@ twin by test_weak_f32, test_weak_bits_q31, test_second_stage and test_refine_mec
 from __future__ import annotations
 
 import hashlib
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -73,6 +74,9 @@ class Subject(Protocol):
     def digests(self, library: Path) -> Iterator[tuple[str, str]]:
         """What a build shows, by variant."""
 
+    def hashes(self, library: Path) -> Iterator[tuple[str, str]]:
+        """Of each variant the CRC-32 of its samples and the running hash behind them (pvid/fnv.h)."""
+
 
 def defined(sizes: Mapping[str, int]) -> tuple[str, ...]:
     """As options of the compiler, with those of every library of a mechanism."""
@@ -103,6 +107,11 @@ def played(core: Publisher, kind: str, size: int, run: Callable[[Any], Any], sam
         told.update(image)
         told.update(repr((len(image), snapshot.restore_as(kind, core, image))).encode())
     return told.hexdigest()[:16]
+
+
+def hash_behind(samples: npt.NDArray[Any], record: Any) -> str:
+    """CRC-32 of samples and the running hash at their end."""
+    return f"{zlib.crc32(samples.tobytes()):08x} {int(record.hash[-1]):08x}"
 
 
 # ---- float32, both stages ----
@@ -151,11 +160,16 @@ class BothStages:
         return core_of(FLOAT, refined=True)
 
     def digests(self, library: Path) -> Iterator[tuple[str, str]]:
-        native = WeakNative(self.run.weak.name, library)
+        native = WeakNative(self.run.weak.name, library, self.native.sources)
         for variant, (weak, refine, samples) in self.variants().items():
             core = native.refined_of(weak, refine)
             size = len(core.state_bytes) + native.headers.ffi.sizeof(core.refinement[0])
             yield f"{self.name}, {variant}", played(core, "refine_f32", size, core.run_both, samples)
+
+    def hashes(self, library: Path) -> Iterator[tuple[str, str]]:
+        native = WeakNative(self.run.weak.name, library, self.native.sources)
+        for variant, (weak, refine, samples) in self.variants().items():
+            yield variant, hash_behind(samples, native.refined_of(weak, refine).run_both(samples))
 
     def variants(self) -> dict[str, Any]:
         """Settings of both stages and samples."""
@@ -224,13 +238,22 @@ class InFixedPoint:
         return core_of(FIXED, refined=False)
 
     def digests(self, library: Path) -> Iterator[tuple[str, str]]:
-        native = WeakNativeQ31(self.native.name, library, self.native.config)
+        native = WeakNativeQ31(self.native.name, library, self.native.config, self.native.sources)
         for variant, (settings, counts) in self.variants().items():
             core = native.identifier()
             kept = [set_in(core, name, value) for name, value in settings.items()]
             if core.initialise():
                 raise SystemExit(f"{self.name}, {variant}: refused")
             yield f"{self.name}, {variant}", played(core, "weak_q31", len(core.state_bytes), core.run_samples, counts)
+            del kept
+
+    def hashes(self, library: Path) -> Iterator[tuple[str, str]]:
+        native = WeakNativeQ31(self.native.name, library, self.native.config, self.native.sources)
+        for variant, (settings, counts) in self.variants().items():
+            core = native.identifier()
+            kept = [set_in(core, name, value) for name, value in settings.items()]
+            core.initialise()
+            yield variant, hash_behind(counts, core.run_samples(counts))
             del kept
 
     def variants(self) -> dict[str, tuple[dict[str, Any], npt.NDArray[np.int32]]]:

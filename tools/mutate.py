@@ -3,6 +3,7 @@
 
     build/venv/bin/python tools/mutate.py                  240 mutants; writes build/mutants.md; a quarter of an hour
     build/venv/bin/python tools/mutate.py --count 10       ten of them; writes nothing
+    build/venv/bin/python tools/mutate.py --recorded       of all bits only the running hashes that the tests record
 
 The quick tests are two: what tests/playback.py plays of the strong form and tests/playback_engine.py of the weak engine
 and its second stage with the generated C of mechanisms, whose bits the suite compares with the numpy twin; and the
@@ -57,6 +58,7 @@ LINK = FIRMWARE / "link" / "link.c"
 BESIDES = (*(ROOT / "host" / "native").glob("[lr]*.c"), LINK)  # of the shared library, beside the core
 ENGINE = re.compile(r"^(refine|weak)_|_(refine|weak)_")  # names of files that the strong form does without
 COUNT = 240
+RECORDED = "--recorded" in sys.argv  # the workers of a pool read it, too
 LONGEST = 60  # seconds of processor time for what takes one
 QUICK = 1.0  # seconds that a test may take to be asked under sanitizers as well
 WANTED = 0.95
@@ -239,14 +241,16 @@ Digests = Callable[[Path], Iterator[tuple[str, str]]]
 @cache
 def playbacks() -> dict[Kit, Digests]:
     """The builds that are played, and what one shows by variant."""
-    playback.variants()
-    found: dict[Kit, Digests] = {NATIVE: lambda library: playback.digests(Native(library))}
+    found: dict[Kit, Digests] = {}
+    if not RECORDED:
+        playback.variants()
+        found[NATIVE] = lambda library: playback.digests(Native(library))
     for one in playback_engine.subjects():
         folder = one.library.parent
         options = ("-std=c99", *one.definitions, f"-I{folder}", f"-I{ROOT / 'host' / 'native'}")
         kit = Kit(one.name, "gcc", options, sources=(*one.sources, *sorted(folder.glob("*.c"))))
         shutil.copy(folder / HEADERS, emptied(BUILD / kit.name) / HEADERS)
-        found[kit] = one.digests
+        found[kit] = one.hashes if RECORDED else one.digests
     return found
 
 
@@ -343,7 +347,7 @@ def baseline() -> Baseline:
             raise SystemExit(f"the core as it is does not give the same bits twice ({kit.name})")
     for one in playback_engine.subjects():
         own = next(shown for kit, shown in digests.items() if kit.name == one.name)
-        if own != dict(one.digests(one.library)):
+        if own != dict((one.hashes if RECORDED else one.digests)(one.library)):
             raise SystemExit(f"{one.name}: other bits than those of the library of pvid")
     kits = (*playbacks(), PLAIN, TESTS)
     return Baseline(digests, {kit: including(kit) for kit in kits}, tests_of(PLAIN))
@@ -438,7 +442,7 @@ def killed_by_bits(mutant: Mutant, base: Baseline, folder: Path) -> str | None:
     """The first variant of a playback that is another; "no mutant" when no build's code is, or it does not compile."""
     kits = sorted(playbacks(), key=lambda kit: (kit is NATIVE) == bool(ENGINE.search(mutant.file)))
     differs = False
-    for kit in kits:
+    for kit in (*kits, *([PLAIN] if RECORDED else [])):
         if not base.reached(kit, mutant.file):
             continue
         library = changed_library(kit, mutant, base, folder, f"{mutant.rank(0)[:16]}.so")
@@ -446,6 +450,8 @@ def killed_by_bits(mutant: Mutant, base: Baseline, folder: Path) -> str | None:
             return "no mutant"
         if library[1]:
             differs = True
+            if kit is PLAIN:  # it is not played
+                continue
             if kit is not NATIVE:
                 (library[0].with_name(HEADERS)).symlink_to(BUILD / kit.name / HEADERS)
             shown = first_difference(digests_apart(kit, library[0], base.digests[kit]), base.digests[kit])
@@ -662,13 +668,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=0, help=f"mutants; without it {COUNT}, and the report is written")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--recorded", action="store_true", help="of all bits the recorded running hashes alone")
     parser.add_argument("--restart", action="store_true", help="ask those again, too, that were killed before")
     given = parser.parse_args()
     if given.restart:
         MEMORY.unlink(missing_ok=True)
-    results = campaign(given.count or COUNT, given.seed, memory=MEMORY)
+    results = campaign(given.count or COUNT, given.seed, memory=None if RECORDED else MEMORY)
     told = tally(results)
-    if not given.count:
+    if not given.count and not RECORDED:
         REPORT.write_text(report_of(results, given.seed), encoding="utf-8")
     print(
         f"{told.killed} of {told.mutants} mutants killed, {len(told.equivalent)} equivalent: "
