@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints what the host has from the public C headers: the enumerations as host/src/pvid/settings/enums.py, the settings
 of the estimator and of what judges it as host/src/pvid/settings/parts.py; and texts for firmware/src/judge/text.c and
-host/docs/reasons.md. --check: only compares.
+host/docs/reasons.md; and the version. --check: only compares.
 
 Run it with build/venv/bin/python after a change of the headers, when ./tools/pvid has built the C core.
 """
@@ -25,6 +25,9 @@ from pvid.core.native import Native  # noqa: E402
 FILE = ROOT / "host" / "src" / "pvid" / "settings" / "enums.py"
 TEXTS = ROOT / "firmware" / "src" / "judge" / "text.c"
 PARTS = FILE.with_name("parts.py")
+VERSION = ROOT / "firmware" / "include" / "pvid" / "version.h"
+MODULE = ROOT / "host" / "src" / "pvid" / "base" / "version.py"
+CITATION = ROOT / ".github" / "CITATION.cff"
 PAGE = ROOT / "host" / "docs" / "reasons.md"
 STATUS = ROOT / "firmware" / "include" / "pvid" / "status.h"
 ENUMS = {
@@ -196,6 +199,11 @@ def statuses(headers: Headers) -> str:
     )
 
 
+def version() -> str:
+    """That of version.h."""
+    return ".".join(re.findall(r"#define PVID_VERSION_\w+ (\d+)", VERSION.read_text(encoding="utf-8")))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true")
@@ -203,7 +211,10 @@ def main() -> None:
     headers = native.headers
     only_check = parser.parse_args().check
     page = with_table(PAGE, "statuses", statuses(headers))
-    for file, text in ((FILE, printed(headers)), (PARTS, parts(native)), (TEXTS, texts(headers)), (PAGE, page)):
+    module = f'"""The version, printed by tools/print_headers.py from version.h."""\n\n__version__ = "{version()}"\n'
+    citation = re.sub(r"(?m)^version: .*$", f"version: {version()}", CITATION.read_text(encoding="utf-8"))
+    made = {FILE: printed(headers), PARTS: parts(native), TEXTS: texts(headers), PAGE: page}
+    for file, text in (made | {MODULE: module, CITATION: citation}).items():
         if not only_check:
             file.write_text(text, encoding="utf-8")
         elif file.read_text(encoding="utf-8") != text:

@@ -67,6 +67,15 @@ def check_versions(root: Path) -> None:
             raise RefusalError(f"{path} has {other} at its top and firmware/include/pvid/version.h has {version}.")
 
 
+def check_changes(root: Path) -> None:
+    """Refuses changes that no section of the changelog has yet."""
+    left = sorted(path.name for path in (root / ".github" / "changes").glob("*.*.md"))
+    if left:
+        raise RefusalError(
+            f".github/changes/{left[0]} is in no section of the changelog; of such files there are {len(left)}."
+        )
+
+
 def check_tree(root: Path) -> None:
     """Refuses changes that no commit has."""
     changed = run("git", "status", "--porcelain", cwd=root, failure="git cannot tell what is committed").splitlines()
@@ -265,7 +274,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--rehearse", action="store_true", help="report what forbids a release, and build all the same")
     rehearse = parser.parse_args(arguments).rehearse
     try:
-        for check in (check_tree, check_versions):
+        for check in (check_tree, check_versions, check_changes):
             try:
                 check(ROOT)
             except RefusalError as refusal:

@@ -57,12 +57,22 @@ def test_a_release_passes_both_checks(project: Path) -> None:
     assert release.version_of_header(project) == "1.2.3"
 
 
+def test_a_change_in_no_section_is_refused_by_its_file(project: Path) -> None:
+    release.check_changes(project)
+    changes, name = project / ".github" / "changes", "+rig-columns.fixed"
+    changes.mkdir(parents=True)
+    (changes / "README.md").write_text("How.\n", encoding="utf-8")
+    release.check_changes(project)
+    (changes / f"{name}.md").write_text("More.\n", encoding="utf-8")
+    with pytest.raises(release.RefusalError, match=rf"{re.escape(name)}\S+ is in no section .* there are 1"):
+        release.check_changes(project)
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
         (PACKAGE, "1.2.3", "1.2.4"),
         (CHANGELOG, "## 1.2.3", "## 1.3.0"),
-        (CHANGELOG, "## 1.2.3", "## Unreleased\n\n## 1.2.3"),
     ],
 )
 def test_another_version_is_refused_by_its_file(name: str, old: str, new: str, project: Path) -> None:
@@ -87,7 +97,7 @@ def test_what_no_commit_has_is_refused(name: str, project: Path) -> None:
 
 def test_this_clone_has_one_version_and_the_lines_that_the_sdist_replaces() -> None:
     assert release.version_of_header(ROOT) == release.version_of_python(ROOT)
-    assert release.version_of_changelog(ROOT) in ("Unreleased", release.version_of_header(ROOT))
+    assert release.version_of_changelog(ROOT) == release.version_of_header(ROOT)
     text = (ROOT / "host" / "pyproject.toml").read_text(encoding="utf-8")
     assert [text.count(upward) for upward in release._UPWARD] == [1] * len(release._UPWARD)
 
