@@ -56,7 +56,7 @@ def identify(
         Arithmetic: float64 by default; the C core in f32 or q31 is compiled for the mechanism.
     refine
         In float64: the full equations are fitted to the whole run; by default of a model that has equations of its own
-        for it, such as kapitza.
+        for it.
     own, shared
         Of several recordings: unknowns with a value of their own in each, such as a payload, `m[A]` and `m[B]`; offsets
         of sensors, which have their own, with one value in all.

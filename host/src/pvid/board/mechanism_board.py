@@ -156,7 +156,7 @@ class MechanismBoard:
         ----------
         refined
             With the second stage. The simulation follows the equations of the weak form: where those of the refinement
-            are others, as the pendulum's, they contradict it.
+            are others, they contradict it.
 
         Raises
         ------

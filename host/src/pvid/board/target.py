@@ -439,7 +439,7 @@ def play(
     Parameters
     ----------
     signals
-        Of every sensor [ticks], in its unit; in counts for the fixed-point core. Of the pendulum phi and y.
+        Of every sensor [ticks], in its unit; in counts for the fixed-point core.
     hash_every, estimate_every
         Ticks between checkpoints of the running hash and between estimates; 0: the last only.
     patience_s

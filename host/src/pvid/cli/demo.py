@@ -46,7 +46,7 @@ def target() -> Target:
 def command(model: str, figure: Path, seed: int) -> int:
     """Simulates the rig of MODEL, streams it to the firmware on an emulated board and compares every bit.
 
-    MODEL is a mechanism of `pvid models`; kapitza, the two-link pendulum, by default.
+    MODEL is a mechanism of `pvid models`; without one, that of the README.
     """
     from pvid.cli.demo_run import demo  # loads SymPy
 

@@ -63,7 +63,7 @@ class Demonstrated:
 
     @classmethod
     def of(cls, model: str, seed: int) -> Demonstrated:
-        """Of a shipped mechanism: the pendulum with its full equations, the others with theirs."""
+        """Of a shipped mechanism, with its full equations where it has any."""
         rig = simulated_rig(model)
         simulation = RigSimulation.of(compiled_of(model), rig)
         own = _guessed(model, rig, simulation, seed)

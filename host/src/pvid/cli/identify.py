@@ -29,7 +29,7 @@ from pvid.settings.engine_cores import FLOAT
     "--refine/--no-refine",
     default=None,
     help="Fit the full equations to the whole run, from this answer on: any angle, friction, skew. In float64, or with "
-    "--core f32 by the second stage in C.  [default: of a model with equations of its own for it, such as kapitza]",
+    "--core f32 by the second stage in C.  [default: of a model with equations of its own for it]",
 )
 @click.option(
     "--on", "target", metavar="TARGET", help="Also compute on TARGET: an emulator, stream-host or a serial port."

@@ -155,7 +155,7 @@ def commands() -> None:
     """Identifies the parameters of a mechanism from its motion, on a PC and on microcontrollers, with equal bits.
 
     \b
-    pvid demo                                     see it work
-    pvid identify RUN.csv --set l1=0.25           your recording of a pendulum
-    pvid identify RUN.csv --model MODEL           of another mechanism
+    pvid demo                                           see it work
+    pvid identify RUN.csv                               your recording
+    pvid identify RUN.csv --model MODEL --set l1=0.25   that of a mechanism, with a constant
     """

@@ -181,7 +181,7 @@ class Form(IntEnum):
     """Which identifier an image holds."""
 
     STRONG = 0
-    WEAK = 2  # 1 was the weak form of the pendulum alone
+    WEAK = 2  # 1 was that of a single mechanism
 
 
 class Core(IntEnum):

@@ -1,7 +1,7 @@
 """How much a filter blurs the derivatives of signals, and what the parameters are off by for it.
 
 No equation contains the motion of a drive, so no residual shows that its derivative is too small: the parameters take
-the error. Measured on pendulums with a driven pivot at 200 Hz: an error of 1 % of the acceleration is 0.8 % of w. The
+the error. Measured on links with a driven pivot at 200 Hz: an error of 1 % of the acceleration is 0.8 % of w. The
 rate in a term of its own, as |v| v, is blurred without a trace, too: the term's parameter takes it.
 """
 

@@ -3,7 +3,7 @@
 D samples make a step. The block sums are a comb filter of order 2, weights 1, 2, .., D, .., 2, 1 over D^2, with zeros
 where frequencies fold onto 0. A filter at the steps, a compensator, gives the value or a derivative from its output:
 exact at a few frequencies of the motion, with the least noise of all that are. A compensator that is right only on
-average biases the parameters (evidence: half-window sums of the pendulum).
+average biases the parameters (evidence: half-window sums of a driven pivot).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def comb_gain(hz: Float, decimation: int, sample_rate: float) -> Float:
 def nodes_of(order: int, degree: int) -> int:
     """How many a compensator has that takes the place of a polynomial of this degree: 4 where that is for derivatives.
 
-    With 3, y'' of the pendulum at 42 steps a second biases w by 1.4 standard deviations of a 40 s run with 16 bits.
+    With 3, y'' of a driven pivot at 42 steps a second biases w by 1.4 standard deviations of a 40 s run with 16 bits.
     """
     return 4 if order and degree >= 5 else 2
 
