@@ -40,6 +40,8 @@ def board_of_mechanism(name: str, kind: type[Board] | None = None) -> Board:
         board = kind.of_recording(MechanismRig(OWN[name].path, OWN[name].rate), own_recording(name))
     else:
         board = kind.of_shipped_rig(name)
+    if isinstance(board, MechanismBoardQ31):
+        return replace(board, recording=board.recording[:TICKS])
     return replace(board, recording=board.recording[:TICKS])
 
 
