@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from conftest import ROOT
 from described import CHAIN, MOTOR
 
 from pvid.base.errors import PvidError
+from pvid.codegen import generated
 from pvid.codegen.build import build, check, files_of
 from pvid.codegen.files_weak_q31 import fitted_of
 from pvid.codegen.fixed_model import Reaches
@@ -222,17 +224,36 @@ def test_a_soft_sign_is_one_of_the_design_too() -> None:
     assert widths.split() == ["0.0f,", "0.25f,"]
 
 
+def test_a_model_is_analysed_once_however_many_printers_read_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+
+    def counted(name: str) -> Callable[..., Any]:
+        own = getattr(generated, name)
+
+        def make(*given: Any) -> Any:
+            made.append(name)
+            return own(*given)
+
+        return make
+
+    parts = ("functions_of", "fixed_model", "weak_functions_of", "strong_functions_of", "refine_functions")
+    for name in parts:
+        monkeypatch.setattr(generated, name, counted(name))
+    assert len(files_of(generated_model(compiled_of("rigid_body"), strong=True))) > 10
+    assert sorted(made) == sorted(parts)
+
+
 def test_a_wrong_bit_fails_the_test_of_the_folder(tmp_path: Path) -> None:
     files = files_of(generated_model(MOTOR))
     wrong = files["motor_f32.c"].replace("pvid_sign_f32", "pvid_magnitude_f32")
     for name, text in {**files, "motor_f32.c": wrong}.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    generated = [tmp_path / f"motor_{one}.c" for one in ("f32", "q31", "test")]
+    written = [tmp_path / f"motor_{one}.c" for one in ("f32", "q31", "test")]
     core = [
         source(f"{one}.c")
         for one in ("elementary_f32", "elementary_q31", "scaled_q31", "scaled_model_q31", "integer_q31")
     ]
-    sources = [*generated, *core]
+    sources = [*written, *core]
     includes = [f"-I{ROOT / 'firmware' / one}" for one in ("include", "src")]
     run("gcc", "-std=c99", "-O1", *includes, *sources, "-o", tmp_path / "test")
     done = subprocess.run([tmp_path / "test"], capture_output=True, text=True, check=False)
