@@ -44,14 +44,14 @@ static void any_engine(void)
     engine_design.model = &engine_model;
     engine_config.design = &engine_design;
     engine.design = &engine_design;
-    engine.collect.design = &engine_design;
-    engine.collect.front.offset = limits;
+    engine.accumulator.design = &engine_design;
+    engine.accumulator.front.offset = limits;
     engine.drive_min = limits;
     engine.estimator.model = &model;
     any_image();
     (void)pvid_snapshot_restore_weak_q31(&engine, &engine_config, image, any_u32(0, sizeof image));
-    /*@ assert engine.design == &engine_design && engine.collect.design == &engine_design; */
-    /*@ assert engine.collect.front.offset == &limits[0] && engine.drive_min == &limits[0]; */
+    /*@ assert engine.design == &engine_design && engine.accumulator.design == &engine_design; */
+    /*@ assert engine.accumulator.front.offset == &limits[0] && engine.drive_min == &limits[0]; */
     /*@ assert engine.estimator.model == &model; */
     (void)pvid_snapshot_save_weak_q31(&engine, &engine_config, any_u32(0, UINT32_MAX), image, any_u32(0, sizeof image));
 }

@@ -143,9 +143,9 @@ def rig(name: str, samples: int) -> Rig:
 _DRIVER = """
 #include <string.h>
 
-#include "weak/collect_q31.h"
+#include "weak/accumulator_q31.h"
 #include "weak/columns_q31.h"
-#include "weak/mirror_q31.h"
+#include "weak/reflection_q31.h"
 #include "weak/sums_q31.h"
 #include "weak/white_q31.h"
 #include "number/integer_q31.h"
@@ -158,14 +158,14 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
 /* S_h of the windows of a run, channel by channel; returns their number. */
 unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned most, uint8_t outcome[])
 {
-    static pvid_weak_collect_q31 self;
+    static pvid_weak_accumulator_q31 self;
     const pvid_weak_model_q31 *model = rig_design_q31.model;
     const unsigned harmonics = (rig_design_q31.functions / 2u) + (rig_design_q31.power / 2u) + 1u;
     unsigned windows = 0;
     static const int32_t offset[PVID_MAX_SAMPLES] = {0};
-    pvid_weak_collect_init_q31(&self, &rig_design_q31, offset);
+    pvid_weak_accumulator_init_q31(&self, &rig_design_q31, offset);
     for (unsigned k = 0; k < ticks; k++) {
-        const pvid_weak_tick tick = pvid_weak_collect_step_q31(&self, &counts[k * model->samples]);
+        const pvid_weak_tick tick = pvid_weak_accumulator_step_q31(&self, &counts[k * model->samples]);
         outcome[k] = (uint8_t)tick;
         if ((tick == PVID_WEAK_WINDOW) && (windows < most)) {
             for (unsigned c = 0; c < model->channels; c++) {
@@ -239,8 +239,8 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
     pvid_weak_white_spectrum_q31(&white, design, (uint8_t)kind, design->error_variance[kind], weight, 0, harmonics);
     const pvid_scaled_q31 least = pvid_weak_white_floor_q31(&white, design);
     pvid_weak_white_invert_q31(&white, least, 0, harmonics);
-    for (size_t k = 0; k < pvid_weak_mirrors_q31(design); k++) {
-        pvid_weak_white_mirror_q31(&white, design, k);
+    for (size_t k = 0; k < pvid_weak_reflectors_q31(design); k++) {
+        pvid_weak_white_reflector_q31(&white, design, k);
     }
     pvid_weak_columns_begin_q31(&made, design, kind);
     for (size_t h = 0; h < harmonics; h++) {
@@ -259,7 +259,7 @@ unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t win
         const bool kept = pvid_weak_columns_keep_q31(whole[j], rows - live, mirror);
         for (size_t i = 0; i < count; i++) {
             if (kept && ((i < used) || (i > j))) {
-                pvid_weak_mirror_q31(mirror, rows - live, &made.x[i][live]);
+                pvid_weak_reflect_q31(mirror, rows - live, &made.x[i][live]);
             }
         }
         live += kept ? 1u : 0u;

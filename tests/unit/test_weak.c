@@ -543,7 +543,7 @@ static void a_frozen_identifier_drops_windows_and_resumes(void **state)
     (void)run(&rig, 5 * HOP, reasons);
     assert_int_equal(reasons[PVID_HELD_FROZEN], 5);
     assert_int_equal(self.estimator.counters.rows, rows);
-    assert_true(self.finish.alone); /* the next window has no neighbour */
+    assert_true(self.finish.no_predecessor); /* the next window has no neighbour */
     pvid_weak_freeze_f32(&self, false);
     assert_true(run(&rig, 5 * HOP, reasons) >= 4u);
 }

@@ -9,7 +9,7 @@
 
 #include "engine_q31.h"
 #include "weak/weak_front_q31.h"
-#include "weak/collect_q31.h"
+#include "weak/accumulator_q31.h"
 #include "weak/weak_finish_q31.h"
 #include "pvid/little_endian.h"
 #include "pvid/pvid_q31.h"

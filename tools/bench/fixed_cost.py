@@ -20,11 +20,11 @@ STATE_HEADER = ("state", "bytes")
 
 # Sources that a part of the engine has of its own; what is left is arithmetic that all parts share.
 _PARTS = (
-    ("samples to the block sums, schedule", r"weak_q31|collect_q31"),
+    ("samples to the block sums, schedule", r"weak_q31|accumulator_q31"),
     ("jets at a step", r"weak_front_q31"),
     ("channels and integrals of a step", r"values_q31|_weak_q31|elementary_q31"),
     ("half-window sums and their join", r"sums_q31"),
-    ("a window: white columns, rows, residuals", r"weak_finish_q31|columns_q31|white_q31|mirror_q31|rescale_q31"),
+    ("a window: white columns, rows, residuals", r"weak_finish_q31|columns_q31|white_q31|reflection_q31|rescale_q31"),
     ("a window: the sensors' noise", r"noise_q31"),
     ("a window: scatter of the scores, equation errors", r"scores_q31|error_q31"),
     (

@@ -23,7 +23,7 @@ TEXT_HEADER = ("text", "bytes")
 MECHANISMS_HEADER = ("mechanism", "mean", "longest", "state", "tables", "text")
 
 _PARTS = (
-    ("samples to the block sums, schedule", r"weak_f32|watch_f32"),
+    ("samples to the block sums, schedule", r"weak_f32|limits_f32"),
     ("jets at a step", r"weak_front_f32"),
     ("channels and integrals of a step", r"weak_step_f32|\w+_weak_f32|elementary_f32"),
     ("half-window sums and their join", r"sums_f32"),
@@ -39,7 +39,7 @@ _PARTS = (
 _STRUCTS = (
     ("block sums and the line of the compensators", "sizeof(pvid_weak_front_f32)"),
     ("inputs, gains and integrals of the last steps", "sizeof(pvid_weak_history_f32)"),
-    ("range and least motion of the samples", "sizeof(pvid_weak_watch_f32)"),
+    ("range and least motion of the samples", "sizeof(pvid_weak_limits_f32)"),
     ("sums of two half windows", "sizeof(((pvid_weak_sums_f32 *)0)->sum)"),
     ("blocks of eight steps", "sizeof(((pvid_weak_sums_f32 *)0)->block)"),
     (

@@ -81,7 +81,7 @@ static void share(void *to, const void *from, size_t bytes)
     }
 }
 
-static void take(void *to, const void *from, size_t bytes)
+static void copy_out(void *to, const void *from, size_t bytes)
 {
     word *own = to;
     const word *place = from;
@@ -113,7 +113,7 @@ bool pvid_publication_read(const pvid_publication_mark *mark, const void *estima
         const uint32_t version = load_number(&mark->version);
         const uint32_t place = version % 2u;
         read_so_far();
-        take(out, (place == 0u) ? estimate : copy, bytes);
+        copy_out(out, (place == 0u) ? estimate : copy, bytes);
         const uint32_t count = load_number(&mark->number[place]);
         read_so_far();
         if (load_number(&mark->version) == version) {

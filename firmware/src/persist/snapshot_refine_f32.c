@@ -10,7 +10,7 @@
 #define PLACE(field) ((uint32_t)offsetof(pvid_refine_f32, field))
 
 /* The refinement without its configuration, which keeps the pointers and values of init. */
-#define KEPT (sizeof(pvid_refine_f32) - offsetof(pvid_refine_f32, h))
+#define SAVED_BYTES (sizeof(pvid_refine_f32) - offsetof(pvid_refine_f32, h))
 
 /* Sizes and places of the parts, and the sizes of their arrays. */
 static const uint32_t layout[] = {
@@ -39,7 +39,7 @@ static pvid_snapshot_identity identity_of(const pvid_weak_config_f32 *config)
     identity.layout ^= pvid_snapshot_layout(layout, sizeof layout / sizeof layout[0]);
     identity.model = pvid_fingerprint_refine_model_f32(identity.model);
     identity.config = pvid_fingerprint_refine_f32(identity.config, config->refine->config);
-    identity.bytes += KEPT;
+    identity.bytes += SAVED_BYTES;
     return identity;
 }
 

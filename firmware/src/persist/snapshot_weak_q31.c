@@ -23,10 +23,10 @@ static const uint32_t layout[] = {
     sizeof(pvid_reason),
     sizeof(void *),
     PLACE(drive),
-    PLACE(collect),
-    PLACE(collect.values),
-    PLACE(collect.sums),
-    PLACE(collect.window),
+    PLACE(accumulator),
+    PLACE(accumulator.values),
+    PLACE(accumulator.sums),
+    PLACE(accumulator.window),
     PLACE(finish),
     PLACE(finish.gate),
     PLACE(finish.scores),
@@ -58,8 +58,10 @@ static const uint32_t layout[] = {
 };
 
 static const pvid_snapshot_pointer pointers[] = {
-    {PLACE(design), PVID_SNAPSHOT_OF_INIT},          {PLACE(drive_min), PVID_SNAPSHOT_OF_INIT},
-    {PLACE(collect.design), PVID_SNAPSHOT_OF_INIT},  {PLACE(collect.front.offset), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(design), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(drive_min), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(accumulator.design), PVID_SNAPSHOT_OF_INIT},
+    {PLACE(accumulator.front.offset), PVID_SNAPSHOT_OF_INIT},
     {PLACE(estimator.model), PVID_SNAPSHOT_OF_INIT},
 };
 static const pvid_snapshot_shape shape = {sizeof(pvid_weak_q31), pointers, sizeof pointers / sizeof pointers[0]};

@@ -27,23 +27,23 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
 #define WHITENESS 0.89f
 
 /* Residuals beyond this are never used [units of the first output]. */
-#define ABSURD 1.0e3f
+#define RESIDUAL_MAX 1.0e3f
 
 /* In the search: a converged block with less than this many times the limit may grow; one with more than that many
  * begins anew with the first length. */
-#define MAY_GROW 3.0f
-#define HOPELESS 30.0f
+#define GROWTH_LIMIT 3.0f
+#define RESTART_LIMIT 30.0f
 
 /* A search whose last step was longer than this [prior_sd] begins anew when there is a new estimate of the weak form; a
  * block with a shorter one and small residuals need not converge: it goes on twice as long. */
-#define ASTRAY 3.0f
-#define ROUGH 2.0f
+#define RESTART_STEP 3.0f
+#define UNCONVERGED_STEP 2.0f
 
 /* Lost blocks until the search begins again from the weak form's estimate; a block that is not sane counts twice. */
 #define LOST_MOST 6u
 
 /* Entries of the ring before an estimate of the weak form that the search may use. */
-#define RECENT 200u
+#define WEAK_AGE_MAX 200u
 
 /* Part of the difference by which level and clash follow a block's. */
 #define LEVEL_GAIN 0.2f
@@ -54,17 +54,17 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
 
 /* Factor on the triangle if the next block contains samples that the triangle already has, or if the past is given up:
  * it has next to no weight then, but the clash with it can still be computed. */
-#define KEPT (1.0f / 16.0f)
+#define PAST_WEIGHT (1.0f / 16.0f)
 
 /* Largest change of the information of past and block (square root of its determinant) from the block's first pass,
  * which is linearised where the past was, to its last one. Beyond it the past is given up. */
 #define CONSISTENT 2.0f
 
 /* Steps between the three readings that a block's start is measured by. */
-#define APART 4u
+#define START_SPACING 4u
 
 /* In the track a first pass whose step of the logarithms is this much below the limit is the block's last. */
-#define SHORT 0.25f
+#define SINGLE_PASS_STEP 0.25f
 
 /* Standard errors that an estimate of the weak form may be off. */
 #define PRIOR_ERRORS 10.0f
@@ -76,14 +76,14 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
 
 /* With signs a block whose last step is above step_fine is taken only up to the second, and this part of its triangle
  * remains: the others are to outweigh the error of its linearization. */
-#define ROUGHLY 0.25f
+#define PARTIAL_WEIGHT 0.25f
 
 /* Least variance of a row over that of the sensors: the errors of reversals in the finest steps are alike from block to
  * block. */
-#define REVERSALS 4.0f
+#define REVERSAL_VARIANCE 4.0f
 
 /* Part of a width's start below which it does not fall: the steps are too long for a sharper reversal. */
-#define SHARPEST 0.25f
+#define LEAST_WIDTH 0.25f
 
 /* Jobs of a pass for each of its big steps, at most, and for its beginning; ticks of a solution; entries that such a
  * block keeps free. */
@@ -97,7 +97,7 @@ enum { WAIT, PASS, SOLVE, MOVE, END, FOLLOW, ASSESS, JUDGE, PUBLISH, NEXT, START
 #define SOLVE_TICKS(self) 45u
 #endif
 #define FIRST_JOBS 16u
-#define SPARE 16u
+#define FREE_ENTRIES 16u
 
 static inline bool is_ready(const pvid_refine_f32 *self)
 {
@@ -139,7 +139,7 @@ static bool is_gated(const pvid_refine_f32 *self)
 static void begin_pass(pvid_refine_f32 *self)
 {
     const float gate =
-        is_gated(self) ? (self->config.gate * self->config.sd[0] * pvid_refine_root_f32(self->level)) : ABSURD;
+        is_gated(self) ? (self->config.gate * self->config.sd[0] * pvid_refine_root_f32(self->level)) : RESIDUAL_MAX;
     const pvid_refine_steps_f32 steps = {
         .h = self->h,
 #if PVID_REFINE_RUNGE_KUTTA
@@ -181,7 +181,7 @@ PVID_COLD static void begin_block(pvid_refine_f32 *self)
  * a large motion is too far away. */
 static void start_job(pvid_refine_f32 *self)
 {
-    const uint32_t behind = self->begin + ((2u * APART) + 1u);
+    const uint32_t behind = self->begin + ((2u * START_SPACING) + 1u);
     if ((int32_t)(pvid_refine_front_end_f32(&self->front) - behind) < 0) {
         self->waiting = true;
         self->due = behind;
@@ -189,9 +189,9 @@ static void start_job(pvid_refine_f32 *self)
     }
     pvid_refine_signals_f32 at[3];
     for (uint32_t k = 0; k < 3u; k++) {
-        pvid_refine_front_read_f32(&self->front, self->begin + (k * APART), &at[k]);
+        pvid_refine_front_read_f32(&self->front, self->begin + (k * START_SPACING), &at[k]);
     }
-    const float scale = 1.0f / ((2.0f * (float)APART) * self->h);
+    const float scale = 1.0f / ((2.0f * (float)START_SPACING) * self->h);
     for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
         const size_t code = pvid_refine_measured[i];
         if (code > 0u) {
@@ -293,7 +293,8 @@ static uint32_t oldest(const pvid_refine_f32 *self, uint32_t passes, uint32_t le
 {
     const pvid_refine_config_f32 *config = &self->config;
     const uint32_t ticks = passes * ticks_of_pass(self, length);
-    const uint32_t taken = (ticks / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + SPARE; /* in the meantime */
+    const uint32_t taken =
+        (ticks / ((config->ratio > 1u) ? (config->ratio - 1u) : 1u)) + FREE_ENTRIES; /* in the meantime */
     const uint32_t room = pvid_refine_front_room_f32(&self->front);
     const uint32_t end = pvid_refine_front_end_f32(&self->front);
     const uint32_t back = (room > taken) ? (room - taken) : 0u;
@@ -404,7 +405,7 @@ static bool is_consistent(const pvid_refine_f32 *self)
 }
 #endif
 
-static void take(pvid_refine_f32 *self, float square, float clash, bool again, uint32_t began)
+static void accept_block(pvid_refine_f32 *self, float square, float clash, bool again, uint32_t began)
 {
     const pvid_refine_config_f32 *config = &self->config;
     self->refused = 0;
@@ -430,12 +431,12 @@ static void take(pvid_refine_f32 *self, float square, float clash, bool again, u
         lengthen(self, began);
     }
     const bool anew = self->again || !consistent;
-    fade = anew ? KEPT : fade;
+    fade = anew ? PAST_WEIGHT : fade;
     float counts = 1.0f;
 #if PVID_REFINE_SIGNS > 0
-    counts = is_fine(self) ? 1.0f : ROUGHLY;
+    counts = is_fine(self) ? 1.0f : PARTIAL_WEIGHT;
 #endif
-    self->kept = anew ? (KEPT * counts) : counts;
+    self->kept = anew ? (PAST_WEIGHT * counts) : counts;
     fade *= counts;
     for (size_t i = 0; i < PVID_REFINE_TRIANGLE; i++) {
         self->triangle[i] = self->solve.triangle[i] * fade;
@@ -472,10 +473,10 @@ static void refuse(pvid_refine_f32 *self, bool sane)
 static void resize(pvid_refine_f32 *self, bool sane, float square)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    if (sane && (square < (MAY_GROW * config->chi_max))) {
+    if (sane && (square < (GROWTH_LIMIT * config->chi_max))) {
         const uint32_t twice = 2u * (uint32_t)self->length;
         self->length = (uint16_t)((twice < config->block) ? twice : self->length);
-    } else if (!sane || !(square <= (HOPELESS * config->chi_max))) {
+    } else if (!sane || !(square <= (RESTART_LIMIT * config->chi_max))) {
         self->length = config->first_block;
     } else {
         /* as long again */
@@ -547,14 +548,14 @@ static void end_block(pvid_refine_f32 *self)
     self->sane = is_sane(self);
     const float room = at_least_one(self->level);
     const bool again = self->again;
-    const float limit = again ? (MAY_GROW * config->chi_max) : config->chi_max;
+    const float limit = again ? (GROWTH_LIMIT * config->chi_max) : config->chi_max;
     const bool taken = self->sane && (square < (limit * room)) &&
                        ((self->taken == 0u) || again || (clash < (config->clash_max * room))) && is_settled(self);
     const uint32_t began = self->begin;
     self->begin += (uint32_t)self->work.step * PVID_REFINE_SUB;
     self->again = false;
     if (taken) {
-        take(self, square, clash, again, began);
+        accept_block(self, square, clash, again, began);
         self->verdict = (self->taken > 1u) ? PVID_UPDATED : PVID_HELD_UNCERTAIN; /* one block proves little */
     } else {
         self->verdict = (self->taken > 0u) ? PVID_HELD_BLOCK : PVID_HELD_SEARCHING;
@@ -606,7 +607,7 @@ static void solve_job(pvid_refine_f32 *self)
 static bool is_enough(const pvid_refine_f32 *self)
 {
     const pvid_refine_config_f32 *config = &self->config;
-    const bool tracks = (self->taken > 0u) && (self->solve.bend < (SHORT * config->step_max));
+    const bool tracks = (self->taken > 0u) && (self->solve.bend < (SINGLE_PASS_STEP * config->step_max));
     const bool small = (tracks || (self->pass >= config->passes)) && is_settled(self);
     return small || (self->pass >= config->most_passes) || !lasts(self, self->length);
 }
@@ -623,7 +624,7 @@ static bool grows(const pvid_refine_f32 *self)
     const pvid_refine_config_f32 *config = &self->config;
     const uint32_t twice = 2u * (uint32_t)self->length;
     return (self->taken == 0u) && (self->pass >= 2u) && (twice < config->block) && may_grow(self, twice) &&
-           (self->solve.size < ROUGH) && (mean_square(self) < (MAY_GROW * config->chi_max));
+           (self->solve.size < UNCONVERGED_STEP) && (mean_square(self) < (GROWTH_LIMIT * config->chi_max));
 }
 
 /* The point of linearisation and the start move by the steps. */
@@ -640,7 +641,7 @@ static void move(pvid_refine_f32 *self)
     pvid_refine_move_f32(self->linear, self->solve.step, moved);
 #if PVID_REFINE_WIDTHS > 0
     for (size_t i = 0; i < PVID_REFINE_WIDTHS; i++) {
-        const float least = SHARPEST * self->config.width[i];
+        const float least = LEAST_WIDTH * self->config.width[i];
         moved[i] = (moved[i] > least) ? moved[i] : least;
     }
 #endif
@@ -664,7 +665,7 @@ static void move(pvid_refine_f32 *self)
         begin_pass(self);
     } else if (is_enough(self)) {
         self->phase = END;
-    } else if ((self->taken == 0u) && self->renewed && !(self->solve.size < ASTRAY)) {
+    } else if ((self->taken == 0u) && self->renewed && !(self->solve.size < RESTART_STEP)) {
         self->lost = 1;
         self->length = self->config.first_block;
         self->verdict = PVID_HELD_SEARCHING;
@@ -688,7 +689,7 @@ static float variance_of_row(const pvid_refine_f32 *self)
     const float clash = clash_of(self);
     float larger = (clash > level) ? clash : level;
 #if PVID_REFINE_SIGNS > 0
-    larger = (larger > REVERSALS) ? larger : REVERSALS;
+    larger = (larger > REVERSAL_VARIANCE) ? larger : REVERSAL_VARIANCE;
 #endif
     return (self->config.sd[0] * self->config.sd[0]) * larger;
 }
@@ -727,7 +728,7 @@ static uint32_t recent(const pvid_refine_front_f32 *front)
 {
     const uint32_t first = pvid_refine_front_first_f32(front);
     const uint32_t end = pvid_refine_front_end_f32(front);
-    return (end > (first + RECENT)) ? (end - RECENT) : first;
+    return (end > (first + WEAK_AGE_MAX)) ? (end - WEAK_AGE_MAX) : first;
 }
 
 /* The next block. A search that is lost begins anew from the weak form's newest estimate. */

@@ -11,7 +11,7 @@
 
 #include "number/integer_q31.h"
 #include "number/unroll.h"
-#include "weak/mirror_q31.h"
+#include "weak/reflection_q31.h"
 #include "weak/white_q31.h"
 
 #define SUM_BITS 30
@@ -166,7 +166,7 @@ bool pvid_weak_columns_keep_q31(uint64_t whole, size_t n, int32_t x[])
         return false;
     }
     (void)pvid_weak_block_q31(n, x);
-    pvid_weak_mirror_of_q31(n, x);
+    pvid_weak_reflector_of_q31(n, x);
     return true;
 }
 

@@ -8,7 +8,7 @@
 
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
-#include "weak/mirror_q31.h"
+#include "weak/reflection_q31.h"
 #include "weak/sums_q31.h"
 #include "weak/white_q31.h"
 
@@ -27,7 +27,7 @@ void pvid_weak_noise_leverage_q31(const pvid_weak_white_q31 *white, const pvid_w
     }
     for (size_t left = k + 1u; left > 0u; left--) {
         const size_t j = left - 1u;
-        pvid_weak_mirror_q31(&white->mirror[j][first + j], n - j, &u[j]);
+        pvid_weak_reflect_q31(&white->reflector[j][first + j], n - j, &u[j]);
     }
     for (size_t i = 0; i < n; i++) {
         const int32_t square = (int32_t)pvid_floor_shift_q31(pvid_short_square_q31(u[i]), 22);

@@ -13,7 +13,7 @@
 #include "weak/sums_f32.h"
 #include "weak/ticks_f32.h"
 #include "weak/valid_f32.h"
-#include "weak/watch_f32.h"
+#include "weak/limits_f32.h"
 #include "weak/weak_finish_f32.h"
 #include "weak/weak_front_f32.h"
 #include "weak/weak_step_f32.h"
@@ -22,11 +22,11 @@
 /* The largest finite number. */
 #define LARGEST 3.40282347e38f
 
-/* No reasons of a tick: a window is being processed; a block is being added, or a window joined; the channels of a step
- * are to be formed. */
-#define PROCESS 255u
-#define ADD 254u
-#define FORM 253u
+/* Tasks, beside the reasons of a tick that has none: stages of a window; a block is added, or a window joined; the
+ * channels of a step are formed. */
+#define TASK_PROCESS 255u
+#define TASK_ADD 254u
+#define TASK_FORM 253u
 
 static inline bool all_finite(const float values[], size_t n)
 {
@@ -122,13 +122,13 @@ static inline uint8_t harmonics_of(const pvid_weak_f32 *self)
     return (PVID_EXACT != 0) ? (uint8_t)PVID_MAX_HARMONICS : self->harmonics;
 }
 
-/* What a tick without a step does from now on. */
-PVID_NOINLINE static void rest(pvid_weak_f32 *self)
+/* Sets what a tick that ends no step has to do. */
+PVID_NOINLINE static void choose_task(pvid_weak_f32 *self)
 {
     if (pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self))) {
-        self->rest = ADD;
+        self->task = TASK_ADD;
     } else {
-        self->rest = pvid_weak_finish_is_busy_f32(&self->finish) ? PROCESS : (uint8_t)idle(self);
+        self->task = pvid_weak_finish_is_busy_f32(&self->finish) ? TASK_PROCESS : (uint8_t)idle(self);
     }
 }
 
@@ -137,10 +137,10 @@ PVID_COLD static void restart(pvid_weak_f32 *self)
     pvid_weak_front_reset_f32(&self->front);
     pvid_weak_step_reset_f32(&self->history);
     pvid_weak_sums_reset_f32(&self->sums, self->harmonics);
-    pvid_weak_watch_reset_f32(&self->watch);
+    pvid_weak_limits_reset_f32(&self->limits);
     pvid_weak_finish_skip_f32(&self->finish);
     self->warm = false;
-    rest(self);
+    choose_task(self);
 }
 
 static pvid_status init_refinement(pvid_weak_f32 *self, const pvid_weak_refine_f32 *refine)
@@ -205,8 +205,8 @@ PVID_COLD static pvid_status prepare(pvid_weak_f32 *self, const pvid_weak_config
     self->iterations = (uint8_t)((self->estimator.settings.gain < 1.0f) ? 1u : config->iterations);
     pvid_weak_front_init_f32(&self->front, design, config->sample_rate_hz);
     pvid_weak_step_init_f32(&self->history, (float)pvid_weak_front_lead_f32(&self->front) / config->sample_rate_hz);
-    pvid_weak_watch_init_f32(&self->watch, config, delay_of(design));
-    self->watches = (config->range != NULL) || (self->watch.moves != 0u);
+    pvid_weak_limits_init_f32(&self->limits, config, delay_of(design));
+    self->has_limits = (config->range != NULL) || (self->limits.moves != 0u);
     self->samples = design->model->samples;
     if ((PVID_EXACT != 0) &&
         ((self->channels != PVID_EXACT_CHANNELS) || (self->front.plain != (PVID_EXACT_PLAIN != 0)))) {
@@ -267,11 +267,11 @@ PVID_COLD static pvid_reason drop_reason(pvid_weak_f32 *self)
     if (self->frozen) {
         return PVID_HELD_FROZEN;
     }
-    if (pvid_weak_watch_beyond_f32(&self->watch)) {
+    if (pvid_weak_limits_beyond_f32(&self->limits)) {
         pvid_count_up(&self->estimator.counters.held_out_of_range);
         return PVID_HELD_OUT_OF_RANGE;
     }
-    if (self->watch.still) {
+    if (self->limits.still) {
         pvid_count_up(&self->estimator.counters.held_not_excited);
         return PVID_HELD_NOT_EXCITED;
     }
@@ -296,7 +296,7 @@ PVID_NOINLINE static pvid_reason end_half(pvid_weak_f32 *self)
 }
 
 /* The channels of a step to the present block. */
-PVID_NOINLINE static pvid_reason form(pvid_weak_f32 *self)
+PVID_NOINLINE static pvid_reason form_channels(pvid_weak_f32 *self)
 {
     mark_busy(self);
     const pvid_weak_design_f32 *design = self->design;
@@ -307,7 +307,8 @@ PVID_NOINLINE static pvid_reason form(pvid_weak_f32 *self)
             dropped = end_half(self);
         }
     }
-    self->rest = pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self)) ? (uint8_t)ADD : self->resume;
+    self->task =
+        pvid_weak_sums_is_busy_f32(&self->sums, harmonics_of(self)) ? (uint8_t)TASK_ADD : self->task_after_step;
     return (dropped != PVID_ACCUMULATED) ? dropped : idle(self);
 }
 
@@ -328,7 +329,7 @@ static inline uint32_t items_of(const pvid_weak_f32 *self)
 }
 
 /* Some harmonics of the last block are added, or of the last window joined. */
-static pvid_reason add(pvid_weak_f32 *self)
+static pvid_reason add_harmonics(pvid_weak_f32 *self)
 {
     mark_busy(self);
     pvid_weak_sums_f32 *sums = &self->sums;
@@ -343,13 +344,13 @@ static pvid_reason add(pvid_weak_f32 *self)
         }
     }
     if (!pvid_weak_sums_is_busy_f32(sums, harmonics_of(self))) {
-        rest(self);
+        choose_task(self);
     }
     return idle(self);
 }
 
 /* Some stages of the last whole window. */
-static pvid_reason process(pvid_weak_f32 *self)
+static pvid_reason process_window(pvid_weak_f32 *self)
 {
     mark_busy(self);
     uint32_t left = self->stages_per_tick;
@@ -359,25 +360,25 @@ static pvid_reason process(pvid_weak_f32 *self)
         left--;
     } while (left > 0u);
     if (!pvid_weak_finish_is_busy_f32(&self->finish)) {
-        rest(self);
+        choose_task(self);
     }
     return (pvid_reason)self->finish.report;
 }
 
 /* The samples of the tick of a step, whose channels follow. */
-static void watch(pvid_weak_f32 *self, const float sample[])
+static void check_limits(pvid_weak_f32 *self, const float sample[])
 {
     const pvid_weak_design_f32 *design = self->design;
     const uint16_t index = self->sums.index;
     const size_t half = self->sums.half;
-    pvid_weak_watch_step_f32(&self->watch, design->model->samples, sample, half, index == 0u);
+    pvid_weak_limits_step_f32(&self->limits, design->model->samples, sample, half, index == 0u);
     if (index + 1u == design->hop) {
-        pvid_weak_watch_half_f32(&self->watch, design->model->samples, half, design->hop);
+        pvid_weak_limits_half_f32(&self->limits, design->model->samples, half, design->hop);
     }
 }
 
 /* A block before the first step of a run. */
-PVID_COLD static void lead(pvid_weak_f32 *self)
+PVID_COLD static void begin_run(pvid_weak_f32 *self)
 {
     float *jet = self->history.inputs[self->history.newest];
     bool first = false;
@@ -391,43 +392,43 @@ PVID_NOINLINE static pvid_reason end_block(pvid_weak_f32 *self, const float samp
 {
     const uint8_t decimation = pvid_weak_decimation(self->front.decimation);
     const bool steps = pvid_weak_front_step_f32(&self->front, self->design, self->history.inputs[self->history.newest]);
-    self->resume = self->rest;
+    self->task_after_step = self->task;
     if (!steps && !self->history.ran && (PVID_COUNT(PVID_EXACT_RUNS, self->design->model->runs) > 0u)) {
-        lead(self);
+        begin_run(self);
     }
-    if (steps && self->watches && (self->history.known > 1u)) {
-        watch(self, sample);
+    if (steps && self->has_limits && (self->history.known > 1u)) {
+        check_limits(self, sample);
     }
     if (steps && (decimation >= PVID_WEAK_TWO_TICKS)) {
-        self->rest = FORM;
+        self->task = TASK_FORM;
         return idle(self);
     }
-    const pvid_reason formed = steps ? form(self) : idle(self);
-    if ((decimation > 1u) || (self->rest <= FORM)) {
+    const pvid_reason formed = steps ? form_channels(self) : idle(self);
+    if ((decimation > 1u) || (self->task <= TASK_FORM)) {
         return formed;
     }
-    const pvid_reason worked = (self->rest == ADD) ? add(self) : process(self);
+    const pvid_reason worked = (self->task == TASK_ADD) ? add_harmonics(self) : process_window(self);
     return (formed == idle(self)) ? worked : formed;
 }
 
-/* A tick with something to do. */
-PVID_NOINLINE static pvid_reason due(pvid_weak_f32 *self)
+/* The task of a tick. */
+PVID_NOINLINE static pvid_reason run_task(pvid_weak_f32 *self)
 {
-    if (self->rest == ADD) {
-        return add(self);
+    if (self->task == TASK_ADD) {
+        return add_harmonics(self);
     }
-    return (self->rest == PROCESS) ? process(self) : form(self);
+    return (self->task == TASK_PROCESS) ? process_window(self) : form_channels(self);
 }
 
-/* Behind the samples of a tick. */
-static inline pvid_reason follow(pvid_weak_f32 *self, const float sample[])
+/* What a tick does after its samples. */
+static inline pvid_reason end_tick(pvid_weak_f32 *self, const float sample[])
 {
     self->front.wait--;
     if (self->front.wait == 0u) {
         return end_block(self, sample);
     }
-    const uint32_t rested = self->rest;
-    return (rested >= FORM) ? due(self) : (pvid_reason)rested;
+    const uint32_t task = self->task;
+    return (task >= TASK_FORM) ? run_task(self) : (pvid_reason)task;
 }
 
 /* Of samples with one that is not finite or beyond its range: returns whether all are finite. */
@@ -435,13 +436,13 @@ static bool are_finite(pvid_weak_f32 *self, const float sample[])
 {
     const bool finite = all_finite(sample, self->design->model->samples);
     if (finite) {
-        self->watch.beyond = self->watch.delay;
+        self->limits.beyond = self->limits.delay;
     }
     return finite;
 }
 
 /* Adds finite samples to the block. */
-static inline void take(pvid_weak_f32 *self, const float sample[])
+static inline void add_samples(pvid_weak_f32 *self, const float sample[])
 {
 #if !PVID_EXACT_PLAIN
     if (!is_plain(self)) {
@@ -461,8 +462,8 @@ PVID_COLD static pvid_reason odd_tick(pvid_weak_f32 *self, const float sample[])
     if (!are_finite(self, sample)) {
         return reject(self);
     }
-    take(self, sample);
-    return follow(self, sample);
+    add_samples(self, sample);
+    return end_tick(self, sample);
 }
 
 /* A tick of the weak form. */
@@ -471,8 +472,8 @@ PVID_ALWAYS_INLINE pvid_reason weak_tick(pvid_weak_f32 *self, const float sample
     if (!pvid_weak_front_fits_f32(&self->front, self->samples, sample)) {
         return odd_tick(self, sample);
     }
-    take(self, sample);
-    return follow(self, sample);
+    add_samples(self, sample);
+    return end_tick(self, sample);
 }
 
 /* Reasons of a tick with a new estimate for the second stage. */

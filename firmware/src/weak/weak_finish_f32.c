@@ -119,15 +119,15 @@ static void begin_kind(pvid_weak_finish_f32 *self)
 
 void pvid_weak_finish_skip_f32(pvid_weak_finish_f32 *self)
 {
-    self->alone = true;
+    self->no_predecessor = true;
 }
 
 void pvid_weak_finish_begin_f32(pvid_weak_finish_f32 *self)
 {
-    if (self->alone) {
+    if (self->no_predecessor) {
         pvid_weak_scores_skip_f32(&self->scores);
     }
-    self->alone = false;
+    self->no_predecessor = false;
     self->kind = 0;
     self->theta = 0;
     self->term = 0;

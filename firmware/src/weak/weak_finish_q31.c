@@ -14,7 +14,7 @@
 #include "weak/columns_q31.h"
 #include "weak/error.h"
 #include "weak/error_q31.h"
-#include "weak/mirror_q31.h"
+#include "weak/reflection_q31.h"
 #include "weak/noise_q31.h"
 #include "weak/scores_q31.h"
 #include "weak/steps.h"
@@ -121,15 +121,15 @@ static void begin_kind(pvid_weak_finish_q31 *self)
 
 void pvid_weak_finish_skip_q31(pvid_weak_finish_q31 *self)
 {
-    self->alone = true;
+    self->no_predecessor = true;
 }
 
 void pvid_weak_finish_begin_q31(pvid_weak_finish_q31 *self)
 {
-    if (self->alone) {
+    if (self->no_predecessor) {
         pvid_weak_scores_skip_q31(&self->scores);
     }
-    self->alone = false;
+    self->no_predecessor = false;
     pvid_weak_known_q31 *known = &self->known;
     known->renewed = (known->age >= NOISE_WINDOWS) || (self->size > SMALL_STEP);
     known->age = (uint8_t)(known->renewed ? 1u : (known->age + 1u));
@@ -193,12 +193,12 @@ static bool invert_stage(pvid_weak_q31 *self)
     return end < harmonics;
 }
 
-static bool mirror_stage(pvid_weak_q31 *self)
+static bool reflector_stage(pvid_weak_q31 *self)
 {
     pvid_weak_finish_q31 *finish = &self->finish;
-    pvid_weak_white_mirror_q31(&finish->white[finish->kind], self->design, finish->index);
+    pvid_weak_white_reflector_q31(&finish->white[finish->kind], self->design, finish->index);
     finish->index++;
-    return finish->index < pvid_weak_mirrors_q31(self->design);
+    return finish->index < pvid_weak_reflectors_q31(self->design);
 }
 
 static bool leverage_stage(pvid_weak_q31 *self)
@@ -208,7 +208,7 @@ static bool leverage_stage(pvid_weak_q31 *self)
     pvid_weak_noise_leverage_q31(&finish->white[finish->kind], self->design, finish->index, rows->parts.noise.u,
                                  rows->parts.noise.leverage);
     finish->index++;
-    return finish->index < pvid_weak_mirrors_q31(self->design);
+    return finish->index < pvid_weak_reflectors_q31(self->design);
 }
 
 static bool share_stage(pvid_weak_q31 *self)
@@ -301,7 +301,7 @@ static bool unit_stage(pvid_weak_q31 *self)
     }
     for (size_t h = finish->index; h < end; h++) {
         pvid_weak_columns_scan_q31(&rows->parts.columns, self->design, finish->kind, &finish->white[finish->kind],
-                                   self->collect.window.length[h], h);
+                                   self->accumulator.window.length[h], h);
     }
     finish->index = (uint16_t)end;
     return end < harmonics;
@@ -315,10 +315,10 @@ static bool column_stage(pvid_weak_q31 *self)
     const size_t harmonics = finish->white[finish->kind].cosines;
     if (finish->index < harmonics) {
         const int32_t (*sums)[PVID_MAX_CHANNELS][2] =
-            (const int32_t (*)[PVID_MAX_CHANNELS][2])pvid_weak_window_sums_q31(&self->collect.sums,
-                                                                               &self->collect.window);
+            (const int32_t (*)[PVID_MAX_CHANNELS][2])pvid_weak_window_sums_q31(&self->accumulator.sums,
+                                                                               &self->accumulator.window);
         pvid_weak_columns_take_q31(&finish->work.rows.parts.columns, design, finish->kind, &finish->white[finish->kind],
-                                   self->collect.window.length[finish->index], sums[finish->index], finish->index);
+                                   self->accumulator.window.length[finish->index], sums[finish->index], finish->index);
     } else {
         const size_t place = finish->index - harmonics;
         pvid_weak_columns_end_q31(&finish->work.rows.parts.columns, design, &finish->white[finish->kind], place);
@@ -344,16 +344,16 @@ static bool project_stage(pvid_weak_q31 *self)
     }
     const size_t begin = finish->live;
     const size_t rows = self->design->functions - begin;
-    int32_t *mirror = &finish->work.rows.parts.columns.x[nuisance][begin];
+    int32_t *reflector = &finish->work.rows.parts.columns.x[nuisance][begin];
     if (finish->part == 0u) {
-        finish->kept = pvid_weak_columns_keep_q31(finish->work.rows.whole[finish->index], rows, mirror);
+        finish->kept = pvid_weak_columns_keep_q31(finish->work.rows.whole[finish->index], rows, reflector);
         finish->part = 1;
         return true;
     }
     const size_t place = finish->part - 1u;
     const size_t column = (place < first) ? place : (place + finish->index + 1u);
     if (finish->kept) {
-        pvid_weak_mirror_q31(mirror, rows, &finish->work.rows.parts.columns.x[column][begin]);
+        pvid_weak_reflect_q31(reflector, rows, &finish->work.rows.parts.columns.x[column][begin]);
     }
     finish->part++;
     if (finish->part > (first + kind->nuisances) - (finish->index + 1u)) {
@@ -646,7 +646,7 @@ static bool advance_kind(pvid_weak_q31 *self, pvid_reason *reason)
         more = invert_stage(self);
         break;
     case STAGE_MIRROR:
-        more = mirror_stage(self);
+        more = reflector_stage(self);
         break;
     case STAGE_LEVERAGE:
         more = leverage_stage(self);
@@ -763,7 +763,7 @@ static uint32_t stages_of_columns(const pvid_weak_design_q31 *design)
 {
     const size_t harmonics = pvid_weak_harmonics_q31(design);
     return stages_of(design->n_noise, ENTRIES_PER_STAGE) + stages_of(harmonics, HARMONICS_PER_STAGE) +
-           stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_weak_mirrors_q31(design) +
+           stages_of(harmonics, ROOTS_PER_STAGE) + (uint32_t)pvid_weak_reflectors_q31(design) +
            stages_of(harmonics, UNITS_PER_STAGE) + (uint32_t)harmonics;
 }
 
@@ -776,10 +776,9 @@ static uint32_t stages_of_kind(const pvid_weak_q31 *self, const pvid_weak_kind *
     for (size_t i = 0; i < kind->nuisances; i++) {
         project += ((size_t)kind->thetas + 1u + kind->nuisances) - i;
     }
-    const uint32_t noise =
-        self->finish.known.used
-            ? ((uint32_t)pvid_weak_mirrors_q31(design) + stages_of(harmonics, SHARES_PER_STAGE) + 2u + design->n_noise)
-            : 0u;
+    const uint32_t noise = self->finish.known.used ? ((uint32_t)pvid_weak_reflectors_q31(design) +
+                                                      stages_of(harmonics, SHARES_PER_STAGE) + 2u + design->n_noise)
+                                                   : 0u;
     return noise + stages_of_columns(design) + (uint32_t)columns_of(kind) + (uint32_t)project +
            stages_of((size_t)kind->thetas + 1u, FORMATS_PER_STAGE) + stages_of(rows, RESIDUALS_PER_STAGE) +
            PVID_INFORMATION_END_PARTS + (uint32_t)rows + 1u;

@@ -8,7 +8,7 @@
 #include "number/init.h"
 #include "number/integer_q31.h"
 #include "number/unroll.h"
-#include "weak/collect_q31.h"
+#include "weak/accumulator_q31.h"
 #include "weak/valid_q31.h"
 #include "weak/weak_finish_q31.h"
 #include "weak/weak_front_q31.h"
@@ -34,18 +34,18 @@ static pvid_reason idle_reason(const pvid_weak_q31 *self)
 }
 
 /* What a tick does from now on that ends no step. */
-static void rest(pvid_weak_q31 *self)
+static void choose_task(pvid_weak_q31 *self)
 {
-    const bool busy = (self->collect.sums.left > 0u) || pvid_weak_finish_is_busy_q31(&self->finish);
-    self->rest = (uint8_t)(busy ? BUSY : (uint32_t)idle_reason(self));
+    const bool busy = (self->accumulator.sums.left > 0u) || pvid_weak_finish_is_busy_q31(&self->finish);
+    self->task = (uint8_t)(busy ? BUSY : (uint32_t)idle_reason(self));
 }
 
 static void restart(pvid_weak_q31 *self)
 {
-    pvid_weak_collect_reset_q31(&self->collect);
+    pvid_weak_accumulator_reset_q31(&self->accumulator);
     pvid_weak_finish_skip_q31(&self->finish);
     self->warm = false;
-    rest(self);
+    choose_task(self);
 }
 
 /* Whether the sums of a window are read before others take their place. */
@@ -98,7 +98,7 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     self->drive_min = config->drive_min;
     self->driven = config->drive_min == NULL;
     self->iterations = (uint8_t)((self->estimator.settings.gain < PVID_ONE_Q30) ? 1u : config->iterations);
-    pvid_weak_collect_init_q31(&self->collect, design, config->offset);
+    pvid_weak_accumulator_init_q31(&self->accumulator, design, config->offset);
     const uint32_t ticks = pvid_weak_free_ticks_q31(design);
     const uint32_t stages = pvid_weak_finish_stages_q31(self);
     const uint32_t each = (ticks > 0u) ? ((stages + (ticks - 1u)) / ticks) : UINT32_MAX;
@@ -106,8 +106,8 @@ static pvid_status prepare(pvid_weak_q31 *self, const pvid_weak_config_q31 *conf
     if ((self->stages_per_tick == 0u) || !window_fits(self)) {
         return PVID_BAD_ITERATIONS;
     }
-    self->plain = self->collect.front.plain ? design->model->samples : 0u;
-    rest(self);
+    self->plain = self->accumulator.front.plain ? design->model->samples : 0u;
+    choose_task(self);
     return PVID_OK;
 }
 
@@ -121,12 +121,12 @@ pvid_status pvid_weak_init_layout_q31(pvid_weak_q31 *self, const pvid_weak_confi
 }
 
 /* The counts of the tick in which the channels of step `index` of a half were made. */
-static void watch_drive(pvid_weak_q31 *self, size_t half, bool begins, const int32_t reading[])
+static void add_drive(pvid_weak_q31 *self, size_t half, bool begins, const int32_t reading[])
 {
     pvid_weak_drive_q31 *drive = &self->drive;
     for (size_t i = 0; i < self->design->model->samples; i++) {
         if (self->drive_min[i] > 0) {
-            const int32_t x = pvid_weak_count_q31(reading[i], self->collect.front.offset[i]);
+            const int32_t x = pvid_weak_count_q31(reading[i], self->accumulator.front.offset[i]);
             drive->sum[half][i] = (begins ? 0 : drive->sum[half][i]) + x;
             drive->square[half][i] = (begins ? 0 : drive->square[half][i]) + pvid_short_square_q31(x);
         }
@@ -181,12 +181,12 @@ PVID_NOINLINE static pvid_reason reject(pvid_weak_q31 *self)
 /* The last tick of a step. */
 PVID_NOINLINE static pvid_weak_tick end_step(pvid_weak_q31 *self, const int32_t reading[])
 {
-    const uint16_t index = self->collect.values.index;
-    const uint8_t half = self->collect.values.half;
-    const pvid_weak_tick tick = pvid_weak_collect_end_q31(&self->collect);
-    if ((tick != PVID_WEAK_REJECTED) && (self->drive_min != NULL) && (self->collect.values.index != index)) {
-        watch_drive(self, half, index == 0u, reading);
-        if (self->collect.values.index == 0u) { /* the half is complete */
+    const uint16_t index = self->accumulator.values.index;
+    const uint8_t half = self->accumulator.values.half;
+    const pvid_weak_tick tick = pvid_weak_accumulator_end_q31(&self->accumulator);
+    if ((tick != PVID_WEAK_REJECTED) && (self->drive_min != NULL) && (self->accumulator.values.index != index)) {
+        add_drive(self, half, index == 0u, reading);
+        if (self->accumulator.values.index == 0u) { /* the half is complete */
             self->driven = is_driven(self);
         }
     }
@@ -200,7 +200,7 @@ static inline pvid_reason advance_finish(pvid_weak_q31 *self)
     for (uint32_t left = self->stages_per_tick; left > 0u; left--) {
         pvid_weak_finish_step_q31(self, &reason);
         if (!pvid_weak_finish_is_busy_q31(&self->finish)) {
-            rest(self);
+            choose_task(self);
             return reason;
         }
     }
@@ -220,29 +220,29 @@ static pvid_reason after(pvid_weak_q31 *self, pvid_weak_tick tick)
     } else {
         /* the tick is full, or there is nothing to do */
     }
-    rest(self);
+    choose_task(self);
     return reason;
 }
 
 /* A tick that ends no step, with work. */
 PVID_NOINLINE static pvid_reason work(pvid_weak_q31 *self)
 {
-    if (self->collect.sums.left == 0u) {
+    if (self->accumulator.sums.left == 0u) {
         return advance_finish(self);
     }
-    const pvid_weak_tick tick = pvid_weak_collect_work_q31(&self->collect);
-    return (self->collect.sums.left == 0u) ? after(self, tick) : idle_reason(self);
+    const pvid_weak_tick tick = pvid_weak_accumulator_work_q31(&self->accumulator);
+    return (self->accumulator.sums.left == 0u) ? after(self, tick) : idle_reason(self);
 }
 
 /* Behind the readings of a tick. */
 static inline pvid_reason end_tick(pvid_weak_q31 *self, const int32_t reading[])
 {
-    self->collect.front.wait--;
-    if (self->collect.front.wait == 0u) {
+    self->accumulator.front.wait--;
+    if (self->accumulator.front.wait == 0u) {
         return after(self, end_step(self, reading));
     }
-    const uint8_t rested = self->rest;
-    return (rested == BUSY) ? work(self) : (pvid_reason)rested;
+    const uint8_t task = self->task;
+    return (task == BUSY) ? work(self) : (pvid_reason)task;
 }
 
 /* A tick whose readings need more than to be added. */
@@ -251,7 +251,7 @@ PVID_NOINLINE static pvid_reason other_tick(pvid_weak_q31 *self, const int32_t r
     if (!is_ready(self) || (reading == NULL)) {
         return PVID_NOT_READY;
     }
-    if (!pvid_weak_front_derive_q31(&self->collect.front, self->design, reading)) {
+    if (!pvid_weak_front_derive_q31(&self->accumulator.front, self->design, reading)) {
         return reject(self);
     }
     return end_tick(self, reading);
@@ -263,7 +263,7 @@ pvid_reason pvid_weak_step_q31(pvid_weak_q31 *self, const int32_t reading[])
     if ((plain == 0u) || (reading == NULL)) {
         return other_tick(self, reading);
     }
-    if (!pvid_weak_front_plain_q31(&self->collect.front, self->design, plain, reading)) {
+    if (!pvid_weak_front_plain_q31(&self->accumulator.front, self->design, plain, reading)) {
         return reject(self);
     }
     return end_tick(self, reading);

@@ -13,7 +13,7 @@
 
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
-#include "weak/mirror_q31.h"
+#include "weak/reflection_q31.h"
 #include "weak/sums_q31.h"
 
 #define FLOOR_BITS 33
@@ -124,23 +124,23 @@ static void begin_vector(const pvid_weak_white_q31 *self, size_t k, size_t first
 static void reflect(const pvid_weak_white_q31 *self, size_t place, size_t n, size_t count, int32_t x[])
 {
     for (size_t k = 0; k < count; k++) {
-        pvid_weak_mirror_q31(&self->mirror[k][place + k], n - k, &x[k]);
+        pvid_weak_reflect_q31(&self->reflector[k][place + k], n - k, &x[k]);
     }
 }
 
-void pvid_weak_white_mirror_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, size_t place)
+void pvid_weak_white_reflector_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, size_t place)
 {
     const size_t vectors = design->power / 2u;
     const bool is_sine = place >= vectors;
     const size_t k = is_sine ? (place - vectors) : place;
     const size_t first = is_sine ? self->cosines : 0u;
     const size_t n = is_sine ? (pvid_weak_sums_rows_q31(design) - self->cosines) : self->cosines;
-    int32_t *x = &self->mirror[k][first];
+    int32_t *x = &self->reflector[k][first];
     begin_vector(self, k, is_sine ? 1u : 0u, n, x);
     (void)pvid_weak_block_q31(n, x);
     reflect(self, first, n, k, x);
     (void)pvid_weak_block_q31(n - k, &x[k]); /* what is left may be small */
-    pvid_weak_mirror_of_q31(n - k, &x[k]);
+    pvid_weak_reflector_of_q31(n - k, &x[k]);
 }
 
 void pvid_weak_white_remove_q31(const pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, int32_t column[])

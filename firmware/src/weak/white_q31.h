@@ -45,13 +45,13 @@ static inline int32_t pvid_weak_white_exponent_q31(const pvid_weak_white_q31 *se
 }
 
 /* Reflections of a kind: n. */
-static inline size_t pvid_weak_mirrors_q31(const pvid_weak_design_q31 *design)
+static inline size_t pvid_weak_reflectors_q31(const pvid_weak_design_q31 *design)
 {
     return design->power;
 }
 
 /* Makes the reflection `place`, counted from 0: those of the real parts, then those of the imaginary parts. */
-void pvid_weak_white_mirror_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, size_t place);
+void pvid_weak_white_reflector_q31(pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, size_t place);
 
 /* A block [K + n] to its K white rows. */
 void pvid_weak_white_remove_q31(const pvid_weak_white_q31 *self, const pvid_weak_design_q31 *design, int32_t column[]);

@@ -68,7 +68,7 @@ typedef struct {
     bool out[2];                                      /* of each half: contains such a step */
     bool still;                                       /* a sample moved too little in the last two halves */
     pvid_weak_spread_f32 spread[2][PVID_MAX_SAMPLES]; /* of each half, if a sample has a least deviation */
-} pvid_weak_watch_f32;
+} pvid_weak_limits_f32;
 
 /* The sums of the two halves of a window, and the block of steps that is being added to them. */
 typedef struct {
@@ -168,7 +168,7 @@ typedef union {
 /* Processing of a whole window: rows of each kind, then steps of p, then the assessment. */
 typedef struct {
     bool compensation;
-    bool alone; /* the next window has no neighbour before it */
+    bool no_predecessor; /* the next window has no neighbour before it */
     uint8_t stage;
     uint8_t kind;
     uint8_t theta;      /* first one of the kind */
@@ -202,12 +202,12 @@ struct pvid_weak_f32 {
     const pvid_weak_design_f32 *design;
     const pvid_weak_refine_f32 *refine; /* second stage; NULL: none */
     uint8_t samples;                    /* of a tick; 0: `self` is not initialised */
-    uint8_t resume;                     /* `rest` behind the channels of a step */
-    uint8_t rest;      /* reason of a tick that only adds its samples; or what is to be done: weak_f32.c */
-    bool warm;         /* a window has been complete since the restart */
-    bool frozen;       /* complete windows are dropped */
-    bool busy;         /* the last tick did more than to take its samples; with a second stage alone */
-    bool watches;      /* samples are compared with their range, or their deviation with the least one */
+    uint8_t task_after_step;            /* `task` behind the channels of a step */
+    uint8_t task;                       /* of a tick that ends no step, weak_f32.c; or its reason if it has none */
+    bool warm;                          /* a window has been complete since the restart */
+    bool frozen;                        /* complete windows are dropped */
+    bool busy;                          /* the last tick did more than to take its samples; with a second stage alone */
+    bool has_limits;   /* samples are compared with their range, or their deviation with the least one */
     uint8_t harmonics; /* H + 1 */
     uint8_t channels;  /* that are summed */
     uint8_t iterations;
@@ -216,7 +216,7 @@ struct pvid_weak_f32 {
     float dt;                /* between steps [s] */
     pvid_weak_front_f32 front;
     pvid_weak_history_f32 history;
-    pvid_weak_watch_f32 watch;
+    pvid_weak_limits_f32 limits;
     pvid_weak_sums_f32 sums;
     pvid_weak_finish_f32 finish;
     pvid_estimator_f32 estimator;

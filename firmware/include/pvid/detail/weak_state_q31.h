@@ -83,10 +83,10 @@ typedef struct {
 
 /* The noise of a kind's sums, and the reflections that leave its white rows. */
 typedef struct {
-    uint8_t cosines;                                        /* real parts; the others are imaginary parts */
-    uint8_t powers;                                         /* of h^2 in use */
-    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];              /* D_h, then 1 / sqrt(D_h) */
-    int32_t mirror[PVID_MAX_POWER / 2][PVID_WEAK_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
+    uint8_t cosines;                                           /* real parts; the others are imaginary parts */
+    uint8_t powers;                                            /* of h^2 in use */
+    pvid_scaled_q31 scale[PVID_MAX_HARMONICS];                 /* D_h, then 1 / sqrt(D_h) */
+    int32_t reflector[PVID_MAX_POWER / 2][PVID_WEAK_ROWS_Q31]; /* reflection k from the entry k of each family, Q30 */
 } pvid_weak_white_q31;
 
 /* White columns of a kind: theta's, Y, nuisances. A value is its integer times 2^exponent standard deviations. */
@@ -103,7 +103,7 @@ typedef struct {
     pvid_weak_values_q31 values;
     pvid_weak_sums_q31 sums;
     pvid_weak_window_q31 window;
-} pvid_weak_collect_q31;
+} pvid_weak_accumulator_q31;
 
 /* Sums of a sample over the steps of each half [counts], for the check of the drive. */
 typedef struct {
@@ -193,7 +193,7 @@ typedef struct {
     bool kept;                /* the present nuisance is */
     bool saturated;           /* a row of the kind does not fit: none of them is used */
     bool rejected;            /* by the gate: no row of the kind is used */
-    bool alone;               /* the next window has no neighbour before it */
+    bool no_predecessor;      /* the next window has no neighbour before it */
     uint16_t index;           /* within the stage */
     uint16_t free;            /* rows less nuisances of the kinds that were added */
     pvid_reason reason;       /* of the last solve, then of the window */
@@ -216,7 +216,7 @@ typedef struct {
 struct pvid_weak_q31 {
     const pvid_weak_design_q31 *design;
     const int32_t *drive_min;
-    uint8_t rest;  /* reason of a tick that ends no step and has no work; 255: there is work */
+    uint8_t task;  /* reason of a tick that ends no step and has no work; 255: there is work */
     uint8_t plain; /* samples, if each is a signal; else 0 */
     uint8_t iterations;
     uint8_t stages_per_tick; /* stages of a whole window per tick */
@@ -224,7 +224,7 @@ struct pvid_weak_q31 {
     bool frozen;             /* complete windows are dropped */
     bool driven;             /* the last two halves had enough drive */
     pvid_weak_drive_q31 drive;
-    pvid_weak_collect_q31 collect;
+    pvid_weak_accumulator_q31 accumulator;
     pvid_weak_finish_q31 finish;
     pvid_estimator_q31 estimator;
     pvid_trust_q31 trust;

@@ -1,6 +1,6 @@
 /* Reflections (Householder): x - v (v^T x) with |v|^2 = 2, v in Q30. Private to the core. */
-#ifndef PVID_WEAK_MIRROR_Q31_H
-#define PVID_WEAK_MIRROR_Q31_H
+#ifndef PVID_WEAK_REFLECTION_Q31_H
+#define PVID_WEAK_REFLECTION_Q31_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -15,9 +15,9 @@ int32_t pvid_weak_block_q31(size_t n, int32_t x[]);
 
 /* A block x[n] becomes the v of the reflection that leaves of it its first entry alone; 0
  * stays 0: no reflection. */
-void pvid_weak_mirror_of_q31(size_t n, int32_t x[]);
+void pvid_weak_reflector_of_q31(size_t n, int32_t x[]);
 
 /* Reflects x[n], which was a block before the reflections so far. */
-void pvid_weak_mirror_q31(const int32_t v[], size_t n, int32_t x[]);
+void pvid_weak_reflect_q31(const int32_t v[], size_t n, int32_t x[]);
 
 #endif

@@ -1,4 +1,4 @@
-#include "weak/collect_q31.h"
+#include "weak/accumulator_q31.h"
 
 #include <stddef.h>
 
@@ -40,16 +40,17 @@ uint32_t pvid_weak_ticks_behind_join_q31(const pvid_weak_design_q31 *design)
     return (all > joining) ? (all - joining) : 0u;
 }
 
-void pvid_weak_collect_init_q31(pvid_weak_collect_q31 *self, const pvid_weak_design_q31 *design, const int32_t offset[])
+void pvid_weak_accumulator_init_q31(pvid_weak_accumulator_q31 *self, const pvid_weak_design_q31 *design,
+                                    const int32_t offset[])
 {
     self->design = design;
     self->items_per_tick = (uint8_t)items(design);
     pvid_weak_front_init_q31(&self->front, design, offset);
     pvid_weak_values_init_q31(&self->values, pvid_weak_front_lead_q31(&self->front));
-    pvid_weak_collect_reset_q31(self);
+    pvid_weak_accumulator_reset_q31(self);
 }
 
-void pvid_weak_collect_reset_q31(pvid_weak_collect_q31 *self)
+void pvid_weak_accumulator_reset_q31(pvid_weak_accumulator_q31 *self)
 {
     pvid_weak_front_reset_q31(&self->front);
     pvid_weak_values_reset_q31(&self->values);
@@ -57,7 +58,7 @@ void pvid_weak_collect_reset_q31(pvid_weak_collect_q31 *self)
 }
 
 /* Some harmonics of the block that is being added. */
-pvid_weak_tick pvid_weak_collect_work_q31(pvid_weak_collect_q31 *self)
+pvid_weak_tick pvid_weak_accumulator_work_q31(pvid_weak_accumulator_q31 *self)
 {
     for (uint32_t i = self->items_per_tick; (i > 0u) && (self->sums.left > 0u); i--) {
         pvid_weak_sums_item_q31(&self->sums, self->design, &self->values, &self->window);
@@ -65,7 +66,7 @@ pvid_weak_tick pvid_weak_collect_work_q31(pvid_weak_collect_q31 *self)
     return ((self->sums.left == 0u) && self->sums.joins) ? PVID_WEAK_WINDOW : PVID_WEAK_BUSY;
 }
 
-pvid_weak_tick pvid_weak_collect_end_q31(pvid_weak_collect_q31 *self)
+pvid_weak_tick pvid_weak_accumulator_end_q31(pvid_weak_accumulator_q31 *self)
 {
     const pvid_weak_design_q31 *design = self->design;
     const uint16_t index = self->values.index;
@@ -74,7 +75,7 @@ pvid_weak_tick pvid_weak_collect_end_q31(pvid_weak_collect_q31 *self)
         pvid_weak_entry_q31 *place = pvid_weak_sums_place_q31(&self->sums, index);
         const pvid_weak_outcome outcome = pvid_weak_values_step_q31(&self->values, design, jet, place);
         if (outcome == PVID_WEAK_BEYOND) {
-            pvid_weak_collect_reset_q31(self);
+            pvid_weak_accumulator_reset_q31(self);
             return PVID_WEAK_REJECTED;
         }
         if (outcome == PVID_WEAK_CHANNELS) {
@@ -92,5 +93,5 @@ pvid_weak_tick pvid_weak_collect_end_q31(pvid_weak_collect_q31 *self)
     if (design->decimation > 1u) {
         return PVID_WEAK_BUSY;
     }
-    return (self->sums.left > 0u) ? pvid_weak_collect_work_q31(self) : PVID_WEAK_FREE;
+    return (self->sums.left > 0u) ? pvid_weak_accumulator_work_q31(self) : PVID_WEAK_FREE;
 }

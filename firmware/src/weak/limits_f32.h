@@ -1,6 +1,6 @@
 /* Whether a window is to be used: ranges and least deviations of the samples. Private to the core. */
-#ifndef PVID_WEAK_WATCH_F32_H
-#define PVID_WEAK_WATCH_F32_H
+#ifndef PVID_WEAK_LIMITS_F32_H
+#define PVID_WEAK_LIMITS_F32_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -8,19 +8,20 @@
 #include "pvid/weak.h"
 
 /* delay: steps from a sample to the last step that it is part of. */
-void pvid_weak_watch_init_f32(pvid_weak_watch_f32 *self, const pvid_weak_config_f32 *config, uint16_t delay);
+void pvid_weak_limits_init_f32(pvid_weak_limits_f32 *self, const pvid_weak_config_f32 *config, uint16_t delay);
 
 /* Forgets samples beyond their ranges. */
-void pvid_weak_watch_reset_f32(pvid_weak_watch_f32 *self);
+void pvid_weak_limits_reset_f32(pvid_weak_limits_f32 *self);
 
 /* Takes a step of a half, at a tick with these samples. first: it is the half's first step. */
-void pvid_weak_watch_step_f32(pvid_weak_watch_f32 *self, size_t samples, const float sample[], size_t half, bool first);
+void pvid_weak_limits_step_f32(pvid_weak_limits_f32 *self, size_t samples, const float sample[], size_t half,
+                               bool first);
 
 /* Behind the last step of the half `later`, which has so many: sets `still` if a sample moved too little in it and the
  * half before. */
-void pvid_weak_watch_half_f32(pvid_weak_watch_f32 *self, size_t samples, size_t later, uint16_t hop);
+void pvid_weak_limits_half_f32(pvid_weak_limits_f32 *self, size_t samples, size_t later, uint16_t hop);
 
 /* Whether a sample of the last two halves was beyond its range. */
-bool pvid_weak_watch_beyond_f32(const pvid_weak_watch_f32 *self);
+bool pvid_weak_limits_beyond_f32(const pvid_weak_limits_f32 *self);
 
 #endif

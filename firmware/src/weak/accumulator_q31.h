@@ -3,8 +3,8 @@
  * The last tick of a step's D forms its channels. The others add a block of four steps to the sums, some harmonics a
  * tick, and at the end of a window join these; when nothing is to be added they are free for stages of the last whole
  * window. With D = 1 every tick does both. All other ticks only add their readings to the front end's block. */
-#ifndef PVID_WEAK_COLLECT_Q31_H
-#define PVID_WEAK_COLLECT_Q31_H
+#ifndef PVID_WEAK_ACCUMULATOR_Q31_H
+#define PVID_WEAK_ACCUMULATOR_Q31_H
 
 #include <stdbool.h>
 
@@ -28,30 +28,30 @@ uint32_t pvid_weak_ticks_behind_join_q31(const pvid_weak_design_q31 *design);
 bool pvid_weak_blocks_fit_q31(const pvid_weak_design_q31 *design);
 
 /* Requires a valid design; offset as in the configuration. */
-void pvid_weak_collect_init_q31(pvid_weak_collect_q31 *self, const pvid_weak_design_q31 *design,
-                                const int32_t offset[]);
+void pvid_weak_accumulator_init_q31(pvid_weak_accumulator_q31 *self, const pvid_weak_design_q31 *design,
+                                    const int32_t offset[]);
 
 /* The windows restart; integrals since the start of the run are kept. */
-void pvid_weak_collect_reset_q31(pvid_weak_collect_q31 *self);
+void pvid_weak_accumulator_reset_q31(pvid_weak_accumulator_q31 *self);
 
 /* The last tick of a step, after its readings. */
-pvid_weak_tick pvid_weak_collect_end_q31(pvid_weak_collect_q31 *self);
+pvid_weak_tick pvid_weak_accumulator_end_q31(pvid_weak_accumulator_q31 *self);
 
 /* Another tick, while a block is being added, after its readings. */
-pvid_weak_tick pvid_weak_collect_work_q31(pvid_weak_collect_q31 *self);
+pvid_weak_tick pvid_weak_accumulator_work_q31(pvid_weak_accumulator_q31 *self);
 
 /* One tick. */
-static inline pvid_weak_tick pvid_weak_collect_step_q31(pvid_weak_collect_q31 *self, const int32_t reading[])
+static inline pvid_weak_tick pvid_weak_accumulator_step_q31(pvid_weak_accumulator_q31 *self, const int32_t reading[])
 {
     if (!pvid_weak_front_add_q31(&self->front, self->design, reading)) {
-        pvid_weak_collect_reset_q31(self);
+        pvid_weak_accumulator_reset_q31(self);
         return PVID_WEAK_REJECTED;
     }
     self->front.wait--;
     if (self->front.wait == 0u) {
-        return pvid_weak_collect_end_q31(self);
+        return pvid_weak_accumulator_end_q31(self);
     }
-    return (self->sums.left > 0u) ? pvid_weak_collect_work_q31(self) : PVID_WEAK_FREE;
+    return (self->sums.left > 0u) ? pvid_weak_accumulator_work_q31(self) : PVID_WEAK_FREE;
 }
 
 #endif

@@ -1,4 +1,4 @@
-#include "weak/mirror_q31.h"
+#include "weak/reflection_q31.h"
 
 #include "number/integer_q31.h"
 #include "number/scaled_q31.h"
@@ -33,7 +33,7 @@ int32_t pvid_weak_block_q31(size_t n, int32_t x[])
     return exponent;
 }
 
-void pvid_weak_mirror_of_q31(size_t n, int32_t x[])
+void pvid_weak_reflector_of_q31(size_t n, int32_t x[])
 {
     int64_t square = 0;
     for (size_t i = 0; i < n; i++) {
@@ -58,7 +58,7 @@ void pvid_weak_mirror_of_q31(size_t n, int32_t x[])
 }
 
 /* Partial sums are within |v| |x|, results within |x|. */
-void pvid_weak_mirror_q31(const int32_t v[], size_t n, int32_t x[])
+void pvid_weak_reflect_q31(const int32_t v[], size_t n, int32_t x[])
 {
     int64_t sum = 0;
     for (size_t i = 0; i < n; i++) {

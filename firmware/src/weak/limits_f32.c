@@ -6,11 +6,11 @@
  * At every step each sample x adds x - r and (x - r)^2 to its half, r the half's first sample. With d = r_B - r_A the
  * second half's sums about r_A are  s + hop d  and  q + 2 d s + hop d^2;  the variance in a window of N = 2 hop steps
  * is (q - s^2/N) / N of both halves together. */
-#include "weak/watch_f32.h"
+#include "weak/limits_f32.h"
 
 #include "number/exact.h"
 
-void pvid_weak_watch_init_f32(pvid_weak_watch_f32 *self, const pvid_weak_config_f32 *config, uint16_t delay)
+void pvid_weak_limits_init_f32(pvid_weak_limits_f32 *self, const pvid_weak_config_f32 *config, uint16_t delay)
 {
     self->range = config->range;
     self->drive_min = config->drive_min;
@@ -18,17 +18,18 @@ void pvid_weak_watch_init_f32(pvid_weak_watch_f32 *self, const pvid_weak_config_
     for (size_t i = 0; (config->drive_min != NULL) && (i < config->design->model->samples); i++) {
         self->moves |= (config->drive_min[i] > 0.0f) ? ((uint32_t)1u << i) : 0u;
     }
-    pvid_weak_watch_reset_f32(self);
+    pvid_weak_limits_reset_f32(self);
 }
 
-void pvid_weak_watch_reset_f32(pvid_weak_watch_f32 *self)
+void pvid_weak_limits_reset_f32(pvid_weak_limits_f32 *self)
 {
     self->beyond = 0;
     self->out[0] = false;
     self->out[1] = false;
 }
 
-void pvid_weak_watch_step_f32(pvid_weak_watch_f32 *self, size_t samples, const float sample[], size_t half, bool first)
+void pvid_weak_limits_step_f32(pvid_weak_limits_f32 *self, size_t samples, const float sample[], size_t half,
+                               bool first)
 {
     self->out[half] = (!first && self->out[half]) || (self->beyond > 0u);
     self->beyond = (uint16_t)((self->beyond > 0u) ? (self->beyond - 1u) : 0u);
@@ -49,12 +50,12 @@ void pvid_weak_watch_step_f32(pvid_weak_watch_f32 *self, size_t samples, const f
     }
 }
 
-bool pvid_weak_watch_beyond_f32(const pvid_weak_watch_f32 *self)
+bool pvid_weak_limits_beyond_f32(const pvid_weak_limits_f32 *self)
 {
     return self->out[0] || self->out[1];
 }
 
-PVID_COLD void pvid_weak_watch_half_f32(pvid_weak_watch_f32 *self, size_t samples, size_t later, uint16_t hop)
+PVID_COLD void pvid_weak_limits_half_f32(pvid_weak_limits_f32 *self, size_t samples, size_t later, uint16_t hop)
 {
     bool still = false;
     const float n = (float)hop;
