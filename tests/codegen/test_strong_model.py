@@ -1,31 +1,36 @@
-"""The strong form of every mechanism through the core's estimator: C and twin have the same bits, and it converges."""
+"""The printed strong form of every mechanism: the sums of the paper's equations, bits of C and twin, convergence."""
 
 from __future__ import annotations
 
-import ctypes
 import subprocess
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+import sympy as sp
 from generated import WARNINGS
 
 from pvid.base.errors import PvidError
 from pvid.codegen import files_strong
+from pvid.codegen.operations import Argument, Literal, Program
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
-from pvid.codegen.strong_twin import StrongModelConfig, StrongModelTwin, row_of
+from pvid.codegen.strong_library import strong_native
+from pvid.codegen.strong_sums import StrongSums, chains_of, over, strong_sums_of, times
+from pvid.codegen.strong_twin import StrongModelTwin
 from pvid.core.native import Native
-from pvid.core.sources import INCLUDES, sources_of
+from pvid.core.sources import INCLUDES
 from pvid.design.fir import savitzky_golay
 from pvid.model import Model
+from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
 from pvid.models import mechanisms
 from pvid.oracle import strong as oracle
-from pvid.settings.enums import Reason
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.enums import Law, Reason
+from pvid.settings.parts import EstimatorConfig, GateConfig
+from pvid.settings.strong import StrongModelConfig
 from pvid.sim.simulated_run import simulation_of
 
 Float = npt.NDArray[np.float64]
@@ -33,37 +38,7 @@ Float32 = npt.NDArray[np.float32]
 
 TICKS = 400
 GAP = 180  # a sample of the run that is no number
-SIZES = ("-DPVID_MAX_P=8", "-DPVID_MAX_THETA=16", "-DPVID_MAX_MOMENTS=136")
-DRIVER = """
-#include "{name}.h"
-#include <string.h>
-int run(uint32_t ticks, const float *sample, uint16_t half, uint16_t stride, const float *weights, float rate,
-        const float *row_sd, const float *start, const float *start_sd, const float *lower, const float *upper,
-        uint16_t divider, float *p, uint8_t *reason, float *se);
-static {name}_f32 identifier;
-int run(uint32_t ticks, const float *sample, uint16_t half, uint16_t stride, const float *weights, float rate,
-        const float *row_sd, const float *start, const float *start_sd, const float *lower, const float *upper,
-        uint16_t divider, float *p, uint8_t *reason, float *se)
-{{
-    {name}_config_f32 config = {{.bank = {{half, stride, weights}}, .sample_rate_hz = rate}};
-    config.estimator = pvid_estimator_defaults_f32;
-    config.estimator.divider = divider;
-    memcpy(config.row_sd, row_sd, sizeof config.row_sd);
-    memcpy(config.estimator.start, start, {upper}_P * sizeof(float));
-    memcpy(config.estimator.start_sd, start_sd, {upper}_P * sizeof(float));
-    memcpy(config.estimator.lower, lower, {upper}_P * sizeof(float));
-    memcpy(config.estimator.upper, upper, {upper}_P * sizeof(float));
-    const pvid_status status = {name}_init_f32(&identifier, &config);
-    for (uint32_t k = 0; (k < ticks) && (status == PVID_OK); k++) {{
-        reason[k] = (uint8_t){name}_step_f32(&identifier, &sample[k * {upper}_SIGNALS]);
-        memcpy(&p[k * {upper}_P], identifier.estimator.p, {upper}_P * sizeof(float));
-    }}
-    pvid_estimate_f32 estimate;
-    pvid_estimator_assess_f32(&identifier.estimator, &estimate);
-    memcpy(se, estimate.se, {upper}_P * sizeof(float));
-    return (int)status;
-}}
-"""
+FIVE = np.array([[0, 0], [8 / 12, -1 / 12], [16 / 12, -1 / 12], [-1, 0.5], [-4, 1]], np.float32)
 
 
 @cache
@@ -71,66 +46,12 @@ def strong_of(name: str) -> StrongFunctions:
     return renamed(strong_functions_of(strong_form(mechanisms.compiled_of(name))))
 
 
-@pytest.fixture(scope="module")
-def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The float core with room for every mechanism."""
-    folder = tmp_path_factory.mktemp("core")
-    command = ["gcc", "-std=c99", "-O1", "-fPIC", *SIZES, *INCLUDES, "-c", *map(str, sources_of("f32"))]
-    subprocess.run(command, check=True, cwd=folder)
-    library = folder / "core.a"
-    subprocess.run(["ar", "rcs", str(library), *map(str, folder.glob("*.o"))], check=True)
-    return library
+@cache
+def sums_of(name: str) -> StrongSums:
+    return strong_sums_of(strong_of(name))
 
 
-@dataclass
-class Steps:
-    """What C returns: p [ticks, n_p], reason [ticks], standard errors [n_p]."""
-
-    p: Float32
-    reason: npt.NDArray[np.uint8]
-    se: Float32
-
-
-class InC:
-    """The generated strong form, compiled with the project's warnings as errors."""
-
-    def __init__(self, strong: StrongFunctions, core: Path, folder: Path) -> None:
-        functions = strong.functions
-        self.n_p = len(functions.model.unknowns)
-        name = functions.name
-        files = {
-            f"{name}.h": files_strong.header(strong, "test"),
-            f"{name}.c": files_strong.source(strong, "test"),
-            "driver.c": DRIVER.format(name=name, upper=name.upper()),
-        }
-        for one, text in files.items():
-            (folder / one).write_text(text, encoding="utf-8")
-        options = ["-std=c99", "-O2", "-shared", "-fPIC", *WARNINGS, *SIZES, *INCLUDES, f"-I{folder}"]
-        sources = [str(folder / f"{name}.c"), str(folder / "driver.c"), str(core)]
-        subprocess.run(["gcc", *options, *sources, "-o", str(folder / "strong.so"), "-lm"], check=True)
-        header = str(folder / f"{name}.h")
-        subprocess.run(["g++", "-fsyntax-only", "-Wall", "-x", "c++", *SIZES, *INCLUDES, header], check=True)
-        self._library = ctypes.CDLL(str(folder / "strong.so"))
-
-    def run(self, samples: Float32, config: StrongModelConfig) -> Steps:
-        ticks = len(samples)
-        out = Steps(np.empty((ticks, self.n_p), np.float32), np.empty(ticks, np.uint8), np.empty(self.n_p, np.float32))
-        one = config.estimator
-        arrays = [np.ascontiguousarray(x, np.float32) for x in (one.start, one.start_sd, one.lower, one.upper)]
-        sd = np.array(config.row_sd, np.float32)
-        given = np.ascontiguousarray(samples)
-
-        def at(array: npt.NDArray[np.generic]) -> ctypes.c_void_p:
-            return ctypes.c_void_p(array.ctypes.data)
-
-        bank = (ctypes.c_uint16(config.weights.shape[1]), ctypes.c_uint16(config.stride), at(config.weights))
-        rate = ctypes.c_float(config.sample_rate)
-        results = (ctypes.c_uint16(one.divider), at(out.p), at(out.reason), at(out.se))
-        status = self._library.run(ctypes.c_uint32(ticks), at(given), *bank, rate, at(sd), *map(at, arrays), *results)
-        assert status == 0
-        return out
-
-
+@cache
 def recorded(name: str) -> tuple[Float32, Float]:
     """Samples of the shipped rig [ticks, signals], and the true p."""
     simulation = simulation_of(name)
@@ -138,17 +59,34 @@ def recorded(name: str) -> tuple[Float32, Float]:
     return np.stack([run[one.name] for one in strong_of(name).signals], 1).astype(np.float32), simulation.truth
 
 
-def theta_at(strong: StrongFunctions, p: Float) -> Float:
-    """theta of the SymPy expressions [n_theta]."""
-    values = dict(zip(strong.functions.model.p, p, strict=True))
-    return np.array([float(one.subs(values)) for one in strong.functions.theta.expressions])
+def rows_of(strong: StrongFunctions, inputs: Float) -> Float:
+    """Regressors and Y of all kinds in float64 [columns, ...] from the inputs [inputs, ...]."""
+    symbols = [one.symbol for one in strong.functions.inputs]
+    row = sp.lambdify(symbols, list(strong.row.expressions), modules=[{sgn.__name__: np.sign}, "numpy"])
+    return np.stack([np.broadcast_to(np.asarray(x, float), inputs.shape[1:]) for x in row(*inputs)])
 
 
-def config_of(name: str, samples: Float32, truth: Float, window: int = 61, divider: int = 5) -> StrongModelConfig:
-    """Started 30 % off, rows weighted by their residuals at the truth."""
-    strong, rig = strong_of(name), simulation_of(name).rig
-    unknowns = strong.functions.model.unknowns
-    bank = savitzky_golay(window, 6)
+def values_of(program: Program, arguments: Float) -> Float:
+    """The results of a program in float64."""
+    functions = {"neg": np.negative, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "abs": np.abs, "sign": np.sign}
+    pairs = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
+    values: list[Float] = []
+    for place, one in enumerate(program.values):
+        if isinstance(one, Literal):
+            values.append(np.asarray(float(program.literal(place))))
+        elif isinstance(one, Argument):
+            values.append(arguments[one.place])
+        else:
+            given = [values[k] for k in one.operands]
+            values.append(pairs[one.kind](*given) if one.kind in pairs else functions[one.kind](*given))
+    return np.array([np.broadcast_to(values[k], arguments.shape[1:]) for k in program.results])
+
+
+def config_of(name: str, divider: int = 8, weights: Float32 | None = None) -> StrongModelConfig:
+    """Started 30 % off, rows of equal weight; the window is of 61 samples, or these weights."""
+    strong, simulation = strong_of(name), simulation_of(name)
+    unknowns, truth = strong.functions.model.unknowns, simulation.truth
+    bank = savitzky_golay(61, 6)
     start = np.where([one.positive for one in unknowns], 1.3 * truth, 0.0)
     spread = np.where([one.positive for one in unknowns], 0.5 * start, [one.sd for one in unknowns])
     estimator = EstimatorConfig(
@@ -159,50 +97,160 @@ def config_of(name: str, samples: Float32, truth: Float, window: int = 61, divid
         row_sd=1.0,
         divider=divider,
     )
-    plain = (1.0,) * len(strong.functions.kinds)
-    given = StrongModelConfig(rig.sample_rate, bank.weights32, bank.stride, plain, estimator)
-    columns, ready = StrongModelTwin(strong, given).columns(samples)
-    theta = theta_at(strong, truth)
-    sd = []
-    for kind in strong.functions.kinds:
-        n = columns[kind.columns.start : kind.known, ready].astype(np.float64)
-        sd.append(float(np.std(columns[kind.known, ready] - theta[kind.theta.start : kind.theta.stop] @ n)))
-    return replace(given, row_sd=tuple(sd))
+    plain = (1e-3,) * len(strong.functions.kinds)
+    taps = bank.weights32 if weights is None else weights
+    return StrongModelConfig(simulation.rig.sample_rate, taps, bank.stride, plain, estimator)
 
 
 @pytest.mark.parametrize("name", mechanisms.names())
-def test_c_and_twin_have_the_same_bits(name: str, core: Path, tmp_path: Path) -> None:
-    samples, truth = recorded(name)
-    samples = samples[:TICKS].copy()
-    config = config_of(name, samples, truth)
+def test_the_printed_sums_are_those_of_the_papers_equations(name: str) -> None:
+    """S = C^T M C and F = C^T (B - M theta) literally, in float64 on random inputs of three kinds of sizes."""
+    strong, sums = strong_of(name), sums_of(name)
+    functions, random = strong.functions, np.random.default_rng(7)
+    unknowns = functions.model.unknowns
+    for size in (0.3, 1.0, 4.0):
+        inputs = size * random.normal(size=(len(functions.inputs), 60))
+        p = np.array([one.guess * random.uniform(0.5, 2) if one.positive else random.normal() for one in unknowns])
+        weights = np.exp(random.normal(size=len(sums.kinds)))
+        weights[0] = 1
+        columns, n_p = rows_of(strong, inputs), len(p)
+        s, f, distance = np.zeros((n_p, n_p)), np.zeros(n_p), 0.0
+        for kind, own, w in zip(functions.kinds, sums.kinds, weights, strict=True):
+            thetas = functions.theta.expressions[kind.theta.start : kind.theta.stop]
+            theta = np.array(sp.lambdify(sums.p, thetas)(*p), float)
+            c = np.array(sp.lambdify(sums.p, sp.Matrix(thetas).jacobian(sums.p))(*p), float)
+            n, y = columns[kind.columns.start : kind.known], columns[kind.known]
+            m, b, scale = n @ n.T, n @ y, w / float(own.unit) ** 2
+            s += scale * c.T @ m @ c
+            f += scale * c.T @ (b - m @ theta)
+            distance += scale * float(np.sum((y - theta @ n) ** 2))
+        x = values_of(sums.atoms_program, inputs)
+        total = np.array([np.prod([x[a] ** k for a, k in m], axis=0).sum() if m else 60.0 for m in sums.places])
+        arguments = np.concatenate([p, weights, total])
+        found = values_of(sums.projection, arguments)
+        upper = np.triu_indices(n_p)
+        d = np.sqrt(np.maximum(np.diag(s), 1e-300))
+        assert np.abs((found[: len(upper[0])] - s[upper]) / (d[upper[0]] * d[upper[1]])).max() < 1e-9
+        # F is a difference of large sums: against the sizes of its parts
+        parts = np.abs(s) @ np.abs(p) + np.abs(f)
+        assert (np.abs(found[len(upper[0]) :] - f) <= 1e-9 * parts).all()
+        linear = sums.linear
+        projected = f[linear] + s[np.ix_(linear, linear)] @ p[linear]
+        rss = values_of(sums.distance, arguments)[0] - p[linear] @ (projected + f[linear])
+        assert abs(rss - distance) < 1e-8 * max(distance, np.abs(p[linear]) @ np.abs(projected))
+
+
+@pytest.mark.parametrize("name", mechanisms.names())
+def test_residual_gradient_and_bound_are_those_of_the_rows(name: str) -> None:
+    strong, sums = strong_of(name), sums_of(name)
+    functions, random = strong.functions, np.random.default_rng(8)
+    inputs = random.normal(size=(len(functions.inputs), 40))
+    p = np.array([one.guess * 1.1 if one.positive else 0.1 for one in functions.model.unknowns])
+    x, columns = values_of(sums.atoms_program, inputs), rows_of(strong, inputs)
+    spread = np.concatenate([np.repeat(p[:, None], 40, 1), x])
+    found = iter(values_of(sums.innovation.program, spread))
+    squares = np.zeros(40)
+    for kind, own, entries in zip(functions.kinds, sums.kinds, sums.innovation.entries, strict=True):
+        thetas = functions.theta.expressions[kind.theta.start : kind.theta.stop]
+        c = np.array(sp.lambdify(sums.p, sp.Matrix(thetas).jacobian(sums.p))(*p), float)
+        theta, unit = np.array(sp.lambdify(sums.p, thetas)(*p), float), float(own.unit)
+        n, y = columns[kind.columns.start : kind.known] / unit, columns[kind.known] / unit
+        np.testing.assert_allclose(next(found), y - theta @ n, rtol=1e-9, atol=1e-9 * np.abs(theta @ n).max())
+        for a in entries:
+            np.testing.assert_allclose(next(found), (c.T @ n)[a], rtol=1e-9, atol=1e-9)
+        squares = np.maximum(squares, y**2)
+    assert (values_of(sums.bound, x)[0] >= squares * (1 - 1e-12)).all()
+
+
+@pytest.mark.parametrize("schedule", ["window in stages", "five points at every row"])
+@pytest.mark.parametrize("name", mechanisms.names())
+def test_c_and_twin_have_the_same_bits(name: str, schedule: str) -> None:
+    samples = recorded(name)[0][:TICKS].copy()
     samples[GAP, 0] = np.nan
-    in_c, twin = InC(strong_of(name), core, tmp_path), StrongModelTwin(strong_of(name), config)
-    want = twin.run(samples)
-    want_p, want_reason = want.p, want.reason
-    got = in_c.run(samples, config)
-    assert (got.reason == want_reason).all()
-    assert (got.p.view(np.uint32) == want_p.view(np.uint32)).all()
-    assert want_reason[GAP] == Reason.REJECTED_NOT_FINITE and want_reason[GAP + 40] == Reason.WARMING_UP
-    assert (want_reason == Reason.UPDATED).sum() > 20
-    assert len(np.unique(want_p, axis=0)) > 20
+    five = schedule != "window in stages"
+    config = config_of(name, 1 if five else 8, FIVE if five else None)
+    config = replace(config, stride=3 if five else config.stride, gate=GateConfig(6.0, 1.0))
+    got = strong_native(strong_of(name), config).identifier_of(config).run_samples(samples)
+    want = StrongModelTwin(strong_of(name), config).run(samples)
+    assert (got.reason == want.reason).all()
+    assert (got.p.view(np.uint32) == want.p.view(np.uint32)).all()
+    assert (got.sums.view(np.uint32) == want.sums.view(np.uint32)).all()
+    assert want.reason[GAP] == Reason.REJECTED_NOT_FINITE and want.reason[GAP + 5] == Reason.WARMING_UP
+    assert len(np.unique(want.p, axis=0)) > 10
 
 
-def test_rigid_body_and_motor_are_identified_from_derivatives(core: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", mechanisms.names())
+def test_the_printed_c_has_no_warning_and_its_header_is_cpp(name: str, tmp_path: Path) -> None:
+    files = files_strong.files_of(strong_of(name), "test")
+    for one, text in files.items():
+        (tmp_path / one).write_text(text, encoding="utf-8")
+    header, source = (str(tmp_path / one) for one in files)
+    options = ["-DPVID_MAX_P=8", *INCLUDES, f"-I{tmp_path}"]
+    subprocess.run(["gcc", "-std=c99", "-O2", *WARNINGS, *options, "-c", source, "-o", "/dev/null"], check=True)
+    subprocess.run(["g++", "-fsyntax-only", "-Wall", "-Werror", "-x", "c++", *options, header], check=True)
+
+
+def test_rigid_body_and_motor_are_identified_from_derivatives() -> None:
     """Where the signals are smooth and measured at the order that the row needs; on the shipped rigs' noise."""
     for name, among, bound in (("rigid_body", None, 2e-3), ("dc_motor", ("R", "k"), 5e-3)):
-        folder = tmp_path / name
-        folder.mkdir()
         samples, truth = recorded(name)
-        names = strong_of(name).functions.model.p_names
-        found = InC(strong_of(name), core, folder).run(samples, config_of(name, samples, truth, divider=50))
-        for p, true, one in zip(found.p[-1], truth, names, strict=True):
+        config = config_of(name)
+        identifier = strong_native(strong_of(name), config).identifier_of(config)
+        found = identifier.run_samples(samples, sums=False)
+        for p, true, one in zip(found.p[-1], truth, strong_of(name).functions.model.p_names, strict=True):
             if among is None or one in among:
                 assert abs(p / true - 1) < bound, one  # measured: 7e-4 and 8e-4
-        assert (found.se > 0).all() and np.isfinite(found.se).all()
+        se = identifier.assess()["se"][: len(truth)]
+        assert (se > 0).all() and np.isfinite(se).all()
 
 
-def test_the_pendulums_row_is_the_hand_made_one(native: Native) -> None:
-    """Kapitza's pendulum without an unknown zero: 11 entries, 18 non-zeros, and the residuals of the core's row."""
+@pytest.mark.parametrize("law", [Law.STATIONARY, Law.PSEUDOVELOCITY])
+def test_schedules_end_at_the_solution_of_all_rows(law: Law) -> None:
+    """S and F from all sums at every row, at every eighth, in stages: apart by a part of the standard errors."""
+    samples, _ = recorded("rigid_body")
+    base = config_of("rigid_body")
+    ends = {}
+    for schedule, divider, exact in (("exact", 1, 1), ("lazy", 1, 8), ("staged", 8, 0), ("at once", 7, 0)):
+        own = replace(base, estimator=replace(base.estimator, divider=divider, law=law), exact_every=exact)
+        identifier = strong_native(strong_of("rigid_body"), own).identifier_of(own)
+        ends[schedule] = identifier.run_samples(samples, sums=False).p[-1]
+        se = identifier.assess()["se"][:6]
+    share = 0.1 if law is Law.STATIONARY else 3.0  # law (5) depends on its way
+    assert all((np.abs(one - ends["exact"]) < share * se).all() for one in ends.values())
+
+
+def test_samples_beyond_a_row_are_refused_and_p_stays_finite() -> None:
+    samples, _ = recorded("dc_motor")
+    hostile = samples[:600].copy()
+    hostile[100:130] *= np.float32(1e30)
+    hostile[300:420] *= np.float32(1e12)
+    config = config_of("dc_motor", weights=FIVE)
+    identifier = strong_native(strong_of("dc_motor"), config).identifier_of(config)
+    record = identifier.run_samples(hostile)
+    assert np.isfinite(record.p).all() and np.isfinite(record.sums).all()
+    assert {Reason.REJECTED_SATURATED, Reason.UPDATED} <= set(record.reason.tolist())
+
+
+def test_an_outlier_is_rejected_and_a_frozen_identifier_keeps_its_state() -> None:
+    samples, _ = recorded("rigid_body")
+    config = replace(config_of("rigid_body", weights=FIVE), gate=GateConfig(6.0, 1.0))
+    identifier = strong_native(strong_of("rigid_body"), config).identifier_of(config)
+    identifier.run_samples(samples[:400])
+    wrong = samples[400:440].copy()
+    wrong[20] += np.float32(3)
+    assert (identifier.run_samples(wrong).reason == Reason.REJECTED_OUTLIER).sum() >= 1
+    library, state = identifier.native.library, identifier.state
+    library.rigid_body_strong_freeze_f32(state, True)
+    kept = identifier.state_bytes
+    frozen = identifier.run_samples(samples[440:480])
+    assert (frozen.reason == Reason.HELD_FROZEN).all() and len(np.unique(frozen.p, axis=0)) == 1
+    library.rigid_body_strong_freeze_f32(state, False)
+    assert identifier.run_samples(samples[480:500]).reason[-1] in (Reason.ACCUMULATED, Reason.UPDATED)
+    assert len(kept) == len(identifier.state_bytes)
+
+
+def paper_pendulum() -> StrongFunctions:
+    """Kapitza's pendulum of the paper: no unknown zero, the pivot's acceleration is an input."""
     model = Model("pendulum")
     u = model.input("u", "1/s^2", hold="sampled", reach=30)
     phi = model.sensor("phi", "rad", resolution=1e-3)
@@ -211,17 +259,29 @@ def test_the_pendulums_row_is_the_hand_made_one(native: Native) -> None:
     g = w + u
     model.equation(x.d(2) + g * x - (d1 - d2 - 1) * g * phi)
     model.equation(phi.d(2) - g * x + (d1 - 1) * g * phi)
-    strong = strong_functions_of(strong_form(model.compiled("pendulum")))
+    return strong_functions_of(strong_form(model.compiled("pendulum")))
+
+
+def test_the_pendulums_sums_are_as_few_as_by_hand() -> None:
+    """58 sums, one multiplication each; the shift G = u + w is found."""
+    sums = strong_sums_of(renamed(paper_pendulum()))
+    assert len(sums.places) == 58 and len(sums.chains) == 57 and sums.shift is not None
+    assert sums.projection.operations <= 284
+
+
+def test_the_pendulums_row_is_the_hand_made_one(native: Native) -> None:
+    """Kapitza's pendulum without an unknown zero: 11 entries, 18 non-zeros, and the residuals of the core's row."""
+    strong = paper_pendulum()
     assert len(strong.functions.theta.labels) == 11 and len(strong.functions.c_row) == 18
     random = np.random.default_rng(3)
     phis, us = random.normal(size=(200, 5)), random.normal(size=(200, 3))
     n, y = native.strong_rows(phis, us)
     p = np.array([31.67, 8.875, 5.625])
     hand = oracle.BINOMIAL * oracle.theta(p)
-    jets = {"phi": phis.astype(np.float32), "u": us.astype(np.float32)}
-    given = np.stack([jets[one.symbol.of][:, one.symbol.order] for one in strong.functions.inputs])
-    columns = row_of(strong)(given).astype(np.float64)
-    theta = theta_at(strong, p)
+    jets = {"phi": phis, "u": us}
+    columns = rows_of(strong, np.stack([jets[one.symbol.of][:, one.symbol.order] for one in strong.functions.inputs]))
+    values = dict(zip(strong.functions.model.p, p, strict=True))
+    theta = np.array([float(one.subs(values)) for one in strong.functions.theta.expressions])
     ours = columns[-1] - theta @ columns[:-1]
     theirs = y.astype(np.float64) - n.astype(np.float64) @ hand
     size = np.abs(y) + np.abs(n.astype(np.float64)) @ np.abs(hand)
@@ -229,13 +289,24 @@ def test_the_pendulums_row_is_the_hand_made_one(native: Native) -> None:
     assert (np.abs(ours - sign * theirs) <= 1e-6 * size).all()  # a few roundings to float32
 
 
+def test_chains_make_each_product_by_one_multiplication_of_known_ones() -> None:
+    random = np.random.default_rng(4)
+    wanted = [tuple((a, int(k)) for a, k in enumerate(random.integers(0, 4, 4)) if k) for _ in range(40)]
+    made: set[tuple[tuple[int, int], ...]] = {(), *(((a, 1),) for a in range(4))}
+    for one in chains_of(filter(None, wanted), 4):
+        assert one.left in made and one.right in made and times(one.left, one.right) == one.made
+        assert over(one.made, one.left) == one.right
+        made.add(one.made)
+    assert set(wanted) <= made
+
+
 def test_a_row_that_is_integrated_by_parts_is_refused() -> None:
     with pytest.raises(PvidError, match="dc_motor: a row is integrated by parts; give its strong form"):
         strong_functions_of(mechanisms.compiled_of("dc_motor"))
 
 
-def test_the_header_names_the_sizes_that_it_needs() -> None:
+def test_the_header_names_the_size_that_it_needs() -> None:
     header = files_strong.header(strong_of("dc_motor"), "test")
-    assert '#error "compile pvid and this file with -DPVID_MAX_P=7 -DPVID_MAX_THETA=9 -DPVID_MAX_MOMENTS=25"' in header
+    assert '#error "compile pvid and this file with -DPVID_MAX_P=7"' in header
     for line in ("sample[0]  V    [V]    held until the next", "sample[2]  phi  [rad]", "phi, derivative 2"):
         assert line in header

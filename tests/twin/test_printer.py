@@ -240,6 +240,14 @@ def test_static_names_of_two_files_stay_apart() -> None:
     assert (module.a(), module.b(), module.c()) == (1, 2, 3)
 
 
+def test_a_header_behind_a_static_function_of_its_source_calls_it() -> None:
+    files = {
+        "of.h": "static int twice(void) { return 2 * once(); }\n",
+        "a.c": 'static int once(void) { return 3; }\n#include "of.h"\nint a(void) { return twice(); }\n',
+    }
+    assert loaded(text_of([], [], {}, texts=files), "header.py").a() == 6
+
+
 @pytest.mark.parametrize(
     ("statement", "what"),
     [

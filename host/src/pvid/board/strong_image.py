@@ -9,8 +9,8 @@ from pvid.board.boards import BOARDS, Board
 from pvid.board.compare_on import Outcome
 from pvid.board.mechanism_image import build_with, refuse_float_on_avr
 from pvid.board.replay_image import REPORT_EVERY, ReplayReport, play
-from pvid.codegen import files_strong_design
-from pvid.codegen.strong_library import sizes_of_strong, strong_texts
+from pvid.codegen import files_strong, files_strong_design
+from pvid.codegen.strong_library import sizes_of_strong
 from pvid.compare.strong import StrongComparison
 from pvid.configuration.strong import StrongDesign
 
@@ -34,13 +34,13 @@ def header(design: StrongDesign) -> str:
             "#include <stddef.h>",
             "",
             '#include "pvid/arithmetic.h"',
-            '#include "pvid/fnv.h"',
+            '#include "pvid/fnv_word.h"',
             f'#include "{name}_design_f32.h"',
             "",
             f"#define REPLAY_TYPE {name}_f32",
             f"#define REPLAY_INIT {name}_init_f32",
             f"#define REPLAY_STEP {name}_step_f32",
-            "#define REPLAY_HASH pvid_fnv_estimator_f32",
+            f"#define REPLAY_HASH {name}_fnv_f32",
             "#define REPLAY_SAMPLE float",
             "#define REPLAY_COUNT uint32_t",
             "#define REPLAY_HAS_BITS",
@@ -80,7 +80,7 @@ def play_on_board(target: str, run: StrongComparison) -> ReplayReport:
         raise PvidError(f"{target}: an image holds at most {MOST_TICKS} samples, and the recording has {ticks}")
     name = design.strong.functions.name
     files = {
-        **strong_texts(design.strong, MADE_BY),
+        **files_strong.files_of(design.strong, MADE_BY),
         f"{name}_design_f32.h": files_strong_design.header(design.strong, design.config, MADE_BY),
         "replay_run.h": header(design),
     }

@@ -18,12 +18,12 @@ from pvid.cli.input import NewFile, columns_option, force_option
 from pvid.cli.rig_design import model_of_rig, recorded
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
-    from pvid.codegen.strong_twin import StrongModelConfig
     from pvid.codegen.weak_q31 import FixedEngine
     from pvid.model.compiled import CompiledModel
     from pvid.models.simulated_rig import SimulatedRig
     from pvid.rig.run import Recording
     from pvid.settings.refine import RefineConfig
+    from pvid.settings.strong import StrongModelConfig
     from pvid.settings.weak import WeakConfig
 
 _MODEL = click.argument("model", metavar="MODEL")

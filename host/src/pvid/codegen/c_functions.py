@@ -133,7 +133,7 @@ def check_literals(program: Program) -> None:
             float32_of(one.value)
 
 
-_FLOAT = {
+FLOAT_CALLS = {
     "sin": "pvid_sin_f32({})",
     "cos": "pvid_cos_f32({})",
     "sign": "pvid_sign_f32({})",
@@ -150,7 +150,7 @@ def float_function(signature: str, program: Program) -> str:
         statement=lambda name, text: f"const float {name} = {text};",
         argument=lambda place: f"in[{place}]",
         literal=lambda place: c_literal(program.literal(place)),
-        operation=lambda place, operands: call_of(program, place, operands, _FLOAT),
+        operation=lambda place, operands: call_of(program, place, operands, FLOAT_CALLS),
     )
     lines, results = statements(program, language)
     if not uses_arguments(program):

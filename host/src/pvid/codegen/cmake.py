@@ -29,10 +29,16 @@ if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
   target_compile_options({name} PRIVATE {options})
 endif()
 
-# {name}_strong.h, an identifier from derivatives of the signals: needs a pvid of larger sizes, which its header names.
+# {name}_strong.h, an identifier from derivatives of the signals: includes strong/strong_f32.h of pvid's sources.
 option({upper}_STRONG "Build the strong form of {name}" OFF)
 if({upper}_STRONG AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_f32.c)
+  get_target_property({name}_pvid pvid::pvid ALIASED_TARGET)
+  if(NOT {name}_pvid)
+    message(FATAL_ERROR "{upper}_STRONG needs the sources of pvid: add_subdirectory or FetchContent, not find_package")
+  endif()
+  get_target_property({name}_pvid_sources ${{{name}_pvid}} SOURCE_DIR)
   target_sources({name} PRIVATE {name}_strong_f32.c)
+  target_include_directories({name} PRIVATE ${{{name}_pvid_sources}}/src)
 endif()
 
 # {name}_weak.h, the model for pvid/weak.h: needs a pvid of the sizes that its header names.

@@ -1,197 +1,178 @@
-"""The float32 files of a model's strong form: header and source of an identifier with samples in, parameters out."""
+"""The float32 files of a model's strong form: header and source of an identifier with samples in, parameters out.
+
+The source prints what the model determines, and includes strong/strong_f32.h of the core, which is the same for all.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+
 from pvid.codegen import c_functions, describe
+from pvid.codegen.c_functions import Language, c_literal, call_of, statements
 from pvid.codegen.c_text import UNCONTRACTED, banner, c_comment, for_cpp, guarded
-from pvid.codegen.files_functions import includes_of, model_struct
 from pvid.codegen.functions import Function
 from pvid.codegen.generated import GeneratedModel
+from pvid.codegen.operations import Program, exact
 from pvid.codegen.strong import StrongFunctions
+from pvid.codegen.strong_sums import Monomial, StrongSums, strong_sums_of, text_of
 
 _HEADER = """\
-/* Settings. */
+/* Settings. They must outlive the identifier, unchanged. */
 typedef struct {{
-    pvid_fir_bank_f32 bank; /* of all differentiators, see pvid/differentiator.h */
     float sample_rate_hz;   /* 1e-3..1e6 [Hz] */
+    pvid_fir_bank_f32 bank; /* of all derivatives, see pvid/differentiator.h; five points are written out */
     float row_sd[{upper}_KINDS]; /* standard deviation of Y - N^T theta of each kind of row [unit of its Y], > 0 */
-    pvid_estimator_config_f32 estimator; /* start, bounds, law ..; its model, row_sd and update_rate_hz are ignored */
+    pvid_gate_config_f32 gate;   /* outlier gate on the weighted innovations of an instant; zeros: none */
+    uint16_t exact_every;   /* rows from one exact projection to the next if divider is 1, 1..255; 0: 8, with the law
+                               pseudovelocity 1 */
+    pvid_estimator_config_f32 estimator; /* start, bounds, law ..; model, row_sd, update_rate_hz, noise_margin,
+                                            row_weight are ignored; no dead zone */
 }} {name}_config_f32;
 
-/* State; only the functions below write to it. */
+/* State; only the functions below write to it. The last samples of all channels: */
 typedef struct {{
-    pvid_differentiator_f32 channel[{upper}_CHANNELS];
-{members}    float inverse_sd[{upper}_KINDS];
-    pvid_estimator_f32 estimator; /* p and counters; assess with pvid_estimator_assess_f32 */
+    float scale[PVID_ORDERS]; /* factors of the filters' sums [1/s^k] */
+    uint16_t length;          /* places of the ring */
+    uint16_t stride;          /* places from tap to tap */
+    uint16_t head;            /* place of the oldest point */
+    uint16_t at;              /* samples in a point that is not complete */
+    uint16_t missing;         /* points until the window is full */
+    uint8_t before;           /* samples in `past` */
+    uint8_t five_points;      /* 1: the bank is pvid_five_points_f32; 2: and the window is full */
+{past}    float points[PVID_MAX_WINDOW][{upper}_CHANNELS];
+}} {name}_window_f32;
+
+/* Sums, parameters, the equations of the next step. */
+typedef struct {{
+    const {name}_config_f32 *config; /* NULL before init has accepted one */
+    float p[{upper}_P];      /* the estimate */
+    float s[{triangle}];           /* S at the last exact projection and the rows since, upper triangle by rows */
+    float force[{upper}_P];  /* right-hand side of the next step */
+    float prior[{upper}_P];  /* diagonal of H0 */
+    float weight[{upper}_KINDS]; /* of each kind, relative to the first */
+    float row_sd;            /* of the first kind, in units of the core's rows */
+    float gain;              /* g of a step with an exact projection */
+    float retention;         /* factor on the past at a fold, in (0, 1] */
+    uint16_t phase;          /* rows since the last projection */
+    uint8_t exact_every;
+    uint8_t staged;          /* 1: projection, solve and fold at rows of their own */
+    uint8_t fold_every;      /* rows between folds */
+    uint8_t age;             /* rows in the sums since the last fold */
+    uint8_t in_block;        /* rows in `block` */
+    bool mixes;              /* gain < 1 */
+    pvid_counters counters;
+    float block[4][{upper}_ATOMS]; /* rows that are not in the sums yet, and the present one */
+    float high[{upper}_SUMS];      /* the value of a sum is high + low */
+    float low[{upper}_SUMS];
+}} {name}_estimator_f32;
+
+typedef struct {{
+    {name}_window_f32 window;
+    bool frozen;
+    bool alarm; /* the last block of rows was a misfit: see pvid/misfit.h */
+{integrals}    pvid_gate_f32 gate;
+    pvid_misfit_f32 misfit;
+    {name}_estimator_f32 estimator; /* p and counters */
 }} {name}_f32;
 
-/* theta and C of all rows. */
-extern const pvid_model_f32 {name}_model_f32;
+/* The init below, for an application with this word (pvid/layout.h). */
+pvid_status {name}_init_layout_f32({name}_f32 *self, const {name}_config_f32 *config, uint32_t layout);
 
 /* Initialises `self`. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER),
- *   - row_sd is not in 1e-12..1e12 (PVID_BAD_ROW_SD), or
- *   - the bank, the rate or a field of `estimator` is out of its range (the status names it). */
-pvid_status {name}_init_f32({name}_f32 *self, const {name}_config_f32 *config);
-
-/* One sample of each signal, in the order of {upper}_SIGNALS above. A sample that is not finite empties the
- * windows and returns PVID_REJECTED_NOT_FINITE; PVID_WARMING_UP until they are full; then the rows of this instant are
- * added and solved: see pvid_estimator_update_f32. */
-pvid_reason {name}_step_f32({name}_f32 *self, const float sample[{upper}_SIGNALS]);"""
-
-_INIT = """\
-static pvid_status prepare({name}_f32 *self, const {name}_config_f32 *config)
+ *   - library, this model and application were compiled with different sizes (PVID_BAD_LAYOUT; *self is unchanged), or
+ *   - the bank, the rate or another setting is out of its range (the status names it). */
+static inline pvid_status {name}_init_f32({name}_f32 *self, const {name}_config_f32 *config)
 {{
-    memset(self, 0, sizeof *self);
-    for (size_t i = 0; i < {upper}_CHANNELS; i++) {{
-        const pvid_status status =
-            pvid_differentiator_init_f32(&self->channel[i], &config->bank, config->sample_rate_hz);
-        if (status != PVID_OK) {{
-            return status;
-        }}
-    }}
-    for (size_t k = 0; k < {upper}_KINDS; k++) {{
-        if (!(config->row_sd[k] >= 1.0e-12f) || !(config->row_sd[k] <= 1.0e12f)) {{
-            return PVID_BAD_ROW_SD;
-        }}
-        self->inverse_sd[k] = 1.0f / config->row_sd[k];
-    }}
-{settings}    pvid_estimator_config_f32 estimator = config->estimator;
-    estimator.model = &{name}_model_f32;
-    estimator.row_sd = 1.0f;
-    estimator.update_rate_hz = config->sample_rate_hz;
-    return pvid_estimator_init_f32(&self->estimator, &estimator);
+    return {name}_init_layout_f32(self, config, PVID_LAYOUT);
 }}
 
-pvid_status {name}_init_f32({name}_f32 *self, const {name}_config_f32 *config)
-{{
-    const pvid_status status = ((self == NULL) || (config == NULL)) ? PVID_BAD_POINTER : prepare(self, config);
-    if ((status != PVID_OK) && (self != NULL)) {{
-        memset(self, 0, sizeof *self);
-    }}
-    return status;
-}}"""
+/* One sample of each signal, in the order of {upper}_SIGNALS above. Returns
+ *   - PVID_WARMING_UP until the window is full, PVID_ACCUMULATED within a point or between solves,
+ *   - PVID_REJECTED_NOT_FINITE for a sample that is not finite: it restarts the window, the sums are kept,
+ *   - PVID_REJECTED_OUTLIER for an instant that the gate rejects, PVID_REJECTED_SATURATED for one beyond the limit of
+ *     a row, PVID_HELD_FROZEN while frozen,
+ *   - PVID_MISFIT instead of PVID_UPDATED during the alarm of pvid/misfit.h: do not trust the estimate,
+ *   - PVID_HELD_NOT_EXCITED or PVID_HELD_SINGULAR where the rows do not determine p, else PVID_UPDATED. */
+pvid_reason {name}_step_f32({name}_f32 *self, const float sample[{upper}_SIGNALS]);
+
+/* The same for inputs of one instant that you have differentiated yourself, in the order of {upper}_INPUTS above. */
+pvid_reason {name}_row_step_f32({name}_f32 *self, const float in[{upper}_INPUTS]);
+
+/* Standard errors, kappa and residual of the present p. Cost: about two solves. */
+void {name}_assess_f32(const {name}_f32 *self, pvid_estimate_f32 *estimate);
+
+/* Writes the values of the sums, without the rows of an unfinished block. */
+void {name}_read_sums_f32(const {name}_f32 *self, float sums[{upper}_SUMS]);
+
+/* The running hash of pvid/fnv.h: continues hash after a tick with this reason. */
+uint32_t {name}_fnv_f32(uint32_t hash, const {name}_estimator_f32 *estimator, pvid_reason reason);
+
+/* Call this when samples are missing: the window restarts, all other state is kept. */
+void {name}_gap_f32({name}_f32 *self);
+
+/* Freezes the identifier (true) or resumes it (false). While frozen p and the sums are kept without forgetting. */
+void {name}_freeze_f32({name}_f32 *self, bool frozen);"""
 
 _INTEGRATE = """\
-/* Integrals since the start of the run by the trapezoid rule; a missing sample repeats the one before. */
-static void integrate({name}_f32 *self, const float sample[{upper}_SIGNALS], bool finite)
+/* The samples and the integrals since the start of the run by the trapezoid rule; a missing sample repeats the one
+ * before. */
+static const float *integrate(strong_f32 *self, const float sample[STRONG_SIGNALS], bool finite)
 {{
-    float now[{upper}_INTEGRANDS];
-    memcpy(now, self->integrand, sizeof now);
+    float rate[{count}];
+    memcpy(rate, self->integrand, sizeof rate);
     if (finite) {{
-        float in[{upper}_INPUTS] = {{0.0f}};
+        float in[STRONG_INPUTS] = {{0.0f}};
 {places}
-        integrands(in, now);
+        integrands(in, rate);
     }}
-    for (size_t i = 0; i < {upper}_INTEGRANDS; i++) {{
-        const float before = self->is_running ? self->integrand[i] : now[i];
+    for (size_t i = 0; i < {count}u; i++) {{
+        const float before = self->is_running ? self->integrand[i] : rate[i];
         if (self->is_running) {{
-            self->integral[i] += self->half_period * (before + now[i]);
+            self->integral[i] += self->half_period * (before + rate[i]);
         }}
-        self->integrand[i] = now[i];
+        self->integrand[i] = rate[i];
+        self->now[STRONG_SIGNALS + i] = self->integral[i];
     }}
+    memcpy(self->now, sample, STRONG_SIGNALS * sizeof sample[0]);
     self->is_running = self->is_running || finite;
-}}"""
-
-_HOLD = """\
-/* The values at the instant of the sample before the last: of a held input its mean around the instant, exact to the
- * fourth order. False until there are four samples. */
-static bool centre({name}_f32 *self, const float now[{upper}_CHANNELS], float out[{upper}_CHANNELS])
-{{
-    static const bool held[{upper}_CHANNELS] = {{{held}}};
-    for (size_t i = 0; i < {upper}_CHANNELS; i++) {{
-        const float *past = self->past[i];
-        out[i] = held[i] ? (((13.0f * (past[1] + past[2])) - (past[0] + now[i])) / 24.0f) : past[2];
-        self->past[i][0] = past[1];
-        self->past[i][1] = past[2];
-        self->past[i][2] = now[i];
-    }}
-    const bool full = self->filled >= 3u;
-    self->filled = full ? self->filled : (uint8_t)(self->filled + 1u);
-    return full;
-}}"""
-
-_STEP = """\
-/* Whether the samples are finite, by a difference that only finite numbers have. */
-static bool are_finite(const float sample[{upper}_SIGNALS])
-{{
-    bool finite = true;
-    for (size_t i = 0; i < {upper}_SIGNALS; i++) {{
-        const float rest = sample[i] - sample[i];
-        finite = finite && (rest >= 0.0f) && (rest <= 0.0f);
-    }}
-    return finite;
+    return self->now;
 }}
+#define STRONG_WITH_INTEGRALS(self, sample, finite) integrate(self, sample, finite)
+#define STRONG_PREPARE_INTEGRALS(self, config) ((self)->half_period = 0.5f / (config)->sample_rate_hz)"""
 
-static void restart({name}_f32 *self)
-{{
-    for (size_t i = 0; i < {upper}_CHANNELS; i++) {{
-        pvid_differentiator_reset_f32(&self->channel[i]);
-    }}
-{emptied}}}
+_NO_INTEGRALS = """\
+#define STRONG_WITH_INTEGRALS(self, sample, finite) (sample)
+#define STRONG_PREPARE_INTEGRALS(self, config) ((void)0)"""
 
-pvid_reason {name}_step_f32({name}_f32 *self, const float sample[{upper}_SIGNALS])
-{{
-    if ((self == NULL) || (self->estimator.model == NULL)) {{
-        return PVID_NOT_READY;
-    }}
-    const bool finite = are_finite(sample);
-{integrated}    if (!finite) {{
-        restart(self);
-        if (self->estimator.counters.rejected_not_finite < UINT32_MAX) {{
-            self->estimator.counters.rejected_not_finite++;
-        }}
-        return PVID_REJECTED_NOT_FINITE;
-    }}
-    float now[{upper}_CHANNELS];
-    memcpy(now, sample, {upper}_SIGNALS * sizeof now[0]);
-{joined}{held}    float d[{upper}_CHANNELS][PVID_ORDERS];
-    bool ready = true;
-    for (size_t i = 0; i < {upper}_CHANNELS; i++) {{
-        ready = pvid_differentiator_step_f32(&self->channel[i], now[i], d[i]) && ready;
-    }}
-    if (!ready) {{
-        return PVID_WARMING_UP;
-    }}
-    const float in[{upper}_INPUTS] = {{{sources}}};
-    float column[{upper}_COLUMNS];
-    row(in, column);
-    static const uint8_t theta_of[{upper}_KINDS + 1] = {{{ranges}}};
-    size_t at = 0;
-    for (uint8_t k = 0; k < {upper}_KINDS; k++) {{
-        const size_t entries = (size_t)theta_of[k + 1u] - theta_of[k];
-        float n[{upper}_THETA];
-        for (size_t j = 0; j < entries; j++) {{
-            n[j] = column[at + j] * self->inverse_sd[k];
-        }}
-        at += entries;
-        (void)pvid_estimator_add_kind_f32(&self->estimator, k, n, column[at] * self->inverse_sd[k]);
-        at++;
-    }}
-    return pvid_estimator_update_f32(&self->estimator);
-}}"""
+# Five points written out, the oldest first: sums of order 1 .. 4.
+_FIVE = (
+    "(8.0f * ({x}[3] - {x}[1])) - ({x}[4] - {x}[0])",
+    "(16.0f * (({x}[3] - {x}[2]) + ({x}[1] - {x}[2]))) - (({x}[4] - {x}[2]) + ({x}[0] - {x}[2]))",
+    "({x}[4] - {x}[0]) - (2.0f * ({x}[3] - {x}[1]))",
+    "(({x}[4] - {x}[2]) + ({x}[0] - {x}[2])) - (4.0f * (({x}[3] - {x}[2]) + ({x}[1] - {x}[2])))",
+)
 
 
 def printed(model: GeneratedModel) -> dict[str, str]:
     """NAME_strong.h and NAME_strong_f32.c, where they are chosen."""
     if not model.options.strong:
         return {}
-    return {
-        f"{model.name}_strong.h": header(model.strong, model.command),
-        f"{model.name}_strong_f32.c": source(model.strong, model.command),
-    }
+    return files_of(model.strong, model.command)
+
+
+def files_of(strong: StrongFunctions, command: str) -> dict[str, str]:
+    """The same of a strong form, which has the name NAME_strong."""
+    name = strong.functions.name
+    return {f"{name}.h": header(strong, command), f"{name}_f32.c": source(strong, command)}
 
 
 def header(strong: StrongFunctions, command: str) -> str:
     """NAME_strong.h; `strong` has the name NAME_strong."""
-    functions = strong.functions
+    functions, sums = strong.functions, strong_sums_of(strong)
     name, upper = functions.name, functions.name.upper()
-    n_theta, n_p = len(functions.theta.labels), len(functions.model.unknowns)
-    needed = {
-        "PVID_MAX_P": n_p,
-        "PVID_MAX_THETA": n_theta,
-        "PVID_MAX_MOMENTS": functions.moments,
-    }
+    n_p = len(functions.model.unknowns)
     samples = [
         (f"sample[{k}]", one.name, f"[{one.unit or '1'}]", "held until the next" if one.hold == "zoh" else "")
         for k, one in enumerate(strong.signals)
@@ -205,107 +186,401 @@ def header(strong: StrongFunctions, command: str) -> str:
         f"  if ({name}_init_f32(&identifier, &config) != PVID_OK) ...",
         f"  each tick: {name}_step_f32(&identifier, sample); identifier.estimator.p is the estimate",
         "",
+        "How often p is solved for: divider 1, exact_every 1: S and F from all sums at every row, the paper's law (5)",
+        "literally; divider 1: a step at every row, from all sums at every eighth; divider 8, 12 .. 64: projection,",
+        "solve and folding of the sums at rows of their own, the least work of a tick; other dividers: all at one row.",
+        "",
         "Samples:",
         *describe.table(samples),
         "",
-        f"The library must be compiled with {', '.join(f'{macro} >= {size}' for macro, size in needed.items())}.",
-        "Not thread-safe.",
+        f"The library must be compiled with PVID_MAX_P >= {n_p}.",
+        "Not thread-safe. Never allocates.",
         "",
         *describe.everything(functions),
     ]
     counts = {
         "P": n_p,
-        "THETA": n_theta,
-        "C": len(functions.c_row),
         "KINDS": len(functions.kinds),
         "SIGNALS": len(strong.signals),
         "CHANNELS": strong.channels,
         "INPUTS": len(functions.inputs),
-        "COLUMNS": functions.columns,
+        "ATOMS": len(sums.atoms),
+        "SUMS": len(sums.places),
     }
-    members = ""
-    if any(strong.held):
-        members += f"    float past[{upper}_CHANNELS][3];\n    uint8_t filled;\n"
+    past = (
+        f"    float past[{upper}_CHANNELS][3]; /* of the samples, around a held input */\n" if any(strong.held) else ""
+    )
+    integrals = ""
     if strong.integrals:
         counts["INTEGRANDS"] = len(strong.integrals)
-        members += f"    float integral[{upper}_INTEGRANDS];\n    float integrand[{upper}_INTEGRANDS];\n"
-        members += "    float half_period;\n    bool is_running;\n"
+        integrals = (
+            f"    float now[{upper}_CHANNELS]; /* of all channels */\n"
+            f"    float integral[{upper}_INTEGRANDS]; /* since the start of the run */\n"
+            f"    float integrand[{upper}_INTEGRANDS];\n    float half_period;\n    bool is_running;\n"
+        )
+    text = _HEADER.format(name=name, upper=upper, past=past, integrals=integrals, triangle=f"{n_p * (n_p + 1) // 2}")
     body = [
         '#include "pvid/differentiator.h"',
         '#include "pvid/estimator.h"',
+        '#include "pvid/gate.h"',
+        '#include "pvid/misfit.h"',
         "",
-        f"#if {' || '.join(f'{macro} < {size}' for macro, size in needed.items())}",
-        f'#error "compile pvid and this file with {" ".join(f"-D{macro}={size}" for macro, size in needed.items())}"',
+        f"#if PVID_MAX_P < {n_p}",
+        f'#error "compile pvid and this file with -DPVID_MAX_P={n_p}"',
         "#endif",
         "",
-        *for_cpp(
-            [
-                *(f"#define {upper}_{what} {count}" for what, count in counts.items()),
-                "",
-                _HEADER.format(name=name, upper=upper, members=members),
-                "",
-            ]
-        ),
+        *for_cpp([*(f"#define {upper}_{what} {count}" for what, count in counts.items()), "", text, ""]),
     ]
     return guarded(name, about, body)
 
 
 def source(strong: StrongFunctions, command: str) -> str:
     """NAME_strong_f32.c."""
-    functions = strong.functions
-    name, upper = functions.name, functions.name.upper()
-    used = [strong.row, functions.theta, functions.jacobian, *([functions.integrands] if strong.integrals else [])]
-    words = {"name": name, "upper": upper}
+    functions, sums = strong.functions, strong_sums_of(strong)
+    name = functions.name
     parts = [
         c_comment(banner(functions, command)),
         UNCONTRACTED,
-        includes_of(f"{name}.h", used, ("stdbool.h", "stddef.h", "string.h")),
-        *(c_functions.float_function(_signature(strong, one), one.program) for one in used),
-        model_struct(functions, "theta", "jacobian"),
-        _INIT.format(
-            settings="    self->half_period = 0.5f / config->sample_rate_hz;\n" if strong.integrals else "", **words
-        ),
+        _includes(name),
+        _names(strong, sums),
+        *_inputs(strong),
+        *_rows(sums),
+        *_equations(sums),
+        *_integrals(strong),
+        '#include "strong/strong_f32.h"',
     ]
-    if strong.integrals:
-        places = [
-            f"        in[{k}] = sample[{place}];"
-            for k, one in enumerate(functions.inputs)
-            if (place := strong.raw_places(one)) is not None
-        ]
-        parts.append(_INTEGRATE.format(places="\n".join(places), **words))
-    if any(strong.held):
-        held = [*strong.held, *(False for _ in strong.integrals)]
-        parts.append(_HOLD.format(held=", ".join("true" if one else "false" for one in held), **words))
-    joined = ""
-    if strong.integrals:
-        joined = f"    memcpy(&now[{upper}_SIGNALS], self->integral, sizeof self->integral);\n"
-    parts.append(
-        _STEP.format(
-            emptied="    self->filled = 0;\n" if any(strong.held) else "",
-            integrated="    integrate(self, sample, finite);\n" if strong.integrals else "",
-            joined=joined,
-            held=_centred(upper) if any(strong.held) else "",
-            sources=", ".join(f"d[{one.channel}][{one.order}]" for one in strong.sources),
-            ranges=", ".join(["0", *(str(kind.theta.stop) for kind in functions.kinds)]),
-            **words,
-        )
-    )
     return "\n\n".join(parts) + "\n"
 
 
-def _centred(upper: str) -> str:
-    return f"""\
-    float sampled[{upper}_CHANNELS];
-    memcpy(sampled, now, sizeof sampled);
-    if (!centre(self, sampled, now)) {{
-        return PVID_WARMING_UP;
-    }}
-"""
+def _includes(name: str) -> str:
+    own = ["number/finite_f32.h", "number/unroll.h", "pvid/elementary.h", "solve/cholesky_f32.h"]
+    own += ["strong/block_f32.h", "strong/differentiator_f32.h"]
+    standard = ["math.h", "stdbool.h", "stddef.h", "string.h"]
+    groups = [f'#include "{name}.h"'], [f"#include <{one}>" for one in standard], [f'#include "{one}"' for one in own]
+    return "\n\n".join("\n".join(one) for one in groups)
 
 
-def _signature(strong: StrongFunctions, function: Function) -> str:
-    upper = strong.functions.name.upper()
-    sizes = {"row": ("INPUTS", "COLUMNS"), "theta": ("P", "THETA"), "jacobian": ("P", "C")}
-    given, written = sizes.get(function.name, ("INPUTS", "INTEGRANDS"))
-    bounds = ("", "") if function.name in ("theta", "jacobian") else (f"{upper}_{given}", f"{upper}_{written}")
-    return f"static void {function.name}(const float in[{bounds[0]}], float out[{bounds[1]}])"
+def _names(strong: StrongFunctions, sums: StrongSums) -> str:
+    """What strong/strong_f32.h is given."""
+    name, upper = strong.functions.name, strong.functions.name.upper()
+    n_p = len(sums.p)
+    units = ", ".join(c_literal(1 / exact(one.unit)) for one in sums.kinds)
+    linear = ", ".join(map(str, sums.linear)) or "0"
+    held = ", ".join("1" if one else "0" for one in (*strong.held, *([False] * len(strong.integrals))))
+    counted = ["P", "KINDS", "SIGNALS", "CHANNELS", "INPUTS", "ATOMS", "SUMS"]
+    positive = sum(one.positive << k for k, one in enumerate(strong.functions.model.unknowns))
+    return "\n".join(
+        [
+            f"#define STRONG(verb) {name}_##verb##_f32",
+            *(f"#define STRONG_{one} {upper}_{one}" for one in counted),
+            f"#define STRONG_WEIGHT {sums.places[()]}u",
+            f"#define STRONG_S {n_p * (n_p + 1) // 2}",
+            f"#define STRONG_POSITIVE {positive}u",
+            f"#define STRONG_HELD {int(any(strong.held))}",
+            f"#define STRONG_HELD_CHANNELS {{{held}}}",
+            f"#define STRONG_UNITS {{{units}}}",
+            f"#define STRONG_LINEAR {{{linear}}}",
+            f"#define STRONG_LINEAR_COUNT {len(sums.linear)}u",
+            "#define STRONG_FIVE_POINTS_READY 2u",
+            *(f"typedef {name}_{one}_f32 strong_{one}_f32;" for one in ("config", "window", "estimator")),
+            f"typedef {name}_f32 strong_f32;",
+            "",
+            "/* Residual e and gradient C^T N of a row of each kind. */",
+            "typedef struct {",
+            "    float e[STRONG_KINDS];",
+            "    float g[STRONG_KINDS][STRONG_P];",
+            "} strong_gradient_f32;",
+        ]
+    )
+
+
+def _inputs(strong: StrongFunctions) -> list[str]:
+    five, bank = [], []
+    for k, one in enumerate(strong.sources):
+        x = f"x[{one.channel}]"
+        held = one.channel < len(strong.signals) and strong.held[one.channel]
+        if one.order:
+            five.append(f"in[{k}] = ({_FIVE[one.order - 1].format(x=x)}) * scale[{one.order}];")
+            bank.append(f"in[{k}] = sums[{one.channel}].sum[{one.order}] * scale[{one.order}];")
+        else:
+            mean = f"((13.0f * ({x}[1] + {x}[2])) - ({x}[0] + {x}[3])) / 24.0f"
+            five.append(f"in[{k}] = {mean if held else f'{x}[2]'};")
+            bank.append(f"in[{k}] = (sums[{one.channel}].middle + sums[{one.channel}].sum[0]) * scale[0];")
+    scaled = any(one.order for one in strong.sources)
+    described = "; ".join(f"in[{k}]: {one.meaning}" for k, one in enumerate(strong.functions.inputs))
+    return [
+        _commented(
+            f"The inputs of a row from five points of each channel, the oldest first. {described}.",
+            c_functions.definition(
+                "static inline void inputs_of_five(const float x[STRONG_CHANNELS][5], const float scale[PVID_ORDERS],"
+                " float in[STRONG_INPUTS])",
+                [*five, *([] if scaled else ["(void)scale;"])],
+            ),
+        ),
+        _commented(
+            "The same from the sums of a bank of filters.",
+            c_functions.definition(
+                "static inline void inputs_of_bank(const pvid_fir_sums_f32 sums[STRONG_CHANNELS],"
+                " const float scale[PVID_ORDERS], float in[STRONG_INPUTS])",
+                bank,
+            ),
+        ),
+    ]
+
+
+def _rows(sums: StrongSums) -> list[str]:
+    innovation = sums.innovation
+    lines, results = _printed(innovation.program)
+    at = iter(results)
+    entries: list[str] = []
+    squares: list[str] = []
+    forces: dict[int, list[str]] = {a: [] for a in range(len(sums.p))}
+    place = _triangle(len(sums.p))
+    for k, own in enumerate(innovation.entries):
+        entries.append(f"row->e[{k}] = {next(at)};")
+        entries += [f"row->g[{k}][{a}] = {next(at)};" for a in own]
+        names = {a: f"row->g[{k}][{a}]" for a in own}
+        weighted = {a: f"q{k}_{a}" for a in own} if k else names
+        if k:
+            squares += [f"const float {weighted[a]} = weight[{k}] * {names[a]};" for a in own]
+        squares += [f"s[{place[a, b]}] += {weighted[a]} * {names[b]};" for a in own for b in own if b >= a]
+        for a in own:
+            g = f"(weight[{k}] * {names[a]})" if k else names[a]
+            forces[a].append(f"({g} * row->e[{k}])")
+    force = [f"force[{a}] = {' + '.join(terms) or '0.0f'};" for a, terms in forces.items()]
+    bound, (limited,) = _printed(sums.bound)
+    several = len(sums.kinds) > 1
+    unused = [] if several else ["(void)weight;"]
+    kinds = range(len(sums.kinds))
+    square = " + ".join(
+        f"(weight[{k}] * (row->e[{k}] * row->e[{k}]))" if k else "(row->e[0] * row->e[0])" for k in kinds
+    )
+    sensitive = [k for k in kinds if 0 in innovation.entries[k]]
+    unit = "p[0] * " if sums.strong.functions.model.unknowns[0].positive else ""
+    parts = [f"const float r{k} = {unit}row->g[{k}][0];" for k in sensitive]
+    signal = " + ".join(f"(weight[{k}] * (r{k} * r{k}))" if k else f"(r{k} * r{k})" for k in sensitive) or "0.0f"
+    atoms, atom_results = _printed(sums.atoms_program)
+    listed = "; ".join(f"x[{k}] = {one}" for k, one in enumerate(sums.atoms))
+    return [
+        _commented(
+            f"The factors of the rows: {listed}.",
+            c_functions.definition(
+                "static inline void atoms_of(const float in[STRONG_INPUTS], float x[STRONG_ATOMS])",
+                [*atoms, *(f"x[{k}] = {one};" for k, one in enumerate(atom_results))],
+            ),
+        ),
+        _commented(
+            "A bound of the squares of all entries of the rows.",
+            c_functions.definition(
+                "static inline float bound_of(const float x[STRONG_ATOMS])",
+                [*_unused([*bound, limited], ("x",)), *bound, f"return {limited};"],
+            ),
+        ),
+        _commented(
+            f"Residual and gradient of the rows, theory.md (5). {innovation.program.cost}.",
+            c_functions.definition(
+                "static inline void innovate(const float p[STRONG_P], const float x[STRONG_ATOMS],"
+                " strong_gradient_f32 *row)",
+                [*_unused(lines, ("p",)), *lines, *entries],
+            ),
+        ),
+        _commented(
+            "s += C^T N (C^T N)^T, the upper triangle by rows.",
+            c_functions.definition(
+                "static inline void add_squares(const strong_gradient_f32 *row, const float weight[STRONG_KINDS],"
+                " float s[STRONG_S])",
+                [*unused, *squares],
+            ),
+        ),
+        _commented(
+            "C^T N e.",
+            c_functions.definition(
+                "static inline void force_of(const strong_gradient_f32 *row, const float weight[STRONG_KINDS],"
+                " float force[STRONG_P])",
+                [*unused, *force],
+            ),
+        ),
+        _commented(
+            "The square of the innovations.",
+            c_functions.definition(
+                "static inline float square_of(const strong_gradient_f32 *row, const float weight[STRONG_KINDS])",
+                [*unused, f"return {square};"],
+            ),
+        ),
+        _commented(
+            "The square of p[0] dY/dp[0], see pvid/misfit.h.",
+            c_functions.definition(
+                "static inline float signal_of(const strong_gradient_f32 *row, const float weight[STRONG_KINDS],"
+                " const float p[STRONG_P])",
+                [*_unused([*parts, signal], ("weight", "p")), *parts, f"return {signal};"],
+            ),
+        ),
+    ]
+
+
+def _equations(sums: StrongSums) -> list[str]:
+    n_p = len(sums.p)
+    lines, results = _printed(sums.projection)
+    triangle = n_p * (n_p + 1) // 2
+    projected = [f"s[{k}] = {one};" for k, one in enumerate(results[:triangle])]
+    projected += [f"force[{a}] = {one};" for a, one in enumerate(results[triangle:])]
+    arguments = "const float high[STRONG_SUMS], const float low[STRONG_SUMS], const float p[STRONG_P],"
+    arguments += " const float weight[STRONG_KINDS]"
+    distance, (apart,) = _printed(sums.distance)
+    signature = "static PVID_NOINLINE void add_rows(const float block[restrict][STRONG_ATOMS],"
+    signature += " float low[restrict STRONG_SUMS])"
+    return [
+        _commented(
+            f"The rows of a block to the {len(sums.places)} sums of M, B and Y^2: each product by one multiplication.",
+            c_functions.definition(signature, _added_products(sums)),
+        ),
+        _commented(
+            f"S = C^T M C and F = C^T (B - M theta) at p, theory.md (4) and (5). {sums.projection.cost}.",
+            c_functions.definition(
+                f"PVID_ALWAYS_INLINE void project({arguments}, float s[STRONG_S], float force[STRONG_P])",
+                [*_unused(lines, ("p", "weight")), *lines, *projected],
+            ),
+        ),
+        _commented(
+            "The sum of (Y - Q)^2.",
+            c_functions.definition(
+                f"static PVID_COLD float distance({arguments})",
+                [*_unused(distance, ("high", "low", "p", "weight")), *distance, f"return {apart};"],
+            ),
+        ),
+        _commented(
+            "dp = (S + H0)^-1 rhs by L D L^T from the last row up. Fails iff a pivot is below PVID_PIVOT_MIN of its"
+            " diagonal (PVID_HELD_SINGULAR), or p[0] is not sufficiently excited (PVID_HELD_NOT_EXCITED).",
+            c_functions.definition(
+                "PVID_ALWAYS_INLINE pvid_reason solved(const float s[STRONG_S], const float prior[STRONG_P],"
+                " float kappa_min, const float rhs[STRONG_P], float dp[STRONG_P])",
+                _solve(n_p),
+            ),
+        ),
+    ]
+
+
+def _integrals(strong: StrongFunctions) -> list[str]:
+    if not strong.integrals:
+        return [_NO_INTEGRALS]
+    functions = strong.functions
+    places = [
+        f"        in[{k}] = sample[{place}];"
+        for k, one in enumerate(functions.inputs)
+        if (place := strong.raw_places(one)) is not None
+    ]
+    count = len(strong.integrals)
+    inner: Function = functions.integrands
+    signature = f"static void integrands(const float in[STRONG_INPUTS], float out[{count}])"
+    return [
+        c_functions.float_function(signature, inner.program),
+        _INTEGRATE.format(count=count, places="\n".join(places)),
+    ]
+
+
+def _added_products(sums: StrongSums) -> list[str]:
+    """A multiplication, four additions, a load and a store for each sum."""
+    names: dict[Monomial, str] = {((a, 1),): f"a{a}" for a in range(len(sums.atoms))}
+    rows = [f"block[0][{a}], block[1][{a}], block[2][{a}], block[3][{a}]" for a in range(len(sums.atoms))]
+    lines = [f"const pvid_four_f32 a{a} = {{{row}}};" for a, row in enumerate(rows)]
+
+    def add(monomial: Monomial) -> None:
+        if monomial in sums.places:
+            place = sums.places[monomial]
+            lines.append(f"low[{place}] = pvid_four_added_f32(low[{place}], {names[monomial]});")
+
+    for monomial in list(names):
+        add(monomial)
+    for one in sums.chains:
+        names[one.made] = "m" + "_".join(f"{a}x{k}" for a, k in one.made)
+        factors = f"{names[one.left]}, {names[one.right]}"
+        lines.append(
+            f"const pvid_four_f32 {names[one.made]} = pvid_four_times_f32({factors}); /* {text_of(one.made)} */"
+        )
+        add(one.made)
+    return [*lines, f"low[{sums.places[()]}] += (float)PVID_STRONG_ROWS;"]
+
+
+def _solve(n_p: int) -> list[str]:
+    place = _triangle(n_p)
+    sum_of_diagonal = _added([f"d{a}" for a in range(n_p)])
+    lines = [f"const float d{a} = s[{place[a, a]}] + prior[{a}];" for a in range(n_p)]
+    last = n_p - 1
+    lines += [
+        "/* infinity and NaN of any show in the sum; others that are not positive in their pivots */",
+        f"if (!pvid_positive_normal_f32(d{last}) || !pvid_positive_normal_f32({sum_of_diagonal})) {{",
+        "    return PVID_HELD_SINGULAR;",
+        "}",
+    ]
+    for b in reversed(range(n_p)):
+        pivot = f"d{b}"
+        for k in range(b + 1, n_p):
+            pivot = f"({pivot} - (l{b}_{k} * c{b}_{k}))"
+        lines.append(f"const float v{b} = {pivot};")
+        if b < last:
+            lines += [f"if (!pvid_pivot_is_significant_f32(v{b}, d{b})) {{", "    return PVID_HELD_SINGULAR;", "}"]
+        lines.append(f"const float i{b} = 1.0f / v{b};")
+        for a in reversed(range(b)):
+            c = f"s[{place[a, b]}]"
+            for k in range(b + 1, n_p):
+                c = f"({c} - (l{a}_{k} * c{b}_{k}))"
+            lines += [f"const float c{a}_{b} = {c};", f"const float l{a}_{b} = c{a}_{b} * i{b};"]
+    lines += [
+        "const bool own = (v0 >= (2.0f * prior[0])) || !(kappa_min > 0.0f);",
+        "if (!(v0 >= (kappa_min * d0)) || !own) {",
+        "    return PVID_HELD_NOT_EXCITED;",
+        "}",
+    ]
+    for a in reversed(range(n_p)):
+        z = f"rhs[{a}]"
+        for k in range(a + 1, n_p):
+            z = f"({z} - (l{a}_{k} * z{k}))"
+        lines.append(f"const float z{a} = {z};")
+    for a in range(n_p):
+        x = f"(z{a} * i{a})"
+        for k in range(a):
+            x = f"({x} - (l{k}_{a} * dp[{k}]))"
+        lines.append(f"dp[{a}] = {x};")
+    return [*lines, "return PVID_UPDATED;"]
+
+
+def _triangle(n_p: int) -> dict[tuple[int, int], int]:
+    pairs = [(a, b) for a in range(n_p) for b in range(a, n_p)]
+    return {pair: place for place, pair in enumerate(pairs)}
+
+
+def _added(terms: Sequence[str]) -> str:
+    """The sum from the left, with its brackets."""
+    total = ""
+    for one in terms:
+        total = f"({total} + {one})" if total else one
+    return total.removeprefix("(").removesuffix(")") if len(terms) > 1 else total or "0.0f"
+
+
+_ARRAYS = {"p": "p[{}]", "x": "x[{}]", "in": "in[{}]", "w": "weight[{}]", "s": "high[{0}] + low[{0}]"}
+
+
+def _argument(name: str) -> str:
+    stem = name.rstrip("0123456789")
+    return _ARRAYS[stem].format(name.removeprefix(stem))
+
+
+def _printed(program: Program) -> tuple[list[str], list[str]]:
+    """The statements of a program whose arguments are places of arrays, and its results."""
+    language = Language(
+        statement=lambda name, text: f"const float {name} = {text};",
+        argument=lambda place: _argument(program.arguments[place]),
+        literal=lambda place: c_literal(program.literal(place)),
+        operation=lambda place, operands: call_of(program, place, operands, c_functions.FLOAT_CALLS),
+    )
+    return statements(program, language)
+
+
+def _unused(lines: Sequence[str], arrays: Sequence[str]) -> list[str]:
+    """Statements for those of the arrays that the lines do not use."""
+    text = " ".join(lines)
+    return [f"(void){one};" for one in arrays if re.search(rf"\b{one}\[", text) is None]
+
+
+def _commented(comment: str, text: str) -> str:
+    return f"{c_comment([comment])}\n{text}"

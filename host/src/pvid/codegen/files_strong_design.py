@@ -7,8 +7,8 @@ from pvid.codegen.c_text import guarded, initialised, inner, number
 from pvid.codegen.files_weak import fields_in_c
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
-from pvid.codegen.strong_twin import StrongModelConfig
 from pvid.design.c_tables import float_array
+from pvid.settings.strong import StrongModelConfig
 
 
 def printed(model: GeneratedModel) -> dict[str, str]:
@@ -48,9 +48,11 @@ def header(strong: StrongFunctions, config: StrongModelConfig, command: str) -> 
     ]
     bank = {"half": config.half, "stride": config.stride, "weights": f"{name}_weights", "block": config.block}
     fields = {
-        "bank": inner(bank),
         "sample_rate_hz": number(config.sample_rate),
+        "bank": inner(bank),
         "row_sd": "{" + ", ".join(map(number, config.row_sd)) + "}",
+        "gate": inner(fields_in_c(config.gate)),
+        "exact_every": config.exact_every,
         "estimator": inner(fields_in_c(own)),
     }
     body = [

@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from pvid.codegen import files_strong
 from pvid.codegen.strong import StrongFunctions
-from pvid.codegen.strong_twin import StrongModelConfig
 from pvid.core.model_library import model_library
-from pvid.core.native import Native, Stepper
+from pvid.core.native import Arithmetic, Native, OfEstimator, Stepper
 from pvid.core.sizes import raised
 from pvid.settings.engine_cores import STRONG
 from pvid.settings.record import Record
+from pvid.settings.strong import StrongModelConfig
 
 MADE_BY = "identification"
 
@@ -25,20 +25,46 @@ _REPLAY_HEADER = """\
 
 /* Steps an initialised identifier through samples[ticks][signals]. */
 void pvid_replay_samples_f32({name}_f32 *self, uint32_t ticks, const float samples[], const pvid_record_f32 *record);
+
+/* The same through inputs[ticks][inputs] of the rows. */
+void pvid_replay_inputs_f32({name}_f32 *self, uint32_t ticks, const float inputs[], const pvid_record_f32 *record);
 """
 
 _REPLAY = """\
 #include "{name}_replay.h"
 
 #include <stddef.h>
+#include <string.h>
 
-#include "record_tick.h"
+static void record_tick(const pvid_record_f32 *record, uint32_t tick, const {name}_f32 *self, pvid_reason reason)
+{{
+    memcpy(&record->p[(size_t)tick * {upper}_P], self->estimator.p, sizeof self->estimator.p);
+    if (record->sums != NULL) {{
+        {name}_read_sums_f32(self, &record->sums[(size_t)tick * {upper}_SUMS]);
+    }}
+    record->reason[tick] = (uint8_t)reason;
+    *record->running_hash = {name}_fnv_f32(*record->running_hash, &self->estimator, reason);
+    if (record->hash != NULL) {{
+        record->hash[tick] = *record->running_hash;
+    }}
+    if ((record->estimate != NULL) && ((tick % record->estimate_every) == 0u)) {{
+        {name}_assess_f32(self, &record->estimate[tick / record->estimate_every]);
+    }}
+}}
 
 void pvid_replay_samples_f32({name}_f32 *self, uint32_t ticks, const float samples[], const pvid_record_f32 *record)
 {{
     for (uint32_t tick = 0; tick < ticks; tick++) {{
         const pvid_reason reason = {name}_step_f32(self, &samples[(size_t)tick * {upper}_SIGNALS]);
-        record_tick(record, tick, &self->estimator, reason);
+        record_tick(record, tick, self, reason);
+    }}
+}}
+
+void pvid_replay_inputs_f32({name}_f32 *self, uint32_t ticks, const float inputs[], const pvid_record_f32 *record)
+{{
+    for (uint32_t tick = 0; tick < ticks; tick++) {{
+        const pvid_reason reason = {name}_row_step_f32(self, &inputs[(size_t)tick * {upper}_INPUTS]);
+        record_tick(record, tick, self, reason);
     }}
 }}
 """
@@ -46,22 +72,8 @@ void pvid_replay_samples_f32({name}_f32 *self, uint32_t ticks, const float sampl
 
 def sizes_of_strong(strong: StrongFunctions, config: StrongModelConfig | None = None) -> dict[str, int]:
     """Sizes of the core's arrays that the strong form of a model needs; `config`: with this bank."""
-    functions = strong.functions
-    needed = {
-        "PVID_MAX_P": len(functions.model.unknowns),
-        "PVID_MAX_THETA": len(functions.theta.labels),
-        "PVID_MAX_MOMENTS": functions.moments,
-    }
+    needed = {"PVID_MAX_P": len(strong.functions.model.unknowns)}
     return needed if config is None else {**needed, "PVID_MAX_WINDOW": config.memory}
-
-
-def strong_texts(strong: StrongFunctions, made_by: str) -> dict[str, str]:
-    """The generated files of the identifier: name -> text."""
-    name = strong.functions.name
-    return {
-        f"{name}.h": files_strong.header(strong, made_by),
-        f"{name}_f32.c": files_strong.source(strong, made_by),
-    }
 
 
 class StrongModelNative(Native):
@@ -86,8 +98,11 @@ class StrongModelIdentifier(Stepper):
 
     @property
     def estimator(self) -> Any:
-        """pvid_estimator_f32 in it."""
+        """NAME_strong_estimator_f32 in it."""
         return self.state.estimator
+
+    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
+        return OfEstimator(lambda one: (len(one.p), len(one.low)), f"{self._name}_assess_f32", of_identifier=True)
 
     def run_samples(self, samples: npt.ArrayLike, *, sums: bool = True, estimate_every: int = 0) -> Record:
         """Steps through samples [ticks, signals], converted to float32 as a board would read them."""
@@ -106,7 +121,7 @@ def strong_native(strong: StrongFunctions, config: StrongModelConfig) -> StrongM
     name = strong.functions.name
     words = {"name": name, "upper": name.upper()}
     texts = {
-        **strong_texts(strong, MADE_BY),
+        **files_strong.files_of(strong, MADE_BY),
         f"{name}_replay.h": _REPLAY_HEADER.format(**words),
         f"{name}_replay.c": _REPLAY.format(**words),
     }

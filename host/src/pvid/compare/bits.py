@@ -72,7 +72,11 @@ class Comparison:
 
 
 def first_difference(
-    core: Record, twin: Record, p_names: Sequence[str] = P_NAMES, moments: int = 0
+    core: Record,
+    twin: Record,
+    p_names: Sequence[str] = P_NAMES,
+    moments: int = 0,
+    layout: tuple[int, int] | None = None,
 ) -> Difference | None:
     """The first difference between a replay of the core and a lane of its twin: p, sums, status, published p.
 
@@ -80,8 +84,9 @@ def first_difference(
     ----------
     p_names : of the parameters
     moments : entries of M among the sums; 0: by the number of sums
+    layout : the same with the number of entries of B
     """
-    layout = (moments, core.sums.shape[1] - moments - 2) if moments else None
+    layout = layout or (moments, core.sums.shape[1] - moments - 2) if moments else layout
     names: dict[str, Callable[[int], str]] = {
         "p": p_names.__getitem__,
         "sums": lambda place: sum_name(place, core.sums.shape[1], layout),

@@ -53,11 +53,10 @@ class StrongComparison:
         record = identifier.run_samples(design.samples)
         twin = StrongModelTwin(design.strong, design.config).run(design.samples, progress)
         hashes = fnv.running_hashes(twin)
-        moments = design.strong.functions.moments
         found = Comparison(
             ticks=len(record.reason),
             core_hash=identifier.running_hash,
             twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
-            difference=first_difference(record, twin, model.p_names, moments),
+            difference=first_difference(record, twin, model.p_names, layout=(record.sums.shape[1], 0)),
         )
         return cls(design, found, record.hash)

@@ -11,19 +11,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
-from pvid.codegen.strong_twin import Float32, StrongModelConfig, StrongModelTwin
 from pvid.design.fir import MAX_DEGREE, savitzky_golay
 from pvid.model.compiled import CompiledModel
 from pvid.model.strong import strong_form
-from pvid.oracle.strong_described import StrongModel, StrongSettings, all_rows, standard_errors
+from pvid.oracle.strong_described import StrongModel, StrongSettings, all_rows, residuals, standard_errors
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
 from pvid.rig.run import Recording
 from pvid.settings.enums import Law
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.parts import EstimatorConfig
+from pvid.settings.strong import StrongModelConfig
 
 _STEP = 1.25  # from window to window
 _LONGEST = 401  # samples of a window
@@ -34,6 +35,7 @@ _MORE = 4  # degrees of the polynomial above the highest derivative
 _LEAST_DEGREE = 6
 _STIFFER = 2  # degrees more, where the least degree leaves the parameters uncertain: it follows a longer window
 _ENOUGH = 0.05  # largest error, relative
+_DIVIDER = 8  # rows from step to step; projection, solve and folding at rows of their own
 _FLOOR = 1e-12  # of the residuals of a kind, relative to its Y
 
 
@@ -76,7 +78,7 @@ class StrongDesign:
     strong: StrongFunctions
     config: StrongModelConfig
     fitted: Fitted
-    samples: Float32
+    samples: npt.NDArray[np.float32]
 
 
 def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY) -> StrongDesign:
@@ -99,10 +101,9 @@ def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STA
     if best is None:
         raise PvidError(f"{len(recording)} samples are too few for derivatives of order {oracle.order}")
     samples = np.stack([np.asarray(recording.signals[one.name], np.float32) for one in strong.signals], axis=1)
-    config = _config(strong, oracle.parameters, recording.sample_rate, best, law)
-    columns, ready = StrongModelTwin(strong, config).columns(samples)
-    sd = _residual_sd(strong, columns[:, ready].astype(np.float64), oracle.parameters.theta(best.p))
-    return StrongDesign(strong, replace(config, row_sd=sd), best, samples)
+    sd = _residual_sd(oracle, recording, best)
+    config = _config(oracle.parameters, recording.sample_rate, best, law, sd)
+    return StrongDesign(strong, config, best, samples)
 
 
 def _fits(oracle: StrongModel, recording: Recording, degree: int) -> Iterator[Fitted]:
@@ -149,9 +150,8 @@ def _errors(one: Fitted, parameters: Parameters) -> Float:
 
 
 def _config(
-    strong: StrongFunctions, parameters: Parameters, sample_rate: float, fitted: Fitted, law: Law
+    parameters: Parameters, sample_rate: float, fitted: Fitted, law: Law, row_sd: tuple[float, ...]
 ) -> StrongModelConfig:
-    """With rows of weight 1."""
     bank = savitzky_golay(fitted.taps, fitted.degree)
     start = parameters.checked(None)
     unknowns = parameters.model.unknowns
@@ -164,17 +164,22 @@ def _config(
         row_sd=1.0,
         correlation=float(bank.half),  # rows closer than half a window share samples
         law=law,
-        divider=1 if literally else bank.half,
+        divider=1 if literally else _DIVIDER,
     )
-    ones = (1.0,) * len(strong.functions.kinds)
-    return StrongModelConfig(sample_rate, bank.weights32, bank.stride, ones, estimator)
+    return StrongModelConfig(sample_rate, bank.weights32, bank.stride, row_sd, estimator)
 
 
-def _residual_sd(strong: StrongFunctions, columns: Float, theta: list[Float]) -> tuple[float, ...]:
-    """Of each kind, from its columns [columns, ticks]."""
+def _residual_sd(oracle: StrongModel, recording: Recording, fitted: Fitted) -> tuple[float, ...]:
+    """Of each kind of row with the window."""
+    settings = StrongSettings(fitted.taps, fitted.degree, 1)
+    rows = oracle.rows(recording.signals, recording.sample_rate, settings)
     found = []
-    for kind, own in zip(strong.functions.kinds, theta, strict=True):
-        n, y = columns[kind.columns.start : kind.known], columns[kind.known]
-        size = float(np.sqrt(np.mean((n * own[:, np.newaxis]) ** 2))) or 1.0
-        found.append(max(float(np.std(y - own @ n)), _FLOOR * size))
+    for e, n, theta in zip(
+        residuals(oracle.parameters, rows, fitted.p),
+        rows.regressors,
+        oracle.parameters.theta(fitted.p),
+        strict=True,
+    ):
+        size = float(np.sqrt(np.mean((n * theta) ** 2))) or 1.0
+        found.append(max(float(np.std(e)), _FLOOR * size))
     return tuple(found)

@@ -26,7 +26,7 @@ Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
 
 
-class _Estimator(NamedTuple):
+class OfEstimator(NamedTuple):
     """An estimator of the core. sizes: its numbers of parameters and of sums; assess: the function in C, of the
     identifier or of the estimator in it."""
 
@@ -35,7 +35,7 @@ class _Estimator(NamedTuple):
     of_identifier: bool = False
 
 
-class _Arithmetic(NamedTuple):
+class Arithmetic(NamedTuple):
     """Properties of a core. sample, sums: numpy types of samples and p, and of the sums; any_model, strong: the
     estimator of any model, and the strong form's own, which has the pendulum's sums."""
 
@@ -43,30 +43,30 @@ class _Arithmetic(NamedTuple):
     sums: type[np.generic]
     exponents: bool  # of the sums
     misfit_unit: float
-    any_model: _Estimator
-    strong: _Estimator
+    any_model: OfEstimator
+    strong: OfEstimator
 
 
 def _sizes_f32(one: Any) -> tuple[int, int]:
     return int(one.model.n_p), int(one.information.n_moments + one.information.n_theta + 2)
 
 
-_ARITHMETIC: dict[Core, _Arithmetic] = {
-    "f32": _Arithmetic(
+_ARITHMETIC: dict[Core, Arithmetic] = {
+    "f32": Arithmetic(
         np.float32,
         np.float32,
         False,
         1.0,
-        _Estimator(_sizes_f32, "pvid_estimator_assess_f32"),
-        _Estimator(lambda one: (len(one.p), len(one.sums.low)), "pvid_strong_assess_f32", of_identifier=True),
+        OfEstimator(_sizes_f32, "pvid_estimator_assess_f32"),
+        OfEstimator(lambda one: (len(one.p), len(one.sums.low)), "pvid_strong_assess_f32", of_identifier=True),
     ),
-    "q31": _Arithmetic(
+    "q31": Arithmetic(
         np.int32,
         np.int64,
         True,
         2.0**-16,
-        _Estimator(lambda one: (int(one.model.n_p), int(one.information.n_sums)), "pvid_estimator_assess_q31"),
-        _Estimator(lambda one: (len(one.p), len(one.sums)), f"pvid_{DEFAULT}_estimator_assess_q31"),
+        OfEstimator(lambda one: (int(one.model.n_p), int(one.information.n_sums)), "pvid_estimator_assess_q31"),
+        OfEstimator(lambda one: (len(one.p), len(one.sums)), f"pvid_{DEFAULT}_estimator_assess_q31"),
     ),
 }
 
@@ -230,7 +230,7 @@ class Stepper:
         """Its function pvid_<name>_<verb>_<core>."""
         return getattr(self.native.library, f"{self._prefix}{self._name}_{verb}_{self.core}")(self.state, *arguments)
 
-    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
         """Its estimator."""
         return arithmetic.any_model
 
@@ -351,7 +351,7 @@ class StrongStepper(Stepper):
         """pvid_strong_estimator_f32 in it."""
         return self.state.estimator
 
-    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
         return arithmetic.strong
 
 
@@ -364,7 +364,7 @@ class StrongEstimatorQ31(Stepper):
         self._row_format = native.headers.filled("pvid_strong_row_q31", row_format)
         super().__init__(native, f"{DEFAULT}_estimator", "q31", config, replay=f"{DEFAULT}_rows")
 
-    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
         return arithmetic.strong
 
     def initialise(self) -> Status:
@@ -429,7 +429,7 @@ class Identifier(Publisher):
         self.form = config.form
         super().__init__(native, config.form, config.core, config, replay=config.form)
 
-    def _kind_of(self, arithmetic: _Arithmetic) -> _Estimator:
+    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
         return arithmetic.strong
 
     @property

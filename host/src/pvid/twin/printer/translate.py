@@ -172,16 +172,18 @@ class Translator:
         return self._python(name)
 
     def _found(self, name: str, file: str) -> Function | None:
-        """A function that a file sees."""
+        """A function that a file sees; a header that is included behind a function of one source sees that."""
         many = self.functions.get(name, [])
         own = (one for one in many if one.file == file)
-        return next(own, next((one for one in many if _is_seen(one.file, one.node.decl)), None))
+        includes = many[0] if len(many) == 1 and file.endswith(".h") else None
+        return next(own, next((one for one in many if _is_seen(one.file, one.node.decl)), includes))
 
     def _table(self, name: str, file: str) -> tuple[str, Any] | None:
-        """A table that a file sees, and its own file."""
+        """A table that a file sees, as a function, and its own file."""
         many = self.tables.get(name, [])
         own = (one for one in many if one[0] == file)
-        return next(own, next((one for one in many if _is_seen(*one)), None))
+        includes = many[0] if len(many) == 1 and file.endswith(".h") else None
+        return next(own, next((one for one in many if _is_seen(*one)), includes))
 
     # ---- declarations
 
