@@ -49,10 +49,10 @@ def test_it_is_compiled_once_for_the_same_content() -> None:
     assert other != first
     wider = model_library.model_library("tiny", texts("2.0f"), {"PVID_MAX_P": 8})
     assert wider not in (first, other)
-    assert np.array_equal(WeakNative("tiny", first).values([[1.5]]), [[3.0]])
-    assert WeakNative("tiny", wider).headers.ffi.sizeof("pvid_estimate_f32") > WeakNative(
-        "tiny", first
-    ).headers.ffi.sizeof("pvid_estimate_f32")
+    tiny = model_library.ModelSources("tiny", texts("2.0f"), {})
+    one, wide = (WeakNative("tiny", library, tiny) for library in (first, wider))
+    assert np.array_equal(one.values([[1.5]]), [[3.0]])
+    assert wide.headers.ffi.sizeof("pvid_estimate_f32") > one.headers.ffi.sizeof("pvid_estimate_f32")
 
 
 def test_code_that_does_not_compile_is_one_sentence() -> None:
