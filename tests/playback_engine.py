@@ -30,7 +30,7 @@ from pvid.core.sizes import options_of, roomy
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
-from pvid.settings.engine_cores import FIXED, FLOAT
+from pvid.settings.cores import FIXED, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import GateConfig, TrustConfig
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31

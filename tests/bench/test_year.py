@@ -10,13 +10,13 @@ import pytest
 from bench.year import emulated_year, passages_of_a_year, rig_of
 from pvid.board.target import HOST_TARGET
 from pvid.log.rig import recording_of_log
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 
 SAMPLES = 2500  # more than a window
 
 
-@pytest.mark.parametrize("core", ENGINE_CORES)
+@pytest.mark.parametrize("core", CORES)
 def test_passages_of_2_to_the_32_ticks_are_recorded_verified_exported_and_drawn(tmp_path: Path, core: Core) -> None:
     passages = (1, 2, passages_of_a_year(1000.0)) if core == "f32" else (700,)
     log = tmp_path / "a.pvlog"

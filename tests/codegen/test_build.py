@@ -73,7 +73,7 @@ WEAK_PROGRAM = """
 #include "rigid_body_refine_design_f32.h"
 static pvid_weak_f32 identifier;
 static pvid_refine_f32 refinement;
-static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &rigid_body_refine_config_f32};
+static const pvid_weak_refine_f32 second = {&pvid_refiner_f32, &refinement, &rigid_body_refine_config_f32};
 int main(int count, char **names)
 {
     float sample[RIGID_BODY_WEAK_SAMPLES];
@@ -156,7 +156,7 @@ def test_the_weak_form_and_its_refinement_are_options_of_the_folder(tmp_path: Pa
     sizes = [f"-D{macro}={size}" for macro, size in raised(sizes_of_design(design.design)).items()]
     run("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_WEAK=ON", *debug, *sizes)
     done = subprocess.run(["ninja", "-C", str(tmp_path / "b"), "user"], capture_output=True, text=True, check=False)
-    assert done.returncode != 0 and re.search(r"reference to `pvid_refine_stage_f32_model0x\w{8}u", done.stdout)
+    assert done.returncode != 0 and re.search(r"reference to `pvid_refiner_f32_model0x\w{8}u", done.stdout)
     run("cmake", "-DRIGID_BODY_REFINE=ON", tmp_path / "b")
     run("ninja", "-C", tmp_path / "b", "user")
     table = samples_of(design, run_of_rig)

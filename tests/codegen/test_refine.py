@@ -28,7 +28,7 @@ from pvid.model.signals import Jet, sgn
 from pvid.models import mechanisms
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
-from pvid.settings.engine_cores import FLOAT
+from pvid.settings.cores import FLOAT
 
 WARNINGS = (
     "-Werror",

@@ -372,7 +372,7 @@ static void configure_refined(bool sound)
     if (!sound) {
         spoil_refinement(&refined.config);
     }
-    refined.second = (pvid_weak_refine_f32){&pvid_refine_stage_f32, &refined.self, &refined.config};
+    refined.second = (pvid_weak_refine_f32){&pvid_refiner_f32, &refined.self, &refined.config};
     weak.config.refine = &refined.second;
 }
 

@@ -19,7 +19,7 @@ static pvid_weak_f32 identifier;
 #endif
 
 static pvid_refine_f32 refinement;
-static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &stream_refine_config};
+static const pvid_weak_refine_f32 second = {&pvid_refiner_f32, &refinement, &stream_refine_config};
 #endif
 
 uint32_t identifier_arithmetic_faults(void)

@@ -9,4 +9,7 @@
 #define held_pivot held_singular /* counters */
 #define at_rest in_dead_zone
 
+#define pvid_weak_stage_f32 pvid_weak_refiner_f32
+#define pvid_refine_stage_f32 pvid_refiner_f32
+
 #endif

@@ -21,7 +21,7 @@
  *     is at most 10 standard errors of the weak form wide.)
  *
  *   static pvid_refine_f32 refinement;
- *   static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement, &refine_config};
+ *   static const pvid_weak_refine_f32 second = {&pvid_refiner_f32, &refinement, &refine_config};
  *   config.refine = &second;
  *   if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...
  *   each tick:     reason = pvid_weak_step_f32(&identifier, sample);          both stages
@@ -151,8 +151,8 @@ typedef struct pvid_refine_f32 pvid_refine_f32;
  * with the refinement of another one does not link. Sizes: layout.h. */
 #define PVID_REFINED_AS(name, id) name##_model##id
 #define PVID_REFINED(name, id) PVID_REFINED_AS(name, id)
-#define pvid_refine_stage_f32 PVID_REFINED(pvid_refine_stage_f32, PVID_REFINE_MODEL_ID)
-extern const pvid_weak_stage_f32 pvid_refine_stage_f32;
+#define pvid_refiner_f32 PVID_REFINED(pvid_refiner_f32, PVID_REFINE_MODEL_ID)
+extern const pvid_weak_refiner_f32 pvid_refiner_f32;
 
 /* Initialises `self`; `samples`: in the argument of step. Fails iff
  *   - a pointer is NULL (PVID_BAD_POINTER), or

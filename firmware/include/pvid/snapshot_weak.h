@@ -1,4 +1,4 @@
-/* pvid/snapshot_weak.h - snapshot.h for the weak engine of compiled models: weak.h.
+/* pvid/snapshot_weak.h - snapshot.h for the weak form of compiled models: weak.h.
  *
  * Usage, slots and layout as in snapshot.h. A snapshot of another model or design is refused with a status of its own.
  */

@@ -1,4 +1,4 @@
-/* pvid/snapshot_weak_q31.h - snapshot.h for the weak engine in fixed point: weak_q31.h.
+/* pvid/snapshot_weak_q31.h - snapshot.h for the weak form in fixed point: weak_q31.h.
  *
  * Usage, slots and layout as in snapshot.h. A snapshot of another model or design is refused with a status of its own.
  */

@@ -119,19 +119,19 @@ typedef struct {
 struct pvid_refine_f32;
 struct pvid_refine_config_f32;
 
-/* Its functions: pvid_refine_stage_f32 of refine.h. The weak form calls them through this table alone: without a second
+/* Its functions: pvid_refiner_f32 of refine.h. The weak form calls them through this table alone: without a second
  * stage no code of it is linked. */
 typedef struct {
     pvid_status (*init)(struct pvid_refine_f32 *self, const struct pvid_refine_config_f32 *config, size_t samples);
     pvid_reason (*step)(struct pvid_refine_f32 *self, const float sample[], const pvid_estimate_f32 *weak, bool busy);
     void (*gap)(struct pvid_refine_f32 *self);
     void (*freeze)(struct pvid_refine_f32 *self, bool frozen);
-} pvid_weak_stage_f32;
+} pvid_weak_refiner_f32;
 
 /* A refinement, with its storage. */
 typedef struct {
-    const pvid_weak_stage_f32 *stage; /* &pvid_refine_stage_f32 */
-    struct pvid_refine_f32 *storage;  /* must outlive the identifier, whose init initialises it */
+    const pvid_weak_refiner_f32 *refiner; /* &pvid_refiner_f32 */
+    struct pvid_refine_f32 *storage;      /* must outlive the identifier, whose init initialises it */
     const struct pvid_refine_config_f32 *config;
 } pvid_weak_refine_f32;
 

@@ -1,4 +1,4 @@
-/* Hashes of tables that both cores of the weak engine have in common, continued from `hash`. Private to the core. */
+/* Hashes of tables that both cores of the weak form have in common, continued from `hash`. Private to the core. */
 #ifndef PVID_FINGERPRINT_TABLES_H
 #define PVID_FINGERPRINT_TABLES_H
 

@@ -1,4 +1,4 @@
-/* One number each for a compiled model, a design and a configuration of the weak engine in float32: what
+/* One number each for a compiled model, a design and a configuration of the weak form in float32: what
  * differs has, but for chance, another one. Private to the core. */
 #ifndef PVID_FINGERPRINT_WEAK_F32_H
 #define PVID_FINGERPRINT_WEAK_F32_H

@@ -1,4 +1,4 @@
-/* One number each for a compiled model, a design and a configuration of the weak engine in fixed point: what
+/* One number each for a compiled model, a design and a configuration of the weak form in fixed point: what
  * differs has, but for chance, another one. Private to the core. */
 #ifndef PVID_FINGERPRINT_WEAK_Q31_H
 #define PVID_FINGERPRINT_WEAK_Q31_H

@@ -937,7 +937,7 @@ pvid_reason pvid_refine_step_f32(pvid_refine_f32 *self, const float sample[], co
     return (is_ready(self) && (sample != NULL)) ? step_of_stage(self, sample, weak, busy) : PVID_NOT_READY;
 }
 
-const pvid_weak_stage_f32 pvid_refine_stage_f32 = {
+const pvid_weak_refiner_f32 pvid_refiner_f32 = {
     .init = pvid_refine_init_f32,
     .step = step_of_stage,
     .gap = pvid_refine_gap_f32,

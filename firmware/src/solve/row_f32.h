@@ -1,4 +1,5 @@
-/* Check and innovation of a row before it is added to the sums, for both engines. Private to the core, inlined. */
+/* Check and innovation of a row before it is added to the sums, for the estimator and the strong form. Private to the
+ * core, inlined. */
 #ifndef PVID_ROW_F32_H
 #define PVID_ROW_F32_H
 

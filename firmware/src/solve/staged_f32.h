@@ -1,4 +1,4 @@
-/* The engine that solves in stages; pvid/estimator.h declares the stages. Private to the core. */
+/* Solves in stages; pvid/estimator.h declares the stages. Private to the core. */
 #ifndef PVID_STAGED_F32_H
 #define PVID_STAGED_F32_H
 

@@ -1,4 +1,5 @@
-/* Numbers of the four rows of a block: a sum is loaded and stored once for all of them. Private to the core, inlined. */
+/* Numbers of the four rows of a block: a sum is loaded and stored once for all of them. Private to the core, inlined.
+ */
 #ifndef PVID_STRONG_BLOCK_F32_H
 #define PVID_STRONG_BLOCK_F32_H
 

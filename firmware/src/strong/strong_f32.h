@@ -8,8 +8,8 @@
  *   STRONG(verb), strong_f32, strong_config_f32, ..                       names of its functions and types
  *   inputs_of_five, inputs_of_bank, atoms_of, innovate, ..                its functions
  *
- * Every function of a tick is inlined into one: rows and sums have constant places, and what a model does not need costs
- * nothing. Source: theory.md 2 and 4, equation (5).
+ * Every function of a tick is inlined into one: rows and sums have constant places, and what a model does not need
+ * costs nothing. Source: theory.md 2 and 4, equation (5).
  */
 #ifndef PVID_STRONG_F32_H
 #define PVID_STRONG_F32_H
@@ -127,7 +127,7 @@ static bool centre(strong_window_f32 *self, const float now[STRONG_CHANNELS], fl
 /* Takes a sample of each channel into a window of another bank, or one that is not full yet. Returns whether it
  * completes a point, and the window is full. Never for five points: they are ready for the sample after that. */
 static PVID_NOINLINE bool window_takes(strong_window_f32 *self, const pvid_fir_bank_f32 *bank,
-                                     const float sample[STRONG_CHANNELS])
+                                       const float sample[STRONG_CHANNELS])
 {
     float now[STRONG_CHANNELS];
     memcpy(now, sample, sizeof now);
@@ -168,8 +168,7 @@ static PVID_NOINLINE void filter(const strong_window_f32 *self, const pvid_fir_b
     pvid_fir_sums_f32 sums[STRONG_CHANNELS];
     PVID_UNROLL
     for (size_t c = 0; c < STRONG_CHANNELS; c++) {
-        sums[c] =
-            pvid_fir_begin_f32(weight, half, middle[c], self->points[at.newer][c], self->points[at.older][c]);
+        sums[c] = pvid_fir_begin_f32(weight, half, middle[c], self->points[at.newer][c], self->points[at.older][c]);
     }
     for (size_t i = 1; i < half; i++) {
         pvid_fir_outwards(&at);
@@ -210,7 +209,7 @@ static inline void five_points(const strong_window_f32 *self, size_t oldest, flo
         }
     }
 #endif
-    inputs_of_five((const float(*)[5])x, self->scale, in);
+    inputs_of_five((const float (*)[5])x, self->scale, in);
 }
 
 /* Takes a sample of each channel. When it completes a point and the window is full, writes the inputs of a row and
@@ -365,7 +364,8 @@ static inline void add_row(const strong_gradient_f32 *row, const float weight[ST
 }
 
 /* S and F at p from the sums and the first rows of the block. */
-static PVID_NOINLINE void gather(const strong_estimator_f32 *self, size_t rows, float s[STRONG_S], float force[STRONG_P])
+static PVID_NOINLINE void gather(const strong_estimator_f32 *self, size_t rows, float s[STRONG_S],
+                                 float force[STRONG_P])
 {
     float p[STRONG_P];
     float all_s[STRONG_S];
@@ -563,8 +563,8 @@ PVID_ALWAYS_INLINE pvid_reason solve(strong_estimator_f32 *self, const float rhs
     return (reason == PVID_UPDATED) ? reason : pvid_count_held(&self->counters, reason);
 }
 
-/* S and the right-hand side at p from all rows and this one: rhs = g F + (1 - g) rhs, where rhs is the sum of C^T N e of
- * the rows since the last projection. The square of this row is not in S yet. */
+/* S and the right-hand side at p from all rows and this one: rhs = g F + (1 - g) rhs, where rhs is the sum of C^T N e
+ * of the rows since the last projection. The square of this row is not in S yet. */
 static inline void project_all(strong_estimator_f32 *self, const strong_gradient_f32 *row, float rhs[STRONG_P])
 {
     float force[STRONG_P];
@@ -678,7 +678,7 @@ static inline void end_block(strong_estimator_f32 *self)
 {
     self->in_block = 0;
     self->age = (uint8_t)(self->age + PVID_STRONG_ROWS);
-    add_rows((const float(*)[STRONG_ATOMS])self->block, self->low);
+    add_rows((const float (*)[STRONG_ATOMS])self->block, self->low);
     if ((self->staged == 0u) && (self->age >= self->fold_every)) {
         self->age = 0;
         fold(self, 0, STRONG_SUMS);

@@ -148,11 +148,11 @@ static pvid_status init_refinement(pvid_weak_f32 *self, const pvid_weak_refine_f
     if (refine == NULL) {
         return PVID_OK;
     }
-    if ((PVID_REFINEMENT == 0) || (refine->stage == NULL)) {
+    if ((PVID_REFINEMENT == 0) || (refine->refiner == NULL)) {
         return PVID_BAD_POINTER;
     }
     self->refine = refine;
-    return refine->stage->init(refine->storage, refine->config, self->design->model->samples);
+    return refine->refiner->init(refine->storage, refine->config, self->design->model->samples);
 }
 
 /* Returns whether the sums of a window have a place of their own, or are used before the next half's first block. */
@@ -246,7 +246,7 @@ void pvid_weak_gap_f32(pvid_weak_f32 *self)
     if (is_ready(self)) {
         restart(self);
         if (refines(self)) {
-            self->refine->stage->gap(self->refine->storage);
+            self->refine->refiner->gap(self->refine->storage);
         }
     }
 }
@@ -256,7 +256,7 @@ void pvid_weak_freeze_f32(pvid_weak_f32 *self, bool frozen)
     if (is_ready(self)) {
         self->frozen = frozen;
         if (refines(self)) {
-            self->refine->stage->freeze(self->refine->storage, frozen);
+            self->refine->refiner->freeze(self->refine->storage, frozen);
         }
     }
 }
@@ -485,8 +485,8 @@ PVID_NOINLINE static pvid_reason both_ticks(pvid_weak_f32 *self, const float sam
     self->busy = false;
     const pvid_reason reason = weak_tick(self, sample);
     const bool renewed = ((RENEWING >> (uint32_t)reason) & 1u) != 0u;
-    (void)self->refine->stage->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL,
-                                    self->busy);
+    (void)self->refine->refiner->step(self->refine->storage, sample, renewed ? &self->finish.candidate : NULL,
+                                      self->busy);
     return reason;
 }
 

@@ -60,7 +60,7 @@ struct pvid_estimator_q31 {
     pvid_solve_settings_q31 settings;
     int32_t
         noise_table[(PVID_MAX_P * (PVID_MAX_P + 1)) / 2]; /* information of noise of variance 1 in noise_rows rows, */
-    uint16_t noise_rows; /* upper triangle by rows, packed (scaled_q31.h); 0: unknown; the engine writes it */
+    uint16_t noise_rows; /* upper triangle by rows, packed (scaled_q31.h); 0: unknown; the weak form writes it */
     int64_t group_rss;   /* sum of e^2 of the rows of the current group, each at the p of its tick, at most PVID_WIDE */
     int64_t group_weight;     /* their weight, Q16 */
     pvid_scaled_q31 expected; /* mean over the rows in the sums of the variance that the sensors' noise gives them

@@ -21,7 +21,7 @@ from pvid.log.rig import source_of
 from pvid.log.rig_choice import common_rig, rig_of
 from pvid.rig.run import recording_of_arrays
 from pvid.rig.together import names_of
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 
 
 def identify(
@@ -109,7 +109,7 @@ def _identify(
         for one, path in zip(several, paths, strict=True)
     ]
     recording, compiled = read_all(found, sources, _names(paths), columns)
-    engine = ENGINE_CORES.get(core or "")
+    engine = CORES.get(core or "")
     of_each = own_of(compiled, recording, own, shared, in_c=engine is not None)
     if engine is None:
         return result_of(identified(recording, compiled, refine=refine, own=of_each))

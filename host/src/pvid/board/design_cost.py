@@ -31,7 +31,7 @@ from pvid.configuration.weak import (
 from pvid.configuration.weak_q31 import engine_for_recording, engine_for_rig_like_the_shipped
 from pvid.model.compiled import CompiledModel
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import FLOAT
+from pvid.settings.cores import FLOAT
 from pvid.settings.enums import Core, Reason
 from pvid.settings.refine import BIG_STEP, RefineConfig
 from pvid.settings.weak import WeakConfig

@@ -11,11 +11,11 @@ from pvid.core.native import Native
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 
 Board = MechanismBoard | MechanismBoardQ31
-_BOARDS: dict[str, type[Board]] = dict(zip(ENGINE_CORES, (MechanismBoard, MechanismBoardQ31), strict=True))
+_BOARDS: dict[str, type[Board]] = dict(zip(CORES, (MechanismBoard, MechanismBoardQ31), strict=True))
 
 
 def verify_recording(

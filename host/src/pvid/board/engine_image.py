@@ -8,7 +8,7 @@ from pathlib import Path
 from pvid.board.boards import Board
 from pvid.board.mechanism_image import build_mechanism_image, mechanism_run
 from pvid.board.mechanism_image_q31 import build_fixed_image, fixed_run
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 
 
@@ -50,4 +50,4 @@ def _in_fixed_point(board: Board, model: str) -> EngineImage:
     return EngineImage(*build_fixed_image(board, run), run.name, run.measure_from)
 
 
-_IMAGES = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
+_IMAGES = dict(zip(CORES, (_in_float, _in_fixed_point), strict=True))

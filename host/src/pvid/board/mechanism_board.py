@@ -51,7 +51,7 @@ from pvid.oracle.weak.edges import with_edges
 from pvid.rig.former import mechanism_of_former, translated
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
+from pvid.settings.cores import CORES, FLOAT
 from pvid.settings.enums import Law
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.refine import RefineConfig, RefineSignal
@@ -372,7 +372,7 @@ def refuse_unrefined(core: str) -> None:
 
 
 _KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismBoard, MechanismBoardQ31)
-BOARDS = dict(zip(ENGINE_CORES, _KINDS, strict=True))
+BOARDS = dict(zip(CORES, _KINDS, strict=True))
 
 
 def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismBoardQ31 | None:

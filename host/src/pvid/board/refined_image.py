@@ -107,7 +107,7 @@ def header(run: RefinedRun, text: str) -> str:
             *files_refine.design_tables(run.settings, "replay_refine_config"),
             "static pvid_refine_f32 replay_refinement;",
             "static const pvid_weak_refine_f32 replay_second = {",
-            "    &pvid_refine_stage_f32, &replay_refinement, &replay_refine_config};",
+            "    &pvid_refiner_f32, &replay_refinement, &replay_refine_config};",
             "",
             "static pvid_status replay_init(pvid_weak_f32 *self, const pvid_weak_config_f32 *config)",
             "{",

@@ -17,7 +17,7 @@ from pvid.board.refined_image import RefinedRun, build_refined_image, refined_pe
 from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
 from pvid.board.stack_bound import stack_bound
 from pvid.models.registry import DEFAULT
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 from pvid.settings.forms import FORMS
 
 TICKS = 5000
@@ -150,7 +150,7 @@ def _strong(configuration: Configuration) -> BuiltImage:
 
 def _weak(configuration: Configuration) -> BuiltImage:
     """Of a mechanism on its shipped rig; the model's own code and tables count as text and tables."""
-    made = engine_image(configuration.board, configuration.model, ENGINE_CORES[configuration.core].name)
+    made = engine_image(configuration.board, configuration.model, CORES[configuration.core].name)
     return built_engine(made.image, made.tree, made.name)
 
 

@@ -16,7 +16,7 @@ from pvid.compare.strong import StrongComparison
 from pvid.compare.weak import compare_recording as compared
 from pvid.identification.core_refined import compare_both
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG
+from pvid.settings.cores import CORES, FLOAT, STRONG
 from pvid.settings.enums import Core
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
@@ -48,7 +48,7 @@ def compare_recording(
     refuse_too_many_unknowns(model)
     outcomes = []
     chosen = given.get("core") or FLOAT.name
-    for core in [one.name for one in ENGINE_CORES.values() if chosen in (one.name, "all")]:
+    for core in [one.name for one in CORES.values() if chosen in (one.name, "all")]:
         with progress_bar(core, len(recording)) as advance:
             if core == FLOAT.name:
                 found, second = compare_both(model, recording, advance)

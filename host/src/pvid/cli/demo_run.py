@@ -32,7 +32,7 @@ from pvid.models.mechanisms import names as shipped
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import FIXED, FLOAT
+from pvid.settings.cores import FIXED, FLOAT
 from pvid.show.demo_figure import convergence
 from pvid.sim.simulated_run import RigSimulation
 

@@ -12,7 +12,7 @@ from pvid.base.console import DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, force_option
 from pvid.cli.rig_design import model_of_rig, recorded
-from pvid.settings.engine_cores import ENGINE_CORES, FIXED, FLOAT
+from pvid.settings.cores import CORES, FIXED, FLOAT
 
 if TYPE_CHECKING:
     from pvid.deploy.deployment import Deployment
@@ -30,7 +30,7 @@ _TARGETS = ("arduino", "platformio", "esp-idf", "zephyr", "cmake", "cubemx", "am
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file, whose values are the model's.")
 @click.option("--run", "run_path", type=click.Path(path_type=Path), help="A recording of the rig, for its design.")
 @columns_option
-@click.option("--core", type=click.Choice(list(ENGINE_CORES)), default=_DEFAULT, show_default=True, help="Arithmetic.")
+@click.option("--core", type=click.Choice(list(CORES)), default=_DEFAULT, show_default=True, help="Arithmetic.")
 @click.option("--functions", type=click.IntRange(4, 64), help="Test functions of the design.  [default: chosen]")
 @force_option
 def command(
@@ -60,7 +60,7 @@ def command(
     given += [f"--core {core}"] if core != _DEFAULT else []
     given += [f"--functions {functions}"] if functions is not None else []
     title = " ".join(["pvid deploy", Path(model).name, f"--for {target}", *given])
-    is_integer = ENGINE_CORES[core] is FIXED
+    is_integer = CORES[core] is FIXED
     made = _deployment(model, rig_path, run_path, columns, is_integer, functions, title)
     paths = write_package(made, target, out)
     if made.playback.held is not None:

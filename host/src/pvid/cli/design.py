@@ -14,7 +14,7 @@ from pvid.cli.simulate import tone
 from pvid.log.rig_choice import rig_of
 from pvid.models.registry import names
 from pvid.models.simulated_rig import simulated_rig
-from pvid.settings.engine_cores import ENGINE_CORES, FLOAT
+from pvid.settings.cores import CORES, FLOAT
 from pvid.settings.enums import Core
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 )
 @click.option("--duration", type=float, help="Length of the predicted run [s].  [default: the shipped rig's]")
 @click.option("--on", "target", metavar="BOARD", help="Measure the cost on this emulated board too: those of `sizes`.")
-@click.option("--core", type=click.Choice(list(ENGINE_CORES)), default=None, help="Arithmetic of --on.  [default: f32]")
+@click.option("--core", type=click.Choice(list(CORES)), default=None, help="Arithmetic of --on.  [default: f32]")
 @click.option("--refine", is_flag=True, help="With --on: the cost of both stages too.")
 @click.option(
     "--clock",

@@ -20,7 +20,7 @@ from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 from pvid.settings.refine import RefineConfig
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _measured(asked: Asked, model: CompiledModel, recording: Recording | None) -
 def _print_costs(costs: list[Cost]) -> None:
     asked, rate = costs[0].asked, costs[0].sample_rate
     unit = "clock cycles" if asked.board.toolchain == "avr" else "instructions"
-    title = f"{asked.board.name} ({asked.board.core}), {ENGINE_CORES[asked.core].words}: {unit} of a tick, and bytes"
+    title = f"{asked.board.name} ({asked.board.core}), {CORES[asked.core].words}: {unit} of a tick, and bytes"
     table = Table(title=title)
     figures = ("mean", "longest") if asked.clock_mhz is None else ("mean", "%", "longest", "%")
     for heading in ("", *figures, "state", "stack", "code", "tables", "first s", "replayed s"):

@@ -9,7 +9,7 @@ import click
 
 from pvid.base.errors import PvidError
 from pvid.cli.input import FigurePath, NewFile, force_option, form_options, listed_names, model_option
-from pvid.settings.engine_cores import FLOAT
+from pvid.settings.cores import FLOAT
 
 
 @click.command(name="identify")

@@ -27,7 +27,7 @@ from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.rig.together import names_of
-from pvid.settings.engine_cores import ENGINE_CORES, FLOAT, STRONG, STRONG_CORES
+from pvid.settings.cores import CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.settings.enums import Core, Law
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from pvid.identification.validation import Validation
     from pvid.model.compiled import CompiledModel
 
-IN_C = (*(("core", name) for name in ENGINE_CORES), ("form", "weak"))  # options of the weak form, and their values
+IN_C = (*(("core", name) for name in CORES), ("form", "weak"))  # options of the weak form, and their values
 STRONG_FORM = "strong"  # as --form
 LAWS = {"stationary": Law.STATIONARY, "pseudovelocity": Law.PSEUDOVELOCITY}
 
@@ -106,7 +106,7 @@ def identify_run(
                 f"--{option} {value}: {name} is identified in float64, or in C by --core f32 or q31, by the weak form; "
                 f"omit --{option}"
             )
-    in_c = ENGINE_CORES.get(only_in_c.get("core") or "")
+    in_c = CORES.get(only_in_c.get("core") or "")
     if add and on is not None:
         raise PvidError("--add is not for a target: write the model with --write-model FILE and name that with --model")
     if write_model is not None and not add:
@@ -175,7 +175,7 @@ def identify_run(
 def _refuse_several(*, on: str | None, refine: bool, **given: str | None) -> None:
     """PvidError for what takes one recording."""
     one = {"--form strong": given.get("form") == STRONG_FORM, "--on": on is not None}
-    one["--refine in C"] = refine and given.get("core") in ENGINE_CORES
+    one["--refine in C"] = refine and given.get("core") in CORES
     for option, chosen in one.items():
         if chosen:
             raise PvidError(f"{option} takes one recording: omit it, or name one file")

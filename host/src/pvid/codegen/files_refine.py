@@ -385,7 +385,7 @@ def design_header(made: RefineFunctions, settings: RefineConfig, command: str) -
         "The second stage of the weak form (pvid/refine.h):",
         "",
         "  static pvid_refine_f32 refinement;",
-        f"  static const pvid_weak_refine_f32 second = {{&pvid_refine_stage_f32, &refinement, &{config}}};",
+        f"  static const pvid_weak_refine_f32 second = {{&pvid_refiner_f32, &refinement, &{config}}};",
         f"  pvid_weak_config_f32 config = {name}_config_f32;",
         "  config.refine = &second;",
         "  if (pvid_weak_init_f32(&identifier, &config) != PVID_OK) ...",

@@ -13,7 +13,7 @@ from pvid.codegen.strong import StrongFunctions
 from pvid.core.model_library import model_library
 from pvid.core.native import Arithmetic, Native, OfEstimator, Stepper
 from pvid.core.sizes import raised
-from pvid.settings.engine_cores import STRONG
+from pvid.settings.cores import STRONG
 from pvid.settings.record import Record
 from pvid.settings.strong import StrongModelConfig
 

@@ -11,7 +11,7 @@ from pvid.core.sizes import roomy
 from pvid.core.weak_native import WeakNative
 from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.model.compiled import CompiledModel
-from pvid.settings.engine_cores import FIXED
+from pvid.settings.cores import FIXED
 from pvid.settings.weak import WeakDesign32
 from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_model, sizes_of_q31

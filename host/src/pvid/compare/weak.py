@@ -15,7 +15,7 @@ from pvid.configuration.weak_q31 import engine_to_identify
 from pvid.model.compiled import CompiledModel
 from pvid.oracle.weak.choice import Scored
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak_sizes import sizes_of_model
@@ -61,7 +61,7 @@ def _in_fixed_point(
     return compare_counts(engine, engine.counts_of(recording.signals), progress)
 
 
-_COMPARISONS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
+_COMPARISONS = dict(zip(CORES, (_in_float, _in_fixed_point), strict=True))
 
 
 def compare_samples(

@@ -18,7 +18,7 @@ from pvid.core.headers import HEADERS
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.sizes import options_of
 from pvid.core.sources import FIRMWARE, INCLUDES, ROOT, SRC, build_folder, core_sources
-from pvid.settings.engine_cores import FLOAT, EngineCore
+from pvid.settings.cores import FLOAT, CoreBuild
 
 NATIVE = ROOT / "host" / "native"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fPIC", "-w")
@@ -35,7 +35,7 @@ class ModelSources:
     name: str
     texts: Mapping[str, str]
     sizes: Mapping[str, int]
-    engine: EngineCore = FLOAT
+    engine: CoreBuild = FLOAT
     headers: Sequence[str] | None = None
 
     @property
@@ -52,7 +52,7 @@ def model_library(
     name: str,
     texts: Mapping[str, str],
     sizes: Mapping[str, int],
-    engine: EngineCore = FLOAT,
+    engine: CoreBuild = FLOAT,
     headers: Sequence[str] | None = None,
 ) -> Path:
     """The shared library, beside it what cffi reads.
@@ -87,7 +87,7 @@ def _flat(texts: Mapping[str, str]) -> Iterable[str]:
         yield from (name, texts[name])
 
 
-def core_of(engine: EngineCore, refined: bool) -> list[Path]:
+def core_of(engine: CoreBuild, refined: bool) -> list[Path]:
     """Sources beside the generated ones. refined: with the second stage."""
     rooms = (*_ROOMS, engine.room, *(["refine"] if refined else []))
     found = [path for path in core_sources() if path.parent.parent == SRC and path.parent.name in rooms]
@@ -122,7 +122,7 @@ def _build(
     texts: Mapping[str, str],
     definitions: list[str],
     library: Path,
-    engine: EngineCore,
+    engine: CoreBuild,
     headers: Sequence[str],
 ) -> None:
     """Whole or not at all: several processes may build the same."""
@@ -152,7 +152,7 @@ def _build(
                 raise
 
 
-def _core_objects(compiler: str, definitions: list[str], engine: EngineCore, cache_folder: Path) -> list[str]:
+def _core_objects(compiler: str, definitions: list[str], engine: CoreBuild, cache_folder: Path) -> list[str]:
     """Of the core without the second stage: those of one size are the same for every mechanism."""
     sources = core_of(engine, False)
     named = [str(one) for one in sources]
@@ -168,7 +168,7 @@ def _core_objects(compiler: str, definitions: list[str], engine: EngineCore, cac
     return sorted(map(str, place.glob("*.o")))
 
 
-def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, engine: EngineCore) -> str:
+def _declarations(compiler: str, headers: Sequence[str], options: list[str], folder: Path, engine: CoreBuild) -> str:
     """The headers, preprocessed: cffi knows the types of the standard ones."""
     empty = folder / "no_standard_headers"
     empty.mkdir()

@@ -117,7 +117,7 @@ class RefinedIdentifier(WeakIdentifier):
         self.refinement = ffi.new("pvid_refine_f32 *")
         self.refine_filled = native.headers.filled("pvid_refine_config_f32", refine)
         settings = ffi.addressof(self.refine_filled.struct)
-        stage = ffi.addressof(library, next(one for one in dir(library) if one.startswith("pvid_refine_stage_f32")))
+        stage = ffi.addressof(library, next(one for one in dir(library) if one.startswith("pvid_refiner_f32")))
         self._second = ffi.new("pvid_weak_refine_f32 *", [stage, self.refinement, settings])
         super().__init__(native, config, also=(refine,), refine=self._second)
 

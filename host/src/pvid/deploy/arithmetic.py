@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pvid.settings.engine_cores import FIXED as FIXED_ENGINE
-from pvid.settings.engine_cores import FLOAT as FLOAT_ENGINE
-from pvid.settings.engine_cores import EngineCore
+from pvid.settings.cores import FIXED as FIXED_CORE
+from pvid.settings.cores import FLOAT as FLOAT_CORE
+from pvid.settings.cores import CoreBuild
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Arithmetic:
     zephyr : settings of a Zephyr application
     """
 
-    engine: EngineCore
+    engine: CoreBuild
     without: str
     header: str
     snapshot_header: str
@@ -40,7 +40,7 @@ class Arithmetic:
 
 
 FLOAT = Arithmetic(
-    engine=FLOAT_ENGINE,
+    engine=FLOAT_CORE,
     without="_q31",
     header="pvid/weak.h",
     snapshot_header="pvid/snapshot_weak.h",
@@ -50,7 +50,7 @@ FLOAT = Arithmetic(
     zephyr="CONFIG_FPU=y\n",
 )
 FIXED = Arithmetic(
-    engine=FIXED_ENGINE,
+    engine=FIXED_CORE,
     without="_f32",
     header="pvid/weak_q31.h",
     snapshot_header="pvid/snapshot_weak_q31.h",

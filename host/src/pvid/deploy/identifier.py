@@ -256,7 +256,7 @@ def _refined(d: Deployment, second: SecondStage) -> str:
             f'#include "{d.name}_refined.h"',
             "",
             "static pvid_refine_f32 refinement;",
-            "static const pvid_weak_refine_f32 second = {&pvid_refine_stage_f32, &refinement,",
+            "static const pvid_weak_refine_f32 second = {&pvid_refiner_f32, &refinement,",
             f"                                            &{d.name}_refine_config_f32}};",
             "",
             _names(d, "refined_parameter", [one.name for one in second.parameters], size),

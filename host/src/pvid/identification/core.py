@@ -26,7 +26,7 @@ from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.verdict import Reason, Verdict
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import ENGINE_CORES
+from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 from pvid.settings.enums import Reason as Outcome
 from pvid.settings.record import Record
@@ -150,7 +150,7 @@ class CoreAnswer(Answer):
     @property
     def identifier(self) -> str:
         """Form and arithmetic."""
-        return f"weak form, C in {ENGINE_CORES[self.core].words}"
+        return f"weak form, C in {CORES[self.core].words}"
 
     @property
     def lines(self) -> list[str]:
@@ -266,7 +266,7 @@ def _in_fixed_point(answer: Analysis) -> _Run:
     )
 
 
-_RUNS = dict(zip(ENGINE_CORES, (_in_float, _in_fixed_point), strict=True))
+_RUNS = dict(zip(CORES, (_in_float, _in_fixed_point), strict=True))
 
 
 def _answer(answer: Analysis, run: _Run) -> CoreAnswer:

@@ -26,7 +26,7 @@ from pvid.oracle.weak.choice import Scored
 from pvid.oracle.weak.verdict import Reason as Doubt
 from pvid.oracle.weak.verdict import Verdict
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import FLOAT
+from pvid.settings.cores import FLOAT
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig

@@ -20,7 +20,7 @@ from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Verdict
 from pvid.oracle.weak.verdict import Reason as Doubt
 from pvid.rig.run import Recording
-from pvid.settings.engine_cores import FLOAT, STRONG_CORES
+from pvid.settings.cores import FLOAT, STRONG_CORES
 from pvid.settings.enums import Law, Reason
 
 _UNKNOWN_OF_RANGE = 0.5  # as in the verdict of the weak form

@@ -26,7 +26,7 @@ Words = npt.NDArray[np.uint32]
 
 _PROGRESS_TICKS = 512
 _VERBS = ("init", "step", "gap", "freeze", "estimate", "candidate")
-_REFINE = ("pvid_refine_stage_f32", "pvid_refine_best_f32", "pvid_refine_latest_f32", "pvid_refine_reason_f32")
+_REFINE = ("pvid_refiner_f32", "pvid_refine_best_f32", "pvid_refine_latest_f32", "pvid_refine_reason_f32")
 
 
 def printed(sources: ModelSources) -> ModuleType:
@@ -82,7 +82,7 @@ class PrintedTwin:
         if refine is not None:
             self.refinement = module.pvid_refine_f32()
             second = filled(module, "pvid_refine_config_f32", refine)
-            stage = next(one for name, one in vars(module).items() if name.startswith("pvid_refine_stage_f32"))
+            stage = next(one for name, one in vars(module).items() if name.startswith("pvid_refiner_f32"))
             given.refine = module.pvid_weak_refine_f32(stage, self.refinement, second)
         self.state = getattr(module, f"pvid_weak_{core}")()
         self._step = getattr(module, f"pvid_weak_step_{core}")
