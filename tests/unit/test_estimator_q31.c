@@ -12,6 +12,7 @@
 #include "number/scaled_q31.h"
 #include "pendulum_model_q31.h"
 #include "pvid/pvid_q31.h"
+#include "solve/system_q31.h"
 
 #define ONE_Q20 (1 << 20) /* of rows */
 #define ONE_Q26 (1 << 26) /* of p, whose bounds end at 2^30 then */
@@ -336,6 +337,36 @@ static void p0_needs_more_information_than_its_start(void **state)
     }
 }
 
+/* s_ab = c_b^T (M c_a) with each product in M c_a rounded down at 2^32, in integers: no bit is missing, none is added.
+ */
+static void a_projection_is_exact_but_for_its_products(void **state)
+{
+    (void)state;
+    static const int32_t m[3] = {1073741823, -987654321, 1012345678}; /* M_11, M_12, M_22 */
+    static const uint8_t row[4] = {0, 1, 0, 1};
+    static const uint8_t column[4] = {0, 0, 1, 1};
+    static const int32_t c[4] = {536870911, -400000003, 123456789, 500000001};
+    pvid_model_q31 model = own_model;
+    model.n_c = 4;
+    model.c_row = row;
+    model.c_column = column;
+    for (size_t a = 0; a < 2u; a++) {
+        int64_t s[PVID_MAX_P] = {99, 99};
+        assert_int_equal(pvid_system_project_q31(&model, m, c, 2u * a, s), 2u * (a + 1u));
+        for (size_t b = a; b < 2u; b++) {
+            int64_t expected = 0;
+            for (size_t i = 0; i < 2u; i++) {
+                int64_t t = 0;
+                for (size_t j = 0; j < 2u; j++) {
+                    t += pvid_floor_shift_q31((int64_t)m[i + j] * c[(2u * a) + j], 32);
+                }
+                expected += t * c[(2u * b) + i];
+            }
+            assert_true(s[b] == expected);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -348,6 +379,7 @@ int main(void)
         cmocka_unit_test_setup(without_rows_the_start_is_published, start_again),
         cmocka_unit_test(information_of_noise_alone_moves_nothing),
         cmocka_unit_test(p0_needs_more_information_than_its_start),
+        cmocka_unit_test(a_projection_is_exact_but_for_its_products),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "persist/fingerprint_refine_f32.h"
 #include "pvid/fnv_refine.h"
 #include "refine/refine_judge_f32.h"
 #include "number/sincos_f32.h"
@@ -1027,6 +1028,48 @@ static void test_every_number_of_a_refinement_counts_in_its_hash(void **state)
     assert_int_equal(pvid_fnv_refine_f32(5u, &self, PVID_UPDATED), hash);
 }
 
+/* The sizes, then every constant, acceleration and output at one point. */
+static void test_the_model_s_fingerprint_is_that_of_its_functions(void **state)
+{
+    (void)state;
+    float r[PVID_REFINE_PARAMETERS];
+    float m[PVID_REFINE_CONSTANTS];
+    float x[PVID_REFINE_STATES];
+    float u[PVID_REFINE_ROOM_U] = {0.0f};
+    float a[PVID_REFINE_COORDINATES];
+    float z[PVID_REFINE_OUTPUTS];
+    for (size_t i = 0; i < PVID_REFINE_PARAMETERS; i++) {
+        r[i] = 0.375f + (0.140625f * (float)i);
+    }
+    for (size_t i = 0; i < PVID_REFINE_STATES; i++) {
+        x[i] = 0.25f + (0.140625f * (float)i);
+    }
+    for (size_t i = 0; i < PVID_REFINE_INPUTS; i++) {
+        u[i] = 0.75f + (0.140625f * (float)i);
+    }
+    pvid_refine_constants(r, m);
+    pvid_refine_motion(m, x, &x[PVID_REFINE_STATES - PVID_REFINE_COORDINATES], u, a);
+    pvid_refine_output(m, r, x, &x[PVID_REFINE_STATES - PVID_REFINE_COORDINATES], u, z);
+    const uint32_t sizes[] = {PVID_REFINE_ORDER,  PVID_REFINE_COORDINATES, PVID_REFINE_INPUTS,    PVID_REFINE_OUTPUTS,
+                              PVID_REFINE_MOVING, PVID_REFINE_PARAMETERS,  PVID_REFINE_CONSTANTS, PVID_REFINE_SKEW,
+                              PVID_REFINE_P,      PVID_REFINE_RUNGE_KUTTA, PVID_REFINE_SIGNS,     PVID_REFINE_WIDTHS,
+                              PVID_REFINE_HIDDEN};
+    uint32_t expected = 3u;
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        expected = pvid_fnv_word(expected, sizes[i]);
+    }
+    const float *results[] = {m, a, z};
+    const size_t counts[] = {PVID_REFINE_CONSTANTS, PVID_REFINE_COORDINATES, PVID_REFINE_OUTPUTS};
+    for (size_t k = 0; k < 3u; k++) {
+        for (size_t i = 0; i < counts[k]; i++) {
+            uint32_t word;
+            memcpy(&word, &results[k][i], sizeof word);
+            expected = pvid_fnv_word(expected, (results[k][i] - results[k][i] == 0.0f) ? word : 0x7FC00000u);
+        }
+    }
+    assert_int_equal(pvid_fingerprint_refine_model_f32(3u), expected);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1057,6 +1100,7 @@ int main(void)
         cmocka_unit_test(test_a_droop_is_that_of_the_samples_of_a_mean),
         cmocka_unit_test(test_a_level_below_1_widens_nothing),
         cmocka_unit_test(test_every_number_of_a_refinement_counts_in_its_hash),
+        cmocka_unit_test(test_the_model_s_fingerprint_is_that_of_its_functions),
     };
     return cmocka_run_group_tests(tests, prepare, NULL);
 }

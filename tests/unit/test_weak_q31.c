@@ -435,6 +435,22 @@ static void signals_of_several_ticks_are_those_of_their_definition(void **state)
     }
 }
 
+/* Between windows a tick that ends no step has nothing to do, and costs little: its answer is there. */
+static void ticks_without_work_have_their_answer(void **state)
+{
+    (void)state;
+    start();
+    assert_int_equal(identifier.rest, PVID_WARMING_UP);
+    plant_state plant = released_plant();
+    uint32_t idle = 0;
+    for (int i = 0; i < (5 * ENGINE_HOP_TICKS); i++) {
+        const pvid_reason reason = tick(&identifier, &plant, 0);
+        idle += (identifier.rest == (uint8_t)PVID_ACCUMULATED) ? 1u : 0u;
+        assert_true((reason != PVID_WARMING_UP) || (i < (3 * ENGINE_HOP_TICKS)));
+    }
+    assert_true(idle > (uint32_t)ENGINE_HOP_TICKS);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -453,6 +469,7 @@ int main(void)
         cmocka_unit_test_setup(a_snapshot_that_does_not_fit_is_not_written_and_one_of_another_is_not_read, start_again),
         cmocka_unit_test(the_lead_is_what_the_front_end_needs),
         cmocka_unit_test(signals_of_several_ticks_are_those_of_their_definition),
+        cmocka_unit_test(ticks_without_work_have_their_answer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
