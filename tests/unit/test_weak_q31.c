@@ -440,12 +440,12 @@ static void ticks_without_work_have_their_answer(void **state)
 {
     (void)state;
     start();
-    assert_int_equal(identifier.rest, PVID_WARMING_UP);
+    assert_int_equal(identifier.task, PVID_WARMING_UP);
     plant_state plant = released_plant();
     uint32_t idle = 0;
     for (int i = 0; i < (5 * ENGINE_HOP_TICKS); i++) {
         const pvid_reason reason = tick(&identifier, &plant, 0);
-        idle += (identifier.rest == (uint8_t)PVID_ACCUMULATED) ? 1u : 0u;
+        idle += (identifier.task == (uint8_t)PVID_ACCUMULATED) ? 1u : 0u;
         assert_true((reason != PVID_WARMING_UP) || (i < (3 * ENGINE_HOP_TICKS)));
     }
     assert_true(idle > (uint32_t)ENGINE_HOP_TICKS);
