@@ -22,8 +22,7 @@ from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions, refine_functions, widths
-from pvid.codegen.refine_twin import GeneratedRefine
-from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library import weak_native, weak_sources
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.refine import full_motion_of, refine_design
@@ -59,9 +58,7 @@ from pvid.settings.weak import Source as SignalSource
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise
 from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.both_stages import BothStagesTwin
-from pvid.twin.refine import RefineTwin
-from pvid.twin.weak import WeakTwin
+from pvid.twin.printed import PrintedTwin
 
 _COMMAND = "pvid log"
 _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
@@ -185,7 +182,7 @@ class MechanismBoard:
     def names(self) -> BoardNames:
         """What the board says about itself."""
         units = {one.name: one.unit for one in self.compiled.signals}
-        refined = [self.equations.parameters[place] for place in self._shown]
+        refined = [self.equations.parameters[place] for place in self.shown]
         return BoardNames(
             self.config.design.model.name,
             tuple((name, units[name]) for name in self.config.design.model.sample_names),
@@ -194,7 +191,7 @@ class MechanismBoard:
         )
 
     @property
-    def _shown(self) -> tuple[int, ...]:
+    def shown(self) -> tuple[int, ...]:
         """Refined parameters that the board sends."""
         if self.refine is None:
             return ()
@@ -227,7 +224,7 @@ class MechanismBoard:
         code["stream_tables.h"] = files_weak.design_header(self._shared, self.compiled, _COMMAND)
         if self.refine is not None:
             code |= files_refine.files_of(self.equations, _COMMAND)
-            code["stream_refine.h"] = _refine_header(self.refine, self._shown)
+            code["stream_refine.h"] = _refine_header(self.refine, self.shown)
         units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
         macros = [
             f"#define STREAM_CORE {int(Core.F32)}",
@@ -295,12 +292,12 @@ class MechanismBoard:
         single = {name: getattr(frame, name) for name in _SINGLE}
         return replace(self.config, estimator=replace(own, law=Law(frame.law), **places, **single))
 
-    def twin_of(self, frame: Configuration) -> WeakTwin | BothStagesTwin:
+    def twin_of(self, frame: Configuration) -> PrintedTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
-        weak = WeakTwin(self.configured(frame))
-        if self.refine is None:
-            return weak
-        return BothStagesTwin(weak, RefineTwin(GeneratedRefine(self.equations), self.refine))
+        equations = None if self.refine is None else self.equations
+        return PrintedTwin(
+            weak_sources(self.compiled, self.config.design, equations), self.configured(frame), self.refine
+        )
 
     @property
     def without_recording(self) -> MechanismBoard:

@@ -16,7 +16,7 @@ from pvid.board.stream_image import StreamImage, c_string
 from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
-from pvid.codegen.weak_library import weak_native_q31
+from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31
 from pvid.codegen.weak_q31 import FixedEngine, JetReaches, fixed_weak
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.weak import neglected_part
@@ -43,7 +43,7 @@ from pvid.rig.run import Recording
 from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak_q31 import Rescale, WeakConfigQ31, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakNoiseQ31
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.weak_q31 import WeakTwinQ31
+from pvid.twin.printed import PrintedTwin
 
 _COMMAND = "pvid log"
 _PER_PARAMETER = ("start", "start_sd", "lower", "upper")
@@ -202,7 +202,7 @@ class MechanismBoardQ31:
             **{name: getattr(own, name) for name in _SINGLE},
         )
 
-    def twin_of(self, frame: Configuration) -> WeakTwinQ31:
+    def twin_of(self, frame: Configuration) -> PrintedTwin:
         """The twin with the values of a Configure frame.
 
         Raises
@@ -216,7 +216,7 @@ class MechanismBoardQ31:
         places: dict[str, Any] = {name: tuple(getattr(frame, name)[: len(own.start)]) for name in _PER_PARAMETER}
         single = {name: getattr(frame, name) for name in _SINGLE}
         config = replace(self.config, estimator=replace(own, **places, **single))
-        return WeakTwinQ31(config, self.engine.parameters.model)
+        return PrintedTwin(weak_sources_q31(self.engine.made, self.engine.parameters, self.config), config)
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `of_tables` gives the same board back."""

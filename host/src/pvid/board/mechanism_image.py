@@ -17,7 +17,7 @@ from pvid.board.replay_image import REPORT_EVERY
 from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library import weak_native, weak_sources
 from pvid.configuration.weak import config_for_simulated_rig, samples_of
 from pvid.core.sizes import smallest
 from pvid.core.sources import left_out
@@ -28,13 +28,12 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.enums import Core
 from pvid.settings.weak import WeakConfig
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin import fnv
-from pvid.twin.trust import EARLY_WINDOWS
-from pvid.twin.weak import WeakTwin
+from pvid.twin.printed import PrintedTwin
 
 Float32 = npt.NDArray[np.float32]
 
 MISSING = int(np.iinfo(np.int32).min)  # marks a missing sample
+_EARLY_WINDOWS = 8  # PVID_WEAK_EARLY_WINDOWS of weak/steps.h
 MADE_BY = "pvid.board.mechanism_image"
 PERIODS = 3  # half windows whose ticks are counted
 LONG_PERIODS = 16  # the same of a long run; the noise is computed anew once in as many
@@ -94,7 +93,7 @@ def run_of_samples(compiled: CompiledModel, config: WeakConfig, samples: Float32
 def long_run(first: int, period: int, available: int) -> int:
     """Ticks of a run to count in: the first window, those that have several steps of p, and LONG_PERIODS half windows
     of one step each, or as many as there are samples."""
-    return first + min(EARLY_WINDOWS + LONG_PERIODS, max(available - first, 0) // period) * period
+    return first + min(_EARLY_WINDOWS + LONG_PERIODS, max(available - first, 0) // period) * period
 
 
 def measured_from(first: int, period: int, ticks: int) -> int:
@@ -132,7 +131,7 @@ def native_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
 
 def twin_hashes(run: MechanismRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]."""
-    return fnv.running_hashes(WeakTwin(run.config).run(run.samples).lane())
+    return PrintedTwin(weak_sources(run.compiled, run.config.design), run.config).run(run.samples).hash
 
 
 def header(run: MechanismRun) -> str:

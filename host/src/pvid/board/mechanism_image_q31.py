@@ -14,13 +14,12 @@ from pvid.board.boards import Board
 from pvid.board.mechanism_image import PERIODS, build_with, long_run, measured_from
 from pvid.board.replay_image import IN_FLASH, REPORT_EVERY
 from pvid.codegen import files_weak_q31
-from pvid.codegen.weak_library import weak_native_q31
+from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31
 from pvid.codegen.weak_q31 import FixedEngine
 from pvid.configuration.weak import simulated_run_of
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.models import mechanisms
-from pvid.twin import fnv
-from pvid.twin.weak_q31 import WeakTwinQ31
+from pvid.twin.printed import PrintedTwin
 
 MADE_BY = "pvid.board.mechanism_image_q31"
 
@@ -92,7 +91,9 @@ def native_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
 
 def twin_hashes(run: FixedRun) -> npt.NDArray[np.uint32]:
     """Running hash of the numpy twin after every tick, [ticks]."""
-    return fnv.running_hashes(WeakTwinQ31(run.engine.config, run.engine.parameters.model).run(run.counts.T).lane())
+    engine = run.engine
+    sources = weak_sources_q31(engine.made, engine.parameters, engine.config)
+    return PrintedTwin(sources, engine.config).run(run.counts).hash
 
 
 def header(run: FixedRun) -> str:

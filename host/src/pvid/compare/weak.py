@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen.weak_library import weak_native, weak_native_q31
@@ -19,9 +18,7 @@ from pvid.settings.cores import CORES
 from pvid.settings.enums import Core
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak_sizes import sizes_of_model
-from pvid.twin import fnv
-from pvid.twin.weak import WeakTwin
-from pvid.twin.weak_q31 import WeakTwinQ31
+from pvid.twin.printed import PrintedTwin
 
 Progress = Callable[[int], None]
 
@@ -68,30 +65,26 @@ def compare_samples(
     compiled: CompiledModel, config: WeakConfig, samples: npt.ArrayLike, progress: Progress | None = None
 ) -> Comparison:
     """The same for samples [ticks, samples] and settings."""
-    identifier = weak_native(compiled, config.design).identifier_of(config)
-    record = identifier.run_samples(samples)
-    twin = WeakTwin(config).run(samples, progress=progress).lane()
-    hashes = fnv.running_hashes(twin)
+    native = weak_native(compiled, config.design)
+    identifier, twin = native.identifier_of(config), PrintedTwin(native.sources, config)
+    record, own = identifier.run_samples(samples), twin.run(samples, progress)
     moments = sizes_of_model(config.design.model)["PVID_MAX_MOMENTS"]
     return Comparison(
         ticks=len(record.reason),
         core_hash=identifier.running_hash,
-        twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
-        difference=first_difference(record, twin, compiled.p_names, moments),
+        twin_hash=twin.running_hash,
+        difference=first_difference(record, own, compiled.p_names, moments),
     )
 
 
 def compare_counts(engine: FixedEngine, readings: npt.ArrayLike, progress: Progress | None = None) -> Comparison:
     """The same in fixed point, for readings [ticks, samples]."""
-    identifier = weak_native_q31(engine.made, engine.parameters, engine.config).identifier()
-    record = identifier.run_samples(readings)
-    twin = WeakTwinQ31(engine.config, engine.parameters.model).run(np.asarray(readings).T).lane()
-    hashes = fnv.running_hashes(twin)
-    if progress is not None:
-        progress(len(record.reason))
+    native = weak_native_q31(engine.made, engine.parameters, engine.config)
+    identifier, twin = native.identifier(), PrintedTwin(native.sources, engine.config)
+    record, own = identifier.run_samples(readings), twin.run(readings, progress)
     return Comparison(
         ticks=len(record.reason),
         core_hash=identifier.running_hash,
-        twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
-        difference=first_difference(record, twin, engine.compiled.p_names, engine.parameters.model.moments),
+        twin_hash=twin.running_hash,
+        difference=first_difference(record, own, engine.compiled.p_names, engine.parameters.model.moments),
     )

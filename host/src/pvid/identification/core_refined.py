@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.codegen.refine import RefineFunctions, refine_functions
-from pvid.codegen.refine_twin import GeneratedRefine
-from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library import weak_native, weak_sources
 from pvid.compare.bits import Comparison, Difference
 from pvid.compare.weak import compare_samples
 from pvid.configuration.refine import refine_design
@@ -30,16 +29,7 @@ from pvid.settings.cores import FLOAT
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import Float32, WeakConfig
-from pvid.twin.refine import RefineTwin
-
-_PIECE = 500  # ticks between two reports of progress
-_ENDS = (
-    Reason.UPDATED,
-    Reason.HELD_SEARCHING,
-    Reason.HELD_BLOCK,
-    Reason.HELD_UNCERTAIN,
-    Reason.HELD_DISAGREES,
-)  # of a block
+from pvid.twin.printed import PrintedTwin
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,43 +239,21 @@ def compare_both(
 
 
 def compare_refined(stages: BothStages, progress: Callable[[int], None] | None = None) -> Comparison:
-    """The second stage against its twin, which gets the estimates of the first one in C: r, its standard errors and the
-    outcome of the last block after every tick; the state of the last block.
-
-    Cost: 0.1 ms a tick.
-    """
-    identifier, core = stages.run()
-    ticks = len(core.told)
-    twin = RefineTwin(GeneratedRefine(stages.made), stages.settings)
-    pieces = []
-    for first in range(0, ticks, _PIECE):
-        part = slice(first, first + _PIECE)
-        pieces.append(twin.run(stages.samples[part], core.weak_p[part], core.weak_se[part], core.busy[part]))
-        if progress is not None:
-            progress(min(first + _PIECE, ticks))
-    reason = np.concatenate([one.reason for one in pieces])
-    told = _last(reason, np.isin(reason, _ENDS))
-    end = np.zeros((ticks, twin.shape.states), np.float32), np.zeros((ticks, twin.shape.states), np.float32)
-    end[0][-1], end[1][-1] = list(identifier.refinement.work.state), twin.work.state
+    """Both stages against their twin: reason of the last block, r and its standard errors after every tick, the running
+    hash of both stages."""
+    _, core = stages.run()
+    twin = PrintedTwin(weak_sources(stages.model, stages.config.design, stages.made), stages.config, stages.settings)
+    own = twin.run(stages.samples, progress)
+    second = twin.second
+    assert second is not None
     names = [one.name for one in stages.made.parameters]
-    compared = {
-        "refined ": (core.r, np.concatenate([one.r for one in pieces]), names),
-        "standard error of ": (core.se, np.concatenate([one.se for one in pieces]), names),
-        "state of the last block ": (*end, [str(k) for k in range(twin.shape.states)]),
-    }
-    found = [
-        Difference(int(k), "reason", int(core.told[k]), int(told[k])) for k in np.flatnonzero(core.told != told)[:1]
-    ]
-    for what, (own, other, labels) in compared.items():
-        words = own.view(np.uint32), other.view(np.uint32)
+    compared = {"refined ": (core.r, second.r), "standard error of ": (core.se, second.se)}
+    different = np.flatnonzero(core.told != second.told)[:1]
+    found = [Difference(int(k), "reason", int(core.told[k]), int(second.told[k])) for k in different]
+    for what, (ours, theirs) in compared.items():
+        words = ours.view(np.uint32), theirs.view(np.uint32)
         for tick, place in np.argwhere(words[0] != words[1])[:1]:
-            ours, theirs = (int(one[tick, place]) for one in words)
-            found.append(Difference(int(tick), f"{what}{labels[place]}", ours, theirs))
-    last = int(core.hash[-1])
-    return Comparison(ticks, last, last, min(found, key=lambda one: one.tick) if found else None)
-
-
-def _last(reason: npt.NDArray[np.uint8], ends: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-    """The reason of the last block's end up to each tick."""
-    at = np.maximum.accumulate(np.where(ends, np.arange(len(reason)), -1))
-    return np.where(at >= 0, reason[at], np.uint8(Reason.WARMING_UP)).astype(np.uint8)
+            one, other = (int(part[tick, place]) for part in words)
+            found.append(Difference(int(tick), f"{what}{names[place]}", one, other))
+    first = min(found, key=lambda one: one.tick) if found else None
+    return Comparison(len(core.told), int(core.hash[-1]), int(own.hash[-1]), first)

@@ -14,7 +14,7 @@ the log counts as verified.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -41,16 +41,13 @@ from pvid.link.frames import (
     RawCount,
     RefinedEstimate,
 )
-from pvid.link.names import shown_of_refined
 from pvid.log.reader import Gap, Record, Restart
 from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
 from pvid.settings.kinds import Settings
 from pvid.settings.record import HASHED_TYPES
 from pvid.twin import fnv
-from pvid.twin.both_stages import BothStagesTwin
-from pvid.twin.weak import WeakTwin
-from pvid.twin.weak_q31 import WeakTwinQ31
+from pvid.twin.printed import PrintedTwin
 
 Check = Estimate | EstimateQ31 | RefinedEstimate | Hash | Credit
 
@@ -67,10 +64,11 @@ class EngineBoard(Protocol):
     @property
     def matrix(self) -> str: ...
 
-    def twin_of(self, frame: Configuration) -> WeakTwin | WeakTwinQ31 | BothStagesTwin: ...
+    def twin_of(self, frame: Configuration) -> PrintedTwin: ...
 
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
+_PIECE = 8192  # ticks that are computed at a time
 _UPPER = tuple((a, b) for a in range(MAX_P) for b in range(a, MAX_P))
 
 
@@ -341,9 +339,9 @@ class Verifier:
             self._number = self.rig.stream_image.number
         return configuration.settings != self._number
 
-    def _count(self) -> None:
-        self._done += 1
-        if self._progress is not None and self._done % 512 == 0:
+    def _count(self, ticks: int) -> None:
+        before, self._done = self._done, self._done + ticks
+        if self._progress is not None and self._done // 512 > before // 512:
             self._progress(self._done)
 
     def _twin(self, configuration: Configuration) -> tuple[_Twin, tuple[str, ...]]:
@@ -353,9 +351,7 @@ class Verifier:
         if isinstance(self.rig, RigFile):
             return _StrongTwin(self._config(self.rig, configuration)), P_NAMES
         twin = self.rig.twin_of(configuration)
-        if isinstance(twin, BothStagesTwin):
-            return _RefinedTwin(twin, self.rig.matrix), self.rig.p_names
-        return _EngineTwin(twin, self.rig.matrix), self.rig.p_names
+        return _EngineTwin(twin, self.rig.matrix, getattr(self.rig, "shown", ())), self.rig.p_names
 
     def _config(self, rig: RigFile, configuration: Configuration) -> Settings:
         """The identifier's settings: those of the rig file, with the values of the configuration."""
@@ -378,70 +374,146 @@ def _pace(configuration: Configuration) -> int:
     return min((every for every in (configuration.hash_every, configuration.estimate_every) if every), default=0)
 
 
+# Called after a tick that is checked: the tick, its reason, the last reason that reports something, the running hash.
+_After = Callable[[int, int, int, int], None]
+
+
 class _Twin(Protocol):
     """An identifier that computes a stretch again."""
 
     samples: int  # of a tick
     reach: int
     matrix: str  # of an estimate
-    estimator: Any
 
-    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
-        """Steps through samples [ticks, samples]; calls `after` after every tick."""
+    def follow(
+        self, samples: npt.NDArray[Any], ticks: Sequence[int], after: _After, count: Callable[[int], None]
+    ) -> None:
+        """Steps through samples [ticks, samples] up to the last one of `ticks`; calls `after` after each of them, and
+        `count` with the number of ticks since its last call."""
 
-    def estimate(self) -> Any:
+    def estimate(self) -> Mapping[str, Any]:
         """What the board says at present."""
 
     @property
-    def both(self) -> BothStagesTwin | None:
-        """With a second stage."""
+    def n_p(self) -> int: ...
+
+    @property
+    def updates(self) -> int: ...
+
+    def refined(self) -> _Refined | None:
+        """What the board says of its second stage at present; None: it has none."""
+
+
+@dataclass(frozen=True)
+class _Refined:
+    """best : the published estimate. latest : r, se, level, clash, number: of the second stage."""
+
+    stage: int
+    best: Mapping[str, Any]
+    latest: Mapping[str, Any]
+    told: int
 
 
 class _StrongTwin:
     """The strong form, in the rig file's core."""
 
     samples = 2
-    both = None
 
     def __init__(self, config: Settings) -> None:
         case = case_of(config)
         self._twin = case.twin(config)
         self.matrix = case.matrix
-        self.reach, self.estimator = self._twin.reach, self._twin.estimator
+        self.reach, self._estimator = self._twin.reach, self._twin.estimator
+        self.n_p = len(self._estimator.p)
 
-    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
-        return self._twin.follow(samples[:, 0], samples[:, 1], after)
+    def follow(
+        self, samples: npt.NDArray[Any], ticks: Sequence[int], after: _After, count: Callable[[int], None]
+    ) -> None:
+        running, verdict, wanted = fnv.START, int(Reason.WARMING_UP), set(ticks)
+
+        def each(tick: int, reasons: npt.NDArray[np.uint8]) -> None:
+            nonlocal running, verdict
+            reason = int(reasons[0])
+            running = fnv.fold_bytes(running, self._state(reason))
+            verdict = verdict if reason == Reason.ACCUMULATED else reason
+            count(1)
+            if tick in wanted:
+                after(tick, reason, verdict, running)
+
+        self._twin.follow(samples[:, 0], samples[:, 1], each)
+
+    def _state(self, reason: int) -> bytes:
+        """The bytes that the hash covers, as in fnv.h."""
+        estimator, (narrow, wide) = self._estimator, HASHED_TYPES[self._estimator.p.dtype.kind]
+        state: bytes = estimator.p[:, 0].astype(narrow).tobytes() + estimator.sums[:, 0].astype(wide).tobytes()
+        if hasattr(estimator, "exponent"):  # of the sums, in fixed point
+            state += int(estimator.exponent[0]).to_bytes(4, "little")
+        return state + reason.to_bytes(4, "little")
 
     def estimate(self) -> Any:
-        return self.estimator.assess()[0]
+        return self._estimator.assess()[0]
+
+    @property
+    def updates(self) -> int:
+        return int(self._estimator.counters["updates"][0])
+
+    def refined(self) -> None:
+        return None
 
 
 class _EngineTwin:
-    """The engine of any mechanism, in either arithmetic, which reports what it publishes."""
+    """The weak form of any mechanism, in either arithmetic, which reports what it publishes.
 
-    both: BothStagesTwin | None = None
+    Parameters
+    ----------
+    shown : refined parameters that the board sends, with a second stage
+    """
 
-    def __init__(self, twin: WeakTwin | WeakTwinQ31, matrix: str) -> None:
-        self._twin, self.matrix = twin, matrix
-        self.samples, self.reach, self.estimator = twin.samples, twin.reach, twin.estimator
+    def __init__(self, twin: PrintedTwin, matrix: str, shown: Sequence[int]) -> None:
+        self._twin, self.matrix, self._shown = twin, matrix, shown
+        self.samples, self.reach, self.n_p = twin.samples, twin.reach, twin.n_p
 
-    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
-        return self._twin.follow(samples, after)
+    def follow(
+        self, samples: npt.NDArray[Any], ticks: Sequence[int], after: _After, count: Callable[[int], None]
+    ) -> None:
+        first, verdict, reason = 0, int(Reason.WARMING_UP), int(Reason.WARMING_UP)
+        for tick in ticks:
+            while first <= tick:
+                last = min(first + _PIECE, tick + 1)
+                reasons = self._twin.run(samples[first:last]).reason
+                reported = reasons[reasons != Reason.ACCUMULATED]
+                verdict = int(reported[-1]) if len(reported) else verdict
+                reason = int(reasons[-1])
+                count(last - first)
+                first = last
+            after(tick, reason, verdict, self._twin.running_hash)
 
-    def estimate(self) -> Any:
-        return self._twin.trust.estimate[0]
+    def estimate(self) -> Mapping[str, Any]:
+        return self._fields(self._twin.estimate)
 
+    def _fields(self, estimate: Any) -> Mapping[str, Any]:
+        matrix = getattr(estimate, self.matrix)
+        found = {name: getattr(estimate, name) for name in ("p", "se", "kappa", "residual_sd", "weight")}
+        return found | {self.matrix: np.reshape(np.array(matrix), (len(estimate.p), -1))}
 
-class _RefinedTwin(_EngineTwin):
-    """The engine with its second stage."""
+    @property
+    def updates(self) -> int:
+        return self._twin.counters["updates"]
 
-    def __init__(self, both: BothStagesTwin, matrix: str) -> None:
-        super().__init__(both.weak, matrix)
-        self.both = both
-
-    def follow(self, samples: npt.NDArray[Any], after: Callable[[int, npt.NDArray[np.uint8]], None]) -> Any:
-        assert self.both is not None
-        return self.both.follow(samples, after)
+    def refined(self) -> _Refined | None:
+        twin = self._twin
+        if twin.refinement is None:
+            return None
+        (stage, best), own, state = twin.best, twin.refined, twin.refinement
+        zeros = [np.float32(0)] * len(state.linear)
+        latest = {
+            "r": [(zeros if own is None else own.r)[place] for place in self._shown],
+            "se": [(zeros if own is None else own.se)[place] for place in self._shown],
+            "level": 0.0 if own is None else own.level,
+            "clash": 0.0 if own is None else own.clash,
+            "number": 0 if own is None else state.mark.number[0],
+        }
+        return _Refined(int(stage), self._fields(best), latest, twin.module.pvid_refine_reason_f32(state))
 
 
 class _DifferentError(Exception):
@@ -458,7 +530,7 @@ class _Recomputation:
         p_names: tuple[str, ...],
         checks: dict[int, list[Check]],
         stretch: Stretch,
-        count: Callable[[], None],
+        count: Callable[[int], None],
     ) -> None:
         self.twin = twin
         self._p_names = p_names
@@ -468,29 +540,21 @@ class _Recomputation:
         self._checks = checks
         self._stretch = stretch
         self._count = count
-        self._hash = fnv.START
         self._sample_hashes = np.empty(0, np.uint32)
-        self._verdict = int(Reason.WARMING_UP)
 
     def run(self, samples: npt.NDArray[Any]) -> None:
         """Runs over samples [ticks, samples] from the session's first tick; writes the result into the stretch."""
         self._sample_hashes = fnv.sample_hashes(samples)
+        ticks = sorted(done - self._stretch.first - 1 for done in self._checks)
         try:
-            self.twin.follow(samples, self._after)
+            self.twin.follow(samples, ticks, self._after, self._count)
         except _DifferentError:
             pass
 
-    def _after(self, tick: int, reasons: npt.NDArray[np.uint8]) -> None:
-        reason = int(reasons[0])
-        self._hash = fnv.fold_bytes(self._hash, self._state(reason))
-        if self.twin.both is not None:
-            self._hash = fnv.fold_bytes(self._hash, self.twin.both.refine.hashed)
-        if reason != Reason.ACCUMULATED:
-            self._verdict = reason
-        self._count()
+    def _after(self, tick: int, reason: int, verdict: int, running: int) -> None:
         done = self._stretch.first + tick + 1
-        for check in self._checks.get(done, ()):
-            for variable, logged, own in self._compared(check, tick, reason):
+        for check in self._checks[done]:
+            for variable, logged, own in self._compared(check, tick, reason, verdict, running):
                 if logged != own:
                     self._stretch.difference = Difference(done, variable, logged, own, "log")
                     raise _DifferentError
@@ -499,35 +563,29 @@ class _Recomputation:
             self.hashed = self.hashed or hashed
             self.covered = max(self.covered, tick + 1 - (0 if hashed else self.reach))
 
-    def _state(self, reason: int) -> bytes:
-        """The bytes that the hash covers, as in fnv.h."""
-        estimator, (narrow, wide) = self.twin.estimator, HASHED_TYPES[self.twin.estimator.p.dtype.kind]
-        state: bytes = estimator.p[:, 0].astype(narrow).tobytes() + estimator.sums[:, 0].astype(wide).tobytes()
-        if hasattr(estimator, "exponent"):  # of the sums, in fixed point
-            state += int(estimator.exponent[0]).to_bytes(4, "little")
-        return state + reason.to_bytes(4, "little")
-
-    def _compared(self, check: Check, tick: int, reason: int) -> Iterator[tuple[str, int, int]]:
+    def _compared(
+        self, check: Check, tick: int, reason: int, verdict: int, running: int
+    ) -> Iterator[tuple[str, int, int]]:
         """Yields variable, word of the log and word of the twin."""
         if isinstance(check, Hash | Credit) and check.sample_hash != 0:
             yield "hash of the samples", check.sample_hash, int(self._sample_hashes[tick])
         match check:
             case Hash():
-                yield "hash", check.hash, self._hash
+                yield "hash", check.hash, running
             case Credit():
-                yield "hash", check.hash, self._hash
+                yield "hash", check.hash, running
                 yield "status", check.reason, reason
             case Estimate() | EstimateQ31():
-                yield from self._compared_estimate(check)
+                yield from self._compared_estimate(check, verdict)
             case RefinedEstimate():
                 yield from self._compared_refined(check)
 
-    def _compared_estimate(self, check: Estimate | EstimateQ31) -> Iterator[tuple[str, int, int]]:
+    def _compared_estimate(self, check: Estimate | EstimateQ31, verdict: int) -> Iterator[tuple[str, int, int]]:
         matrix = self.twin.matrix
         if not hasattr(check, matrix):
             raise PvidError("the estimates are of another core than the rig file sets")
         own = self.twin.estimate()
-        n_p = len(self.twin.estimator.p)
+        n_p = self.twin.n_p
         upper = tuple((a, b) for a, b in _UPPER if b < n_p)
         for i in range(n_p):
             yield self._p_names[i], _word(check.p[i]), _word(own["p"][i])
@@ -542,33 +600,28 @@ class _Recomputation:
             )
         for name in ("kappa", "residual_sd", "weight"):
             yield name.replace("_", " "), _word(getattr(check, name)), _word(own[name])
-        yield "updates", check.updates, int(self.twin.estimator.counters["updates"][0])
-        yield "status", check.reason, self._verdict
+        yield "updates", check.updates, self.twin.updates
+        yield "status", check.reason, verdict
 
     def _compared_refined(self, check: RefinedEstimate) -> Iterator[tuple[str, int, int]]:
-        both = self.twin.both
-        if both is None:
+        own = self.twin.refined()
+        if own is None:
             raise PvidError("the estimates are of a second stage, which the rig file does not set")
-        (stage, best), refine = both.best(), both.refine
-        n_p = len(self.twin.estimator.p)
+        n_p, latest = self.twin.n_p, own.latest
         for i in range(n_p):
-            yield f"published {self._p_names[i]}", _word(check.p[i]), _word(best["p"][i])
+            yield f"published {self._p_names[i]}", _word(check.p[i]), _word(own.best["p"][i])
         logged = dict(zip(_UPPER, check.covariance, strict=True))
         for a, b in ((a, b) for a, b in _UPPER if b < n_p):
             what = f"published covariance of {self._p_names[a]} and {self._p_names[b]}"
-            yield what, _word(logged[a, b]), _word(best["covariance"][a, b])
-        own, shape = refine.estimate, refine.shape
-        zero = np.zeros(shape.parameters, np.float32)
-        shown = shown_of_refined(shape.parameters, shape.widths, shape.place_of_p)
-        for name, values in (("r", zero if own is None else own.r), ("se", zero if own is None else own.se)):
-            for i, value in enumerate(values[list(shown)]):
+            yield what, _word(logged[a, b]), _word(own.best["covariance"][a, b])
+        for name in ("r", "se"):
+            for i, value in enumerate(latest[name]):
                 yield f"refined {name}[{i}]", _word(getattr(check, name)[i]), _word(value)
         for name in ("level", "clash"):
-            value = np.float32(0) if own is None else getattr(own, name)
-            yield f"refined {name}", _word(getattr(check, name)), _word(value)
-        yield "number of the refined estimate", check.number, 0 if own is None else refine.published
-        yield "stage", check.stage, int(stage)
-        yield "status of the refinement", check.reason, int(refine.told)
+            yield f"refined {name}", _word(getattr(check, name)), _word(latest[name])
+        yield "number of the refined estimate", check.number, latest["number"]
+        yield "stage", check.stage, own.stage
+        yield "status of the refinement", check.reason, own.told
 
 
 def _word(value: Any) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from operator import is_
 from types import ModuleType
 from typing import Any
@@ -40,6 +41,21 @@ def printed(sources: ModelSources) -> ModuleType:
     return printed_module(core_of(sources.engine, sources.refined), [*FOLDERS, NATIVE], macros, roots, sources.texts)
 
 
+@dataclass(frozen=True)
+class SecondStage:
+    """What the second stage did, one entry a tick.
+
+    Attributes
+    ----------
+    told : reason of its last block, uint8 [ticks]
+    r, se : published parameters and standard errors, float32 [ticks, parameters]; 0 where there is none
+    """
+
+    told: npt.NDArray[np.uint8]
+    r: npt.NDArray[np.float32]
+    se: npt.NDArray[np.float32]
+
+
 class PrintedTwin:
     """An identifier of the weak form, in either arithmetic, with or without its second stage.
 
@@ -55,6 +71,8 @@ class PrintedTwin:
     state : pvid_weak_<core> as printed
     samples : numbers of a tick
     reach : ticks from a sample until the identifier has processed it completely, at most
+    running_hash : FNV-1a after the last tick
+    second : of the last run; None without a second stage
 
     Raises
     ------
@@ -91,7 +109,8 @@ class PrintedTwin:
             raise PvidError(refused(status, config, in_counts=self.fixed))
         self.samples = int(config.design.model.samples)
         self.reach = int(config.design.ticks_needed if self.fixed else config.ticks_needed)
-        self._hash = fnv.START
+        self.running_hash = fnv.START
+        self.second: SecondStage | None = None
 
     @property
     def estimator(self) -> Any:
@@ -120,6 +139,11 @@ class PrintedTwin:
         return self.state.trust.estimate
 
     @property
+    def refined(self) -> Any:
+        """pvid_refine_latest_f32: the published estimate of the second stage; None: there is none."""
+        return self.module.pvid_refine_latest_f32(self.refinement)
+
+    @property
     def best(self) -> tuple[Stage, Any]:
         """pvid_refine_best_f32: whose estimate is published, and the estimate."""
         estimate = self.module.pvid_estimate_f32()
@@ -145,29 +169,30 @@ class PrintedTwin:
         """
         given = np.asarray(samples)
         flat = numbers(given, 0 if self.fixed else np.float32(0))
-        step, state, width = self._step, self.state, given.shape[1]
-        core, second, published = _Watched(self._of_core), _Watched(self._of_second), _Watched(self._of_published)
-        places = np.empty((len(given), 3), np.int64)
-        reasons, told = np.empty(len(given), np.uint8), np.zeros(len(given), np.uint8)
-        estimator, refinement = self.estimator, self.refinement
-        of_sums = (
-            [estimator.information.sums] if self.fixed else [estimator.information.high, estimator.information.low]
+        step, state, width, second = self._step, self.state, given.shape[1], self.refinement
+        estimator, information = self.estimator, self.estimator.information
+        watched = (
+            _Watched(self._of_core),
+            _Watched(self._of_published),
+            _Watched(self._of_second),
+            _Watched(self._latest),
         )
-        watched = [estimator.p, *of_sums]
-        of_second = [] if refinement is None else [refinement.linear, refinement.work.state]
+        lists = [estimator.p, *([information.sums] if self.fixed else [information.high, information.low])]
+        of_second = [] if second is None else [second.linear, second.work.state]
+        places = np.zeros((len(watched), len(given)), np.int64)
+        reasons, told = np.empty(len(given), np.uint8), np.zeros(len(given), np.uint8)
         with np.errstate(all="ignore"):
             for tick in range(len(given)):
                 reasons[tick] = step(state, flat[tick * width : (tick + 1) * width])
-                places[tick] = (
-                    core.place(watched, estimator.information.exponent if self.fixed else 0),
-                    second.place(of_second, refinement.level) if of_second else 0,
-                    published.place([], state.trust.mark.version),
-                )
-                if of_second:
-                    told[tick] = self.module.pvid_refine_reason_f32(refinement)
+                places[0, tick] = watched[0].place(lists, information.exponent if self.fixed else 0)
+                places[1, tick] = watched[1].place([], state.trust.mark.version)
+                if second is not None:
+                    places[2, tick] = watched[2].place(of_second, second.level)
+                    places[3, tick] = watched[3].place([], (second.mark.version, second.mark.number[0]))
+                    told[tick] = self.module.pvid_refine_reason_f32(second)
                 if progress is not None and tick % _PROGRESS_TICKS == 0:
                     progress(tick)
-        return self._record(core, second, published, places, reasons, told)
+        return self._record(watched, places, reasons, told)
 
     # ---- words of the state, where it has changed
 
@@ -197,20 +222,28 @@ class PrintedTwin:
     def _of_published(self) -> list[Any]:
         return [*self.estimate.p[: self.n_p], *self.estimate.se[: self.n_p]]
 
+    def _latest(self) -> list[Any]:
+        one = self.refined
+        return [np.float32(0)] * (2 * len(self.refinement.linear)) if one is None else [*one.r, *one.se]
+
     def _record(
-        self, core: _Watched, second: _Watched, published: _Watched, places: Any, reasons: Any, told: Any
+        self,
+        watched: Sequence[_Watched],
+        places: npt.NDArray[np.int64],
+        reasons: npt.NDArray[np.uint8],
+        told: npt.NDArray[np.uint8],
     ) -> Record:
-        words = np.array(core.rows, np.uint32)[places[:, 0]] if len(places) else np.empty((0, self.n_p), np.uint32)
         number = np.int32 if self.fixed else np.float32
-        shown = np.array(published.rows, number)[places[:, 2]] if len(places) else np.empty((0, 2 * self.n_p), number)
-        end = words.shape[1] - self.fixed
-        sums = np.ascontiguousarray(words[:, self.n_p : end])
+        words, shown = watched[0].at(places[0], np.uint32), watched[1].at(places[1], number)
         hashed = [words, reasons[:, None].astype(np.uint32)]
-        if self.refinement is not None and len(places):
-            hashed += [np.array(second.rows, np.uint32)[places[:, 1]], told[:, None].astype(np.uint32)]
-        whole = np.ascontiguousarray(np.concatenate(hashed, axis=1).astype("<u4"))
-        hashes = fnv.of_words(whole, self._hash)
-        self._hash = int(hashes[-1]) if len(hashes) else self._hash
+        if self.refinement is not None:
+            latest = watched[3].at(places[3], np.float32)
+            half = latest.shape[1] // 2
+            self.second = SecondStage(told, latest[:, :half], latest[:, half:])
+            hashed += [watched[2].at(places[2], np.uint32), told[:, None].astype(np.uint32)]
+        hashes = fnv.of_words(np.concatenate(hashed, axis=1), self.running_hash)
+        self.running_hash = int(hashes[-1]) if len(hashes) else self.running_hash
+        sums = np.ascontiguousarray(words[:, self.n_p : words.shape[1] - self.fixed])
         return Record(
             p=np.ascontiguousarray(words[:, : self.n_p]).view(number),
             sums=sums.view(np.int64 if self.fixed else np.float32),
@@ -236,3 +269,8 @@ class _Watched:
             self._last, self._mark = [one[:] for one in lists], mark
             self.rows.append(self._made())
         return len(self.rows) - 1
+
+    def at(self, places: npt.NDArray[np.int64], number: type[np.generic]) -> npt.NDArray[Any]:
+        """The rows at these places [places, row]."""
+        rows = self.rows or [self._made()]
+        return np.array(rows, number)[places]

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -1753,25 +1754,28 @@ def _file_of(node: Any) -> str:
 
 def _parsed(unit: Unit) -> Iterator[Any]:
     """The declarations of a unit. Sources are parsed one by one: each has names of its own."""
-    parser = c_parser.CParser()
     names = [*_INTEGERS]
     for first, text in unit.texts():
         known = " ".join(f"typedef int {name};" for name in names)
         try:
-            nodes = parser.parse(f"{known}\n{text}", str(first)).ext
+            nodes = _nodes_of(f"{known}\n{text}", str(first))
         except Exception as error:  # pycparser's own, of several kinds
             found = re.search(r":(\d+):", str(error))
             file, line = unit.place(first + int(found[1]) - 2) if found else ("?", 0)
             raise UntranslatedError(f"{file}:{line}: {error}") from error
         for node in nodes:
-            if node.coord.line == 1:
-                continue
             if isinstance(node, c_ast.Typedef) and unit.place(first + node.coord.line - 2)[0].endswith(".h"):
                 names.append(node.name)
             yield node
     known = " ".join(f"typedef int {name};" for name in names)
     constants = [f"int {name} = {body};" for name, body in unit.constants.items()]
-    yield from (one for one in parser.parse(known + "\n".join(["", *constants]), "macros").ext if one.coord.line > 1)
+    yield from _nodes_of(known + "\n".join(["", *constants]), "macros")
+
+
+@cache
+def _nodes_of(text: str, name: str) -> list[Any]:
+    """The declarations of a text behind its first line: the core's are the same for every mechanism."""
+    return [one for one in c_parser.CParser().parse(text, name).ext if one.coord.line > 1]
 
 
 def _is_pointer(value: Value) -> bool:
