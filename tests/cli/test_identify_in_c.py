@@ -31,8 +31,7 @@ from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
 from pvid.sim.pendulum import STANDARD_PENDULUM, standard_sensors
-from pvid.twin.refine import RefineTwin
-from pvid.twin.weak import WeakTwin
+from pvid.twin.printed import PrintedTwin
 
 
 def pvid(*arguments: str | Path) -> Result:
@@ -184,8 +183,8 @@ def test_core_and_twin_are_compared_in_every_bit(recorded: dict[str, Path], monk
     answer = pvid("compare", recorded["dc_motor"], "--core", "all")
     assert answer.return_value == DONE and answer.stdout.count("equal") == 3 and "6000" in answer.stdout
     assert "f32" in answer.stdout and "q31" in answer.stdout
-    changed = "pvid.compare.weak.WeakTwin"
-    monkeypatch.setattr(changed, lambda config: WeakTwin(replace(config, iterations=1)))
+    changed = "pvid.compare.weak.PrintedTwin"
+    monkeypatch.setattr(changed, lambda sources, config: PrintedTwin(sources, replace(config, iterations=1)))
     answer = pvid("compare", recorded["rigid_body"])
     assert answer.return_value == DIFFERENT
     assert "DIFFERENT: tick" in " ".join(answer.stdout.split())
@@ -294,8 +293,8 @@ def test_the_second_stage_is_compared_with_its_twin_too(
     rows = [line.split() for line in answer.stdout.splitlines() if "host" in line]
     assert answer.return_value == DONE and [row[5] for row in rows] == ["weak", "refined"]
     assert rows[0][11] != rows[1][11] and answer.stdout.count("equal") == 2  # hashes of one stage and of both
-    changed = "pvid.identification.core_refined.RefineTwin"
-    monkeypatch.setattr(changed, lambda model, config: RefineTwin(model, replace(config, gate=1.0)))
+    changed = "pvid.identification.core_refined.PrintedTwin"
+    monkeypatch.setattr(changed, lambda sources, weak, own: PrintedTwin(sources, weak, replace(own, gate=1.0)))
     answer = pvid("compare", recorded["rigid_body"])
     assert answer.return_value == DIFFERENT
     assert answer.stdout.count("equal") == 1 and "DIFFERENT: tick" in " ".join(answer.stdout.split())

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid.codegen.refine import refine_functions
-from pvid.codegen.refine_twin import GeneratedRefine
+from pvid.core.model_library import NATIVE, core_of
 from pvid.core.native import Native
 from pvid.core.refine_native import RefineNative, RefineRecord
+from pvid.core.sources import FOLDERS
 from pvid.design.refine import refine_config
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
-from pvid.models.mechanisms import compiled_of
+from pvid.settings.engine_cores import FLOAT
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
-from pvid.twin.refine import RefineTwin
+from pvid.twin import fnv
+from pvid.twin.printer.program import printed_module
+from pvid.twin.printer.values import filled, numbers
 
 Float = npt.NDArray[np.float64]
 TRUTH = STANDARD_PENDULUM.linear
@@ -28,8 +31,30 @@ BEFORE = 500  # ticks before the weak form's first estimate
 
 
 @cache
-def model() -> GeneratedRefine:
-    return GeneratedRefine(refine_functions(compiled_of("kapitza")))
+def module() -> ModuleType:
+    """The refinement of the library's pendulum, printed."""
+    roots = [f"pvid_{one}_f32" for one in ("replay_refine", "refine_init", "refine_freeze", "refine_gap")]
+    return printed_module([*core_of(FLOAT, True)], [*FOLDERS, NATIVE], {}, roots)
+
+
+class Twin:
+    """It, stepped as RefineNative."""
+
+    def __init__(self, config: RefineConfig) -> None:
+        self.module, self.state, self.running = module(), module().pvid_refine_f32(), [fnv.START]
+        self.parameters = len(config.prior_sd)
+        settings = filled(self.module, "pvid_refine_config_f32", config)
+        assert self.module.pvid_refine_init_f32(self.state, settings, 2) == 0
+
+    def run(self, given: Float, p: Float, se: Float) -> RefineRecord:
+        ticks, flat = len(given), np.zeros((2, len(given) * self.parameters), np.float32)
+        reason, hashes = np.zeros(ticks, np.uint8), np.zeros(ticks, np.uint32)
+        arrays = (numbers(one, np.float32(0)) for one in (given, p, se))
+        with np.errstate(all="ignore"):
+            self.module.pvid_replay_refine_f32(
+                self.state, ticks, given.shape[1], *arrays, self.running, reason, hashes, *flat
+            )
+        return RefineRecord(reason, hashes, *flat.reshape(2, ticks, self.parameters))
 
 
 @cache
@@ -56,7 +81,7 @@ def both(given: Float, config: RefineConfig, off: tuple[float, float, float]) ->
     """The record of the core, after the comparison with the twin's."""
     p, se = weak(len(given), off)
     core = RefineNative(Native(), config).run(given, p, se)
-    twin = RefineTwin(model(), config).run(given, p, se)
+    twin = Twin(config).run(given, p, se)
     np.testing.assert_array_equal(core.reason, twin.reason)
     np.testing.assert_array_equal(core.hash, twin.hash)
     np.testing.assert_array_equal(core.r, twin.r)
@@ -131,15 +156,15 @@ def test_gap_and_freeze() -> None:
     given = samples(3.0, 1.0)
     p, se = weak(len(given), (0.0, 0.0, 0.0))
     core = RefineNative(Native(), configuration())
-    twin = RefineTwin(model(), configuration())
+    twin = Twin(configuration())
     for first, frozen in ((0, False), (1000, True), (1700, False)):
         last = {0: 1000, 1000: 1700, 1700: 3000}[first]
         core.freeze(frozen)
-        twin.freeze(frozen)
+        twin.module.pvid_refine_freeze_f32(twin.state, frozen)
         part = given[first:last], p[first:last], se[first:last]
         np.testing.assert_array_equal(core.run(*part).hash, twin.run(*part).hash)
         core.gap()
-        twin.gap()
+        twin.module.pvid_refine_gap_f32(twin.state)
 
 
 @pytest.mark.parametrize("bits", [12, 16])

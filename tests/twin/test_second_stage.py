@@ -13,20 +13,17 @@ from weak_rig import EngineRig, engine_rig
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.refined_image import refined_pendulum
-from pvid.codegen.refine import refine_functions
-from pvid.codegen.refine_twin import GeneratedRefine
-from pvid.codegen.weak_library import weak_native
+from pvid.codegen.refine import RefineFunctions, refine_functions
+from pvid.codegen.weak_library import weak_native, weak_sources
 from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.refine import refine_settings
-from pvid.core.weak_native import RefinedIdentifier, WeakNative
+from pvid.core.weak_native import RefinedIdentifier, RefinedRecord, WeakNative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.enums import Reason, SnapshotStatus
 from pvid.settings.f32 import TrustConfig
 from pvid.settings.refine import RefineConfig
-from pvid.twin.both_stages import BothStagesTwin
-from pvid.twin.refine import RefineTwin
-from pvid.twin.weak import WeakTwin
+from pvid.twin.printed import PrintedTwin
 
 NAME = "rigid_body"  # of order 1, three outputs
 
@@ -37,7 +34,7 @@ class Refined:
 
     rig: EngineRig
     library: WeakNative
-    model: GeneratedRefine
+    made: RefineFunctions
     settings: RefineConfig
 
     def identifier(self, **changes: object) -> RefinedIdentifier:
@@ -52,7 +49,7 @@ def refined(name: str = NAME) -> Refined:
     names = made.model
     run = {one: rig.samples[:, k] for k, one in enumerate(_samples(name))}
     settings = refine_settings(made, run, simulated.sample_rate, rig.truth, 2 * simulated.window_s)
-    return Refined(rig, weak_native(names, rig.config.design, made), GeneratedRefine(made), settings)
+    return Refined(rig, weak_native(names, rig.config.design, made), made, settings)
 
 
 def _samples(name: str) -> tuple[str, ...]:
@@ -65,16 +62,14 @@ def kept(one: RefinedIdentifier) -> bytes:
     return bytes(ffi.buffer(one.refinement))[ffi.offsetof("pvid_refine_f32", "h") :]
 
 
-def test_the_twin_has_the_bits_of_a_first_order_model() -> None:
-    given = refined()
-    settings = replace(given.settings, distance=0.1)
-    core, twin = given.identifier(distance=0.1), RefineTwin(given.model, settings)
-    record = core.run_both(given.rig.samples[:6000])
-    expected = twin.run(given.rig.samples[:6000], record.weak_p, record.weak_se, record.busy)
-    np.testing.assert_array_equal(record.r, expected.r)
-    np.testing.assert_array_equal(record.se, expected.se)
-    np.testing.assert_array_equal(np.array(list(core.refinement.work.state), np.float32), twin.work.state)
-    assert Reason.UPDATED in record.told
+def assert_same(record: RefinedRecord, twin: PrintedTwin, samples: npt.NDArray[np.float32]) -> None:
+    """The record of both stages is that of their twin, tick by tick."""
+    found = twin.run(samples)
+    assert twin.second is not None
+    np.testing.assert_array_equal(record.hash, found.hash)
+    np.testing.assert_array_equal(record.told, twin.second.told)
+    np.testing.assert_array_equal(record.r, twin.second.r)
+    np.testing.assert_array_equal(record.se, twin.second.se)
 
 
 @pytest.mark.parametrize(
@@ -84,12 +79,10 @@ def test_the_twin_has_the_bits_of_a_first_order_model() -> None:
 def test_the_twin_has_the_bits_of_the_pendulum_with_options(options: tuple[str, ...], ticks: int) -> None:
     """Dry friction of hidden angles, a skew and derived inputs, with steps of Runge-Kutta."""
     run = refined_pendulum(ticks, BOARDS["mps2-an386"], options)
-    core, twin = run.native(), RefineTwin(GeneratedRefine(run.made), run.settings)
+    core = run.native()
+    sources = weak_sources(run.weak.compiled, run.weak.config.design, run.made)
     record = core.run_both(run.weak.samples)
-    expected = twin.run(run.weak.samples, record.weak_p, record.weak_se, record.busy)
-    np.testing.assert_array_equal(record.r, expected.r)
-    np.testing.assert_array_equal(record.se, expected.se)
-    np.testing.assert_array_equal(np.array(list(core.refinement.work.state), np.float32), twin.work.state)
+    assert_same(record, PrintedTwin(sources, run.weak.config, run.settings), run.weak.samples)
     assert Reason.UPDATED in record.told
 
 
@@ -98,35 +91,24 @@ def test_the_twin_of_both_stages_publishes_what_the_core_does() -> None:
     given, samples = refined(), refined().rig.samples[:15500].copy()
     samples[5000:9200, :3] *= 1.3
     core = given.identifier(distance=0.1)
-    twin = BothStagesTwin(WeakTwin(core.config), RefineTwin(given.model, replace(given.settings, distance=0.1)))
-    stages, best = [], []
-
-    def after(tick: int, reasons: npt.NDArray[np.uint8]) -> None:
-        stage, estimate = twin.best()
-        stages.append(stage)
-        if (tick + 1) % 500 == 0:
-            best.append((stage, estimate))
-
-    twin.follow(samples, after)
-    changes = np.flatnonzero(np.diff(stages))
-    assert len(changes) >= 3, changes
-    for k, (stage, estimate) in enumerate(best):
-        core.run_both(samples[500 * k : 500 * (k + 1)])
-        own_stage, own = core.best
+    twin = PrintedTwin(given.library.sources, core.config, replace(given.settings, distance=0.1))
+    stages = []
+    for k in range(31):
+        part = samples[500 * k : 500 * (k + 1)]
+        assert_same(core.run_both(part), twin, part)
+        (own_stage, own), (stage, estimate) = core.best, twin.best
         assert own_stage == stage, k
-        n = len(twin.weak.estimator.p)
-        for name in ("p", "se"):
-            np.testing.assert_array_equal(own[name][:n], estimate[name][:n])
-        np.testing.assert_array_equal(own["covariance"][:n, :n], estimate["covariance"][:n, :n])
-        for name in ("kappa", "residual_sd", "weight", "misfit", "least_pivot"):
-            assert own[name] == estimate[name]
+        stages.append(stage)
+        for name in own.dtype.names or ():
+            assert own[name].tobytes() == np.array(getattr(estimate, name), np.float32).tobytes(), name
+    assert len(np.flatnonzero(np.diff(stages))) >= 3
 
 
 def test_the_refined_estimate_is_sharper_than_the_weak_one_and_right() -> None:
     given = refined()
     core = given.identifier()
     record = core.run_both(given.rig.samples)
-    names = [one.name for one in given.model.made.parameters]
+    names = [one.name for one in given.made.parameters]
     truth = np.array([simulated_rig(NAME).truth[name] for name in names])
     assert np.all(np.abs(record.r[-1] - truth) < 3.5 * record.se[-1])
     ratio = record.se[-1] / core.estimate["se"][: len(names)]

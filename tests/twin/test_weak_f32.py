@@ -12,7 +12,6 @@ from pvid.models import mechanisms
 from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import WeakConfig
-from pvid.twin.weak import WeakTwin
 
 NO_GATE = GateConfig()
 
@@ -213,15 +212,6 @@ def test_the_sums_of_a_run_outlive_a_gap() -> None:
     assert updates(record.reason) + (record.reason == Reason.HELD_UNCERTAIN).sum() > 0
 
 
-def test_stages_per_tick_are_those_of_the_core() -> None:
-    for name in mechanisms.names():
-        rig = engine_rig(name)
-        core = rig.native.identifier_of(rig.config)
-        twin = WeakTwin(rig.config)
-        assert core.state.stages_per_tick == twin.stages_per_tick
-        assert core.state.items_per_tick == twin.schedule.items_per_tick
-
-
 def random_case(seed: int) -> tuple[EngineRig, WeakConfig, Float32]:
     """A mechanism with random sizes, settings and limits, and a piece of its run with random faults."""
     random = np.random.default_rng(seed)
@@ -264,10 +254,10 @@ def test_an_equation_s_own_error_that_comes_and_goes_has_the_bits_of_the_twin() 
     samples = rig.samples[:12000].copy()
     place = rig.config.design.model.sample_names.index("V")
     samples[:6000, place] += np.random.default_rng(2).standard_normal(6000).astype(np.float32)
-    of_half, of_run = WeakTwin(rig.config), WeakTwin(rig.config)
-    of_half.run(samples[:6000])
-    of_run.run(samples)
-    first, last = (max(float(one.variance[0]) for one in twin.finish.errors) for twin in (of_half, of_run))
-    assert first > 10 * last
+    core, largest = rig.native.identifier_of(rig.config), []
+    for part in (samples[:6000], samples[6000:]):
+        core.run_samples(part)
+        largest.append(max(one.variance for one in core.state.finish.error))
+    assert largest[0] > 10 * largest[1]
     record = assert_equals_the_twin(rig.native, rig.config, samples)[0]
     assert updates(record.reason) > 0

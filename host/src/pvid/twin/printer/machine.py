@@ -71,10 +71,10 @@ class Place:
 
 
 def share(to: Any, of: Any, size: int) -> None:
-    """A copy word by word: of a struct, or of `size` bytes of an array of words."""
+    """A copy word by word: of a struct, or of `size` bytes of an array of words; 0: of nothing."""
     if size == WHOLE:
         to.assign(of)
-    else:
+    elif size > 0:
         to[: size // 4] = of[: size // 4]
 
 
