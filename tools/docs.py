@@ -23,8 +23,10 @@ from typing import cast
 import pvid
 from pvid.cli.page_table import put_table, with_table
 from pvid.cli.verdict_table import verdict_table
+from pvid.core.sources import FOLDERS, SRC
 from pvid.link import frames
 from pvid.oracle import paper
+from pvid.twin.printer.program import text_of
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -102,8 +104,17 @@ def paper_block() -> str:
 
 
 # page, marker, text
+def twin_block() -> str:
+    """A module of the core and what is printed of it, for twin.md."""
+    text = text_of([SRC / "judge" / "gate_f32.c"], FOLDERS, {})
+    printed = text.partition("# ---- judge/gate_f32.c")[2].strip()
+    c = (SRC / "judge" / "gate_f32.c").read_text(encoding="utf-8").strip()
+    return f"## C\n\n```c\n{c}\n```\n\n## Printed\n\n```python\n{printed}\n```"
+
+
 GENERATED = (
     ("paper.md", "paper", paper_block),
+    ("twin.md", "twin", twin_block),
     ("link-and-log.md", "schema", schema_block),
     ("api-python.md", "api", python_reference),
     ("reasons.md", "verdict", verdict_table),
