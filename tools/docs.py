@@ -26,7 +26,7 @@ from pvid.cli.verdict_table import verdict_table
 from pvid.core.sources import FOLDERS, SRC
 from pvid.link import frames
 from pvid.oracle import paper
-from pvid.twin.printer.program import text_of
+from pvid.twin.printer import program
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "host" / "docs"
@@ -106,7 +106,7 @@ def paper_block() -> str:
 # page, marker, text
 def twin_block() -> str:
     """A module of the core and what is printed of it, for twin.md."""
-    text = text_of([SRC / "judge" / "gate_f32.c"], FOLDERS, {})
+    text = program.text_of([SRC / "judge" / "gate_f32.c"], FOLDERS, {})
     printed = text.partition("# ---- judge/gate_f32.c")[2].strip()
     c = (SRC / "judge" / "gate_f32.c").read_text(encoding="utf-8").strip()
     return f"## C\n\n```c\n{c}\n```\n\n## Printed\n\n```python\n{printed}\n```"
