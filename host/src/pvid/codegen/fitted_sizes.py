@@ -11,7 +11,7 @@ from pvid.settings.weak import NONE, WeakChannel, WeakConfig
 from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
 from pvid.twin.q31 import weak_finish
-from pvid.twin.weak import WeakTwin
+from pvid.twin.weak import shares_place
 
 
 def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]:
@@ -26,7 +26,7 @@ def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]
     needed, model = sizes_of_design(config.design), config.design.model
     found = smallest(needed)
     fitted = found | {
-        "PVID_MAX_WINDOWS": 0 if _shares_place(config) else 1,
+        "PVID_MAX_WINDOWS": 0 if shares_place(config) else 1,
         "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
         "PVID_FEEDBACK": int(config.estimator.law is not Law.STATIONARY or config.estimator.feedback_hz > 0),
         "PVID_NEGLECTED": int(config.trust.neglected > 0),
@@ -60,12 +60,6 @@ def fitted_sizes_q31(config: WeakConfigQ31, n_p: int, n_c: int) -> dict[str, int
     counts = {"signals": len(model.signal), "jets": len(model.jet)}
     counts |= {one: int(getattr(model, one)) for one in ("runs", "signs", "gains", "integrands")}
     return fitted | _exact(counts, model.channel)
-
-
-def _shares_place(config: WeakConfig) -> bool:
-    """Whether a window's sums may take the place of the older half's."""
-    twin = WeakTwin(config)
-    return twin.schedule.room_for(twin.finish.stages_of_columns, twin.stages_per_tick)
 
 
 def config_header(name: str, sizes: Mapping[str, int], command: str) -> str:
