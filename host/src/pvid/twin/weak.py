@@ -9,7 +9,6 @@ import numpy as np
 
 from pvid.settings.weak import WeakConfig
 from pvid.twin.f32.estimator import RelativeEstimator
-from pvid.twin.f32.trust import Trust
 from pvid.twin.f32.weak_finish import Finish
 
 _F = np.float32
@@ -48,14 +47,14 @@ class WeakSchedule:
 def shares_place(config: WeakConfig) -> bool:
     """Whether a window's sums may take the place of the older half's."""
     design = config.design
-    model, dt = design.model, _F(design.decimation) / _F(config.sample_rate)
+    model = design.model
     functions = _F(design.functions) * _F(model.kinds)
     weight = (functions - _F(sum(one.nuisances for one in model.kind))) / functions
     own = replace(config.estimator, row_weight=float(weight), correlation=design.overlap)
     pattern: Any = model.model
     rate = _F(config.sample_rate) / (_F(design.decimation) * _F(design.hop))
     estimator = RelativeEstimator([own], float(rate), pattern)
-    finish = Finish(config, dt, estimator, Trust(config.trust, estimator))
+    finish = Finish(config, estimator)
     used = 2 if design.decimation >= _TWO_TICKS else 1
     schedule = WeakSchedule(_BLOCK * max(design.decimation - used, 1), design.hop, design.highest + 1)
     return schedule.room_for(finish.stages_of_columns, schedule.stages_per_tick(finish.stages))
