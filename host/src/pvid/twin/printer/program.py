@@ -1,6 +1,6 @@
 """From C sources to a Python module: printed once, then from the cache of builds.
 
-    twin = printed_module([Path("gate_f32.c")], [FIRMWARE / "include", SRC], {"PVID_PLAIN_NAMES": ""})
+    twin = printed_module([Path("gate_f32.c")], [FIRMWARE / "include", SRC], {})
 
 `text_of` prints without loading; `pvid.twin.printer.values` makes the structs of a printed module from those of cffi.
 """
