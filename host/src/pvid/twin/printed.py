@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import is_
+from threading import Lock
 from types import ModuleType
 from typing import Any
 
@@ -26,6 +27,7 @@ Progress = Callable[[int], None]
 Words = npt.NDArray[np.uint32]
 
 _PROGRESS_TICKS = 512
+_HASHING = Lock()  # a printed module is shared by all threads
 _VERBS = ("init", "step", "gap", "freeze", "estimate", "candidate")
 _REFINE = ("pvid_refiner_f32", "pvid_refine_best_f32", "pvid_refine_latest_f32", "pvid_refine_reason_f32")
 
@@ -200,17 +202,17 @@ class PrintedTwin:
         """The words that a hash of the core covers, but for the reason at its end."""
         words: list[int] = []
         module = vars(self.module)
-        own = module["pvid_fnv_word"]
 
         def keep(_: int, word: int) -> int:
             words.append(word)
             return 0
 
-        try:
-            module["pvid_fnv_word"] = keep
-            module[function](0, *given, 0)
-        finally:
-            module["pvid_fnv_word"] = own
+        with _HASHING:
+            own, module["pvid_fnv_word"] = module["pvid_fnv_word"], keep
+            try:
+                module[function](0, *given, 0)
+            finally:
+                module["pvid_fnv_word"] = own
         return words[:-1]
 
     def _of_core(self) -> list[int]:

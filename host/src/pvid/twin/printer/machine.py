@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from struct import Struct
+from typing import Any
 
 import numpy as np
 
 f32 = np.float32
 WHOLE = -1  # size of a struct
 
-# The bits of a float32, both ways, through one word of memory.
-_word = np.zeros(1, np.uint32)
-_float = _word.view(np.float32)
-_as_float = memoryview(_float)  # type: ignore[arg-type]
-_as_word = memoryview(_word)  # type: ignore[arg-type]
-
-T = TypeVar("T")
+_FLOAT, _WORD = Struct("<f"), Struct("<I")
 
 
 def bits(x: Any) -> int:
     """The bits of a float32."""
-    _as_float[0] = x
-    return _as_word[0]
+    return int(_WORD.unpack(_FLOAT.pack(x))[0])
 
 
 def from_bits(word: int) -> Any:
     """The float32 of these bits."""
-    _as_word[0] = word
-    return _float[0]
+    return f32(_FLOAT.unpack(_WORD.pack(word))[0])
 
 
 def signed(x: int, width: int) -> int:
@@ -145,6 +137,3 @@ def struct(declared: type) -> Any:
     return type(
         declared.__name__, (), {**body, "__slots__": tuple(fields), "__doc__": declared.__doc__, "__fields__": fields}
     )
-
-
-Function = Callable[..., Any]
