@@ -17,7 +17,7 @@ from pvid.core.refine_native import RefineNative, RefineRecord
 from pvid.core.sources import FOLDERS
 from pvid.design.refine import refine_config
 from pvid.models.kapitza.refinement import refine_rig, sample_sd
-from pvid.settings.engine_cores import FLOAT
+from pvid.settings.cores import FLOAT
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
