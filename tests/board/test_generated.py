@@ -15,7 +15,7 @@ from pvid.codegen.generated import GeneratedModel
 from pvid.models import mechanisms
 
 TIMEOUT_S = 120.0
-NEEDLESS = "/src/(judge|keep|refine|solve|strong|weak)/|/models/"  # of the core: they call its arithmetic alone
+NEEDLESS = "/src/(judge|persist|refine|solve|strong|weak)/|/models/"  # of the core: they call its arithmetic alone
 LISTS = """
 cmake_minimum_required(VERSION 3.20)
 project(generated LANGUAGES C)
