@@ -13,10 +13,11 @@ from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.together import with_own
+from pvid.oracle.weak import work
 from pvid.oracle.weak.choice import score_of
 from pvid.oracle.weak.failures import attempted
 from pvid.oracle.weak.functions import Float
-from pvid.oracle.weak.identify import neglected, ready
+from pvid.oracle.weak.identify import allowance_of, neglected, ready
 from pvid.rig.columns import Columns
 from pvid.rig.mechanism_file import channels_of
 
@@ -33,6 +34,7 @@ _FAR, _NEAR = 30.0, 10.0  # factor of a parameter's guess: a unit is doubted bey
 _ALIKE = 1.05  # times the least part that is left
 _EXPLAINS = 0.9  # R^2 of rows that explain a recording
 _TIMES = ("ms", "us")
+_OF_ANALYSIS = 0.3  # of the work that is allowed to a search for a design: that of the search for a mistake
 # By unit: what a column may be in instead, and what to type for it.
 _UNITS = {
     "rad": {"deg": "deg", "rev": "rev"},
@@ -71,7 +73,8 @@ def advice_on(answer: Analysis) -> tuple[str, ...]:
             value = float(np.nanmin(run[one.name]))
             shown = with_unit(value, one.unit, 3) if value else "0"
             return (f"{one.name} is {shown} in every sample: is it the column of the drive?",)
-    found = list(_tried(answer)) or list(_turned(answer))
+    with work.limited(_OF_ANALYSIS * allowance_of(answer.model, run, answer.recording.sample_rate)):
+        found = list(_tried(answer)) or list(_turned(answer))
     least = min((left for left, _, _ in found), default=0.0)
     # A linear mechanism moves alike with the other sign of its input and of its sensor.
     alike = [(said, typed) for left, said, typed in found if left <= _ALIKE * least][:2]

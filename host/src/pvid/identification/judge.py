@@ -26,12 +26,12 @@ from pvid.identification.refinement.problem import prior_about
 from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.identification.validation import Motion
 from pvid.identification.values import gains_of, noise_of, shifts_of, values_of_found
-from pvid.oracle.weak import verdict
+from pvid.oracle.weak import verdict, work
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.failures import FAILURES, attempted
 from pvid.oracle.weak.gate import gated
-from pvid.oracle.weak.identify import Identified, ready
+from pvid.oracle.weak.identify import Identified, allowance_of, ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
@@ -44,7 +44,9 @@ _FEWEST = 4  # windows of a half of the parts, to which a model is fitted
 _SAMPLES = 3000  # that are simulated of each half
 _ALIKE = 0.1  # difference of the logarithms of the rms up to which estimates predict alike
 _PASSES = 8  # of the refinement
-_MOST = 12_000  # samples that it takes: no more are needed where the equations are what errs
+_MOST = 6_000  # samples that it takes: no more are needed where the equations are what errs
+_OF_ANALYSIS = 0.5  # of the work that is allowed to a search for a design: that of the estimates here
+_SIMULATED = 40  # times that the samples of both halves are simulated with all derivatives, at most
 _NEAR = 4  # passes of a fit that begins at that to all data
 _DESCRIBED = 0.5  # R^2 that an estimate has at least that replaces the usual one
 PREDICTED = 0.9  # R^2 of motion that was not seen, below which the equations do not describe it
@@ -99,7 +101,8 @@ def judged(answer: Analysis) -> Analysis:
     if answer.is_explained:
         return answer
     try:
-        with np.errstate(all="ignore"):
+        units = allowance_of(answer.model, answer.recording.run, answer.recording.sample_rate)
+        with np.errstate(all="ignore"), work.limited(_OF_ANALYSIS * units):
             return _judged(answer)
     except FAILURES:  # the equations cannot be simulated on this run: the usual answer, as it is
         return answer
@@ -196,6 +199,13 @@ class _Trial:
         p = answer.found.p if known else np.array([one.guess for one in answer.model.unknowns])
         self._motion = Motion.near(answer.model, answer.recording.run, rate, p)
         self._block = self._motion.block(answer.found.design.window_s, _PARTS)
+        problem = self._motion.problem
+        samples = min(len(answer.recording), 2 * _SAMPLES) * problem.measured.sub / problem.measured.coarse
+        problem.budget.left = _SIMULATED * samples * (1 + problem.kernel.columns)
+
+    @property
+    def _is_spent(self) -> bool:
+        return work.is_spent() or self._motion.problem.budget.is_spent
 
     def estimates(
         self, name: str, design: WeakDesign, start: Float, weights: Sequence[tuple[str, bool, bool]]
@@ -206,6 +216,8 @@ class _Trial:
             return []
         out = []
         for words, equation_error, compensate in weights:
+            if self._is_spent and not (name == _USUAL and not words):
+                break
             fitted = _Fitted(equation_error, compensate)
             usual = self._answer.found.fit
             own = name == _USUAL and not words and not usual.diverged
@@ -263,7 +275,7 @@ class _Trial:
     def refined(self, best: Candidate) -> Candidate | None:
         """The refinement from an estimate on: it is weighted by what that reaches, not by the sensors' noise."""
         motion, samples = self._motion, self._block
-        if not np.isfinite(best.score):
+        if not np.isfinite(best.score) or self._is_spent:
             return None
         sd = np.maximum(motion.sd, [one.rms for one in best.sensors])
 

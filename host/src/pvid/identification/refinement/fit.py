@@ -236,14 +236,15 @@ class Problem:
         steps = len(cut.first) * cut.samples * self.measured.sub / self.measured.coarse
         self.budget.left -= steps * columns
 
-    def block(self, r: Float, cut: Cut, starts: Float, use: Bool) -> Block | None:
-        """One pass; None where the motion runs away."""
+    def block(self, r: Float, cut: Cut, starts: Float, use: Bool, move: bool = True) -> Block | None:
+        """One pass; None where the motion runs away. `move` False: r stays, and there are no derivatives by it."""
         m = self.measured
-        self._spend(cut, 1 + self.kernel.columns)
+        self._spend(cut, 1 + (self.kernel.columns if move else self.kernel.states))
         z, jacobian, _ = self.kernel.blocks(
-            r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, True, m.coarse
+            r, cut.first, cut.samples, m.sub, m.h, *self.inputs(r), starts, True if move else "starts", m.coarse
         )
         assert jacobian is not None
+        jacobian = jacobian if move else np.ascontiguousarray(jacobian[..., : self.kernel.states])
         if not (np.abs(z).max() < _RUNS_AWAY and np.abs(jacobian).max() < _RUNS_AWAY):  # or is no number
             return None
         error = np.where(use, (cut.rows(m.z) - z) / m.sd, 0.0)
@@ -277,7 +278,7 @@ class Problem:
         found = None  # the block of r and these starts
         while passes < most and not self.budget.is_spent:
             passes += 1
-            found = self.block(r, cut, starts, use)
+            found = self.block(r, cut, starts, use, move)
             if found is None:
                 break
             d_r, d_starts, _, relative = self._step(found.triangle, r, prior, free)
@@ -303,7 +304,8 @@ class Problem:
             r, starts, cost, found = near, begun, now, None
             if ends:
                 break
-        return self._judged(r, prior, cut, starts, use, converged, passes, cost, found)
+        searched = prior if move else replace(prior, free=np.zeros(self.n, np.bool_))
+        return self._judged(r, searched, cut, starts, use, converged, passes, cost, found)
 
     def with_starts(self, prior: Prior, cut: Cut, most: int = PASSES) -> Refined:
         """Starts that fit the readings at the r of a prior, which stays."""
@@ -363,7 +365,7 @@ class Problem:
             whole = q[: len(free), : len(free)] * scale
             d_r[free] = np.linalg.lstsq(q[: len(free), : len(free)], q[: len(free), -1], rcond=1e-13)[0] / scale
             relative = float(np.linalg.norm(q[: len(free), -1]))
-        right = top[:, :, -1] - top[:, :, states:-1] @ d_r
+        right = top[:, :, -1] - (top[:, :, states:-1] @ d_r if len(free) else 0.0)
         left = top[:, :, :states]
         size = np.maximum(np.linalg.norm(left, axis=1), 1e-300)
         scaled = left / size[:, None, :]
@@ -397,7 +399,7 @@ class Problem:
         if not np.isfinite(cost):
             found = None
         elif found is None:
-            found = self.block(r, cut, starts, use)
+            found = self.block(r, cut, starts, use, bool(prior.free.any()))
         if found is None:
             return Refined(r, empty, empty, np.inf, np.inf, False, passes, cut, starts, 0.0, np.inf)
         free = np.flatnonzero(prior.free)

@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -74,7 +75,7 @@ class RefinedKernel:
         u: Float,
         du: Float,
         starts: Float,
-        derivatives: bool = True,
+        derivatives: bool | Literal["starts"] = True,
         coarse: int = 1,
     ) -> tuple[Float, Float | None, Float]:
         """Readings, derivatives, ends.
@@ -87,6 +88,7 @@ class RefinedKernel:
         sub : steps a sample, of h [s]
         u, du : inputs and their rates at begin, middle and end of each step [steps, 3, inputs]
         starts : [blocks, states]
+        derivatives : "starts": those by the starts alone; other columns mean nothing
         coarse : steps, an even number or 1, that are taken as one where no friction reverses
 
         Returns
@@ -111,8 +113,11 @@ class RefinedKernel:
             _pointer(starts),
             _pointer(z),
             None if jacobian is None else _pointer(jacobian),
+            derivatives == "starts",
             _pointer(ends),
         )
+        if derivatives == "starts":
+            return z, jacobian, ends
         if jacobian is not None and "chart" in made.functions:
             moving = made.moving - made.skew
             part = slice(self.states, self.states + moving)
@@ -189,7 +194,7 @@ class PlayedKernel(RefinedKernel):
         u: Float,
         du: Float,
         starts: Float,
-        derivatives: bool = True,
+        derivatives: bool | Literal["starts"] = True,
         coarse: int = 1,
     ) -> tuple[Float, Float | None, Float]:
         """As of RefinedKernel; ends are those of the motion."""
@@ -204,8 +209,8 @@ class PlayedKernel(RefinedKernel):
             ctypes.c_double(float(r[self._place])),
             _pointer(z),
             None if jacobian is None else _pointer(jacobian),
-            self.columns,
-            self.columns - 1,
+            0 if jacobian is None else jacobian.shape[-1],
+            0 if jacobian is None else jacobian.shape[-1] - 1,
         )
         return z, jacobian, ends
 
@@ -270,7 +275,7 @@ class TogetherKernel(RefinedKernel):
         u: Float,
         du: Float,
         starts: Float,
-        derivatives: bool = True,
+        derivatives: bool | Literal["starts"] = True,
         coarse: int = 1,
     ) -> tuple[Float, Float | None, Float]:
         """As of RefinedKernel."""
@@ -285,8 +290,9 @@ class TogetherKernel(RefinedKernel):
                 self._of(r, k), first[own], samples, sub, h, u, du, begun, derivatives, coarse
             )
             if jacobian is not None and inner is not None:
-                columns = np.array([*range(self.states), *(self.states + place for place in self._places[k])])
-                jacobian[own[:, None], :, :, columns] = np.moveaxis(inner, 3, 1)
+                columns = [*range(self.states), *(self.states + place for place in self._places[k])]
+                given = np.array(columns[: self.states] if derivatives == "starts" else columns)
+                jacobian[own[:, None], :, :, given] = np.moveaxis(inner[..., : len(given)], 3, 1)
         return z, jacobian, ends
 
     def number_of(self, first: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:

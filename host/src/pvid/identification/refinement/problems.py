@@ -19,7 +19,7 @@ from pvid.model.signals import sgn
 Float = npt.NDArray[np.float64]
 Values = Mapping[str, float]  # of parameters and settings, by name
 
-_WORK = 1.2e9  # of one refinement: three to four minutes
+_WORK = 20_000  # of one refinement for each sample: some seconds for a thousand; one that arrives takes a fifth of it
 _PERIODS = 2.0  # of the slowest oscillation in a whole block; windows of the weak form where nothing oscillates
 _A_PERIOD = 60  # averaged samples in a period of the fastest motion
 _OSCILLATES = 0.1  # part of an eigenvalue that is imaginary
@@ -75,7 +75,7 @@ class Problems:
                 self._mean = max(1, int(rate / (_A_PERIOD * fast)))
         self._slow = slow
         self._signals, self._begins = signals, begins_of(signals, self._mean)
-        self.budget = Budget(_WORK)
+        self.budget = Budget(_WORK * len(next(iter(signals.values()))))
         self._problems: dict[tuple[str, ...], Problem] = {}
         self.first = [one.name for one in made.parameters if one.place >= 0]
         own = [one.name for one in made.parameters if one.place < 0 and not one.sign]

@@ -7,9 +7,9 @@
 #define NC (NX + NM + SKEW) /* columns that are integrated */
 #define NW (NC + NT)        /* and those of the outputs alone */
 
-/* dx/dt and dS/dt, S [NX][NC] */
+/* dx/dt and dS/dt, S [NX][NC], of the first `columns` columns: NX of them, or all */
 static void rates(const double *m, const double *x, const double *u, const double *du, const double *s, double *f,
-                  double *ds)
+                  double *ds, int columns)
 {
     double a[N];
     if (!ds) {
@@ -24,7 +24,7 @@ static void rates(const double *m, const double *x, const double *u, const doubl
 #endif
         for (int i = 0; i < N; i++) {
             double *row = ds + (NX - N + i) * NC;
-            for (int c = 0; c < NC; c++) {
+            for (int c = 0; c < columns; c++) {
                 double sum = 0;
                 for (int j = 0; j < N; j++) {
                     sum += K[i * N + j] * s[j * NC + c];
@@ -34,14 +34,14 @@ static void rates(const double *m, const double *x, const double *u, const doubl
                 }
                 row[c] = sum;
             }
-            for (int k = 0; k < NM; k++)
+            for (int k = 0; k < NM && columns > NX; k++)
                 row[NX + k] += B[k * N + i];
 #if SKEW
-            for (int k = 0; k < NU; k++)
+            for (int k = 0; k < NU && columns > NX; k++)
                 row[NX + NM] += U[i * NU + k] * du[k];
 #endif
 #if ORDER == 2
-            for (int c = 0; c < NC; c++)
+            for (int c = 0; c < columns; c++)
                 ds[i * NC + c] = s[(N + i) * NC + c];
 #endif
         }
@@ -64,32 +64,36 @@ static void step(const double *m, double *x, double *s, const double *u, const d
         sum[i] = 0;
     }
     if (columns)
-        for (int i = 0; i < NX * NC; i++) {
-            st[i] = s[i];
-            ssum[i] = 0;
-        }
+        for (int i = 0; i < NX; i++)
+            for (int c = i * NC; c < i * NC + columns; c++) {
+                st[c] = s[c];
+                ssum[c] = 0;
+            }
     for (int stage = 0; stage < 4; stage++) {
-        rates(m, t, u + place[stage] * NU, du + place[stage] * NU, st, f, columns ? ds : 0);
+        rates(m, t, u + place[stage] * NU, du + place[stage] * NU, st, f, columns ? ds : 0, columns);
         for (int i = 0; i < NX; i++) {
             sum[i] += weight[stage] * f[i];
             if (stage < 3)
                 t[i] = x[i] + along[stage] * h * f[i];
         }
         if (columns)
-            for (int i = 0; i < NX * NC; i++) {
-                ssum[i] += weight[stage] * ds[i];
-                if (stage < 3)
-                    st[i] = s[i] + along[stage] * h * ds[i];
-            }
+            for (int i = 0; i < NX; i++)
+                for (int c = i * NC; c < i * NC + columns; c++) {
+                    ssum[c] += weight[stage] * ds[c];
+                    if (stage < 3)
+                        st[c] = s[c] + along[stage] * h * ds[c];
+                }
     }
     for (int i = 0; i < NX; i++)
         x[i] += h * sum[i];
     if (columns)
-        for (int i = 0; i < NX * NC; i++)
-            s[i] += h * ssum[i];
+        for (int i = 0; i < NX; i++)
+            for (int c = i * NC; c < i * NC + columns; c++)
+                s[c] += h * ssum[c];
 }
 
-static void read_out(const double *m, const double *x, const double *u, const double *s, double *z, double *J)
+static void read_out(const double *m, const double *x, const double *u, const double *s, double *z, double *J,
+                     int starts_alone)
 {
     pvid_refine_output(m, x, x + NX - N, u, z);
     if (!J)
@@ -103,7 +107,7 @@ static void read_out(const double *m, const double *x, const double *u, const do
 #endif
     for (int o = 0; o < NZ; o++) {
         double *row = J + o * NW;
-        for (int c = 0; c < NC; c++) {
+        for (int c = 0; c < (starts_alone ? NX : NC); c++) {
             double sum = 0;
             for (int j = 0; j < N; j++) {
                 sum += Zq[o * N + j] * s[j * NC + c];
@@ -113,6 +117,8 @@ static void read_out(const double *m, const double *x, const double *u, const do
             }
             row[c] = sum;
         }
+        if (starts_alone)
+            continue;
         for (int k = 0; k < NM; k++)
             row[NX + k] += Zr[o * (NM + NT) + k];
         for (int k = 0; k < NT; k++)
@@ -136,10 +142,13 @@ static int is_near(const double *m, const double *r, const double *x, const doub
 #endif
 
 /* u, du: at begin, middle and end of each step [steps][3][NU]; z [blocks][samples][NZ]; J [blocks][samples][NZ][NW] or
- * NULL; ends [blocks][NX]; coarse: an even number of steps, or 1, that may be taken as one */
+ * NULL; starts_alone: of J the first NX columns; ends [blocks][NX]; coarse: an even number of steps, or 1, that may be taken
+ * as one */
 void refine_blocks(const double *r, int blocks, const int *first, int samples, int sub, int coarse, double h,
-                   const double *u, const double *du, const double *starts, double *z, double *J, double *ends)
+                   const double *u, const double *du, const double *starts, double *z, double *J, int starts_alone,
+                   double *ends)
 {
+    const int columns = starts_alone ? NX : NC;
     (void)coarse;
     double m[NUMBER_OF_CONSTANTS + 1];
     pvid_refine_constants(r, m);
@@ -159,7 +168,8 @@ void refine_blocks(const double *r, int blocks, const int *first, int samples, i
             const long row = (long)b * samples + k;
             /* an output that jumps with a held input: before the jump it is that of the last step's end */
             const long read = (READ_BEFORE && at > 0) ? at * 3 - 1 : at * 3;
-            read_out(m, x, u + read * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0);
+            read_out(m, x, u + read * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0,
+                     starts_alone);
             int together = 1; /* steps: as many as `coarse` in one where no friction reverses */
 #if NS
             if (!is_near(m, r, x, u + at * 3 * NU, before))
@@ -176,7 +186,7 @@ void refine_blocks(const double *r, int blocks, const int *first, int samples, i
                     }
                     from[i] = wide[i];
                 }
-                step(m, x, s, from[0], from[1], together * h, J != 0);
+                step(m, x, s, from[0], from[1], together * h, J ? columns : 0);
             }
         }
         for (int i = 0; i < NX; i++)

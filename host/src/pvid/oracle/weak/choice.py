@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.oracle.weak import verdict
+from pvid.oracle.weak import verdict, work
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import blur_of, rates_of_drives, shift_of
 from pvid.oracle.weak.design import WeakDesign
@@ -72,7 +72,7 @@ class Scored:
 
 
 _KEPT = 4096
-_scores: dict[tuple[object, ...], Scored | None] = {}
+_scores: dict[tuple[object, ...], tuple[Scored | None, float]] = {}  # with the work of it
 
 
 def score_of(
@@ -93,11 +93,16 @@ def score_of(
         samples.update(np.ascontiguousarray(run[name], np.float64).data)
     begun = None if start is None else tuple(np.asarray(start, np.float64).tolist())
     key = (model.number, samples.digest(), design, begun, errors, fewest)
-    if key not in _scores:
-        _scores[key] = _scored(model, run, design, start, errors, fewest)
-        while len(_scores) > _KEPT:
-            del _scores[next(iter(_scores))]
-    return _scores[key]
+    if key in _scores:  # an answer does not depend on what was kept
+        found, units = _scores[key]
+        work.spend(units)
+        return found
+    before = work.left()
+    found = _scored(model, run, design, start, errors, fewest)
+    _scores[key] = found, before - work.left()
+    while len(_scores) > _KEPT:
+        del _scores[next(iter(_scores))]
+    return found
 
 
 def _scored(
@@ -134,6 +139,11 @@ def _scored(
 def power_of(model: Compiled) -> int:
     """n of sin^n: even, 2 above the highest order, 6 at least."""
     return max(6, 2 * ((model.channels.top + 3) // 2), 8 if model.channels.top >= 4 else 6)
+
+
+def basis_of(model: Compiled, sample_rate: float) -> WeakDesign:
+    """What the search for a design begins with."""
+    return WeakDesign(sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3)
 
 
 def lengths(samples: float, sample_rate: float, fewest: int = _FEWEST_WINDOWS) -> list[float]:
@@ -205,9 +215,7 @@ def _ranked(
     plain = {name: x for name, x in run.items()}
     parts = [part.stop - part.start for part in segments_of(samples_of(model.bare, plain))]
     rates = any(jet.order for jet in model.channels.needed)
-    basis = WeakDesign(
-        sample_rate, 64 / sample_rate, 12, power_of(model), rate_taps=21, rate_degree=3, reversals=reversals
-    )
+    basis = replace(basis_of(model, sample_rate), reversals=reversals)
     tried: list[Scored] = []
     errors = False
     fewest = at_least[0]
@@ -215,6 +223,8 @@ def _ranked(
     def attempt(designs: Iterable[WeakDesign]) -> None:
         for design in designs:
             best = min(tried, key=_order, default=None)
+            if best and work.is_spent():
+                return
             found = score_of(model, run, design, best.p if best else start, errors, fewest - 2)
             if found is not None:
                 tried.append(found)
@@ -284,7 +294,7 @@ def _searched(
     starts = list(starts_about(model.parameters, model.parameters.checked(start)))
     out = []
     for design in designs:
-        tried = [score_of(model, run, design, other, False, fewest) for other in starts]
+        tried = [score_of(model, run, design, other, False, fewest) for other in starts if not work.is_spent()]
         known = [one for one in tried if one is not None and one.known]
         if known:
             out.append(min(known, key=lambda one: one.chi2))

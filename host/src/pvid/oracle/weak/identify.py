@@ -13,10 +13,10 @@ from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.base.wording import listed
 from pvid.model.compiled import CompiledModel, Known
-from pvid.oracle.weak import verdict
+from pvid.oracle.weak import verdict, work
 from pvid.oracle.weak.attenuation import other_line
 from pvid.oracle.weak.blur import shift_of
-from pvid.oracle.weak.choice import Scored, ranked
+from pvid.oracle.weak.choice import Scored, basis_of, ranked
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.errors import Uncertainty, uncertainty
 from pvid.oracle.weak.failures import FAILURES, Found, attempted
@@ -26,7 +26,7 @@ from pvid.oracle.weak.gate import gated
 from pvid.oracle.weak.library import Library
 from pvid.oracle.weak.missing import MOST, Explained, Missing, explained
 from pvid.oracle.weak.naming import of_missing, of_unexplained
-from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows
+from pvid.oracle.weak.rows import Compiled, EquationError, WeakRows, record_of
 from pvid.oracle.weak.samples import explains, of_samples
 from pvid.oracle.weak.scale import of_scale
 from pvid.oracle.weak.solve import DivergedError, Fit, batch, compensated, gauss_newton, online
@@ -117,6 +117,21 @@ _NOT_REWEIGHTED = (
 ready = Recent(Compiled)  # a model with its functions
 
 
+# Of the work that is allowed to the search for a design: that of the rest where it finds a plausible estimate, terms
+# that are missing included, and where it finds none.
+_OF_KNOWN, _OF_UNKNOWN = 5.0, 0.5
+
+
+def allowance_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], sample_rate: float) -> float:
+    """Units of work that the search for a design of a run may do."""
+    columns = sum(len(row.theta) + 1 for row in model.rows)
+    samples, reversals = max(np.size(one) for one in run.values()), 0
+    if ready(model).channels.signs:
+        record = attempted(lambda: record_of(ready(model), run, basis_of(ready(model), sample_rate)))
+        reversals = 0 if record is None else sum(one.reversals for one in record.signs)
+    return work.allowance(len(model.rows), columns, reversals, samples)
+
+
 def start_of(model: CompiledModel, start: Mapping[str, float] | npt.ArrayLike | None) -> Float | None:
     """A start as an array; names that a mapping leaves out start at their guess."""
     if start is None:
@@ -154,12 +169,32 @@ def identify(
     model = ready(compiled)
     begun = start_of(compiled, start)
     with_error = weights == "residuals"
-    ranking: tuple[Scored, ...] = ()
     if design is None:
-        ranking = tuple(ranked(model, run, sample_rate, begun, with_error))
-        used, near = ranking[0].design, ranking[0].p
-    else:
-        used, near = design, None
+        units = allowance_of(compiled, run, sample_rate)
+        with work.limited(units):
+            ranking = tuple(ranked(model, run, sample_rate, begun, with_error))
+        with work.limited((_OF_KNOWN if ranking[0].known else _OF_UNKNOWN) * units):
+            return _judged(compiled, run, ranking[0].design, begun, ranking[0].p, compensate, with_error, ranking)
+    return _judged(compiled, run, design, begun, None, compensate, with_error)
+
+
+def _judged(
+    compiled: CompiledModel,
+    run: Mapping[str, npt.ArrayLike],
+    used: WeakDesign,
+    begun: Float | None,
+    near: Float | None,
+    compensate: bool,
+    with_error: bool,
+    ranking: tuple[Scored, ...] = (),
+) -> Identified:
+    """The estimate by a design, with all its checks.
+
+    Parameters
+    ----------
+    begun, near : starts of the search for p, `near` where the other leads nowhere; None: the guesses, none
+    """
+    model, sample_rate = ready(compiled), used.sample_rate
     rows = WeakRows.of(model, run, used)
     fit = _estimated(rows, begun, with_error, compensate)
     if near is not None and not _found(compiled, fit):  # the guesses lead elsewhere
@@ -312,7 +347,8 @@ def _checks(
     model, design = fit.rows.compiled, rows.record.grid.design
     bare = model.bare
 
-    def compared(judge: Callable[..., list[Reason]], other: Fit | None) -> list[Reason]:
+    def compared(judge: Callable[..., list[Reason]], fitted: Callable[[], Fit | None]) -> list[Reason]:
+        other = None if work.is_spent() else fitted()  # no fit is compared with one that was ended
         return [] if other is None else judge(bare, fit, found, other, uncertainty(other))
 
     return {
@@ -324,12 +360,12 @@ def _checks(
         "the residuals": lambda: verdict.of_residuals(found),
         "the range": lambda: verdict.of_range(bare, fit.p, judged),
         "spoiled windows": lambda: verdict.of_spoiled(rows, fit),
-        "the weights of the sensors": lambda: compared(verdict.of_weights, by_sensors(fit)),
+        "the weights of the sensors": lambda: compared(verdict.of_weights, partial(by_sensors, fit)),
         "windows of another length": lambda: compared(
-            verdict.of_windows, other_length(model, run, design, fit.p, equation_error)
+            verdict.of_windows, partial(other_length, model, run, design, fit.p, equation_error)
         ),
         "shorter derivatives": lambda: compared(
-            verdict.of_smoothing, shorter_rates(model, run, design, fit.p, equation_error)
+            verdict.of_smoothing, partial(shorter_rates, model, run, design, fit.p, equation_error)
         ),
     }
 

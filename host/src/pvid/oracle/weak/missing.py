@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.oracle.weak import work
 from pvid.oracle.weak.errors import chi2_of_sensors, uncertainty
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.library import Library
@@ -36,11 +37,11 @@ VISIBLE = 0.01  # of the value
 # Terms are named by fits with them.
 _MOST_TERMS = 3
 _LARGE = 0.25  # share of a term that is named even if it moves no parameter
-_FAMILIES = 4  # that are fitted for each
+_FAMILIES = 5  # that are fitted for each
 _TRIED = 0.3  # of the best share
 _DISTINCT = 0.01  # of a column's square, that is its own: a term with less is the parameters in another guise
 _OF_BEST = 0.001  # the same of the term that explains most
-_SAME = 0.999  # cosine of two columns, beside all parameters, that no run tells apart
+_SAME = 0.9999  # cosine of two columns, beside all parameters, that no run tells apart
 _RIVAL = 0.9  # of the best gain of likelihood
 _MOST_RIVALS = 5
 _NOISE = 2.0  # chi^2 that is the sensors'
@@ -129,10 +130,10 @@ class Missing:
         What p imitates leads no group: it would take p's place.
         """
         best: dict[tuple[str, str, str], Candidate] = {}
-        for one in self.there:
-            if one.share >= _TRIED * self.there[0].share:
-                best.setdefault(one.family, one)
-        families = list(best.values())
+        tried = [one for one in self.there if one.share >= _TRIED * self.there[0].share]
+        for one in sorted(tried, key=lambda one: one.own <= _DISTINCT):  # of levels one that is no guise of p
+            best.setdefault(one.family, one)
+        families = sorted(best.values(), key=lambda one: -one.share)
         if not families:
             return []
         columns = self.scores.rests(families)
@@ -232,7 +233,7 @@ def _gains(
     ----------
     before : unlikelihood of the fit without it
     """
-    tried = filter(None, (_refitted(library, fit, one) for one in candidates))
+    tried = filter(None, (_refitted(library, fit, one) for one in candidates if not work.is_spent()))
     gains = [(before - unlikelihood(with_it), one, with_it) for one, with_it in tried]
     return sorted((one for one in gains if one[0] > 0), key=lambda one: -one[0])
 
@@ -328,11 +329,14 @@ def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit
     best = at(one.level, best[2])
     for factor in _FACTORS:
         for step in (factor, 1 / factor):
-            for _ in range(_STEPS):
+            for _ in range(0 if work.is_spent() else _STEPS):
                 other = at(best[1].level * step, best[2])
                 if not other[0] < best[0]:
                     break
                 best = other
-    while not _are_alike(best[2].errors, (again := at(best[1].level, best[2]))[2].errors) and again[0] < best[0]:
+    for _ in range(_ROUNDS):
+        again = at(best[1].level, best[2])
+        if _are_alike(best[2].errors, again[2].errors) or not again[0] < best[0]:
+            break
         best = again
     return best[1], best[2]

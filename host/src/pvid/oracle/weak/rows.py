@@ -23,6 +23,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.noise import NoiseFilters, NoiseModel, ReversalNoise
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.whitener import Whitener
+from pvid.oracle.weak.work import of_pass
 from pvid.rig.run import NUMBER
 
 # Rows that are numerically dependent get this part of the mean variance.
@@ -189,6 +190,14 @@ class WeakRows:
     def windows(self) -> int:
         """Whole ones."""
         return len(self.columns[0])
+
+    @property
+    def work(self) -> float:
+        """Units of whitening all windows once (pvid.oracle.weak.work)."""
+        rows = self.functions.count * (self.kinds if len(self.groups) == 1 else 1)
+        columns = sum(one.shape[1] for one in self.columns)
+        entries = len(self.reversals.windows) * self.windows / (int(self.numbers[-1]) + 1)
+        return of_pass(self.windows, rows, columns, entries)
 
     @property
     def kinds(self) -> int:

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from pvid.oracle.weak import work
 from pvid.oracle.weak.failures import FAILURES
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
@@ -18,6 +19,7 @@ from pvid.oracle.weak.rows import EquationError, WeakRows, WhiteRows
 RIDGE = 1e-13  # added to the unit diagonal of what is inverted
 _STEP_LIMIT = 0.3  # largest step of log p, or of p over its reach
 PASSES = 25  # of whitening at the present p
+_LEAST_PASSES = 4  # of them where the work is spent
 _STEPS = 30  # of Gauss-Newton between two whitenings
 SETTLED = 1e-8  # a step below this ends the search
 
@@ -103,6 +105,7 @@ def gauss_newton(parameters: Parameters, moments: Moments, p: Float, prior: Floa
     theta = moments.grouped(parameters.theta(p))
     after = misfit(moments, theta)
     for k in range(steps):
+        work.spend_step()
         s, f = normal(parameters, moments, p, theta)
         step = _bounded_step(s + weak, f, parameters.blocked(p, f))
         size = float(np.max(np.abs(step) / reach))
@@ -245,6 +248,9 @@ def _passes(
     errors = [EquationError()] * rows.kinds
     settled = False
     for turn in range(passes):
+        if turn >= _LEAST_PASSES and work.is_spent():
+            break
+        work.spend(rows.work)
         theta = parameters.theta(p)
         white = [rows.white(group, theta, errors) for group in rows.groups]
         yield Fit(p, rows, white, errors, begun, settled=False)
@@ -279,6 +285,7 @@ def resumed(rows: WeakRows, fit: Fit, passes: int) -> Fit:
     parameters, p, errors = rows.compiled.parameters, fit.p, fit.errors
     prior = parameters.prior(fit.start)
     for turn in range(passes + 1):
+        work.spend(rows.work)
         theta = parameters.theta(p)
         errors = [sharpened(rows, k, theta, one, 1) if one.variance else one for k, one in enumerate(errors)]
         white = [rows.white(group, theta, errors) for group in rows.groups]

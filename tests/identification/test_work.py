@@ -1,0 +1,100 @@
+"""A run that nothing fits ends, with the right advice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.identification.road import identified
+from pvid.models.mechanisms import compiled_of
+from pvid.oracle.weak import work
+from pvid.oracle.weak.choice import score_of
+from pvid.oracle.weak.design import WeakDesign
+from pvid.oracle.weak.identify import allowance_of, ready, start_of
+from pvid.rig.run import Recording
+from pvid.sim.simulated_run import simulation_of
+
+Float = npt.NDArray[np.float64]
+Run = Mapping[str, Float]
+
+MOTOR = simulation_of("dc_motor")
+RUN = MOTOR.run(3)
+RATE = MOTOR.rig.sample_rate
+
+
+def units_of(run: Run) -> tuple[float, tuple[str, ...]]:
+    """Work of the road, prediction included, and its advice."""
+    recording = Recording(np.arange(len(run["V"])) / RATE, dict(run), RATE)
+    with work.limited(1e9) as counted:
+        answer = identified(recording, compiled_of("dc_motor"))
+    return counted.whole - counted.left, answer.advice
+
+
+def allowed(run: Run) -> float:
+    """To the search for its design."""
+    return allowance_of(compiled_of("dc_motor"), run, RATE)
+
+
+def chattering(run: Run) -> dict[str, Float]:
+    """The encoder's last bit toggles at random, the current is noise."""
+    random = np.random.default_rng(1)
+    n = len(run["V"])
+    step = 2 * np.pi / 2**12
+    return {**run, "phi": step * random.integers(0, 2, n), "i": random.normal(0, 1, n)}
+
+
+@pytest.mark.parametrize(
+    ("bad", "advice"),
+    [
+        (lambda run: {**run, "V": -run["V"]}, "V seems to have the opposite sign"),
+        (lambda run: {**run, "i": -run["i"]}, "i seems to have the opposite sign"),
+        (lambda run: {**run, "V": run["V"][::-1].copy()}, ""),
+        (chattering, ""),
+    ],
+)
+def test_what_nothing_fits_ends_with_the_right_advice(bad: Callable[[Run], Run], advice: str) -> None:
+    """Search, checks and names, advice and judge may do 6.8 times what is allowed to a search, and some fits make their
+    least passes beyond it; without a limit some of these runs do 50 times as much."""
+    run = bad(RUN)
+    units, said = units_of(run)
+    assert units < 8 * allowed(run)
+    assert said[0].startswith(advice) if advice else not said
+
+
+def test_a_good_run_does_about_half_of_the_work_that_is_allowed() -> None:
+    units, said = units_of(RUN)
+    assert not said and units < 0.7 * allowed(RUN)
+
+
+def test_an_allowance_grows_with_the_samples_and_not_with_a_sensor_that_chatters() -> None:
+    assert work.allowance(2, 8, 400, 40_000) > 2 * work.allowance(2, 8, 60, 6_000)
+    assert work.allowance(2, 8, 3000, 6_000) == work.allowance(2, 8, 300, 6_000)
+    assert work.of_pass(100, 80, 8, 1000) > 5 * work.of_pass(100, 80, 8, 10)
+
+
+def test_inner_limits_take_from_the_outer_one() -> None:
+    with work.limited(10) as outer:
+        with work.limited(100) as inner:
+            work.spend(4)
+            assert inner.left == 6 and not work.is_spent()
+        assert outer.left == 6
+        with work.limited(5):
+            work.spend(7)
+            assert work.is_spent()
+        assert outer.left == -1 and work.is_spent()
+    assert not work.is_spent()
+
+
+def test_a_score_that_was_kept_costs_what_it_cost() -> None:
+    """Else an answer would depend on what was identified before."""
+    model = ready(compiled_of("dc_motor"))
+    design = WeakDesign(RATE, 0.25, 12, 6, rate_taps=21, rate_degree=3)
+    costs = []
+    for _ in range(2):
+        with work.limited(1e9) as counted:
+            assert score_of(model, RUN, design, start_of(model.model, None), False) is not None
+        costs.append(counted.whole - counted.left)
+    assert costs[0] == pytest.approx(costs[1]) and costs[0] > 0
