@@ -110,7 +110,7 @@ def assert_equals_the_twin(
             assert not len(different), f"lane {lane}, {part}, first at tick {different[0]}"
         assert core.running_hash == twin.running_hash
         assert core.counters == twin.counters and core.is_published == twin.is_published
-        for name in core.estimate.dtype.names:
+        for name in core.estimate.dtype.names or ():
             other = np.array(getattr(twin.estimate, name), np.float32)
             assert core.estimate[name].tobytes() == other.tobytes(), name
         assert np.isfinite(record.p).all() and np.isfinite(record.sums).all()

@@ -39,7 +39,7 @@ def test_a_large_motion_is_refined_to_the_bound(furuta: Case) -> None:
 def test_the_twin_has_the_bits_of_blocks_whose_start_is_measured(furuta: Case) -> None:
     """With gaps, behind which blocks start anew."""
     core, samples = furuta.identifier(0), furuta.samples(0)[:18_000]
-    twin = PrintedTwin(core.native.sources, core.config, furuta.settings)
+    twin = PrintedTwin(core.sources, core.config, furuta.settings)
     assert twin.module.PVID_REFINE_HAS_MEASURED == 1
     told: set[int] = set()
     for piece in np.split(samples, [7000]):
@@ -131,7 +131,7 @@ def test_the_twin_has_the_bits_of_steps_of_runge_kutta(name: str, ticks: int) ->
     core, samples = case.identifier(0), case.samples(0)[:ticks].copy()
     samples[ticks - 500, case.settings.signal[-1].sample] = np.nan
     samples[ticks - 100, case.settings.signal[0].sample] = np.nan
-    twin = PrintedTwin(core.native.sources, core.config, case.settings)
+    twin = PrintedTwin(core.sources, core.config, case.settings)
     record = core.run_both(samples)
     np.testing.assert_array_equal(record.hash, twin.run(samples).hash)
     np.testing.assert_array_equal(list(core.refinement.work.sums.sum), twin.refinement.work.sums.sum)
@@ -144,7 +144,7 @@ def test_an_input_that_is_held_keeps_the_droop_of_its_own_steps_alone() -> None:
     case = Case.of("rigid_body", 1000.0)
     settings = replace(case.settings, ratio=4)
     core = replace(case, settings=settings).identifier(0)
-    twin = PrintedTwin(core.native.sources, core.config, settings)
+    twin = PrintedTwin(core.sources, core.config, settings)
     theta, ticks = 0.05, 2000
     place = settings.signal[0].sample
     sample = np.zeros((ticks, len(settings.signal)), np.float32)

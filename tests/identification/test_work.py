@@ -43,7 +43,8 @@ def chattering(run: Run) -> dict[str, Float]:
     random = np.random.default_rng(1)
     n = len(run["V"])
     step = 2 * np.pi / 2**12
-    return {**run, "phi": step * random.integers(0, 2, n), "i": random.normal(0, 1, n)}
+    phi: Float = step * random.integers(0, 2, n).astype(np.float64)
+    return {**run, "phi": phi, "i": random.normal(0, 1, n)}
 
 
 @pytest.mark.parametrize(

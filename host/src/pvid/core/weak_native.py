@@ -71,6 +71,7 @@ class WeakIdentifier(Publisher):
 
     def __init__(self, native: WeakNative, config: WeakConfig, **given: Any) -> None:
         self._model = native.model
+        self.sources = native.sources
         self.config = config
         super().__init__(native, "weak", "f32", config, replay="weak", **given)
 
