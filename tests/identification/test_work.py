@@ -62,7 +62,7 @@ def test_what_nothing_fits_ends_with_the_right_advice(bad: Callable[[Run], Run],
     run = bad(RUN)
     units, said = units_of(run)
     assert units < 8 * allowed(run)
-    assert said[0].startswith(advice) if advice else not said
+    assert said[0].startswith(advice) if advice else not any("--columns" in one for one in said)
 
 
 def test_a_good_run_does_about_half_of_the_work_that_is_allowed() -> None:

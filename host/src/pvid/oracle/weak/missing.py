@@ -49,6 +49,7 @@ _NOISE = 2.0  # chi^2 that is the sensors'
 _ALL, MOST = 0.95, 0.9
 _ROUNDS = 6  # of a size
 _SETTLED = 0.01  # of a size
+_BEYOND = 1.5  # times the largest level that is tried, or over the smallest one
 _AT_REST = 0.05  # of the variance of an equation's error
 _FACTORS, _STEPS = (1.25, 1.08, 1.025), 4  # of a level, as often as it gets better
 _PART = 0.01  # of a level: a step that gives its slope
@@ -319,11 +320,15 @@ def _are_alike(before: Sequence[EquationError], after: Sequence[EquationError]) 
 def _leveled(library: Library, fit: Fit, one: Candidate) -> tuple[Candidate, Fit]:
     assert isinstance(one.kind, Act)
     act, recorded = one.kind, library.recorded(one.signal)
+    # A level far from those that are tried takes the signal away: 0 = 0 fits every run.
+    tried = [abs(level) for level in act.tried(recorded)]
+    least, most = min(tried, default=0.0) / _BEYOND, max(tried, default=np.inf) * _BEYOND
 
     def at(level: float, near: Fit = fit) -> tuple[float, Candidate, Fit]:
         own = replace(one, level=level, size=1.0, change=library.act(recorded, act, level).change)
         with_it = corrected(replace(fit, p=near.p, errors=near.errors), own)
-        return unlikelihood(with_it) if _is_nearer(with_it, fit) else np.inf, own, with_it
+        believable = least <= abs(level) <= most and _is_nearer(with_it, fit)
+        return unlikelihood(with_it) if believable else np.inf, own, with_it
 
     best = at(one.level)
     best = at(one.level, best[2])
