@@ -65,7 +65,7 @@ def test_what_nothing_fits_ends_with_the_right_advice(bad: Callable[[Run], Run],
     assert said[0].startswith(advice) if advice else not any("--columns" in one for one in said)
 
 
-def test_a_good_run_does_about_half_of_the_work_that_is_allowed() -> None:
+def test_a_good_run_does_a_part_of_the_work_that_is_allowed() -> None:
     units, said = units_of(RUN)
     assert not said and units < 0.7 * allowed(RUN)
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-_PASSES = 250  # of a search in the designs that are usually chosen; one that fits takes a fifth to a half of them
+_PASSES = 500  # of a search in the designs that are usually chosen; one that fits takes a tenth to a half of them
 _OF_A_PASS, _OF_A_STEP = 2.0, 0.15
 _OF_ROWS, _OF_REVERSALS = 1.5e-7, 3.5e-6  # of a product of a column's entries: of all windows, of located reversals
 _FUNCTIONS = 40
