@@ -232,20 +232,20 @@ static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
     for (size_t i = 0; i < 2u; i++) {
         COUNTS(own.signal[i].sample++);
         COUNTS(own.signal[i].source++);
-        COUNTS(own.jet[i].signal++);
-        COUNTS(own.jet[i].order++);
-        COUNTS(own.noise[i].kind++);
-        COUNTS(own.noise[i].power++);
-        COUNTS(own.noise[i].a++);
-        COUNTS(own.noise[i].b++);
+        COUNTS(own.jet[i].signal ^= 1u);
+        COUNTS(own.jet[i].order ^= 1u);
+        COUNTS(own.noise[i].kind ^= 1u);
+        COUNTS(own.noise[i].power ^= 1u);
+        COUNTS(own.noise[i].a ^= 1u);
+        COUNTS(own.noise[i].b ^= 1u);
         COUNTS(own.noise[i].factor *= 2.0f);
     }
     for (size_t i = 0; i < CHANNELS; i++) {
-        COUNTS(own.channel[i].gain++);
-        COUNTS(own.channel[i].integrand++);
-        COUNTS(own.channel[i].fold++);
-        COUNTS(own.channel[i].plain++);
-        COUNTS(own.channel[i].ramp++);
+        COUNTS(own.channel[i].gain ^= 1u);
+        COUNTS(own.channel[i].integrand ^= 1u);
+        COUNTS(own.channel[i].fold ^= 1u);
+        COUNTS(own.channel[i].plain ^= 1u);
+        COUNTS(own.channel[i].ramp ^= 1u);
     }
     for (size_t i = 0; i < TERMS; i++) {
         COUNTS(own.term[i].channel++);

@@ -336,21 +336,21 @@ static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
         COUNTS(own.signal[i].source++);
     }
     for (size_t i = 0; i < kapitza_weak_q31.jets; i++) {
-        COUNTS(own.jet[i].signal++);
-        COUNTS(own.jet[i].order++);
+        COUNTS(own.jet[i].signal ^= 1u);
+        COUNTS(own.jet[i].order ^= 1u);
         COUNTS(own.filter[i].down++);
     }
     for (size_t i = 0; i < kapitza_weak_q31.channels; i++) {
-        COUNTS(own.format[i].value++);
-        COUNTS(own.format[i].lift++);
-        COUNTS(own.format[i].own++);
-        COUNTS(own.format[i].plain++);
-        COUNTS(own.format[i].ramp++);
-        COUNTS(own.channel[i].gain++);
-        COUNTS(own.channel[i].integrand++);
-        COUNTS(own.channel[i].fold++);
-        COUNTS(own.channel[i].plain++);
-        COUNTS(own.channel[i].ramp++);
+        COUNTS(own.format[i].value ^= 1u);
+        COUNTS(own.format[i].lift ^= 1u);
+        COUNTS(own.format[i].own ^= 1u);
+        COUNTS(own.format[i].plain ^= 1u);
+        COUNTS(own.format[i].ramp ^= 1u);
+        COUNTS(own.channel[i].gain ^= 1u);
+        COUNTS(own.channel[i].integrand ^= 1u);
+        COUNTS(own.channel[i].fold ^= 1u);
+        COUNTS(own.channel[i].plain ^= 1u);
+        COUNTS(own.channel[i].ramp ^= 1u);
     }
     for (size_t i = 0; i < kapitza_weak_q31.integrands; i++) {
         COUNTS(own.integral[i].down++);
@@ -364,10 +364,10 @@ static void every_entry_of_a_table_counts_in_the_fingerprint(void **state)
         COUNTS(own.term[i].column++);
     }
     for (size_t i = 0; i < kapitza_design_q31.n_noise; i++) {
-        COUNTS(own.noise[i].kind++);
-        COUNTS(own.noise[i].power++);
-        COUNTS(own.noise[i].a++);
-        COUNTS(own.noise[i].b++);
+        COUNTS(own.noise[i].kind ^= 1u);
+        COUNTS(own.noise[i].power ^= 1u);
+        COUNTS(own.noise[i].a ^= 1u);
+        COUNTS(own.noise[i].b ^= 1u);
         COUNTS(own.noise[i].factor.m++);
     }
     COUNTS(own.order[0]++);

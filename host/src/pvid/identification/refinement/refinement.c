@@ -142,8 +142,8 @@ static int is_near(const double *m, const double *r, const double *x, const doub
 #endif
 
 /* u, du: at begin, middle and end of each step [steps][3][NU]; z [blocks][samples][NZ]; J [blocks][samples][NZ][NW] or
- * NULL; starts_alone: of J the first NX columns; ends [blocks][NX]; coarse: an even number of steps, or 1, that may be taken
- * as one */
+ * NULL; starts_alone: of J the first NX columns; ends [blocks][NX]; coarse: an even number of steps, or 1, that may be
+ * taken as one */
 void refine_blocks(const double *r, int blocks, const int *first, int samples, int sub, int coarse, double h,
                    const double *u, const double *du, const double *starts, double *z, double *J, int starts_alone,
                    double *ends)
@@ -168,8 +168,7 @@ void refine_blocks(const double *r, int blocks, const int *first, int samples, i
             const long row = (long)b * samples + k;
             /* an output that jumps with a held input: before the jump it is that of the last step's end */
             const long read = (READ_BEFORE && at > 0) ? at * 3 - 1 : at * 3;
-            read_out(m, x, u + read * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0,
-                     starts_alone);
+            read_out(m, x, u + read * NU, s, z + row * NZ, J ? J + row * NZ * NW : 0, starts_alone);
             int together = 1; /* steps: as many as `coarse` in one where no friction reverses */
 #if NS
             if (!is_near(m, r, x, u + at * 3 * NU, before))
