@@ -139,7 +139,10 @@ PROOFS = (
         ("src/strong/differentiator_q31.c", "src/number/integer_q31.c"),
         (
             *("-eva-min-loop-unroll", "161", "-eva-split-return", "full"),
-            *("-eva-slevel-function", "any_bank:10,prepare:10,pvid_differentiator_init_q31:10"),
+            *(
+                "-eva-slevel-function",
+                "any_bank:10,prepare:10,pvid_differentiator_init_q31:10,pvid_differentiator_init_layout_q31:10",
+            ),
         ),
         left=(
             r"signed overflow\.\s+assert .*\b48 \* (phi|y)_even",

@@ -194,7 +194,7 @@ def test_bad_usage_is_one_sentence_that_names_it(arguments: tuple[str, ...], nam
 def test_without_a_command_the_help_is_printed_as_text(tmp_path: Path) -> None:
     done = pvid(tmp_path)
     assert done.returncode == 0 and done.stderr == ""
-    assert "\nIdentify:\n" in done.stdout and "identify RUN.csv --set l1=0.25" in done.stdout
+    assert "\nIdentify:\n" in done.stdout and "identify RUN.csv --model MODEL --set l1=0.25" in done.stdout
 
 
 def test_an_unknown_zero_of_the_encoder_is_found(tmp_path: Path) -> None:

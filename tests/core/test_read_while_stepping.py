@@ -24,6 +24,7 @@ def play_threads(folder: Path, *options: str) -> subprocess.CompletedProcess[str
     command += [
         str(source("publication.c")),
         str(source("kinds.c")),
+        str(source("fnv.c")),
         *map(str, sources),
         "-lm",
         "-lpthread",

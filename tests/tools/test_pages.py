@@ -84,7 +84,7 @@ def compile_c(block: pages.Block, folder: Path) -> None:
         *(f"-D{macro}={size}" for macro, size in sizes.items()),
     ]
     done = subprocess.run(
-        [*command, *PUBLIC_INCLUDES, *(f"-I{path}" for path in generated), "page.c"],
+        [*command, *PUBLIC_INCLUDES, f"-I{ROOT / 'firmware' / 'src'}", *(f"-I{path}" for path in generated), "page.c"],
         cwd=folder,
         capture_output=True,
         text=True,

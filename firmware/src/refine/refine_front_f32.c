@@ -142,7 +142,7 @@ void pvid_refine_front_between_f32(const pvid_refine_front_f32 *self, uint32_t e
 #endif
 
 /* Sizes of floats by their bits, which order as they do; NaN is the largest. */
-#define SIZE 0x7FFFFFFFu
+#define SIZE_BITS 0x7FFFFFFFu
 #define SIGN 0x80000000u
 #define HALF_BITS 0x3F000000u       /* 0.5 */
 #define FULL_SCALE_BITS 0x46FFFE00u /* 32767 */
@@ -153,7 +153,7 @@ static int16_t counts(float *rest, float x)
 {
     const float whole = x + *rest;
     const uint32_t bits = pvid_bits_f32(whole);
-    if ((bits & SIZE) >= FULL_SCALE_BITS) {
+    if ((bits & SIZE_BITS) >= FULL_SCALE_BITS) {
         *rest = 0.0f;
         return INT16_MIN;
     }
@@ -330,7 +330,7 @@ pvid_refine_entry pvid_refine_front_end_block_f32(pvid_refine_front_f32 *self, c
         const float second = first - past[1];
         float third = second - past[2];
         float fourth = third - past[3];
-        if ((pvid_bits_f32(fourth) & SIZE) > pvid_bits_f32(self->peak[i])) {
+        if ((pvid_bits_f32(fourth) & SIZE_BITS) > pvid_bits_f32(self->peak[i])) {
             const float off = judge(self, config, i, fourth);
             third += off;
             fourth += 4.0f * off;
