@@ -57,11 +57,11 @@ def chattering(run: Run) -> dict[str, Float]:
     ],
 )
 def test_what_nothing_fits_ends_with_the_right_advice(bad: Callable[[Run], Run], advice: str) -> None:
-    """Search, checks and names, advice and judge may do 6.8 times what is allowed to a search, and some fits make their
+    """Search, checks and names, advice and judge may do 8.3 times what is allowed to a search, and some fits make their
     least passes beyond it; without a limit some of these runs do 50 times as much."""
     run = bad(RUN)
     units, said = units_of(run)
-    assert units < 8 * allowed(run)
+    assert units < 10 * allowed(run)
     assert said[0].startswith(advice) if advice else not any("--columns" in one for one in said)
 
 
