@@ -17,7 +17,6 @@ from pvid.compare.weak import compare_recording as compared
 from pvid.identification.core_refined import compare_both
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.cores import CORES, FLOAT, STRONG
-from pvid.settings.enums import Core
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 
@@ -67,9 +66,9 @@ def compare_recording(
     return outcomes
 
 
-def _compared(form: str, core: Core, found: Comparison) -> Outcome:
+def _compared(form: str, core: str, found: Comparison, law: str = "stationary") -> Outcome:
     verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
-    return Outcome("host", core, form, "stationary", found.ticks, found.core_hash, found.equal, verdict)
+    return Outcome("host", core, form, law, found.ticks, found.core_hash, found.equal, verdict)
 
 
 def _compared_strong(
@@ -85,13 +84,7 @@ def _compared_strong(
         raise PvidError(f"--core {core} has no twin; omit it")
     recording, model = recording_of(path, rig, columns)
     refuse_too_many_unknowns(model)
-    outcomes = []
-    for law in [given["law"]] if given.get("law") else ["stationary"]:
-        assert law is not None
-        with progress_bar(f"{law} law, {FLOAT.name}", len(recording)) as advance:
-            run = StrongComparison.of(model, recording, LAWS[law], advance)
-        found = run.found
-        verdict = "equal" if found.equal else f"DIFFERENT: {found.difference}"
-        outcomes.append(Outcome("host", core, STRONG_FORM, law, found.ticks, found.core_hash, found.equal, verdict))
-        outcomes += [compare_on_board(target, run, law) for target in targets]
-    return outcomes
+    law = given.get("law") or "stationary"
+    with progress_bar(f"{law} law, {FLOAT.name}", len(recording)) as advance:
+        run = StrongComparison.of(model, recording, LAWS[law], advance)
+    return [_compared(STRONG_FORM, core, run.found, law), *(compare_on_board(target, run, law) for target in targets)]

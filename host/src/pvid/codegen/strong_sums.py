@@ -39,7 +39,7 @@ class Kind:
     product : P = N^T theta, expanded, in the symbols of the atoms and p
     known : place of the atom Y; None where Y is 0
     unit : rows of the core are those of the model over this
-    gradient : dP/dp_a for each parameter; the shift's atom stands for G
+    gradient : dP/dp_a for each parameter, in which the atom of the shift is written for G
     rest : Q, likewise
     """
 

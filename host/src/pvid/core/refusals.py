@@ -13,8 +13,8 @@ from pvid.settings.enums import Status
 
 _LARGE = 3.4e38
 
-# Fields of the configurations of both stages that a status stands for, least and largest value of each. Of a status
-# that is not here: the field of its name, without a range.
+# By status: the fields of both stages' configurations that it may mean, with the least and the largest value of each.
+# A status that is not here means the field of its name, which has no range.
 _RANGES: Mapping[Status, tuple[tuple[str, float, float], ...]] = {
     Status.BAD_SAMPLE_RATE: (("sample_rate", 1e-3, 1e6),),
     Status.BAD_LENGTH: (("l1", 1e-30, _LARGE),),

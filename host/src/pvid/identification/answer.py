@@ -107,7 +107,7 @@ class Answer(ABC):
 
     @property
     def doubts(self) -> Sequence[Reason]:
-        """What is told of the values beside them."""
+        """The reasons that are printed below the values."""
         return self.verdict.reasons
 
     @property

@@ -401,7 +401,7 @@ class _Twin(Protocol):
     def updates(self) -> int: ...
 
     def refined(self) -> _Refined | None:
-        """What the board says of its second stage at present; None: it has none."""
+        """The estimates of the second stage at the last tick; None: there is no second stage."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,7 +74,7 @@ class LiveSimulation:
         self, name: str, known: Mapping[str, float], t: Float, samples: Mapping[str, Float], newest: Mapping[str, float]
     ) -> None:
         from pvid.identification.validation import predicted  # loads SymPy
-        from pvid.models.mechanisms import compiled_of
+        from pvid.rig.mechanism_file import MechanismRig
         from pvid.rig.run import Recording
 
         step = float(np.median(np.diff(t)))
@@ -84,10 +83,7 @@ class LiveSimulation:
         if step <= 0:
             return
         with suppress(PvidError, np.linalg.LinAlgError):
-            model = compiled_of(name)
-            model = replace(
-                model, knowns=tuple(replace(one, value=known.get(one.name, one.value)) for one in model.knowns)
-            )
+            model = MechanismRig(name, known=known).compiled()
             run = Recording(t[part], {key: x[part] for key, x in samples.items()}, 1.0 / step)
             self._newest = predicted(model, run, _values(model, newest), None)
 

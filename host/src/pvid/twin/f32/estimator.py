@@ -221,15 +221,10 @@ class RelativeEstimator(Estimator):
             self.theta = pattern.theta(self.p)
         self.row_weight = _lanes([c.row_weight for c in configs])
         self.noise_margin = _lanes([c.noise_margin for c in configs])
-        self.noise_alone: Float32 | None = None  # that a solve's S must exceed
         self.rss = np.zeros(len(configs), np.float32)
-        self.group_rss = self.rss
-        self.group_weight = np.zeros(len(configs), np.float32)
         self.expected = np.zeros(len(configs), np.float32)
         self.everywhere = np.ones(len(configs), np.bool_)
         self.was_due = True
-        self.judged_variance = self.row_variance
-        self._solved = (np.zeros((0, 0, 0), np.float32), self.sums, self.rss)  # S, sums, rounding of the last solve
 
     @property
     def is_rate(self) -> bool:
@@ -250,7 +245,6 @@ class RelativeEstimator(Estimator):
                 gradient = self.model.transpose_times(self.model.jacobian(self.p), n, kind)
                 self.innovation = np.where(fits, self.innovation + gradient * e, self.innovation)
             self.rss = np.where(fits, self.rss + e * e, self.rss)
-            self.group_weight = np.where(fits, self.group_weight + self.row_weight, self.group_weight)
             self.sums = self.information.add(self.model.terms(kind, n, e, self.row_weight), fits)
         reason = np.full(len(y), Reason.ACCUMULATED, np.uint8)
         reason[~fits] = Reason.REJECTED_SATURATED
@@ -259,47 +253,6 @@ class RelativeEstimator(Estimator):
         self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
         self.counters["rejected_not_finite"] += not_finite
         return reason
-
-    def accept_rows(self, squares: Float32, rss: Float32) -> npt.NDArray[np.uint8]:
-        """pvid_products_accept_f32: squares of the columns of rows [theta of their kind, lanes]."""
-        limit = ROW_LIMIT * ROW_LIMIT
-        fits = (squares <= limit).all(axis=0) & (rss <= limit)
-        not_finite = ~fits & ~(np.isfinite(squares).all(axis=0) & np.isfinite(rss))
-        reason = np.full(len(rss), Reason.ACCUMULATED, np.uint8)
-        reason[~fits] = Reason.REJECTED_SATURATED
-        reason[not_finite] = Reason.REJECTED_NOT_FINITE
-        self.counters["rejected_saturated"] += reason == Reason.REJECTED_SATURATED
-        self.counters["rejected_not_finite"] += not_finite
-        return reason
-
-    def add_moment(self, kind: int, place: int, product: Float32) -> None:
-        """Adds to an entry of a kind's packed upper triangle of M."""
-        self._add_to_low(self.model.blocks.places_of_kind(kind)[0].start + place, product)
-
-    def add_gradient(self, kind: int, place: int, product: Float32) -> None:
-        """Adds sum N e to an entry of a kind's b."""
-        self._add_to_low(self.model.moments + self.model.blocks.of_kind[kind].start + place, product)
-
-    def _add_to_low(self, place: int, value: Float32) -> None:
-        with np.errstate(all="ignore"):
-            low = self.information.low.copy()
-            low[place] = low[place] + value
-            self.information.low = low
-            self.sums = self.information.read()
-
-    def end_rows(self, kind: int, gradient: Float32, rss: Float32, rows: int) -> None:
-        """pvid_products_end_f32: behind the products of so many rows; sum N e of the kind [theta, lanes], sum e^2."""
-        pattern = self.model
-        with np.errstate(all="ignore"):
-            weight = self.row_weight * np.float32(rows)
-            self._add_to_low(-2, rss)
-            self._add_to_low(-1, weight)
-            self.rss = self.rss + rss
-            self.group_weight = self.group_weight + weight
-            if self.is_rate:
-                slope = pattern.transpose_times(pattern.jacobian(self.p), gradient, kind)
-                self.innovation = self.innovation + slope
-        self.counters["rows"] += rows
 
     def add_to_b(self, g: Float32) -> npt.NDArray[np.uint8]:
         """pvid_estimator_add_to_b_f32: g [n_theta, lanes]."""
@@ -332,9 +285,7 @@ class RelativeEstimator(Estimator):
         self.was_due = True
         self.size = np.zeros(len(reason), np.float32)
         if ends_group:
-            self.group_rss = self.rss
             self.rss = np.zeros_like(self.rss)
-            self.group_weight = np.zeros_like(self.group_weight)
             self.phase += 1
             self.was_due = bool(self.phase[0] >= self.divider[0])
         elif self.is_rate:
@@ -364,37 +315,9 @@ class RelativeEstimator(Estimator):
         return self._projection_stages + 5 + -(-self.model.n_theta // self._ROWS_PER_STAGE) + ends_group
 
     @property
-    def assessment_stages(self) -> int:
-        """Stages of an assessment."""
-        return self._projection_stages + self.assess_solved_stages
-
-    @property
     def assess_solved_stages(self) -> int:
         """Stages of an assessment behind a solve."""
         return 4 + self.model.n_p
-
-    def judged(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
-        """The assessment, and whether S contains more information than noise of the residual variance [lanes]."""
-        sums = self.information.read()
-        s, residual = self._assessed(sums)
-        variance = self.judged_variance = self._variance(sums, residual)
-        return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
-
-    def judged_as_solved(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
-        """The same from the normal equations of the last solve, which was due: S at the p before its step."""
-        s, sums, rounding = self._solved
-        variance = self.judged_variance = self._variance(sums, self._residual(sums, rounding))
-        return self._assess(sums, s.copy(), variance), self._above_noise(s, variance, sums[-1])
-
-    def _above_noise(self, s: Float32, variance: Float32, weight: Float32) -> npt.NDArray[np.bool_]:
-        if self.noise_alone is None:
-            return self.everywhere
-        rest = np.zeros_like(s)
-        much = (self.noise_margin * variance) * weight
-        for a in range(len(s)):
-            for b in range(a, len(s)):
-                rest[a, b] = s[a, b] - much * self.noise_alone[a, b]
-        return cholesky.factor(rest).ok | ~(self.noise_margin > 0)
 
     def _commit(self, gain: Float32, fallback: tuple[npt.NDArray[np.bool_], Float32] | None) -> npt.NDArray[np.uint8]:
         pattern = self.model
@@ -404,9 +327,7 @@ class RelativeEstimator(Estimator):
         c = pattern.jacobian(self.p)
         force = pattern.transpose_times(c, b)
         s = pattern.project(c, matrix)
-        own = s.copy()
-        above_noise = self._above_noise(s, self.row_variance, sums[-1])
-        x, reason, in_dead_zone = self._step_from(s, force, gain, self.everywhere, above_noise)
+        x, reason, in_dead_zone = self._step_from(s, force, gain, self.everywhere, self.everywhere)
         stepping = (reason == Reason.UPDATED) & ~in_dead_zone
         x = np.where(stepping, x, self.p)
         falls_back = np.zeros_like(stepping)
@@ -437,9 +358,6 @@ class RelativeEstimator(Estimator):
         self.theta = np.where(moving, theta, self.theta)
         self.p = np.where(moving, x, self.p)
         self.counters["updates"] += moving & stepping
-        sums = sums.copy()
-        sums[-2] = self.information.high[-2] + self.information.low[-2]
-        self._solved = own, sums, self.information.rounding
         return reason
 
     def place(self, p: Float32) -> None:
@@ -463,22 +381,9 @@ class RelativeEstimator(Estimator):
         residual = capped(sums[-2] + rounding)
         return np.where(residual > floor, residual, floor)
 
-    def set_expected(self, variance: Float32) -> None:
-        """pvid_estimator_set_expected_f32: variance [lanes] of the rows since the last group by the sensors' noise."""
-        with np.errstate(all="ignore"):
-            part = self.group_weight / self.sums[-1]
-            share = np.where(self.group_weight < self.sums[-1], part, np.float32(1))
-            moved = self.expected + (capped(variance) - self.expected) * share
-        self.expected = np.where(self.group_weight > 0, moved, self.expected)
-
     def misfit(self, sums: Float32) -> Float32:
         """pvid_estimator_misfit_f32 [lanes]."""
         freedom = sums[-1] - np.float32(len(self.p))
         explained = freedom * self.expected
         known = (freedom >= 1) & (explained > 0) & (sums[-2] > 0)
         return np.where(known, capped(sums[-2] / explained), np.float32(0))
-
-    @property
-    def rounded(self) -> npt.NDArray[np.bool_]:
-        """pvid_estimator_is_rounded_f32 [lanes]."""
-        return np.asarray(self.information.rounding > self.sums[-2])
