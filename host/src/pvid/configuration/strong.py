@@ -28,7 +28,6 @@ from pvid.settings.strong import StrongModelConfig
 
 _STEP = 1.25  # from window to window
 _LONGEST = 401  # samples of a window
-_REACH = 2.05  # windows within this factor of another are compared with it
 _WINDOWS = 8  # that a recording has at least
 _EVERY = 4  # samples from row to row in float64
 _MORE = 4  # degrees of the polynomial above the highest derivative
@@ -48,7 +47,7 @@ class Fitted:
     taps, degree : of the window
     p : [n_p]
     noise : standard errors from the scatter of the rows [n_p]
-    change : largest change of p to a window between half and twice this one [n_p]
+    change : largest change of p to the next shorter and the next longer window [n_p]
     """
 
     taps: int
@@ -126,11 +125,11 @@ def _fits(oracle: StrongModel, recording: Recording, degree: int) -> Iterator[Fi
 def _compared(tried: list[Fitted]) -> list[Fitted]:
     """Each with its change; one window alone says nothing about it."""
 
-    def change(one: Fitted) -> Float:
-        near = [other for other in tried if 1 / _REACH < other.taps / one.taps < _REACH]
-        return np.asarray(np.max([np.abs(other.p - one.p) for other in near], axis=0))
+    def change(at: int) -> Float:
+        beside = tried[max(at - 1, 0) : at + 2]  # one further off has an error of its own
+        return np.asarray(np.max([np.abs(other.p - tried[at].p) for other in beside], axis=0))
 
-    return [replace(one, change=change(one)) for one in tried] if len(tried) > 1 else []
+    return [replace(one, change=change(at)) for at, one in enumerate(tried)] if len(tried) > 1 else []
 
 
 def _best(tried: list[Fitted], parameters: Parameters) -> Fitted | None:
