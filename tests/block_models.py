@@ -1,4 +1,4 @@
-"""Random models with several kinds of rows, the same in C (functions of Python behind cffi) and in the twins."""
+"""Random models with several kinds of rows, the same in C (functions of Python behind cffi) and in numpy."""
 
 from __future__ import annotations
 
@@ -12,10 +12,8 @@ import numpy.typing as npt
 from pvid.core.native import Native
 from pvid.settings.f32 import EstimatorConfig
 from pvid.settings.q31 import EstimatorConfigQ31
-from pvid.twin.f32.pattern import PatternModel
-from pvid.twin.q31.integer import Int, round_shift
-from pvid.twin.q31.model import ModelQ31
 
+Int = npt.NDArray[np.int64]
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
 
@@ -87,19 +85,6 @@ class BlockModel:
         """The same theta in rows of one kind."""
         return BlockModel((self.n_theta,), self.n_p, self.factor, self.factors)
 
-    def pattern(self) -> PatternModel:
-        """For the float twin."""
-        return PatternModel(
-            n_theta=self.n_theta,
-            n_p=self.n_p,
-            positive=(True,) * self.n_p,
-            c_row=tuple(row for _, row in self.non_zeros),
-            c_column=tuple(column for column, _ in self.non_zeros),
-            theta=self.theta,
-            jacobian=self.jacobian,
-            kind_end=self.kind_end if len(self.kind_end) > 1 else (),
-        )
-
 
 @dataclass(frozen=True)
 class BlockModelQ31:
@@ -120,7 +105,7 @@ class BlockModelQ31:
         """theta int64 [n_theta, ...] of p int64 [n_p, ...]."""
         return np.stack(
             [
-                sign * (p[a] << 15 if b < 0 else round_shift(p[a] * p[b], 16))
+                sign * (p[a] << 15 if b < 0 else (p[a] * p[b] + (1 << 15)) >> 16)
                 for sign, (a, b) in zip(self._signs(), self.real.factors, strict=True)
             ]
         )
@@ -143,21 +128,6 @@ class BlockModelQ31:
             a, b = self.real.factors[row]
             c.append(45 if b < 0 else (bits[b] if column == a else bits[a]) + 15)
         return theta, c
-
-    def twin(self) -> ModelQ31:
-        """For the fixed-point twin."""
-        real = self.real
-        return ModelQ31(
-            n_theta=real.n_theta,
-            n_p=real.n_p,
-            positive=(True,) * real.n_p,
-            c_row=tuple(row for _, row in real.non_zeros),
-            c_column=tuple(column for column, _ in real.non_zeros),
-            theta=self.theta,
-            jacobian=self.jacobian,
-            formats=self.formats,
-            kind_end=real.kind_end if len(real.kind_end) > 1 else (),
-        )
 
 
 class EstimatorInC:

@@ -53,9 +53,9 @@ PLAY = "import playback; from pvid.core.native import Native; list(playback.dige
 PLAY_ENGINE = "import playback_engine; [list(one.digests(one.library)) for one in playback_engine.subjects()]"
 # The weak engine in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
-    *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_bits_q31", "weak_snapshot_q31", "weak_rows_q31")),
-    *(f"tests/twin/test_{name}.py" for name in ("second_stage", "refinement", "trust_q31", "kinds", "kinds_q31")),
-    *(f"tests/twin/test_{name}.py" for name in ("estimator_q31", "gate", "misfit")),
+    *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_q31", "second_stage", "refinement")),
+    *(f"tests/core/test_{name}_q31.py" for name in ("weak_snapshot", "weak_engine", "trust")),
+    *(f"tests/twin/test_{name}.py" for name in ("kinds", "kinds_q31", "estimator_q31", "gate", "misfit")),
     *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
     "tests/core/test_weak_valid_q31.py",
     "tests/codegen/test_fitted_sizes.py",  # builds for one design

@@ -8,17 +8,27 @@ from functools import cache
 import numpy as np
 import pytest
 from own_mechanisms import OWN, own_recording
+from weak_rig import engine_rig
+from weak_rig_q31 import rig as rig_q31
 
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_image import MechanismRun, mechanism_run, run_of_samples
 from pvid.codegen import files_weak
 from pvid.codegen.fitted_sizes import config_header, fitted_sizes
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.weak_library import weak_native
+from pvid.codegen.weak_library import weak_native, weak_sources_q31
 from pvid.configuration.weak import config_for_recording, samples_of
 from pvid.core.model_library import ModelSources
 from pvid.core.weak_native import WeakNative
 from pvid.settings.enums import Reason
+from pvid.setup.weak_stages import (
+    column_stages,
+    column_stages_q31,
+    shares_place,
+    shares_place_q31,
+    window_stages,
+)
+from pvid.twin.printed import PrintedTwin
 
 
 @cache
@@ -43,6 +53,47 @@ def test_a_window_and_a_block_share_places_where_there_is_time() -> None:
     assert (sizes["PVID_MAX_BLOCKS"], sizes["PVID_MAX_WINDOWS"], sizes["PVID_EXACT"]) == (1, 0, 1)
     motor = fitted_sizes(mechanism_run("dc_motor").config)
     assert (motor["PVID_MAX_BLOCKS"], motor["PVID_MAX_WINDOWS"], motor["PVID_EXACT"]) == (2, 1, 1)
+
+
+@pytest.mark.parametrize("name", ["kapitza", "cart_pendulum"])
+def test_stages_are_counted_as_the_core_counts_them(name: str) -> None:
+    """Of one kind, and of two with nuisances; a design whose windows find no place is refused."""
+    rig, found = engine_rig(name), set()
+    sources = replace(rig.native.sources, sizes={**rig.native.sources.sizes, "PVID_MAX_WINDOWS": 0})
+    for functions, hop, decimation, iterations, margin in (
+        (16, 24, 16, 2, 4.0),
+        (8, 24, 16, 1, 0.0),
+        (24, 64, 4, 3, 4.0),
+    ):
+        config = rig.resized(functions=functions, hop=hop, decimation=decimation)
+        estimator = replace(config.estimator, noise_margin=margin)
+        config = replace(config, estimator=estimator, iterations=iterations)
+        found.add(shares_place(config))
+        if not shares_place(config):
+            with pytest.raises(PvidError, match="refused the configuration"):
+                PrintedTwin(sources, config)
+            continue
+        twin = PrintedTwin(sources, config)
+        assert twin.module.pvid_weak_finish_stages_f32(twin.state) == window_stages(config)
+        assert twin.module.pvid_weak_finish_columns_f32(twin.state) == column_stages(config)
+    assert found == {True, False}
+
+
+@pytest.mark.parametrize(("name", "decimation"), [("kapitza", 16), ("dc_motor", 64), ("dc_motor", 16)])
+def test_stages_in_fixed_point_are_counted_as_the_core_counts_them(name: str, decimation: int) -> None:
+    one = rig_q31(name, 3000)
+    full = tuple(x // decimation for x in one.design.full_scale)  # a sum over a step fits
+    config = replace(one.config, design=replace(one.design, decimation=decimation, full_scale=full))
+    sources = weak_sources_q31(one.fixed, one.parameters, config)
+    sources = replace(sources, sizes={**sources.sizes, "PVID_MAX_WINDOWS": 0})
+    assert shares_place_q31(config.design) == (decimation != 16 or name == "kapitza")
+    if shares_place_q31(config.design):
+        twin = PrintedTwin(sources, config)
+        assert twin.state.finish.known.used
+        assert twin.module.pvid_weak_finish_columns_q31(twin.state) == column_stages_q31(config.design)
+    else:
+        with pytest.raises(PvidError, match="bad iterations"):
+            PrintedTwin(sources, config)
 
 
 @pytest.mark.parametrize("name", ["kapitza", "dc_motor", *OWN])

@@ -11,18 +11,17 @@ import numpy.typing as npt
 import pytest
 from block_models import Q31InC
 from generated import WARNINGS, exactly, functions_by_name
+from printed_estimator import PrintedEstimator, printed_core
 
 from pvid.codegen import files_functions
 from pvid.codegen.fixed_model import FixedModel, fixed_model
 from pvid.codegen.formats import bits_of
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.twin_file import loaded_q31
 from pvid.core.native import Native
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources
 from pvid.models import mechanisms
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31
-from pvid.twin.q31.estimator import EstimatorQ31
 
 Float = npt.NDArray[np.float64]
 
@@ -42,11 +41,16 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return [str(path) for path in folder.glob("*.o")]
 
 
+def texts_of(fixed: FixedModel) -> dict[str, str]:
+    """The generated model."""
+    model = GeneratedModel(fixed.functions.model, "test")
+    return files_functions.printed_f32(model) | files_functions.printed_q31(model)
+
+
 def native_of(fixed: FixedModel, core: list[str], folder: Path) -> Native:
     """The core with the generated model in it."""
     name = fixed.functions.name
-    model = GeneratedModel(fixed.functions.model, "test")
-    for file, text in (files_functions.printed_f32(model) | files_functions.printed_q31(model)).items():
+    for file, text in texts_of(fixed).items():
         (folder / file).write_text(text, encoding="utf-8")
     library = folder / "libmodel.so"
     made = [*OPTIONS, *WARNINGS, "-O1", "-shared", "-fPIC", *INCLUDES, str(folder / f"{name}_q31.c"), *core]
@@ -94,7 +98,9 @@ def test_core_and_twin_have_the_same_integers_and_find_p(name: str, core: list[s
     config = config_of(fixed, size)
     pointer = native.headers.ffi.addressof(native.library, f"{functions.name}_model_q31")
     c = Q31InC(native, pointer, config)
-    twin = EstimatorQ31([config], loaded_q31(fixed).model)
+    texts = {file: text for file, text in texts_of(fixed).items() if not file.endswith("_f32.c")}
+    module = printed_core("q31", SIZES, texts, [f"{name}_model_q31"])
+    twin = PrintedEstimator(native, module, getattr(module, f"{functions.name}_model_q31"), config)
     random = np.random.default_rng(6)
     n_scale = 2.0 ** np.array(config.n_bits)
     for _ in range(GROUPS):
@@ -104,18 +110,13 @@ def test_core_and_twin_have_the_same_integers_and_find_p(name: str, core: list[s
                 n = np.round(np.clip(random.standard_normal(len(rows.theta)), -5, 5) * size[own] * n_scale[own])
                 y = round((n / n_scale[own] @ theta[own] + ROW_SD * random.standard_normal()) * 2.0**Y_BITS)
                 integers = n.astype(np.int64)
-                reason = twin.add(integers[:, None], np.array([y], np.int64), kind)
-                assert c.add(kind, integers, y) == reason[0] == Reason.ACCUMULATED
-        for ends_group, solved in ((True, c.update), (False, c.iterate)):
-            (*_, reported) = twin.solve(ends_group=ends_group)
-            assert reported is not None and solved() == reported[0]
-        assert np.array_equal(c.p, twin.p[:, 0])
-        assert np.array_equal(c.sums, twin.sums[:, 0])
+                assert c.add(kind, integers, y) == twin.add(kind, integers, y) == Reason.ACCUMULATED
+        assert c.update() == twin.update()
+        assert c.iterate() == twin.iterate()
+        assert np.array_equal(c.p, twin.p)
+        assert np.array_equal(c.sums, twin.sums)
     estimate, n_p = c.assess(), len(truth)
-    judged = twin.assess()[0]
-    for field in judged.dtype.names:
-        of_p = (slice(n_p),) * judged[field].ndim  # the core has room for more
-        assert np.array_equal(estimate[field][of_p], judged[field][of_p]), field
+    assert estimate.tobytes() == twin.assess().tobytes()
     unit = 2.0 ** -np.array(config.p_bits, np.float64)
     error, se = c.p * unit - truth, estimate["se"][:n_p] * unit
     assert np.all(np.abs(error) < 5 * se), (error / se).round(1)

@@ -116,7 +116,7 @@ class Emulation:
         out = []
         for kind, about in enumerate(self.model.kind):
             whole = np.zeros((about.columns, *sums.shape[1:]), np.complex128)
-            for one in self.model.terms_of(kind):
+            for one in self.model.term[self.model.kind[kind].first : self.model.kind[kind].end]:
                 whole[one.column] += float(one.factor) * (-1j * rates) ** one.order * sums[one.channel]
             flat = np.empty((*whole.shape[:-1], 2 * functions.highest + 1))
             flat[..., 0] = whole[..., 0].real

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from pvid.codegen import files_weak
-from pvid.codegen.weak import WeakFunctions, weak_functions_of
-from pvid.codegen.weak_twin import weak_model_of
+from pvid.codegen.weak import WeakFunctions, weak_functions_of, weak_model_of
 from pvid.core.model_library import ModelSources
 from pvid.core.sizes import raised
 from pvid.core.weak_native import WeakNative

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
-from block_models import BlockModelQ31, EstimatorQ31InC
+from block_models import BlockModelQ31, EstimatorQ31InC, Int
+from printed_estimator import PrintedEstimator, block_model, printed_core
 
 from pvid.core.native import Native
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31
-from pvid.twin.q31.estimator import SUM_LIMIT, EstimatorQ31
 
-LIMIT = 2**28
+LIMIT, SUM_LIMIT = 2**28, 2**60  # of a row; above it the sums are divided by 4
 UNIT = 2**26  # of p
 N_P, N_THETA = 4, 8
 MODEL = BlockModelQ31.random(np.random.default_rng(3), (N_THETA,), N_P)
@@ -27,43 +26,42 @@ CONFIG = EstimatorConfigQ31(
     y_bits=20,
     row_sd=256,
 )
-Rows = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Steps:
     """State after every tick: p [ticks, n_p], sums [ticks, n_sums], their exponent and the reason [ticks]."""
 
-    p: Rows
-    sums: Rows
-    exponent: Rows
-    reason: Rows
+    p: Int
+    sums: Int
+    exponent: Int
+    reason: Int
 
 
-def against_twin(native: Native, config: EstimatorConfigQ31, n: Rows, y: Rows) -> Steps:
+def against_twin(native: Native, config: EstimatorConfigQ31, n: Int, y: Int) -> Steps:
     """Steps the core and the twin through rows N [ticks, 8], Y [ticks], a group each; all integers must be equal."""
-    core, twin = EstimatorQ31InC(native, MODEL, config), EstimatorQ31([config], MODEL.twin())
-    steps = []
+    module, steps = printed_core("q31"), []
+    core, twin = (
+        EstimatorQ31InC(native, MODEL, config),
+        PrintedEstimator(native, module, block_model(module, MODEL), config),
+    )
     for tick in range(len(y)):
-        own = core.add(0, n[tick], int(y[tick]))
+        own, other = (one.add(0, n[tick], int(y[tick])) for one in (core, twin))
+        assert own == other, tick
         if own == Reason.ACCUMULATED:
-            own = core.update()
-        reason = twin.add(n[tick][:, None], y[tick : tick + 1])
-        if reason[0] == Reason.ACCUMULATED:
-            for reported in twin.solve(ends_group=True):
-                reason = reason if reported is None else reported
-        assert reason[0] == own, tick
-        assert np.array_equal(twin.p[:, 0], core.p), tick
-        assert np.array_equal(twin.sums[:, 0], core.sums), tick
+            own, other = core.update(), twin.update()
+        assert own == other, tick
+        assert np.array_equal(twin.p, core.p), tick
+        assert np.array_equal(twin.sums, core.sums), tick
         exponent = int(core.state.information.exponent)
-        assert twin.exponent[0] == exponent, tick
+        assert twin.state.information.exponent == exponent, tick
         steps.append((core.p, core.sums, exponent, own))
-    assert core.counters == {name: int(of[0]) for name, of in twin.counters.items()}
-    assert core.assess().tobytes() == twin.assess()[0].tobytes()
+    assert core.counters == twin.counters
+    assert core.assess().tobytes() == twin.assess().tobytes()
     return Steps(*(np.array(part) for part in zip(*steps, strict=True)))
 
 
-def loud_rows(ticks: int, largest: int = LIMIT) -> tuple[Rows, Rows]:
+def loud_rows(ticks: int, largest: int = LIMIT) -> tuple[Int, Int]:
     """Rows at the limit in one place, N8, and small elsewhere, with the Y that the start explains."""
     random = np.random.default_rng(5)
     n = random.integers(-2000, 2001, (ticks, N_THETA))

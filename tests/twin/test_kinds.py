@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from block_models import BlockModel, EstimatorInC
+from printed_estimator import PrintedEstimator, block_model, printed_core
 
 from pvid.core.native import Native
 from pvid.settings.enums import Law, Reason
 from pvid.settings.f32 import EstimatorConfig
-from pvid.twin.f32.estimator import RelativeEstimator
 
 Float32 = npt.NDArray[np.float32]
 
@@ -56,35 +56,31 @@ def rows_of(
 
 
 class Pair:
-    """The estimator in C and its twin in one lane."""
+    """The estimator in C and its twin."""
 
     def __init__(self, native: Native, model: BlockModel, config: EstimatorConfig) -> None:
         self.core = EstimatorInC(native, model, config, RATE)
-        self.twin = RelativeEstimator([config], RATE, model.pattern())
+        module = printed_core("f32")
+        self.twin = PrintedEstimator(native, module, block_model(module, model), config, RATE)
 
     def add(self, kind: int, n: Float32, y: float) -> Reason:
-        reason = self.twin.add(n[:, None], np.array([y], np.float32), kind)[0]
+        reason = self.twin.add(kind, n, y)
         assert self.core.add(kind, n, y) == reason
         return Reason(reason)
 
     def add_to_b(self, g: Float32) -> Reason:
-        reason = self.twin.add_to_b(g[:, None])[0]
+        reason = self.twin.add_to_b(g)
         assert self.core.add_to_b(g) == reason
         return Reason(reason)
 
     def solve(self, ends_group: bool) -> None:
-        reason = None
-        for reported in self.twin.solve(ends_group):
-            reason = reported
-        assert reason is not None
-        assert (self.core.update() if ends_group else self.core.iterate()) == reason[0]
+        own, other = ((one.update if ends_group else one.iterate)() for one in (self.core, self.twin))
+        assert own == other
 
     def assert_equal(self) -> None:
-        twin = self.twin
-        assert self.core.p.tobytes() == twin.p[:, 0].tobytes()
-        levels = np.stack([twin.information.high[:, 0], twin.information.low[:, 0]])
-        assert np.array_equal(self.core.levels, levels)
-        assert self.core.state.information.rounding == twin.information.rounding[0]
+        assert self.core.p.tobytes() == self.twin.p.tobytes()
+        assert self.core.levels.tobytes() == self.twin.levels.tobytes()
+        assert self.core.state.information.rounding == self.twin.state.information.rounding
 
 
 @pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS.keys())
@@ -103,8 +99,8 @@ def test_core_and_twin_have_the_same_bits(native: Native, kind_end: tuple[int, .
         if number % 4 == 1:
             pair.solve(ends_group=False)
         pair.assert_equal()
-    assert pair.core.assess().tobytes() == pair.twin.assess()[0].tobytes()
-    assert pair.core.counters == {name: int(of[0]) for name, of in pair.twin.counters.items()}
+    assert pair.core.assess().tobytes() == pair.twin.assess().tobytes()
+    assert pair.core.counters == pair.twin.counters
     assert pair.core.counters["in_dead_zone"] > 0 or "dead_zone" not in fields
     # rough: the laws without iteration, and what was added to b, leave more than the rows' noise
     assert np.allclose(pair.core.p, truth, rtol=0.05)
@@ -229,4 +225,4 @@ def test_what_cannot_be_added_changes_nothing(native: Native) -> None:
     assert pair.add_to_b(-large) is Reason.REJECTED_SATURATED
     assert pair.core.add(2, fine, 1.0) == Reason.NOT_READY  # there are kinds 0 and 1
     assert np.array_equal(pair.core.levels, before)
-    assert pair.core.counters == {name: int(of[0]) for name, of in pair.twin.counters.items()}
+    assert pair.core.counters == pair.twin.counters

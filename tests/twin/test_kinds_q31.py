@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from block_models import BlockModelQ31, EstimatorQ31InC
+from block_models import BlockModelQ31, EstimatorQ31InC, Int
+from printed_estimator import PrintedEstimator, block_model, printed_core
 
 from pvid.core.native import Native
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, sources_of
 from pvid.settings.enums import Reason
 from pvid.settings.q31 import EstimatorConfigQ31
-from pvid.twin.q31.estimator import EstimatorQ31
-from pvid.twin.q31.integer import Int
-from pvid.twin.q31.scaled import Scaled
 
 P_BITS, N_BITS, Y_BITS = 27, 20, 18
 ROW_SD = 0.02
@@ -69,33 +68,33 @@ def rows_of(
 
 
 class Pair:
-    """The estimator in C and its twin in one lane."""
+    """The estimator in C and its twin; sizes: of the core that is not the default one."""
 
-    def __init__(self, native: Native, model: BlockModelQ31, config: EstimatorConfigQ31) -> None:
+    def __init__(
+        self, native: Native, model: BlockModelQ31, config: EstimatorConfigQ31, sizes: Mapping[str, int] | None = None
+    ) -> None:
         self.core = EstimatorQ31InC(native, model, config)
-        self.twin = EstimatorQ31([config], model.twin())
+        module = printed_core("q31", sizes)
+        self.twin = PrintedEstimator(native, module, block_model(module, model), config)
 
     def add(self, kind: int, n: Int, y: int) -> Reason:
-        reason = self.twin.add(n[:, None], np.array([y], np.int64), kind)[0]
+        reason = self.twin.add(kind, n, y)
         assert self.core.add(kind, n, y) == reason
         return Reason(reason)
 
     def add_to_b(self, m: Int, e: Int) -> Reason:
-        reason = self.twin.add_to_b(Scaled(m[:, None], e[:, None]))[0]
+        reason = self.twin.add_to_b(m, e)
         assert self.core.add_to_b(m, e) == reason
         return Reason(reason)
 
     def solve(self, ends_group: bool) -> None:
-        reason = None
-        for reported in self.twin.solve(ends_group):
-            reason = reported
-        assert reason is not None
-        assert (self.core.update() if ends_group else self.core.iterate()) == reason[0]
+        own, other = ((one.update if ends_group else one.iterate)() for one in (self.core, self.twin))
+        assert own == other
 
     def assert_equal(self) -> None:
-        assert np.array_equal(self.core.p, self.twin.p[:, 0])
-        assert np.array_equal(self.core.sums, self.twin.sums[:, 0])
-        assert self.core.state.information.exponent == self.twin.exponent[0]
+        assert np.array_equal(self.core.p, self.twin.p)
+        assert np.array_equal(self.core.sums, self.twin.sums)
+        assert self.core.state.information.exponent == self.twin.state.information.exponent
 
 
 @pytest.mark.parametrize("fields", CONFIGS.values(), ids=CONFIGS.keys())
@@ -117,8 +116,8 @@ def test_core_and_twin_have_the_same_integers(
         if number % 4 == 1:
             pair.solve(ends_group=False)
         pair.assert_equal()
-    assert pair.core.assess().tobytes() == pair.twin.assess()[0].tobytes()
-    assert pair.core.counters == {name: int(of[0]) for name, of in pair.twin.counters.items()}
+    assert pair.core.assess().tobytes() == pair.twin.assess().tobytes()
+    assert pair.core.counters == pair.twin.counters
     assert pair.core.counters["in_dead_zone"] > 0 or "dead_zone" not in fields
     # rough: the laws without iteration, and what was added to b, leave more than the rows' noise
     assert np.allclose(pair.core.p, truth, rtol=0.05)
@@ -213,15 +212,17 @@ def test_what_cannot_be_added_changes_nothing(native: Native) -> None:
     assert pair.add_to_b(g, np.full(9, 30)) is Reason.ACCUMULATED
     pair.assert_equal()
     assert pair.core.sums[10 + 15 + 7] == before[10 + 15 + 7] + 2**60
-    assert pair.core.counters == {name: int(of[0]) for name, of in pair.twin.counters.items()}
+    assert pair.core.counters == pair.twin.counters
+
+
+ROOMY = {"PVID_MAX_P": 8, "PVID_MAX_THETA_Q31": 31, "PVID_MAX_MOMENTS_Q31": 496, "PVID_MAX_C_Q31": 62}
 
 
 @pytest.fixture(scope="module")
 def roomy(tmp_path_factory: pytest.TempPathFactory) -> Native:
     """The core with room for the largest mechanisms, and its headers for cffi as host/native makes them."""
     folder = tmp_path_factory.mktemp("roomy")
-    sizes = {"PVID_MAX_P": 8, "PVID_MAX_THETA_Q31": 31, "PVID_MAX_MOMENTS_Q31": 496, "PVID_MAX_C_Q31": 62}
-    options = ["-std=c99", *(f"-D{name}={size}" for name, size in sizes.items())]
+    options = ["-std=c99", *(f"-D{name}={size}" for name, size in ROOMY.items())]
     sources = [str(path) for path in sources_of("q31")]
     library = folder / "libpvid_roomy.so"
     subprocess.run(["gcc", *options, "-O1", "-shared", "-fPIC", *INCLUDES, *sources, "-o", str(library)], check=True)
@@ -247,14 +248,14 @@ def test_more_theta_than_eleven_have_guard_bits(roomy: Native, kind_end: tuple[i
     """As many as the largest mechanisms have, in blocks and in one; every entry of C in the same column."""
     random = np.random.default_rng(5)
     model = BlockModelQ31.random(random, kind_end, 2)
-    pair = Pair(roomy, model, config_of(model))
+    pair = Pair(roomy, model, config_of(model), ROOMY)
     truth, groups = rows_of(model, random, 40)
     for group in groups:
         for kind, n, y in group:
             assert pair.add(kind, n, y) is Reason.ACCUMULATED
         pair.solve(ends_group=True)
         pair.assert_equal()
-    core, twin = pair.core.assess(), pair.twin.assess()[0]
+    core, twin = pair.core.assess(), pair.twin.assess()
     for field in ("p", "se"):
         assert np.array_equal(core[field][:2], twin[field][:2])
     # twice as far as its standard error is 1 in 20, and there are ten numbers
@@ -269,7 +270,7 @@ def test_equal_columns_of_equal_rows_do_not_overflow(roomy: Native) -> None:
         model = BlockModelQ31(
             replace(model.real, factor=np.ones(n_theta, np.float32), factors=((0, -1),) * n_theta, n_p=1)
         )
-        pair = Pair(roomy, model, config_of(model))
+        pair = Pair(roomy, model, config_of(model), ROOMY)
         n = np.full(n_theta, (2**24) - 1)  # M_ii h^2 just below 2^30
         for _ in range(16):
             y = n_theta * 2.0 * n[0] / 2**N_BITS * 2**Y_BITS

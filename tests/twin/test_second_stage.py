@@ -14,8 +14,8 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
 from pvid.board.refined_image import refined_pendulum
 from pvid.codegen.refine import RefineFunctions, refine_functions
+from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native, weak_sources
-from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.refine import refine_settings
 from pvid.core.weak_native import RefinedIdentifier, RefinedRecord, WeakNative
 from pvid.models.mechanisms import compiled_of
@@ -83,6 +83,16 @@ def test_the_twin_has_the_bits_of_the_pendulum_with_options(options: tuple[str, 
     sources = weak_sources(run.weak.compiled, run.weak.config.design, run.made)
     record = core.run_both(run.weak.samples)
     assert_same(record, PrintedTwin(sources, run.weak.config, run.settings), run.weak.samples)
+    assert Reason.UPDATED in record.told
+
+
+@pytest.mark.parametrize("name", [NAME, "dc_motor"])
+def test_the_twin_has_the_bits_of_both_stages_over_a_missing_sample(name: str) -> None:
+    given = refined(name)
+    core, samples = given.identifier(), given.rig.samples[:5000].copy()
+    samples[2500, 0] = np.nan
+    record = core.run_both(samples)
+    assert_same(record, PrintedTwin(given.library.sources, core.config, given.settings), samples)
     assert Reason.UPDATED in record.told
 
 

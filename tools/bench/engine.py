@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.mechanisms import design_of, size_of, start_of
+from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.weak import samples_of
 from pvid.oracle.weak.errors import uncertainty
 from pvid.oracle.weak.identify import ready

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from bench.pendulum import RIGS, design_for
 from bench.refine_cases import CASES, L1, RATE_HZ, RELEASE, TRUTH, Case, bound_of, bound_of_measured
 from pvid.codegen.refine import RefineFunctions, refine_functions
+from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native
-from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.refine import rig_with_options
 from pvid.core.weak_native import RefinedIdentifier, WeakNative
 from pvid.design.refine import refine_config

@@ -22,8 +22,8 @@ from pvid.board.stream_rig import MOST_TICKS, SLOWEST
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions, refine_functions, widths
+from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native, weak_sources
-from pvid.codegen.weak_twin import weak_model_of
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.refine import full_motion_of, refine_design
 from pvid.configuration.weak import (

@@ -211,7 +211,7 @@ def _struct(model: WeakModel, name: str, upper: str) -> str:
             f"const pvid_weak_model_f32 {name}_weak_f32 = {{",
             *(f"    .{one} = {upper}_{one.upper()}," for one in counts),
             *(f"    .{one} = {one}," for one in ("signal", "jet", "channel", "term", "kind")),
-            f"    .prepare = {'prepare' if model.prepare else 'NULL'},",
+            f"    .prepare = {'prepare' if model.runs + model.signs else 'NULL'},",
             "    .values = values,",
             "    .form = form,",
             f"    .model = &{name}_weak_model_f32,",

@@ -10,8 +10,7 @@ from pvid.settings.enums import Law
 from pvid.settings.weak import NONE, WeakChannel, WeakConfig
 from pvid.settings.weak_q31 import WeakConfigQ31
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
-from pvid.twin.q31 import weak_finish
-from pvid.twin.weak import shares_place
+from pvid.setup.weak_stages import shares_place, shares_place_q31
 
 
 def fitted_sizes(config: WeakConfig, *, refined: bool = False) -> dict[str, int]:
@@ -51,7 +50,7 @@ def fitted_sizes_q31(config: WeakConfigQ31, n_p: int, n_c: int) -> dict[str, int
     model, needed = config.design.model, sizes_of_q31(config.design, n_p, n_c)
     found = smallest(needed)
     fitted = found | {
-        "PVID_MAX_WINDOWS": 0 if weak_finish.shares_place(config.design) else 1,
+        "PVID_MAX_WINDOWS": 0 if shares_place_q31(config.design) else 1,
         "PVID_DEAD_ZONE": int(config.estimator.dead_zone > 0),
         "PVID_CHECK_TABLES": 0,
     }

@@ -14,9 +14,8 @@ from pvid.codegen.fixed_model import FixedModel, Reaches, fixed_model, reaches_o
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.refine import RefineFunctions, check_outputs, refine_functions
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
-from pvid.codegen.weak import WeakFunctions, weak_functions_of
+from pvid.codegen.weak import WeakFunctions, weak_functions_of, weak_model_of
 from pvid.codegen.weak_q31 import FixedEngine
-from pvid.codegen.weak_twin import weak_model_of
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form

@@ -27,12 +27,15 @@ from pvid.oracle.weak.identify import ready
 from pvid.settings.weak import (
     NONE,
     Source,
+    ThetaModel,
     WeakChannel,
     WeakJet,
     WeakKind,
+    WeakModel,
     WeakSignal,
     WeakTerm,
 )
+from pvid.setup.weak_sizes import refuse_too_many_unknowns, sizes_of_model
 
 _ONE = sp.Integer(1)
 _HIGHEST_FOLD = 2
@@ -134,6 +137,47 @@ def weak_functions_of(compiled: CompiledModel) -> WeakFunctions:
         gain_names=tuple(str(one.xreplace(plain.back)) for one in shelf.gains),
         integrand_names=tuple(str(one.xreplace(plain.back)) for one in shelf.integrands),
     )
+
+
+def theta_model(functions: ModelFunctions) -> ThetaModel:
+    """theta and the pattern of its Jacobian."""
+    return ThetaModel(
+        n_theta=len(functions.theta.labels),
+        positive=tuple(one.positive for one in functions.model.unknowns),
+        c_row=functions.c_row,
+        c_column=functions.c_column,
+        kind_end=functions.kind_end,
+    )
+
+
+@Recent
+def weak_model_of(compiled: CompiledModel) -> WeakModel:
+    """The tables of a compiled model, without corners as given.
+
+    Raises
+    ------
+    PvidError
+        Where the engine does not have what the model needs.
+    """
+    refuse_too_many_unknowns(compiled)
+    made = weak_functions_of(compiled)
+    model = WeakModel(
+        name=made.name,
+        sample_names=made.samples,
+        jet_names=made.jet_names,
+        run_names=made.run_names,
+        sign_names=made.sign_names,
+        gain_names=made.gain_names,
+        integrand_names=made.integrand_names,
+        signal=made.signal,
+        jet=made.jet,
+        channel=made.channel,
+        term=made.term,
+        kind=made.kind,
+        model=theta_model(made.functions),
+    )
+    sizes_of_model(model)  # raises
+    return model
 
 
 def _ordered(model: CompiledModel, whole: Channels) -> list[Jet]:

@@ -10,31 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen import c_functions, numpy_q31
+from pvid.codegen import c_functions
 from pvid.codegen.fixed_model import symmetric
 from pvid.codegen.formats import FixedProgram, Interval, bits_of, bounds_of, fixed
 from pvid.codegen.functions import Function, ModelFunctions
-from pvid.codegen.twin_file import namespace
-from pvid.codegen.weak import WeakFunctions
+from pvid.codegen.weak import WeakFunctions, theta_model
 from pvid.design.weak_q31 import Formats
 from pvid.model.compiled import CompiledModel
+from pvid.settings.weak import ThetaModel
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakModelQ31, WeakTermQ31
-from pvid.twin.q31.integer import Int, integers, round_shift
-from pvid.twin.q31.model import ModelQ31
-from pvid.twin.q31.scaled import Scaled, scaled
-
-_PARTS = """\
-import numpy as np
-import numpy.typing as npt
-
-from pvid.twin.q31 import elementary as elementary_q31
-from pvid.twin.q31.integer import Int
-"""
-
 
 _BITS = 58  # of theta and of C: they fit 2^60
-_LARGEST = 1 << 60
-_LEFT = 30  # shift to the left, at most
 _FORMAT_MAX = 200
 
 
@@ -66,7 +52,7 @@ class FixedWeak:
     prepare : None where there are neither runs nor signs
     values : of jets, runs and signs
     prepare_limits, values_limits : largest integer of each input
-    model : tables and twins
+    model : tables
     formats : for the design
     """
 
@@ -124,7 +110,7 @@ def fixed_weak(made: WeakFunctions, given: JetReaches | None = None) -> FixedWea
         values=values,
         prepare_limits=limits[: len(bounds)],
         values_limits=limits,
-        model=_model(made, prepared, values, limits),
+        model=_model(made),
         formats=formats,
     )
 
@@ -162,14 +148,7 @@ def _limits(bounds: Sequence[Interval]) -> tuple[int, ...]:
     return tuple(math.floor(max(map(abs, one)) * 2.0 ** bits_of(one)) for one in bounds)
 
 
-def _model(
-    made: WeakFunctions, prepared: FixedProgram | None, values: FixedProgram, limits: tuple[int, ...]
-) -> WeakModelQ31:
-    jets = len(made.jet)
-    parts = [_PARTS, numpy_q31.fixed_function("values", values, limits, "Gains, then integrands.")]
-    if prepared:
-        parts.append(numpy_q31.fixed_function("prepare", prepared, limits[:jets], "Rates, then arguments of sgn."))
-    space = namespace("\n\n".join(parts), made.name)
+def _model(made: WeakFunctions) -> WeakModelQ31:
     return WeakModelQ31(
         samples=len(made.samples),
         runs=len(made.run_names),
@@ -181,8 +160,6 @@ def _model(
         channel=made.channel,
         term=tuple(WeakTermQ31(one.channel, one.order, one.column) for one in made.term),
         kind=made.kind,
-        prepare=space.get("prepare"),
-        values=space["values"],
     )
 
 
@@ -193,23 +170,15 @@ class ParametersQ31:
     Attributes
     ----------
     p_bits, theta_bits, c_bits : formats
-    model : the twin
+    model : theta and the pattern of C
     functions : what is generated
     """
 
     p_bits: tuple[int, ...]
     theta_bits: tuple[int, ...]
     c_bits: tuple[int, ...]
-    model: ModelQ31
+    model: ThetaModel
     functions: ModelFunctions
-
-
-def fixed_of(x: Scaled, bits: Sequence[int]) -> Int:
-    """Numbers [n, ...] as integers of these formats, saturated at 2^60."""
-    shift = -(x.e + integers(bits).reshape(-1, *[1] * (x.e.ndim - 1)))
-    left = np.minimum(np.maximum(-shift, 0), _LEFT)
-    up = np.where(-shift > _LEFT, np.sign(x.m) * _LARGEST, x.m << left)
-    return np.where(shift >= 0, round_shift(x.m, np.maximum(shift, 0)), up)
 
 
 def fixed_parameters(functions: ModelFunctions, bounds: Sequence[Interval]) -> ParametersQ31:
@@ -223,35 +192,7 @@ def fixed_parameters(functions: ModelFunctions, bounds: Sequence[Interval]) -> P
     p_bits = tuple(bits_of(one) for one in bounds)
     theta_bits = _bits_of_p(functions, functions.theta, bounds)
     c_bits = _bits_of_p(functions, functions.jacobian, bounds)
-    parts = [
-        "import numpy as np\nimport numpy.typing as npt\n\nfrom pvid.twin.q31 import elementary as elementary_q31\n"
-        "from pvid.twin.q31.scaled import Scaled\n",
-        numpy_q31.scaled_function("theta", functions.theta.program, "theta"),
-        numpy_q31.scaled_function("jacobian", functions.jacobian.program, "C"),
-    ]
-    space = namespace("\n\n".join(parts), functions.name)
-
-    def numbers(p: Int) -> Scaled:
-        return scaled(p, -integers(p_bits).reshape(-1, *[1] * (p.ndim - 1)))
-
-    def theta(p: Int) -> Int:
-        return fixed_of(space["theta"](numbers(p)), theta_bits)
-
-    def jacobian(p: Int) -> Int:
-        return fixed_of(space["jacobian"](numbers(p)), c_bits)
-
-    model = ModelQ31(
-        n_theta=len(theta_bits),
-        n_p=len(p_bits),
-        positive=tuple(one.positive for one in functions.model.unknowns),
-        c_row=functions.c_row,
-        c_column=functions.c_column,
-        theta=theta,
-        jacobian=jacobian,
-        formats=lambda _: (list(theta_bits), list(c_bits)),
-        kind_end=tuple(one.theta.stop for one in functions.kinds),
-    )
-    return ParametersQ31(p_bits, theta_bits, c_bits, model, functions)
+    return ParametersQ31(p_bits, theta_bits, c_bits, theta_model(functions), functions)
 
 
 def _bits_of_p(functions: ModelFunctions, function: Function, bounds: Sequence[Interval]) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.codegen.refine import RefineFunctions, check_outputs, is_measured, refine_functions, ring_of, signs_of
 from pvid.codegen.refine_twin import GeneratedRefine
-from pvid.codegen.weak_twin import weak_model_of
+from pvid.codegen.weak import weak_model_of
 from pvid.configuration.weak import Run, simulated_run_of
 from pvid.design.refine import refine_config
 from pvid.model.compiled import CompiledModel, Signal

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.codegen.weak_twin import weak_model_of
+from pvid.codegen.weak import weak_model_of
 from pvid.model.compiled import CompiledModel
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.choice import MODEL_ERROR, Scored, ranked, ranked_for_engine, score_of

@@ -48,6 +48,7 @@ class WeakIdentifierQ31(Publisher):
         self._config = self._owned[0]
         for place, one in enumerate([] if start is None else np.asarray(start, np.int32).tolist()):
             self._config.estimator.start[place] = one
+        self.sources = native.sources
         super().__init__(native, "weak", "q31", native.config, replay="weak")
 
     def _filled_with(self, native: Native, kind: str, config: object) -> Filled:

@@ -5,10 +5,9 @@ Counts of tables are properties: what C has beside a pointer is the length of th
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +17,6 @@ from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
 
 Float32 = npt.NDArray[np.float32]
 UInt8 = npt.NDArray[np.uint8]
-Function = Callable[[Float32], Float32]  # of [inputs, ...] float32 [results, ...]
 
 NONE = 255  # PVID_WEAK_NONE: no gain or integrand, it is 1
 
@@ -93,19 +91,39 @@ class WeakKind:
         return self.thetas + 1 + self.nuisances
 
 
-class ThetaModel(Protocol):
-    """pvid_model_f32: theta and C of all kinds; pvid.twin.f32.pattern.PatternModel is one."""
+@dataclass(frozen=True)
+class ThetaModel:
+    """pvid_model_f32, pvid_model_q31: theta and the pattern of C of all kinds.
+
+    Attributes
+    ----------
+    n_theta : of all kinds
+    positive : of each parameter [n_p]
+    c_row, c_column : of each non-zero of C [n_c]
+    kind_end : one past the last theta of each kind
+    """
+
+    n_theta: int
+    positive: tuple[bool, ...]
+    c_row: tuple[int, ...]
+    c_column: tuple[int, ...]
+    kind_end: tuple[int, ...]
 
     @property
-    def n_theta(self) -> int: ...
+    def n_p(self) -> int:
+        """Parameters."""
+        return len(self.positive)
+
     @property
-    def n_p(self) -> int: ...
+    def n_c(self) -> int:
+        """Non-zeros of C."""
+        return len(self.c_row)
+
     @property
-    def positive(self) -> tuple[bool, ...]: ...
-    @property
-    def theta(self) -> Function: ...
-    @property
-    def jacobian(self) -> Function: ...
+    def moments(self) -> int:
+        """Entries of M on and above the diagonals of its blocks, one a kind."""
+        sizes = (end - first for first, end in zip((0, *self.kind_end), self.kind_end, strict=False))
+        return sum(n * (n + 1) // 2 for n in sizes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +135,6 @@ class WeakModel:
     name : of the mechanism, as in C
     sample_names, jet_names, run_names, sign_names, gain_names, integrand_names : what each place is, in words
     signal, jet, channel, term, kind : tables
-    prepare : of jets [jets, ...]: derivatives of the runs, then arguments of sgn; None if there are none
-    values : of jets, runs and signs [inputs, ...]: gains, then integrands
     model : theta and C of all kinds
     """
 
@@ -134,8 +150,6 @@ class WeakModel:
     channel: tuple[WeakChannel, ...]
     term: tuple[WeakTerm, ...]
     kind: tuple[WeakKind, ...]
-    prepare: Function | None
-    values: Function
     model: ThetaModel
 
     @property
@@ -187,10 +201,6 @@ class WeakModel:
     def kinds(self) -> int:
         """Of rows: one for each equation."""
         return len(self.kind)
-
-    def terms_of(self, kind: int) -> tuple[WeakTerm, ...]:
-        """Those of one kind."""
-        return self.term[self.kind[kind].first : self.kind[kind].end]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +12,6 @@ from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31, TrustConfigQ31
 from pvid.settings.weak import WeakChannel, WeakJet, WeakKind, WeakSignal
 
 Int32 = npt.NDArray[np.int32]
-Int64 = npt.NDArray[np.int64]
-Function = Callable[[Int64], tuple[Int64, npt.NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True)
@@ -33,9 +31,6 @@ class WeakModelQ31:
     ----------
     samples, gains, integrands, runs, signs : how many
     signal, jet, channel, term, kind : tables
-    prepare : of jets [jets, ...]: derivatives of the runs, then arguments of sgn; None if there are none
-    values : of jets, runs and signs [inputs, ...]: gains, then integrands; both also tell whether the inputs are within
-        their reach
     """
 
     samples: int
@@ -48,8 +43,6 @@ class WeakModelQ31:
     channel: tuple[WeakChannel, ...]
     term: tuple[WeakTermQ31, ...]
     kind: tuple[WeakKind, ...]
-    prepare: Function | None
-    values: Function
 
 
 @dataclass(frozen=True)

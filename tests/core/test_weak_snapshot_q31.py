@@ -13,7 +13,7 @@ from engine_snapshots import (
     assert_every_change_is_refused,
     assert_every_function_is_hashed,
 )
-from weak_q31 import rig
+from weak_rig_q31 import rig
 
 from pvid.codegen.weak_library import weak_native_q31
 from pvid.core.weak_native_q31 import WeakIdentifierQ31

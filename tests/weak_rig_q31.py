@@ -11,26 +11,22 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.codegen import files_weak_q31
-from pvid.codegen.weak import weak_functions_of
+from pvid.codegen.weak import weak_functions_of, weak_model_of
 from pvid.codegen.weak_q31 import FixedWeak, JetReaches, fixed_parameters, fixed_weak
-from pvid.codegen.weak_twin import weak_model_of
 from pvid.core.sources import INCLUDES, sources_of
-from pvid.design.weak_q31 import DOWN, FINE_DOWN, Sensing, fixed_design
+from pvid.design.weak_q31 import Sensing, fixed_design
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
+from pvid.oracle.weak.channels import running_integrals
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows, record_of
-from pvid.settings.record import Record
-from pvid.settings.weak import NONE
+from pvid.settings.weak import Source
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
 from pvid.setup.weak import design_tables, for_engine
 from pvid.setup.weak_q31 import config_of_q31, row_formats
 from pvid.sim.imperfections import Imperfections
 from pvid.sim.simulated_run import RigSimulation
-from pvid.twin.q31.scaled import Scaled
-from pvid.twin.q31.weak_front import front_ticks, jets
-from pvid.twin.q31.weak_values import steps
 
 Float = npt.NDArray[np.float64]
 Int = npt.NDArray[np.int64]
@@ -97,40 +93,54 @@ class Rig:
         rate = self.oracle_design.sample_rate
         return config_of_q31(self.design, known, formats, self.parameters.p_bits, offset, rate, start)
 
+    @property
+    def _first(self) -> int:
+        """Sample to whose instant the engine's first step refers."""
+        half, decimation = self.design.half, self.design.decimation
+        if decimation > 1:
+            return decimation * (1 + half)
+        made = any(one.source is not Source.SAMPLED for one in self.design.model.signal)
+        return max(half, 2) if made else half
+
     def oracle_sums(self) -> dict[int, Float]:
         """Float64 S_h [windows, H + 1, 2] of the channels that have terms, by their places."""
         functions = self.oracle_design.test_functions
         # The oracle's first step is at the third sample or later; the engine's may be at the first one.
-        missing = max(2 - front_ticks(self.design).first, 0)
+        missing = max(2 - self._first, 0)
         padded = {name: np.concatenate([x[:1]] * missing + [x]) for name, x in self.exact.items()}
         record = record_of(self.compiled, padded, self.oracle_design) if missing else self.record
         sums = record.sums(functions)
         out = {}
+        for mine, theirs in self._places.items():
+            whole = np.zeros((sums.shape[1], functions.highest + 1, 2))
+            whole[:, 0, 0] = sums[theirs, :, 0]
+            whole[:, 1:, 0], whole[:, 1:, 1] = (sums[theirs, :, 1::2], sums[theirs, :, 2::2])
+            out[mine] = whole
+        return out
+
+    @cached_property
+    def _places(self) -> dict[int, int]:
+        """Place of each channel that has terms -> that in the oracle."""
+        found: dict[int, int] = {}
         first = 0
         for row in self.record.channels.rows:
             ordered = sorted(row.terms, key=lambda one: (one.column, one.order, one.channel))
-            for mine, theirs in zip(self.made.term[first:], ordered, strict=False):
-                whole = np.zeros((sums.shape[1], functions.highest + 1, 2))
-                whole[:, 0, 0] = sums[theirs.channel, :, 0]
-                whole[:, 1:, 0], whole[:, 1:, 1] = (sums[theirs.channel, :, 1::2], sums[theirs.channel, :, 2::2])
-                out[mine.channel] = whole
+            found |= {a.channel: b.channel for a, b in zip(self.made.term[first:], ordered, strict=False)}
             first += len(row.terms)
-        return out
+        return found
 
     def sizes(self) -> dict[int, float]:
-        """Largest sum of |channel| over a window, integrals counted from the start of the window, by place."""
-        design = self.design
-        made = steps(jets(self.counts, design), design, np.zeros(design.model.runs, np.int64))
-        out = {}
-        for place, one in enumerate(design.model.channel):
-            if one.gain == NONE:
-                out[place] = 2.0 * design.hop
-                continue
-            whole = np.abs(made.channels[place]).astype(np.float64)
-            window = np.convolve(whole, np.ones(2 * design.hop), "valid").max()
-            # a sum of the channel at h = 0, where the cosine is 1
-            down = 2.0 ** ((FINE_DOWN if design.fine else DOWN) + design.sum_shift + design.format[place].own)
-            out[place] = 4.0**one.fold * window * float(design.circle[0]) / down * design.units[place]
+        """Largest sum of |channel| over a window, integrals counted from its start, by place."""
+        window, record, out = 2 * self.design.hop, self.record, {}
+        for mine, theirs in self._places.items():
+            gain, fold = np.abs(record.gains[theirs]), record.channels.channels[theirs].fold
+            count = len(gain) // window
+            whole = gain[: count * window].reshape(count, window)
+            if fold:
+                integrand = np.asarray(record.integrands[theirs])
+                running = running_integrals(integrand, window, fold, self.oracle_design.dt)[fold][:, :-1]
+                whole = whole * np.abs(running[:count])
+            out[mine] = float(whole.sum(axis=1).max())
         return out
 
 
@@ -180,30 +190,6 @@ unsigned run(const int32_t counts[], unsigned ticks, int32_t window[], unsigned 
         }
     }
     return windows;
-}
-
-int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int32_t se[],
-             int64_t sums[], uint8_t exponent[], uint8_t reason[], unsigned ticks);
-
-/* The state after every tick; returns the status of init. */
-int identify(const int32_t readings[], const uint8_t frozen[], int32_t p[], int32_t published[], int32_t se[],
-             int64_t sums[], uint8_t exponent[], uint8_t reason[], unsigned ticks)
-{
-    static pvid_weak_q31 self;
-    const size_t samples = rig_design_q31.model->samples;
-    const pvid_status status = pvid_weak_init_q31(&self, &rig_config_q31);
-    for (unsigned k = 0; (status == PVID_OK) && (k < ticks); k++) {
-        pvid_weak_freeze_q31(&self, frozen[k] != 0u);
-        reason[k] = (uint8_t)pvid_weak_step_q31(&self, &readings[k * samples]);
-        const pvid_information_q31 *information = &self.estimator.information;
-        const size_t n_p = self.estimator.model->n_p;
-        memcpy(&p[k * n_p], self.estimator.p, n_p * sizeof p[0]);
-        memcpy(&published[k * n_p], pvid_weak_estimate_q31(&self)->p, n_p * sizeof p[0]);
-        memcpy(&se[k * n_p], pvid_weak_estimate_q31(&self)->se, n_p * sizeof se[0]);
-        memcpy(&sums[k * information->n_sums], information->sums, information->n_sums * sizeof sums[0]);
-        exponent[k] = information->exponent;
-    }
-    return (int)status;
 }
 
 unsigned columns(unsigned kind, const pvid_scaled_q31 theta[], const int32_t window[], int32_t x[], int32_t exponent[]);
@@ -305,15 +291,15 @@ class Core:
     def _run(self, arguments: list[str]) -> None:
         subprocess.run(["gcc", *arguments], check=True, cwd=self.folder)
 
-    def library(self, one: Rig, config: WeakConfigQ31 | None = None) -> ctypes.CDLL:
-        """With the tables of a rig, and this configuration or its own."""
-        name, own = one.made.name, config or one.config
+    def library(self, one: Rig) -> ctypes.CDLL:
+        """With the tables of a rig."""
+        name = one.made.name
         header = files_weak_q31.header(one.fixed, {"PVID_MAX_P": 3}, "a test")
         (self.folder / f"{name}_weak_q31.h").write_text(header, encoding="utf-8")
         text = "\n".join(
             [
                 files_weak_q31.source(one.fixed, one.parameters, "a test"),
-                files_weak_q31.design_header(own, name, {"PVID_MAX_P": 3}, "a test", []),
+                files_weak_q31.design_header(one.config, name, {"PVID_MAX_P": 3}, "a test", []),
                 "extern const pvid_weak_config_q31 *const rig_config;",
                 f"const pvid_weak_config_q31 *const rig_config = &{name}_config_q31;",
             ]
@@ -340,40 +326,19 @@ class Core:
         shape = (count, len(design.model.channel), design.highest + 1, 2)
         return out[:count].reshape(shape).astype(np.int64), outcome.astype(np.int64)
 
-    def columns(self, one: Rig, kind: int, theta: Scaled, window: Int) -> tuple[Int, Int, int]:
+    def columns(self, one: Rig, kind: int, theta: Int, window: Int) -> tuple[Int, Int, int]:
         """White columns [thetas + 1, rows] of a kind, their exponents, and how many nuisances were projected out.
 
-        theta : [thetas]; window : S_h [channels, H + 1, 2]
+        theta : m and e [thetas, 2]; window : S_h [channels, H + 1, 2]
         """
         design = one.design
         count = design.model.kind[kind].thetas + 1
-        given = np.ascontiguousarray(np.stack([theta.m, theta.e], axis=-1), np.int32)
+        given = np.ascontiguousarray(theta, np.int32)
         sums = np.ascontiguousarray(window, np.int32)
         x, exponent = (np.zeros((count, design.functions), np.int32), np.zeros(count, np.int32))
         pointers = [ctypes.c_void_p(array.ctypes.data) for array in (given, sums, x, exponent)]
         live = self.library(one).columns(kind, *pointers)
         return x.astype(np.int64), exponent.astype(np.int64), int(live)
-
-    def identify(
-        self, one: Rig, config: WeakConfigQ31, readings: Int, frozen: npt.NDArray[np.uint8] | None = None
-    ) -> tuple[int, Record]:
-        """The status of init, and the state after every tick of readings [samples, ticks]."""
-        given = np.ascontiguousarray(readings.T, np.int32)
-        ticks, model = len(given), one.parameters.model
-        still = np.zeros(ticks, np.uint8) if frozen is None else np.ascontiguousarray(frozen, np.uint8)
-        record = Record(
-            p=np.zeros((ticks, model.n_p), np.int32),
-            sums=np.zeros((ticks, model.n_sums), np.int64),
-            reason=np.zeros(ticks, np.uint8),
-            exponent=np.zeros(ticks, np.uint8),
-            published=np.zeros((ticks, model.n_p), np.int32),
-            published_se=np.zeros((ticks, model.n_p), np.int32),
-        )
-        published = (record.published, record.published_se)
-        arrays = (given, still, record.p, *published, record.sums, record.exponent, record.reason)
-        pointers = [ctypes.c_void_p(array.ctypes.data) for array in arrays]
-        status = self.library(one, config).identify(*pointers, ticks)
-        return int(status), record
 
 
 @cache
