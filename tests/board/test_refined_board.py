@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pvid.board.boards import BOARDS
-from pvid.board.refined_image import RefinedRun, build_refined_image, refined_pendulum, refined_run
+from pvid.board.refined_image import RefinedRun, build_refined_image, published_run, refined_run
 from pvid.board.replay_image import play
 from pvid.settings.enums import Reason
 
@@ -26,7 +26,7 @@ def test_a_board_refines_a_mechanism_with_the_bits_of_this_computer(name: str, t
 
 def test_a_board_refines_the_pendulum_with_dry_friction_and_slant() -> None:
     board = "mps2-an386"
-    _plays(refined_pendulum(6500, BOARDS[board], ("dry_friction", "slant")), board)
+    _plays(published_run("kapitza", 6500, BOARDS[board], ("dry_friction", "slant")), board)
 
 
 def _plays(run: RefinedRun, board: str) -> None:

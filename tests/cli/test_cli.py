@@ -22,7 +22,7 @@ from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a good run (run.csv, 20 bits, 12 s) and its rig file (run.toml)."""
     folder = tmp_path_factory.mktemp("cli")
-    done = pvid(folder, "simulate", "run.csv", "--duration", "12", "--bits", "20", "--truth", "linear")
+    done = pvid(folder, "simulate", "run.csv", "--duration", "12", "--set", "sensor.phi.resolution=6e-6", "--rows")
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -32,7 +32,7 @@ def strong(*arguments: str) -> tuple[str, ...]:
 
 
 def test_simulate_writes_a_run_and_its_rig_file(place: Path) -> None:
-    assert (place / "run.csv").read_text(encoding="utf-8").splitlines()[0].startswith("t,phi,y")
+    assert (place / "run.csv").read_text(encoding="utf-8").splitlines()[0].startswith("t,y,phi")
     assert (place / "run.toml").is_file()
 
 
@@ -176,8 +176,8 @@ def test_a_run_of_two_segments_is_read_and_its_fault_is_named(
         (("identify", "run.csv", "--set", "l3=1"), "'l3' is not a key of the rig file"),
         (("identify", "run.csv", "--columns", "phi=angle:grad"), "'grad' is no unit of phi"),
         (("identify", "run.csv", "--rig", "run.toml", "--core", "f16"), "f16"),
-        (("simulate", "out.csv", "--tone", "loud"), "loud"),
-        (("simulate", "out.csv", "--duration", "-1"), "-1 s"),
+        (("simulate", "out.csv", "--truth", "l3=1"), "the model has no such unknown"),
+        (("simulate", "out.csv", "--duration", "-1"), "-1.0 is not in the range"),
         (("nonsense",), "nonsense"),
         (("identify", "run.csv", "--l1", "0.25"), "l1 is a key of the rig file: use --set known.l1=VALUE"),
         (("plot", "run.csv", "--clock-sd", "0.001"), "use --set clock_sd=VALUE"),
@@ -199,10 +199,9 @@ def test_without_a_command_the_help_is_printed_as_text(tmp_path: Path) -> None:
 
 def test_an_unknown_zero_of_the_encoder_is_found(tmp_path: Path) -> None:
     lsb = 2 * math.pi / 2**14
-    pvid(tmp_path, "simulate", "run.csv", "--zero", "0.02", "--duration", "20")
+    pvid(tmp_path, "simulate", "run.csv", "--truth", "c=0.02", "--duration", "20")
     answer = json.loads(pvid(tmp_path, "identify", "run.csv", "--rig", "run.toml", "--json").stdout)
     assert answer["form"] == "weak"
-    # the encoder's grid lies within half an LSB of the zero, at random
     zero = answer["parameters"]["c"]
     assert zero["value"] == pytest.approx(0.02, abs=lsb)
     assert 0 < zero["se"] < lsb

@@ -208,7 +208,7 @@ def test_both_stages_in_c_identify_a_recording_and_the_answer_is_the_refined_one
 def test_both_stages_in_c_refine_a_pendulum_of_its_own_rig_file(tmp_path: Path) -> None:
     """Full equations: the linear ones of the weak form are 0.5 % off, which its standard errors contain."""
     run = tmp_path / "run.csv"
-    assert pvid("simulate", run, "--duration", "12", "--truth", "full", "--seed", "2").return_value == DONE
+    assert pvid("simulate", run, "--duration", "12", "--seed", "2").return_value == DONE
     shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
     assert shown["refinement"]["adopted"] and list(shown["parameters"])[-3:] == ["k1", "k2", "tau"]
     for name, truth in {**simulated_rig("kapitza").truth, "k1": 0.0, "k2": 0.0, "tau": 0.0}.items():
@@ -262,7 +262,9 @@ def test_the_options_of_a_rig_file_reach_the_second_stage_in_c_and_a_board(tmp_p
 def test_a_small_motion_with_dry_friction_is_refined_behind_the_long_windows_of_its_weak_form(tmp_path: Path) -> None:
     """The windows are chosen from the run, here 4 s; the blocks agree with one another."""
     run = tmp_path / "run.csv"
-    assert pvid("simulate", run, "--dry", "0.0003", "--duration", "20").return_value == DONE
+    assert (
+        pvid("simulate", run, "--truth", "f1=0.0033", "--truth", "f2=0.0033", "--duration", "20").return_value == DONE
+    )
     replace(RigFile.standard(), refine=Refine(dry_friction=True)).write(run.with_suffix(".toml"))
     shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
     assert shown["refinement"]["adopted"] and shown["refinement"]["clash"] < 4.0

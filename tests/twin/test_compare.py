@@ -43,7 +43,7 @@ print(found.equal, found.difference)
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a run and its rig file."""
     folder = tmp_path_factory.mktemp("recorded")
-    assert pvid(folder, "simulate", "run.csv", "--duration", "2", "--bits", "20").returncode == 0
+    assert pvid(folder, "simulate", "run.csv", "--duration", "2", "--set", "sensor.phi.resolution=6e-6").returncode == 0
     return folder
 
 

@@ -12,7 +12,7 @@ from weak_rig import EngineRig, engine_rig
 
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS
-from pvid.board.refined_image import refined_pendulum
+from pvid.board.refined_image import published_run
 from pvid.codegen.refine import RefineFunctions, refine_functions
 from pvid.codegen.weak import weak_model_of
 from pvid.codegen.weak_library import weak_native, weak_sources
@@ -78,7 +78,7 @@ def assert_same(record: RefinedRecord, twin: PrintedTwin, samples: npt.NDArray[n
 )
 def test_the_twin_has_the_bits_of_the_pendulum_with_options(options: tuple[str, ...], ticks: int) -> None:
     """Dry friction of hidden angles, a skew and derived inputs, with steps of Runge-Kutta."""
-    run = refined_pendulum(ticks, BOARDS["mps2-an386"], options)
+    run = published_run("kapitza", ticks, BOARDS["mps2-an386"], options)
     core = run.native()
     sources = weak_sources(run.weak.compiled, run.weak.config.design, run.made)
     record = core.run_both(run.weak.samples)

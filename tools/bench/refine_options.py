@@ -12,7 +12,7 @@ from bench.refine import table_of
 from bench.refine_cases import L1, RELEASE
 from bench.refine_imperfect import BITS, Fault, Published, run_fault, truth_of
 from pvid.board.boards import BOARDS
-from pvid.board.refined_image import build_refined_image, refined_pendulum
+from pvid.board.refined_image import build_refined_image, published_run
 from pvid.board.sizes import REFINED_TICKS, built_engine, measured
 from pvid.sim.pendulum import STANDARD_PENDULUM, standard_sensors
 
@@ -95,7 +95,7 @@ def _motion(dry: float, slant: float) -> dict[str, np.ndarray]:
 def cost_row(options: tuple[str, ...]) -> tuple[str, ...]:
     """Cells as in COST_HEADER: of a motion that has what the options are for."""
     motion = _motion(3e-4 * ("dry_friction" in options), 0.03 * ("slant" in options))
-    run = refined_pendulum(REFINED_TICKS, BOARDS[_BOARD], options, motion)
+    run = published_run("kapitza", REFINED_TICKS, BOARDS[_BOARD], options, motion)
     found, _ = measured(BOARDS[_BOARD], built_engine(*build_refined_image(BOARDS[_BOARD], run), run.weak.name))
     sizes = (found.mean, found.longest, found.data + found.bss, found.stack_bound, found.text + found.arithmetic)
     return " ".join(options) or "none", *map(str, sizes), str(found.tables)

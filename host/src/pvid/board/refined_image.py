@@ -23,9 +23,8 @@ from pvid.codegen import files_refine
 from pvid.codegen.fitted_sizes import fitted_sizes
 from pvid.codegen.refine import RefineFunctions, refine_functions
 from pvid.codegen.weak_library import weak_native
-from pvid.configuration.refine import full_pendulum, refine_settings
+from pvid.configuration.refine import full_motion_of, refine_settings
 from pvid.core.weak_native import RefinedIdentifier
-from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
@@ -67,26 +66,30 @@ def light_work(board: Board) -> dict[str, int]:
     return {"jobs": 3 if board.has_fpu else 1, "rests": 255}
 
 
-def refined_pendulum(
-    ticks: int, board: Board, options: Collection[str] = (), motion: Mapping[str, npt.ArrayLike] | None = None
+def published_run(
+    name: str,
+    ticks: int,
+    board: Board,
+    options: Collection[str] = (),
+    motion: Mapping[str, npt.ArrayLike] | None = None,
 ) -> RefinedRun:
-    """The pendulum's standard rig with its full equations and 14 bits, on which the refinement finds its track; the
-    ticks of the steady state count in the mean, as in mechanism_run, behind the first window in which it is published.
+    """The shipped rig of a mechanism with the equations of its refinement; the ticks of the steady state count in the
+    mean, as in mechanism_run, behind the first window in which a refined estimate is published.
 
     Parameters
     ----------
     options : of the refinement; Runge-Kutta's steps have their usual jobs, with fewer they are too late
-    motion : another one of the rig: phi and y
+    motion : another one of the rig: name of each signal -> samples
 
     Raises
     ------
     PvidError
         Where it is not published within `ticks`.
     """
-    run = refined_run(DEFAULT, ticks, options)
+    run = refined_run(name, ticks, options)
     if not run.made.runge_kutta:
         run = replace(run, settings=replace(run.settings, **light_work(board)))  # type: ignore[arg-type]
-    measured = motion or full_pendulum((ticks + 1) / 1000.0)
+    measured = motion or full_motion_of(run.weak.compiled, ticks / run.weak.config.sample_rate)
     samples = np.stack([np.asarray(measured[one]) for one in run.weak.config.design.model.sample_names], axis=1)[:ticks]
     run = replace(run, weak=replace(run.weak, counts=np.rint(samples / run.weak.lsb).astype(np.int32)))
     published = np.flatnonzero(run.native().run_both(run.weak.samples).told == Reason.UPDATED)

@@ -13,7 +13,7 @@ from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.engine_image import engine_image
-from pvid.board.refined_image import RefinedRun, build_refined_image, refined_pendulum
+from pvid.board.refined_image import RefinedRun, build_refined_image, published_run
 from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
 from pvid.board.stack_bound import stack_bound
 from pvid.models.registry import DEFAULT
@@ -169,7 +169,7 @@ def built_engine(image: Path, tree: Path, name: str) -> BuiltImage:
 @cache
 def refined_replay(board: Board) -> RefinedRun:
     """What the image of the refinement plays on a board."""
-    return refined_pendulum(REFINED_TICKS, board)
+    return published_run(DEFAULT, REFINED_TICKS, board)
 
 
 def _refined(configuration: Configuration) -> BuiltImage:

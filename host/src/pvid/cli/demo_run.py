@@ -20,7 +20,6 @@ from pvid.board.engine_board import verify_recording
 from pvid.board.target import HOST_TARGET, Verdict
 from pvid.compare.bits import Comparison
 from pvid.compare.weak import compare_recording
-from pvid.configuration.refine import full_motion_of
 from pvid.identification.analysis import analysed
 from pvid.identification.answer import Analysis, Value
 from pvid.identification.core import CoreAnswer, identify_in_c
@@ -65,15 +64,11 @@ class Demonstrated:
     def of(cls, model: str, seed: int) -> Demonstrated:
         """Of a shipped mechanism, with its full equations where it has any."""
         rig = simulated_rig(model)
-        simulation = RigSimulation.of(compiled_of(model), rig)
+        simulation = RigSimulation.of(compiled_of(model), rig, whole=True)
         own = _guessed(model, rig, simulation, seed)
         compiled = own.compiled()
-        if compiled.refinement.equations:
-            signals = {name: np.asarray(one, np.float64) for name, one in full_motion_of(compiled).items()}
-            t = np.arange(len(next(iter(signals.values())))) / rig.sample_rate
-        else:
-            run = simulation.run(seed)
-            t, signals = run["t"], {one.name: run[one.name] for one in compiled.signals}
+        signals = simulation.run(seed)
+        t = signals.pop("t")
         recording = Recording(t, signals, rig.sample_rate)
         truth = {**outputs_at(compiled, simulation.truth), **dict(zip(compiled.p_names, simulation.truth, strict=True))}
         return cls(own, recording, truth, analysed(recording, compiled))

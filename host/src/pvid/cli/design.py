@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,6 @@ import click
 
 from pvid.base.errors import PvidError
 from pvid.cli.input import columns_option, rig_options
-from pvid.cli.simulate import tone
 from pvid.log.rig_choice import rig_of
 from pvid.models.registry import names
 from pvid.models.simulated_rig import simulated_rig
@@ -79,7 +79,7 @@ def command(
     if duration is not None and not 0 < duration < float("inf"):
         raise PvidError(f"the duration must be a positive number of seconds, not {duration:g}")
     asked = _asked(target, core, refine=refine, clock=clock)
-    drive = tuple(tone(text) for text in tones)
+    drive = [_tone(text) for text in tones]
     if model in names() and not (rig_path or settings or run_path or drive or duration):
         return print_design(compiled_of(model), None, asked, as_json=as_json)
     rig = rig_of(run_path, rig_path, settings, model, columns)
@@ -88,8 +88,19 @@ def command(
         return print_design(compiled, recording, asked, as_json=as_json)
     if rig.sample_rate is None and rig.model in names():
         rig = replace(rig, sample_rate=simulated_rig(str(rig.model)).sample_rate)
-    made = nominal_run(rig, [(one.amplitude_m, one.frequency_hz, one.phase_rad) for one in drive], duration)
+    made = nominal_run(rig, drive, duration)
     return print_design(made.compiled, made.recording, asked, as_json=as_json)
+
+
+def _tone(text: str) -> tuple[float, float, float]:
+    """Amplitude, frequency and phase of a sine."""
+    try:
+        amplitude, frequency, phase = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} is not AMPLITUDE,FREQUENCY_HZ,PHASE_RAD") from error
+    if not isfinite(amplitude + frequency + phase) or frequency < 0:
+        raise click.BadParameter(f"{text!r} needs finite numbers and a frequency >= 0")
+    return amplitude, frequency, phase
 
 
 def _asked(target: str | None, core: Core | None, *, refine: bool, clock: float | None) -> Asked | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,27 +13,19 @@ from rich.table import Table
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar, write_stderr
 from pvid.base.errors import PvidError
-from pvid.cli.input import NewFile, columns_option, force_option
+from pvid.cli.input import columns_option, force_option
 from pvid.cli.rig_design import model_of_rig, recorded
+from pvid.cli.simulate import ABOVE_0, numbers, of_model, start_option
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
     from pvid.codegen.weak_q31 import FixedEngine
     from pvid.model.compiled import CompiledModel
-    from pvid.models.simulated_rig import SimulatedRig
     from pvid.rig.run import Recording
     from pvid.settings.refine import RefineConfig
     from pvid.settings.strong import StrongModelConfig
     from pvid.settings.weak import WeakConfig
 
 _MODEL = click.argument("model", metavar="MODEL")
-_ABOVE_0 = click.FloatRange(min=0.0, min_open=True)
-_START = click.option(
-    "--start",
-    "starts",
-    multiple=True,
-    metavar="STATE=VALUE",
-    help="Coordinate or rate at the first sample, as in q=0.5 or q_1=2; repeatable.  [default: the rig's; 0]",
-)
 
 
 @click.group(name="model")
@@ -44,6 +35,9 @@ def command() -> None:
     MODEL is one of the list of `pvid models`, or the path of a model file: a Python file of some ten lines that leaves
     a variable `model` (host/docs/models.md).
     """
+
+
+command.add_command(of_model)
 
 
 @command.command()
@@ -70,9 +64,9 @@ def check(model: str) -> int:
 @click.option("--drive", "only", help="Only this drive.  [default: each of the list]")
 @click.option("--band", nargs=2, type=float, help="Of the drives [Hz].  [default: 10/duration to rate/50]")
 @click.option("--share", default=0.5, show_default=True, help="Largest value of a drive over the reach of its signal.")
-@click.option("--duration", type=_ABOVE_0, help="Of a run [s].  [default: the rig's, 20]")
-@click.option("--rate", type=_ABOVE_0, help="Sample rate [Hz].  [default: the rig's, 1000]")
-@_START
+@click.option("--duration", type=ABOVE_0, help="Of a run [s].  [default: the rig's, 20]")
+@click.option("--rate", type=ABOVE_0, help="Sample rate [Hz].  [default: the rig's, 1000]")
+@start_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def predict(
     model: str,
@@ -103,7 +97,7 @@ def predict(
     length = duration or (own.duration if own else 20.0)
     hz = rate or (own.sample_rate if own else 1000.0)
     low, high = band or (10 / length, hz / 50)
-    start = _numbers(starts, "--start", "--start q=0.5")
+    start = numbers(starts, "--start", "--start q=0.5")
     names = [only] if only else list(DRIVES)
     drive_named(names[0], 1.0, low, high)  # a wrong name or band is refused before anything is simulated
     driven = any(one.driven or one.kind == "input" for one in compiled.signals)
@@ -151,13 +145,13 @@ def predict(
 @click.option("--reach", "reaches", multiple=True, metavar="INPUT=VALUE", help="Fixed point: largest |INPUT|.")
 @click.option(
     "--bandwidth",
-    type=_ABOVE_0,
+    type=ABOVE_0,
     default=10.0,
     show_default=True,
     help="Fixed point: of the signals [Hz], for derivatives.",
 )
 @click.option(
-    "--window", type=_ABOVE_0, default=2.0, show_default=True, help="Fixed point: of integrals since its start [s]."
+    "--window", type=ABOVE_0, default=2.0, show_default=True, help="Fixed point: of integrals since its start [s]."
 )
 @click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="Rig file, whose values are the model's.")
 @click.option("--run", "run_path", type=click.Path(path_type=Path), help="A recording of the rig, for its design.")
@@ -201,8 +195,8 @@ def build(
     if recording is not None:
         compiled = with_edges(compiled, recording.signals, recording.sample_rate)
     design = _design_of(compiled, model, recording, functions)
-    limits = Reaches(bandwidth, window, of=_numbers(reaches, "--reach"))
-    soft = _numbers(soft_signs, "--soft-sign")
+    limits = Reaches(bandwidth, window, of=numbers(reaches, "--reach"))
+    soft = numbers(soft_signs, "--soft-sign")
     given = [*(["--strong"] if strong else []), *(f"--soft-sign {one}" for one in soft_signs)]
     given += [f"--reach {one}" for one in reaches]
     usual = Reaches()
@@ -247,94 +241,6 @@ def build(
         return DIFFERENT
     click.echo(f"{out}: as generated")
     return DONE
-
-
-@command.command()
-@_MODEL
-@click.argument("out", type=NewFile())
-@click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.")
-@click.option("--duration", type=_ABOVE_0, help="Length [s].  [default: the rig's; of a model file 20]")
-@click.option("--rate", type=_ABOVE_0, help="Sample rate [Hz].  [default: the rig's; of a model file 1000]")
-@click.option("--drive", help="A drive of `model predict`.  [default: the rig's; of a model file steps]")
-@click.option(
-    "--truth",
-    "truths",
-    multiple=True,
-    metavar="UNKNOWN=VALUE",
-    help="Its true value; repeatable.  [default: the rig's; of a model file the guess]",
-)
-@_START
-@click.option("--friction", type=click.Choice(["sharp", "soft"]), default="sharp", show_default=True)
-@click.option("--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp.")
-@click.option(
-    "--imperfect",
-    "imperfect",
-    multiple=True,
-    metavar="KIND.SIGNAL=SIZE",
-    help="backlash or eccentricity [LSB], skew [s], gain [true over recorded]; repeatable.",
-)
-@force_option
-def simulate(
-    model: str,
-    out: Path,
-    seed: int,
-    duration: float | None,
-    rate: float | None,
-    drive: str | None,
-    truths: tuple[str, ...],
-    starts: tuple[str, ...],
-    friction: str,
-    stiction: float,
-    imperfect: tuple[str, ...],
-) -> int:
-    """Simulates a rig of MODEL with its sensors; writes the run OUT and its rig file.
-
-    Of a shipped mechanism it is the shipped rig. Of a model file it is one at rest, whose inputs follow a drive within
-    half their reach.
-    """
-    from pvid.models.mechanisms import compiled_of
-    from pvid.models.registry import asked_for
-    from pvid.sim.imperfections import Imperfections, sizes_of
-    from pvid.sim.simulated_run import RigSimulation, write_simulated_run
-
-    compiled = compiled_of(asked_for(model))
-    rig = _rig_to_simulate(compiled, model, duration, rate, drive)
-    true = _numbers(truths, "--truth", "--truth m=1.3")
-    for name in true:
-        if name not in compiled.p_names:
-            raise PvidError(f"--truth {name}: the model has no such unknown; it has {', '.join(compiled.p_names)}")
-    start = _numbers(starts, "--start", "--start q=0.5")
-    rig = replace(rig, truth={**rig.truth, **true}, start={**rig.start, **start})
-    law = Imperfections("sharp" if friction == "sharp" else "soft", stiction, **sizes_of(imperfect))
-    simulation = RigSimulation.of(compiled, rig)
-    run = simulation.run(seed, law)
-    settings = write_simulated_run(out, run, simulation, _name_beside(out, model))
-    write_stderr(f"{out}: {simulation.samples} samples of {', '.join(run)}; rig file {settings}")
-    return DONE
-
-
-def _rig_to_simulate(
-    compiled: CompiledModel, model: str, duration: float | None, rate: float | None, drive: str | None
-) -> SimulatedRig:
-    """The shipped rig, or one of the guesses at rest with a drive of the list."""
-    from pvid.models.mechanisms import names as names_of_shipped
-    from pvid.models.simulated_rig import simulated_rig
-    from pvid.sim.simulated_run import rig_of_guess
-
-    if model in names_of_shipped():
-        rig = simulated_rig(compiled.name)
-        rig = replace(rig, duration=duration or rig.duration, sample_rate=rate or rig.sample_rate)
-        if drive is None:
-            return rig
-        length, hz = rig.duration, rig.sample_rate
-        return replace(rig, drive=rig_of_guess(compiled, drive, 10 / length, hz / 50, rate=hz, duration=length).drive)
-    length, hz = duration or 20.0, rate or 1000.0
-    return rig_of_guess(compiled, drive or "steps", 10 / length, hz / 50, rate=hz, duration=length)
-
-
-def _name_beside(out: Path, model: str) -> str:
-    """A mechanism's name, or the path of a model file from the folder of the rig file."""
-    return os.path.relpath(model, out.parent) if model.endswith(".py") else model
 
 
 def _strong_design_of(compiled: CompiledModel, model: str, recording: Recording | None) -> StrongModelConfig | None:
@@ -404,21 +310,3 @@ def _fixed_engine(
         return engine_for_recording(compiled, recording, functions, soft_signs), None
     except PvidError as error:
         return None, str(error)
-
-
-def _numbers(given: tuple[str, ...], option: str, example: str = "--reach phi_1=40") -> dict[str, float]:
-    """NAME=VALUE, several times.
-
-    Raises
-    ------
-    PvidError
-        Where one is not of this kind.
-    """
-    found = {}
-    for one in given:
-        name, _, value = one.partition("=")
-        try:
-            found[name] = float(value)
-        except ValueError as error:
-            raise PvidError(f"{option} {one}: write NAME=VALUE, as in {example}") from error
-    return found

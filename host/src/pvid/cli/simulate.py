@@ -1,117 +1,177 @@
-"""`pvid simulate`."""
+"""`pvid simulate`, and `pvid model simulate`: a run of a simulated rig, with its rig file."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from pvid.base.console import DONE, write_stderr
-from pvid.base.replacing import refuse_foreign
+from pvid.base.errors import PvidError
 from pvid.cli.input import NewFile, force_option
-from pvid.rig.file import rig_path_of
-from pvid.rig.mechanism_file import MechanismRig
-from pvid.rig.run import write_run
-from pvid.sim.pendulum import (
-    STANDARD_DRIVE,
-    STANDARD_PENDULUM,
-    STANDARD_RELEASE,
-    Pendulum,
-    Sensors,
-    Tone,
-    simulate,
-    standard_sensors,
+from pvid.models.registry import DEFAULT, asked_for
+from pvid.models.registry import names as names_of_shipped
+from pvid.rig.mechanism_file import MechanismRig, with_settings
+
+if TYPE_CHECKING:  # SymPy takes a third of a second to load
+    from pvid.model.compiled import CompiledModel
+    from pvid.models.simulated_rig import SimulatedRig
+
+ABOVE_0 = click.FloatRange(min=0.0, min_open=True)
+start_option = click.option(
+    "--start",
+    "starts",
+    multiple=True,
+    metavar="STATE=VALUE",
+    help="Coordinate or rate at the first sample, as in q=0.5 or q_1=2; repeatable.  [default: the rig's; 0]",
+)
+_OUT = click.argument("out", type=NewFile())
+_LAW = click.option("--friction", type=click.Choice(["sharp", "soft"]), default="sharp", show_default=True)
+_OPTIONS = (
+    click.option("--seed", default=0, show_default=True, help="Of the sensors' noise.", type=click.IntRange(min=0)),
+    click.option("--duration", type=ABOVE_0, help="Length [s].  [default: the rig's; of a model file 20]"),
+    click.option("--rate", type=ABOVE_0, help="Sample rate [Hz].  [default: the rig's; of a model file 1000]"),
+    click.option("--drive", help="A drive of `model predict`.  [default: the rig's; of a model file steps]"),
+    click.option(
+        "--truth",
+        "truths",
+        multiple=True,
+        metavar="UNKNOWN=VALUE",
+        help="Its true value; repeatable.  [default: the rig's; of a model file the guess; of a refined parameter 0]",
+    ),
+    start_option,
+    click.option(
+        "--set",
+        "settings",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="A key of the rig file, as in sensor.phi.resolution=1e-3; repeatable.",
+    ),
+    click.option(
+        "--rows",
+        is_flag=True,
+        help="Simulate the equations of the rows, where the second stage has equations of its own.",
+    ),
+    _LAW,
+    click.option(
+        "--stiction", default=1.0, show_default=True, help="Friction at rest over that of sliding; needs sharp."
+    ),
+    click.option(
+        "--imperfect",
+        "imperfect",
+        multiple=True,
+        metavar="KIND.SIGNAL=SIZE",
+        help="backlash or eccentricity [LSB], skew [s], gain [true over recorded]; repeatable.",
+    ),
+    force_option,
 )
 
 
-def tone(text: str) -> Tone:
-    try:
-        amplitude, frequency, phase = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r} is not AMPLITUDE_M,FREQUENCY_HZ,PHASE_RAD") from error
-    return Tone(amplitude, frequency, phase)
+def _with_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    for option in reversed(_OPTIONS):
+        function = option(function)
+    return function
 
 
 @click.command(name="simulate")
-@click.argument("out", type=NewFile())
-@click.option("--duration", default=40.0, show_default=True, help="Length [s].")
-@click.option("--rate", default=1000.0, show_default=True, help="Sample rate [Hz].")
-@click.option("--truth", type=click.Choice(["linear", "full"]), default="full", show_default=True)
-@click.option("--bits", default=14, show_default=True, type=click.IntRange(4, 32), help="Encoder resolution.")
-@click.option("--exact", is_flag=True, help="Perfect sensors: no quantisation, no noise, no offset.")
-@click.option("--noise", type=float, help="White noise of the encoder [LSB].  [default: 0.5]")
-@click.option("--zero", default=0.0, show_default=True, help="Offset of the encoder [rad].")
-@click.option("--skew", default=0.0, show_default=True, help="Delay of the pivot's sample behind the encoder's [s].")
-@click.option("--tone", "tones", multiple=True, metavar="A,F,PHASE", help="Drive tone [m,Hz,rad]; repeatable.")
-@click.option(
-    "--release",
-    nargs=2,
-    type=float,
-    default=STANDARD_RELEASE,
-    show_default=True,
-    help="Initial phi1, phi1+phi [rad].",
-)
-@click.option("--l1", default=STANDARD_PENDULUM.l1, show_default=True, help="Length of rod 1 [m].")
-@click.option("--l2", default=STANDARD_PENDULUM.l2, show_default=True, help="Joint to centre of mass of body 2 [m].")
-@click.option("--rho2", default=STANDARD_PENDULUM.rho2, show_default=True, help="Radius of gyration of body 2 [m].")
-@click.option("--gravity", default=STANDARD_PENDULUM.g, show_default=True, help="Gravity [m/s^2].")
-@click.option("--tilt", default=0.0, show_default=True, help="Tilt of the plane of motion [rad].")
-@click.option(
-    "--damping", default=0.0, show_default=True, help="Viscous friction of both joints per unit mass [m^2/s]."
-)
-@click.option("--dry", default=0.0, show_default=True, help="Dry friction of both joints per unit mass [m^2/s^2].")
-@click.option("--slant", default=0.0, show_default=True, help="Of the pivot's slide against the vertical [rad].")
-@click.option("--seed", default=0, show_default=True)
-@click.option("--rig", "rig_out", type=NewFile(), help="Rig file to write.  [default: OUT with .toml]")
-@force_option
-def command(**options: Any) -> int:
-    """Simulates a rig; writes the run OUT (.csv, .csv.gz, .npz, .parquet) and its rig file."""
-    pendulum = Pendulum(
-        l1=options["l1"],
-        l2=options["l2"],
-        rho2=options["rho2"],
-        g=options["gravity"],
-        damping1=options["damping"],
-        damping2=options["damping"],
-        dry1=options["dry"],
-        dry2=options["dry"],
-        slant=options["slant"],
-    ).tilted(options["tilt"])
-    sensors = standard_sensors(options["bits"])
-    if options["exact"]:
-        sensors = Sensors()
-    if options["noise"] is not None:
-        sensors = replace(sensors, phi_noise_lsb=options["noise"])
-    sensors = replace(sensors, phi_zero=options["zero"], skew_s=options["skew"])
-    drive = tuple(tone(text) for text in options["tones"]) or STANDARD_DRIVE
-    simulation = simulate(
-        pendulum=pendulum,
-        drive=drive,
-        sensors=sensors,
-        sample_rate=options["rate"],
-        duration=options["duration"],
-        release=tuple(options["release"]),
-        truth=options["truth"],
-        seed=options["seed"],
-    )
-    out: Path = options["out"]
-    rig_path: Path = options["rig_out"] or rig_path_of(out)
-    refuse_foreign(rig_path)
-    write_run(out, simulation.run)
-    exact = {"gain_sd": 0.0} | ({"resolution": sensors.y_lsb} if sensors.y_lsb else {})
-    angle = {"resolution": sensors.phi_lsb} if sensors.phi_lsb else {}
-    rig = MechanismRig(
-        "kapitza",
-        options["rate"],
-        known={"l1": pendulum.l1},
-        sensor={"phi": angle, "y": exact},
-        known_sd={"l1": 0.0},
-        clock_sd=0.0,
-    )
-    rig.write(rig_path)
-    largest = float(np.abs(simulation.run.phi).max())
-    write_stderr(f"{out}: {len(simulation.run.t)} samples, |phi| up to {largest:.3f} rad; rig file {rig_path}")
+@_OUT
+@click.option("--model", default=DEFAULT, show_default=True, help="A mechanism of `pvid models`, or a model file.")
+@_with_options
+def command(model: str, out: Path, **options: Any) -> int:
+    """Simulates a rig with its sensors; writes the run OUT (.csv, .csv.gz, .npz, .parquet) and its rig file."""
+    return _simulate(model, out, **options)
+
+
+@click.command(name="simulate")
+@click.argument("model", metavar="MODEL")
+@_OUT
+@_with_options
+def of_model(model: str, out: Path, **options: Any) -> int:
+    """Simulates a rig of MODEL with its sensors; writes the run OUT and its rig file.
+
+    Of a shipped mechanism it is the shipped rig. Of a model file it is one at rest, whose inputs follow a drive within
+    half their reach.
+    """
+    return _simulate(model, out, **options)
+
+
+def _simulate(
+    model: str,
+    out: Path,
+    seed: int,
+    duration: float | None,
+    rate: float | None,
+    drive: str | None,
+    truths: tuple[str, ...],
+    starts: tuple[str, ...],
+    settings: tuple[str, ...],
+    rows: bool,
+    friction: str,
+    stiction: float,
+    imperfect: tuple[str, ...],
+) -> int:
+    from pvid.sim.imperfections import Imperfections, sizes_of
+    from pvid.sim.simulated_run import RigSimulation, write_simulated_run
+
+    own = MechanismRig.of_document(with_settings({}, settings), asked_for(model))
+    compiled = own.compiled()
+    rig = _rig_to_simulate(compiled, model, duration, rate, drive)
+    true = numbers(truths, "--truth", "--truth m=1.3")
+    known = [*compiled.p_names, *(() if rows else (one.name for one in compiled.refinement.extras))]
+    for name in true:
+        if name not in known:
+            raise PvidError(f"--truth {name}: the model has no such unknown; it has {', '.join(known)}")
+    start = numbers(starts, "--start", "--start q=0.5")
+    whole_start = {**rig.whole_start, **start}
+    rig = replace(rig, truth={**rig.truth, **true}, start={**rig.start, **start}, whole_start=whole_start)
+    law = Imperfections("sharp" if friction == "sharp" else "soft", stiction, **sizes_of(imperfect))
+    simulation = RigSimulation.of(compiled, rig, whole=not rows)
+    run = simulation.run(seed, law)
+    written = write_simulated_run(out, run, simulation, _name_beside(out, model), own.sensor)
+    write_stderr(f"{out}: {simulation.samples} samples of {', '.join(run)}; rig file {written}")
     return DONE
+
+
+def _rig_to_simulate(
+    compiled: CompiledModel, model: str, duration: float | None, rate: float | None, drive: str | None
+) -> SimulatedRig:
+    """The shipped rig, or one of the guesses at rest with a drive of the list."""
+    from pvid.models.simulated_rig import simulated_rig
+    from pvid.sim.simulated_run import rig_of_guess
+
+    if model in names_of_shipped():
+        rig = simulated_rig(compiled.name)
+        rig = replace(rig, duration=duration or rig.duration, sample_rate=rate or rig.sample_rate)
+        if drive is None:
+            return rig
+        length, hz = rig.duration, rig.sample_rate
+        return replace(rig, drive=rig_of_guess(compiled, drive, 10 / length, hz / 50, rate=hz, duration=length).drive)
+    length, hz = duration or 20.0, rate or 1000.0
+    return rig_of_guess(compiled, drive or "steps", 10 / length, hz / 50, rate=hz, duration=length)
+
+
+def _name_beside(out: Path, model: str) -> str:
+    """A mechanism's name, or the path of a model file from the folder of the rig file."""
+    return os.path.relpath(model, out.parent) if model.endswith(".py") else model
+
+
+def numbers(given: tuple[str, ...], option: str, example: str = "--reach phi_1=40") -> dict[str, float]:
+    """NAME=VALUE, several times.
+
+    Raises
+    ------
+    PvidError
+        Where one is not of this kind.
+    """
+    found = {}
+    for one in given:
+        name, _, value = one.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError as error:
+            raise PvidError(f"{option} {one}: write NAME=VALUE, as in {example}") from error
+    return found

@@ -21,10 +21,10 @@ from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Integral, Jet, jets
 from pvid.models.kapitza.refinement import PARAMETERS
-from pvid.models.registry import DEFAULT
+from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.refine import BIG_STEP, RefineConfig, RefineRig, RefineSignal
 from pvid.settings.weak import Source, WeakConfig
-from pvid.sim.pendulum import simulate, standard_sensors
+from pvid.sim.simulated_run import RigSimulation
 
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
@@ -92,16 +92,10 @@ def refine_for_simulated_rig(
     return refine_design(compiled, config, run, p, soft_signs)
 
 
-def full_motion_of(compiled: CompiledModel) -> Run:
-    """A run of the shipped rig of a mechanism with the equations of its refinement: of the pendulum the full ones, the
-    other mechanisms have no others."""
-    return full_pendulum() if compiled.name == DEFAULT else simulated_run_of(compiled)[0]
-
-
-def full_pendulum(duration: float = 40.0) -> dict[str, Float]:
-    """The standard rig with its full equations and an encoder of 14 bits: name of each signal -> samples."""
-    found = simulate(sensors=standard_sensors(14), truth="full", duration=duration, seed=1).run
-    return {"phi": found.phi, "y": found.y}
+def full_motion_of(compiled: CompiledModel, duration: float | None = None) -> Run:
+    """A run of the shipped rig of a mechanism with the equations of its refinement; duration [s], None: the rig's."""
+    rig = simulated_rig(compiled.name)
+    return RigSimulation.of(compiled, replace(rig, duration=duration or rig.duration), whole=True).run()
 
 
 def refine_settings(

@@ -34,9 +34,10 @@ class SimulatedRig:
     Attributes
     ----------
     model : name of the mechanism
-    truth : value of each unknown
+    truth : value of each unknown, and of refined parameters that are not 0
     drive : of each driven signal: a function of time or a servo
     start : initial value by jet, as in a (angle) or a_1 (its rate); 0 where none is given
+    whole_start : the same start in the coordinates of the refinement's own equations
     sample_rate : [Hz]
     duration : [s]
     substeps : steps of the integration in a sample
@@ -52,6 +53,7 @@ class SimulatedRig:
     truth: Mapping[str, float]
     drive: Mapping[str, Drive | Servo]
     start: Mapping[str, float] = field(default_factory=dict)
+    whole_start: Mapping[str, float] = field(default_factory=dict)
     sample_rate: float = 1000.0
     duration: float = 20.0
     substeps: int = 10

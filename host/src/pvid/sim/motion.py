@@ -8,12 +8,12 @@ state, but an entry of h.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from pvid.base.errors import PvidError
-from pvid.model.compiled import CompiledModel
+from pvid.model.compiled import CompiledModel, Known
 from pvid.model.signals import TIME, Integral, Jet, jets, sgn
 
 
@@ -98,6 +98,20 @@ def motion_of(model: CompiledModel) -> Motion:
         arguments=arguments,
         slopes=sp.Matrix(len(arguments), len(states), lambda i, j: sp.diff(arguments[i], states[j])),
     )
+
+
+def with_whole_equations(model: CompiledModel) -> CompiledModel:
+    """The model with the equations of its refinement, where it has its own; its refined parameters are knowns of value
+    0."""
+    own = model.refinement
+    if not own.equations:
+        return model
+    equations = tuple(one.xreplace(dict(own.shapes)).xreplace(dict(model.opaque)) for one in own.equations)
+    recorded = {one.name for one in model.signals}
+    coordinates = dict.fromkeys(jet.of for one in equations for jet in sorted(jets(one), key=str))
+    hidden = tuple(Jet(name) for name in coordinates if name not in recorded)
+    refined = tuple(Known(one.symbol, one.unit, 0.0) for one in own.extras)
+    return replace(model, equations=equations, hidden=hidden, knowns=model.knowns + refined)
 
 
 def _without_integrals(

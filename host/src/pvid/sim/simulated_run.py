@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.base.replacing import refuse_foreign
 from pvid.model.compiled import CompiledModel, Signal
+from pvid.model.evaluation import numpy_function
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
 from pvid.rig.file import rig_path_of
@@ -21,6 +23,7 @@ from pvid.rig.mechanism_file import MechanismRig, channels_of
 from pvid.rig.run import Recording, write_recording
 from pvid.sim.drives import drive_named
 from pvid.sim.imperfections import Imperfections, disturbance, eccentric, with_play
+from pvid.sim.motion import with_whole_equations
 from pvid.sim.plant import Control, Friction, Plant, Trajectory
 from pvid.sim.sensing import sensed
 
@@ -36,25 +39,35 @@ class RigSimulation:
     """A rig ready to run: its model, its plant, its numbers.
 
     linearised : signals for whose small values the equations hold; the simulation takes these for exact
+    whole : with the equations of the model's refinement, where it has its own
     """
 
     model: CompiledModel
     rig: SimulatedRig
     plant: Plant
     linearised: tuple[str, ...] = ()
+    whole: bool = False
     _motions: dict[Any, Trajectory] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, model: CompiledModel, rig: SimulatedRig) -> RigSimulation:
-        """PvidError where the rig does not give every unknown a value."""
+    def of(cls, model: CompiledModel, rig: SimulatedRig, *, whole: bool = False) -> RigSimulation:
+        """Of a rig; PvidError where it does not give every unknown a value.
+
+        whole : with the equations of the refinement, if the model has such; the rows then neglect what they neglect
+        """
+        whole = whole and bool(model.refinement.equations)
         missing = [name for name in model.p_names if name not in rig.truth]
         if missing:
             raise PvidError(f"the simulated rig of {model.name} gives no value of {', '.join(missing)}")
         # A simulation is exact: it has no error of a gain or a clock, and its equations are those of the model.
-        exact = tuple(replace(one, gain_sd=0.0, neglected=0.0) for one in model.signals)
-        linearised = tuple(one.name for one in model.signals if one.neglected)
+        linearised = () if whole else tuple(one.name for one in model.signals if one.neglected)
+        exact = tuple(
+            replace(one, gain_sd=0.0, neglected=0.0 if one.name in linearised else one.neglected)
+            for one in model.signals
+        )
         knowns = tuple(replace(one, sd=0.0) for one in model.knowns)
-        return cls(replace(model, signals=exact, knowns=knowns, clock_sd=0.0), rig, Plant(model), linearised)
+        plant = Plant(with_whole_equations(model) if whole else model)
+        return cls(replace(model, signals=exact, knowns=knowns, clock_sd=0.0), rig, plant, linearised, whole)
 
     @property
     def truth(self) -> Float:
@@ -121,10 +134,24 @@ class RigSimulation:
         drive = self.rig.drive.get(signal.name)
         if drive is not None and not isinstance(drive, Servo):
             return drive.values(motion.t)
+        if self.whole and signal.name in self.model.refinement.outputs:
+            return self._reading(self.model.refinement.outputs[signal.name], motion)
         try:
             return motion[signal.name]
         except KeyError as error:
             raise PvidError(f"no equation of {self.model.name} contains {signal.name}") from error
+
+    def _reading(self, output: sp.Expr, motion: Trajectory) -> Float:
+        """What an output of the refinement measures, at the times of the motion."""
+        constants = zip(motion.motion.constants, self._constants.tolist(), strict=True)
+        value = output.xreplace(dict(self.model.refinement.shapes)).xreplace(dict(constants))
+        names = sorted(value.free_symbols, key=str)
+        return np.asarray(numpy_function(names, value)(*(motion[str(one)] for one in names)), np.float64)
+
+    @property
+    def _constants(self) -> Float:
+        """Of the plant: the unknowns, then the knowns."""
+        return self.plant.constants(self.truth, {**self.rig.truth, **self.rig.knowns})
 
     def _imperfect(self, signal: Signal, values: Float, imperfections: Imperfections) -> Float:
         name = signal.name
@@ -138,7 +165,6 @@ class RigSimulation:
 
     def _moved(self, imperfections: Imperfections, seed: int, every_step: bool) -> Trajectory:
         plant, rig = self.plant, self.rig
-        constants = plant.constants(self.truth, rig.knowns)
         servos = {name: one for name, one in rig.drive.items() if isinstance(one, Servo)}
         noise = disturbance(imperfections.process, plant.shape[2], self.samples, rig.sample_rate, seed)
         driven = {jet.of for jet in plant.motion.inputs}
@@ -149,7 +175,7 @@ class RigSimulation:
             "every_step": every_step,
             "gains": {name: gain for name, gain in imperfections.gain.items() if name in driven},
         }
-        start = plant.start(rig.start)
+        constants, start = self._constants, plant.start(rig.whole_start if self.whole else rig.start)
         if not servos:
             drives = {name: one for name, one in rig.drive.items() if not isinstance(one, Servo)}
             return plant.driven(constants, start, drives, rig.sample_rate, self.samples, **given)
@@ -227,10 +253,16 @@ def rig_of_guess(
     )
 
 
-def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSimulation, name: str = "") -> Path:
+def write_simulated_run(
+    path: Path,
+    run: Mapping[str, Float],
+    simulation: RigSimulation,
+    name: str = "",
+    sensor: Mapping[str, Mapping[str, float]] | None = None,
+) -> Path:
     """Writes a run (the suffix gives the format) and beside it its rig file, whose path is returned.
 
-    `name` of the model in the rig file; default: that of the model.
+    `name` of the model in the rig file; default: that of the model. `sensor`: what the rig file states of its sensors.
     """
     model, rate = simulation.model, simulation.rig.sample_rate
     signals = {one.name: run[one.name] for one in model.signals}
@@ -239,6 +271,7 @@ def write_simulated_run(path: Path, run: Mapping[str, Float], simulation: RigSim
     write_recording(path, Recording(run["t"], signals, rate), channels_of(model))
     exact = {one.name: {"gain_sd": 0.0} for one in model.signals if one.driven or one.unit != "rad"}
     exact |= {name: {"neglected": 0.0} for name in simulation.linearised}
+    exact = {one: {**(sensor or {}).get(one, {}), **exact.get(one, {})} for one in {**(sensor or {}), **exact}}
     known = {one.name: one.value for one in model.knowns if one.required} | dict(simulation.rig.knowns)
     known_sd = {one.name: 0.0 for one in simulation.plant.model.knowns if one.sd}
     rig = MechanismRig(name or model.name, rate, known=known, sensor=exact, known_sd=known_sd, clock_sd=0.0)
