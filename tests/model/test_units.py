@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pvid.base.errors import PvidError
-from pvid.model import Model, cos, sin
+from pvid.model import Model, cos, sin, units
 from pvid.model.units import dimension_of_unit
 
 FINE = 1e-4
@@ -84,3 +84,10 @@ def test_units_of_outputs_and_of_a_lagrangian_are_checked() -> None:
     model.output("w", "rad/s", (g / j) ** 0.5)
     model.lagrange(j * q.d() ** 2 / 2 + g * cos(q), [q], [u])
     assert len(model.compiled().rows) == 1
+
+
+@pytest.mark.parametrize("name", sorted(units._COHERENT))
+def test_coherent_units_are_those_of_sympy(name: str) -> None:
+    """The table that spares loading them."""
+    if name not in ("Ohm", "count"):
+        assert units._of_sympy(name) == (dimension_of_unit(name), 1)

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from pvid.base.errors import PvidError
 from pvid.model import Model, sgn
-from pvid.models.mechanisms import compiled_of
+from pvid.models.mechanisms import compiled_of, names
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak import choice
-from pvid.oracle.weak.choice import lengths, power_of, ranked
+from pvid.oracle.weak.choice import basis_of, lengths, made, power_of, ranked
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import identify, ready
-from pvid.oracle.weak.rows import WeakRows
+from pvid.oracle.weak.rows import Compiled, WeakRows, record_of
 from pvid.oracle.weak.solve import batch
 from pvid.oracle.weak.whitener import Whitener
 from pvid.sim.imperfections import Imperfections
-from pvid.sim.simulated_run import RigSimulation
+from pvid.sim.simulated_run import RigSimulation, simulation_of
+
+Float = npt.NDArray[np.float64]
 
 
 def test_the_best_design_by_score_is_near_the_best_by_truth() -> None:
@@ -166,3 +170,53 @@ def test_a_torque_that_is_a_law_of_the_angle_is_named_as_feedback() -> None:
     assert "feedback" in [one.name for one in bad.verdict.reasons if one.alarm]
     good = identify(model, driven(feedback_only=False), 1000.0, design=design)
     assert "feedback" not in [one.name for one in good.verdict.reasons]
+
+
+@pytest.mark.parametrize("name", names())
+def test_what_a_changed_signal_leaves_alone_is_taken_from_the_run_before(name: str) -> None:
+    """Columns of a run with one other signal: as of a model that has seen no run before."""
+    simulation = simulation_of(name)
+    run = {key: x[:4000] for key, x in simulation.run(1).items()}
+    changed = [run | {key: x * (1 + 1e-2 * np.sin(np.arange(x.size)))} for key, x in run.items()]
+    design = basis_of(ready(simulation.model), simulation.rig.sample_rate)
+
+    def columns(model: Compiled, of: dict[str, Float]) -> list[Float]:
+        return record_of(model, of, design).columns(design.test_functions)
+
+    model = Compiled(simulation.model)
+    rows = WeakRows.of(model, run, design)
+    assert model.channels.last is rows.record
+    for one in (run, *changed):
+        for found, alone in zip(columns(model, one), columns(Compiled(simulation.model), one), strict=True):
+            np.testing.assert_allclose(found, alone, rtol=0, atol=1e-12 * np.max(np.abs(alone)))
+    of_run = columns(model, run)
+    assert any(not np.array_equal(a, b) for one in changed for a, b in zip(columns(model, one), of_run, strict=True))
+
+
+def test_another_filter_of_the_rates_leaves_nothing_of_the_run_before_behind() -> None:
+    """Its ends are others: the record has other steps."""
+    simulation = simulation_of("furuta")
+    run = {key: x[:4000] for key, x in simulation.run(1).items()}
+    model, design = Compiled(simulation.model), basis_of(ready(simulation.model), simulation.rig.sample_rate)
+    WeakRows.of(model, run, design)
+    other = replace(design, rate_taps=31, rate_degree=4)
+    found = record_of(model, run, other).columns(other.test_functions)
+    alone = record_of(Compiled(simulation.model), run, other).columns(other.test_functions)
+    assert all(np.array_equal(a, b) for a, b in zip(found, alone, strict=True))
+
+
+def test_of_designs_alike_where_the_equations_err_the_least_smoothed_is_chosen() -> None:
+    """A smoothed rate blurs the reversals of a dry friction, which no score shows."""
+    design = WeakDesign(1000.0, 0.2, 12, 6, rate_taps=101, rate_degree=6)
+
+    def scored(score: float, known: bool = True, **changes: float) -> choice.Scored:
+        return choice.Scored(made(design, **changes), score, np.ones(1), 1e4, np.ones(1), known)
+
+    best, alike = scored(1.0), scored(1.03, rate_taps=21, rate_degree=3)
+    others = [
+        scored(1.2, rate_taps=11, rate_degree=2),
+        scored(1.01, rate_taps=15, rate_degree=2, window_s=0.4),
+        scored(1.01, rate_taps=15, rate_degree=2, known=False),
+    ]
+    assert choice._least_smoothed([best, alike, *others]) is alike
+    assert choice._least_smoothed([best, *others]) is best

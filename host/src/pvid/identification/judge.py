@@ -211,7 +211,9 @@ class _Trial:
         self, name: str, design: WeakDesign, start: Float, weights: Sequence[tuple[str, bool, bool]]
     ) -> list[Candidate]:
         """By the weak form with these weights (name, error of the equations, compensation), scored."""
-        rows = attempted(lambda: WeakRows.of(self._compiled, self._answer.recording.run, design))
+        known = self._answer.found.fit.rows
+        same = design == known.record.grid.design and self._compiled is known.compiled
+        rows = known if same else attempted(lambda: WeakRows.of(self._compiled, self._answer.recording.run, design))
         if rows is None:
             return []
         out = []
@@ -222,13 +224,13 @@ class _Trial:
             usual = self._answer.found.fit
             own = name == _USUAL and not words and not usual.diverged
             fit = usual if own else attempted(partial(fitted, rows, start))
-            known = None if fit is None else attempted(partial(uncertainty, fit))
-            if fit is None or known is None or not np.isfinite(fit.p).all():
+            errors = None if fit is None else attempted(partial(uncertainty, fit))
+            if fit is None or errors is None or not np.isfinite(fit.p).all():
                 continue
             halves = [attempted(partial(fitted.half, rows, part, fit)) for part in self._parts]
             if all(one is not None and np.isfinite(one).all() for one in halves):
                 first, second = (self._motion.r_of(one) for one in halves if one is not None)
-                out.append(self._scored(Candidate(name + words, fit.p, known.se, (first, second), fit)))
+                out.append(self._scored(Candidate(name + words, fit.p, errors.se, (first, second), fit)))
         return out
 
     def _scored(self, one: Candidate) -> Candidate:

@@ -12,24 +12,29 @@ from dataclasses import dataclass
 from functools import cache
 
 import sympy as sp
-from sympy.physics import units as si
-from sympy.physics.units.systems.si import dimsys_SI
 
 from pvid.model.readable import readable
 from pvid.model.refusal import ModelError
 from pvid.model.signals import TIME, Integral, Jet, sgn
 
-_BASE = (si.kilogram, si.meter, si.second, si.ampere, si.kelvin, si.mole, si.candela)
 _BASE_NAMES = ("kg", "m", "s", "A", "K", "mol", "cd")
 _DIMENSIONS = ("mass", "length", "time", "current", "temperature", "amount_of_substance", "luminous_intensity")
-_ALSO = {"Ohm": si.ohm, "count": sp.Integer(1), "pct": si.percent, "min": si.minute, "deg": si.degree}
+# Exponents of the base units in the usual coherent ones. All others are those of sympy, whose units take a seventh of a
+# second to load.
+_COHERENT: dict[str, tuple[int, ...]] = {
+    **{name: tuple(int(name == one) for one in _BASE_NAMES) for name in _BASE_NAMES},
+    **{"rad": (), "count": (), "Hz": (0, 0, -1), "N": (1, 1, -2), "Pa": (1, -1, -2), "J": (1, 2, -2), "W": (1, 2, -3)},
+    **{"C": (0, 0, 1, 1), "V": (1, 2, -3, -1), "ohm": (1, 2, -3, -2), "Ohm": (1, 2, -3, -2), "H": (1, 2, -2, -2)},
+    **{"F": (-1, -2, 4, 2), "S": (-1, -2, 3, 2), "Wb": (1, 2, -2, -1), "T": (1, 0, -2, -1)},
+}
+_ALSO = {"pct": "percent", "min": "minute", "deg": "degree"}
 
 
 @dataclass(frozen=True)
 class Dimension:
     """Exponents of kg, m, s, A, K, mol, cd."""
 
-    of: tuple[sp.Rational, ...] = (sp.Integer(0),) * len(_BASE)
+    of: tuple[sp.Rational, ...] = (sp.Integer(0),) * len(_BASE_NAMES)
 
     def __mul__(self, other: Dimension) -> Dimension:
         return Dimension(tuple(a + b for a, b in zip(self.of, other.of, strict=True)))
@@ -96,10 +101,9 @@ def dimension_of_unit(text: str) -> Dimension:
     if not text.strip():
         return NUMBER
     try:
-        quantity = _quantity(ast.parse(text.replace("^", "**").strip(), mode="eval").body)
+        dimension, scale = _measured(ast.parse(text.replace("^", "**").strip(), mode="eval").body)
     except (SyntaxError, ValueError, TypeError) as error:
         raise ModelError(f'"{text}" is no unit: write it as in "kg*m^2/s", with units of SI') from error
-    dimension, scale = _measured(quantity)
     if scale != 1:
         coherent = "rad" if dimension == NUMBER else str(dimension)
         raise ModelError(f'the unit "{text}" is {_plain(scale)} {coherent}: equations are in SI, use "{coherent}"')
@@ -110,40 +114,46 @@ def _plain(scale: sp.Expr) -> str:
     return f"{float(scale):.6g}"
 
 
-def _quantity(node: ast.expr) -> sp.Expr:
+def _measured(node: ast.expr) -> tuple[Dimension, sp.Expr]:
+    """Dimension, and how many coherent units it is."""
     if isinstance(node, ast.BinOp):
-        left, right = _quantity(node.left), _quantity(node.right)
+        (left, by), (right, number) = _measured(node.left), _measured(node.right)
         if isinstance(node.op, ast.Mult):
-            return left * right
+            return left * right, sp.simplify(by * number)
         if isinstance(node.op, ast.Div):
-            return left / right
-        if isinstance(node.op, ast.Pow) and right.is_Number:
-            return left**right
+            return left * right.power(sp.Integer(-1)), sp.simplify(by / number)
+        if isinstance(node.op, ast.Pow) and right == NUMBER and number.is_Rational:
+            return left.power(number), sp.simplify(by**number)
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        return -_quantity(node.operand)
+        dimension, scale = _measured(node.operand)
+        return dimension, -scale
     elif isinstance(node, ast.Constant) and isinstance(node.value, int):
-        return sp.Integer(node.value)
+        return NUMBER, sp.Integer(node.value)
     elif isinstance(node, ast.Name):
-        unit = _ALSO.get(node.id, getattr(si, node.id, None))
-        if isinstance(unit, si.Quantity | sp.Integer):
-            return unit
+        exponents = _COHERENT.get(node.id)
+        return _of_sympy(_ALSO.get(node.id, node.id)) if exponents is None else (_of(*exponents), sp.Integer(1))
     raise ValueError(ast.dump(node))
 
 
-def _measured(quantity: sp.Expr) -> tuple[Dimension, sp.Expr]:
-    """Dimension, and how many coherent units it is."""
-    scale, total = sp.Integer(1), NUMBER
-    for base, exponent in quantity.as_powers_dict().items():
-        if isinstance(base, si.Quantity):
-            exponents = dimsys_SI.get_dimensional_dependencies(si.systems.SI.get_quantity_dimension(base))
-            by_name = {str(getattr(one, "name", one)): number for one, number in exponents.items()}
-            one = Dimension(tuple(sp.sympify(by_name.get(name, 0)) for name in _DIMENSIONS))
-            coherent = sp.prod([unit**number for unit, number in zip(_BASE, one.of, strict=True)])
-            scale *= (base.scale_factor / coherent.xreplace({u: u.scale_factor for u in _BASE})) ** exponent
-            total = total * one.power(exponent)
-        else:
-            scale *= base**exponent
-    return total, sp.simplify(scale)
+def _of(*exponents: int) -> Dimension:
+    whole = (*exponents, *(0,) * (len(_BASE_NAMES) - len(exponents)))
+    return Dimension(tuple(map(sp.Integer, whole)))
+
+
+def _of_sympy(name: str) -> tuple[Dimension, sp.Expr]:
+    """Dimension of a unit that sympy has, and how many coherent units it is."""
+    from sympy.physics import units as si
+    from sympy.physics.units.systems.si import dimsys_SI
+
+    unit = getattr(si, name, None)
+    if not isinstance(unit, si.Quantity):
+        raise ValueError(name)
+    exponents = dimsys_SI.get_dimensional_dependencies(si.systems.SI.get_quantity_dimension(unit))
+    by_name = {str(getattr(one, "name", one)): number for one, number in exponents.items()}
+    dimension = Dimension(tuple(sp.sympify(by_name.get(one, 0)) for one in _DIMENSIONS))
+    base = (si.kilogram, si.meter, si.second, si.ampere, si.kelvin, si.mole, si.candela)
+    coherent = sp.prod([one.scale_factor**number for one, number in zip(base, dimension.of, strict=True)])
+    return dimension, sp.simplify(unit.scale_factor / coherent)
 
 
 def dimension_of(expression: sp.Expr, of: Mapping[str, Dimension]) -> Dimension | None:

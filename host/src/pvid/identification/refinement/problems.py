@@ -91,6 +91,11 @@ class Problems:
         self.options = [*((name,) for name in self._plays), *smooth, *rubbing]
 
     @property
+    def has_own_equations(self) -> bool:
+        """Whether the full equations are others than those of the weak form's rows."""
+        return bool(self._model.refinement.equations)
+
+    @property
     def largest_speed(self) -> float:
         """Of the sensor that moves most, as the motion that is fastest would have it [unit of a sensor/s]."""
         spread = max(float(np.nanstd(self._signals[name])) for name in self._base.made.outputs)

@@ -1,7 +1,8 @@
 """The refinement of any mechanism: from which starts, in which blocks, with which of its extras.
 
-Where the weak form determines every parameter and one fit from its estimate leaves residuals of noise, that is all.
-Else searches begin at several starts, in blocks that grow; where residuals are more than noise, optional extras are
+Where the weak form determines every parameter and one fit from its estimate leaves residuals of noise, that is all;
+also where the rows of the weak form explain the recording, and this fit does not: no extra explains more. Else searches
+begin at several starts, in blocks that grow; where residuals are more than noise, optional extras are
 tried, the play of a sensor, dry friction (pvid.identification.refinement.friction), and shorter blocks.
 """
 
@@ -73,15 +74,19 @@ def refine(answer: Analysis) -> RefinedMechanism:
             return replace(first, main=tuple(_main(first.problem, small)))
     starts = list(starts_of(model, weak, recording.run))
     problems = Problems(model, recording.run, recording.sample_rate, starts, weak.design.window_s)
-    return _Search(problems, starts, sure, small).outcome_from(None if first is None else first.found)
+    explained = sure and weak.chi2 <= GOOD
+    return _Search(problems, starts, sure, small, explained).outcome_from(None if first is None else first.found)
 
 
 class _Search:
     """One recording; `sure`: the first start is an estimate of all parameters, and others are tried where it leads
-    nowhere. Else the search goes on until two of them agree on the best. `small`: places in p of parameters near 0."""
+    nowhere. Else the search goes on until two of them agree on the best. `small`: places in p of parameters near 0.
+    `explained`: the rows of the weak form leave noise alone."""
 
-    def __init__(self, problems: Problems, starts: Sequence[Float], sure: bool, small: set[int]) -> None:
-        self._all, self._sure, self._small = problems, sure, small
+    def __init__(
+        self, problems: Problems, starts: Sequence[Float], sure: bool, small: set[int], explained: bool
+    ) -> None:
+        self._all, self._sure, self._small, self._explained = problems, sure, small, explained
         self._starts = [problems.values_of_p(p) for p in starts]
         self._short: list[tuple[float, Values]] = []  # chi^2 and values of the shortest blocks, of each start
 
@@ -95,11 +100,14 @@ class _Search:
         if first is not None and settled:
             found = first
         else:
-            outcomes = self._outcomes(problem, self._starts, self._sure, known=outcomes)
+            starts = self._starts[:1] if self._explained else self._starts
+            outcomes = self._outcomes(problem, starts, self._sure, known=outcomes)
             if not outcomes:
                 spent = every.budget.is_spent
                 raise PvidError(TOO_LONG if spent else "the refinement finds no motion that is like the recorded one")
             found, rivals = self._of_outcomes(problem, outcomes)
+        if self._explained and every.has_own_equations and found.slow_chi2 > GOOD:
+            return RefinedMechanism(problem, found, tuple(_main(problem, self._small)), breaks=every.breaks)
         if found.slow_chi2 > NOISE:
             problem, found = self._with_options(problem, found)
         unsure = found.slow_chi2 > NOISE and self._largest_error(problem, found) > _UNSURE

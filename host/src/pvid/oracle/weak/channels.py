@@ -99,7 +99,9 @@ class Channels:
 
     def __init__(self, model: CompiledModel) -> None:
         self.model = model
+        self.last: Record | None = None  # of a run: what another one has in common is taken from it
         self._located: dict[tuple[object, ...], reversals.Signs] = {}
+        self._of_changed: dict[frozenset[str], tuple[list[int], Any]] = {}
         found: dict[Channel, int] = {}
         plans = []
         for row in model.rows:
@@ -215,6 +217,56 @@ class Channels:
         plain = (one.xreplace(dict.fromkeys(one.atoms(sgn), _ONE)) for one in inside)
         return {jet for one in plain for jet in jets(one) if jet.order} & self.needed
 
+    @cached_property
+    def _signals(self) -> dict[sp.Symbol, frozenset[str]]:
+        """By auxiliary signal and by mark of a sign: signals that it depends on."""
+        found: dict[sp.Symbol, frozenset[str]] = {}
+        for jet, expression in self.opaque.items():
+            found[jet] = self._signals_of(expression, found)
+        marks = zip(self.signs, self.sign_marks.values(), strict=True)
+        return found | {mark: self._signals_of(one, found) for one, mark in marks}
+
+    @staticmethod
+    def _signals_of(expression: sp.Expr, auxiliary: Mapping[sp.Symbol, frozenset[str]]) -> frozenset[str]:
+        return frozenset().union(*(auxiliary.get(jet, frozenset({jet.of})) for jet in jets(expression)))
+
+    def _values_of(self, changed: frozenset[str]) -> tuple[list[int], Any]:
+        """Places of the expressions that depend on these signals, and their function."""
+        if changed not in self._of_changed:
+            auxiliary = self._signals
+            own = [k for k, one in enumerate(self.expressions) if changed & self._signals_of(one, auxiliary)]
+            self._of_changed[changed] = own, self.function([self.expressions[k] for k in own])
+        return self._of_changed[changed]
+
+    def record_like(self, grid: Grid, like: Record) -> Record:
+        """Values of all channels at the steps of a grid; those in which it does not differ from another record's are
+        taken from there."""
+        alike = grid.design == like.grid.design or not (self.signs or self.opaque)
+        if not alike or not np.array_equal(grid.places, like.grid.places):
+            return self.record(grid)
+        changed = frozenset(jet.of for jet in self.needed if grid.jets[jet] is not like.grid.jets[jet])
+        moved = {mark for mark, names in self._signals.items() if names & changed}
+        ordered = [grid.jets[jet] for jet in sorted(self.needed, key=str)]
+        of_signs = zip(self.signs, self.sign_marks.values(), self._sign_arguments(*ordered), like.signs, strict=True)
+        signs = [
+            self._signs(grid, argument, broadcast(v, grid.size)) if mark in moved else one
+            for argument, mark, v, one in of_signs
+        ]
+        values: dict[sp.Symbol, Float] = dict(zip(self.plain, like.arguments, strict=True)) | dict(grid.jets)
+        values |= {mark: one.values for mark, one in zip(self.sign_marks.values(), signs, strict=True)}
+        if moved.intersection(self.opaque):
+            self._auxiliary(values, grid)
+        arguments = [values[one] for one in self.plain]
+        places, function = self._values_of(changed)
+        gains, integrands, count = like.gains.copy(), list(like.integrands), len(self.channels)
+        for place, x in zip(places, function(*arguments) if places else (), strict=True):
+            if place < count:
+                gains[place] = x
+            else:
+                integrands[place - count] = broadcast(x, grid.size)
+        fresh = sorted({place % count for place in places})
+        return Record(self, grid, gains, integrands, tuple(signs), arguments, (like, fresh))
+
     def record(self, grid: Grid, times: Mapping[Jet, float] | None = None) -> Record:
         """Values of all channels at the steps of a grid; `times`: with these jets so many times as large, but for the
         signs."""
@@ -307,6 +359,7 @@ class Record:
     integrands : of each channel [n]
     signs : of each argument of sgn
     arguments : values of `channels.plain`
+    like : another record, and the channels that differ from its own
     """
 
     def __init__(
@@ -317,9 +370,12 @@ class Record:
         integrands: list[Float],
         signs: tuple[reversals.Signs, ...],
         arguments: list[Float],
+        like: tuple[Record, list[int]] | None = None,
     ) -> None:
         self.channels, self.grid, self.gains, self.integrands = channels, grid, gains, integrands
         self.signs, self.arguments = signs, arguments
+        self._fresh: Sequence[int] = range(len(gains)) if like is None else like[1]
+        self._sums: tuple[TestFunctions, Float] | None = None if like is None else like[0]._sums
 
     @classmethod
     def joined(cls, records: Sequence[Record], firsts: Sequence[int], samples: int) -> Record:
@@ -356,17 +412,22 @@ class Record:
 
     def sums(self, functions: TestFunctions) -> Float:
         """(S_0, Re S_1, Im S_1, ...) of every channel and window [channels, windows, 2 H + 1]."""
-        plain = [k for k, one in enumerate(self.channels.channels) if one.fold == 0]
-        of_plain = functions.window_sums(self.gains[plain])
-        out = np.empty((len(self.gains), *of_plain.shape[1:]))
-        out[plain] = of_plain
-        for k, one in enumerate(self.channels.channels):
-            if one.fold:
+        if self._sums is not None and self._sums[0] is functions:
+            out, fresh = self._sums[1].copy(), self._fresh
+        else:
+            out = np.empty((len(self.gains), self.grid.size // functions.hop - 1, 2 * functions.highest + 1))
+            fresh = range(len(self.gains))
+        channels = self.channels.channels
+        if plain := [k for k in fresh if channels[k].fold == 0]:
+            out[plain] = functions.window_sums(self.gains[plain])
+        for k in fresh:
+            if channels[k].fold:
                 out[k] = 0.0
                 for part in self.grid.parts:
                     first = part.start // functions.hop
-                    own = self._integral_sums(k, one.fold, functions, part)
+                    own = self._integral_sums(k, channels[k].fold, functions, part)
                     out[k, first : first + len(own)] = own
+        self._fresh, self._sums = [], (functions, out)
         return out
 
     def _integral_sums(self, k: int, fold: int, functions: TestFunctions, part: slice) -> Float:

@@ -49,6 +49,10 @@ _FLAT_RATES = (
 _PASSES = 10
 _SETTLED = 1e-5
 
+# Where the equations err, scores differ by less than this factor for no reason, and a reversal of the motion is blurred
+# over the samples of a rate.
+_ALIKE = 1.05
+
 # Above this the equations' own errors are estimated when designs are compared.
 MODEL_ERROR = 5.0
 
@@ -199,7 +203,8 @@ def ranked(
     found = _ranked(model, run, sample_rate, start, equation_error, reversals, (_FEWEST_WINDOWS, _SHORT_RUN))
     if found[0].near_0:  # a logarithm that ran down may have lost its way in windows that are too short
         found += _ranked(model, run, sample_rate, start, equation_error, reversals, (_SHORT_RUN,))
-    return sorted(found, key=_order)
+        found.sort(key=_order)
+    return found
 
 
 def _ranked(
@@ -255,7 +260,7 @@ def _ranked(
     if rates:
         filters = _RATES + (_FLAT_RATES if rates_of_drives(model) else ())
         attempt(made(best.design, rate_taps=taps, rate_degree=degree) for taps, degree in filters)
-        best = min(tried, key=_order)
+        best = _least_smoothed(tried) if errors else min(tried, key=_order)
     place = windows.index(best.design.window_s)
     near = windows[max(place - 1, 0) : place + 2]
     attempt(
@@ -267,7 +272,21 @@ def _ranked(
     if len(model.model.rows) > 1 and reversals == "located":
         best = min(tried, key=_order)
         attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
-    return sorted(tried, key=_order)
+    ordered = sorted(tried, key=_order)
+    if rates and errors:
+        ordered.insert(0, ordered.pop(ordered.index(_least_smoothed(tried))))
+    return ordered
+
+
+def _least_smoothed(tried: Sequence[Scored]) -> Scored:
+    """The best, or one like it that differs in the filter of the rates alone and has a shorter one."""
+    best = min(tried, key=_order)
+
+    def is_alike(one: Scored) -> bool:
+        same = replace(one.design, rate_taps=best.design.rate_taps, rate_degree=best.design.rate_degree)
+        return same == best.design and one.known == best.known and one.score <= _ALIKE * best.score
+
+    return min(filter(is_alike, tried), key=lambda one: one.design.rate_taps)
 
 
 def ranked_for_engine(model: Compiled, tried: Sequence[Scored]) -> list[Scored] | None:

@@ -97,13 +97,20 @@ def samples_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike]) -> dict[s
     return out
 
 
-def grid_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], design: WeakDesign, needed: set[Jet]) -> Grid:
+def grid_of(
+    model: CompiledModel,
+    run: Mapping[str, npt.ArrayLike],
+    design: WeakDesign,
+    needed: set[Jet],
+    like: Grid | None = None,
+) -> Grid:
     """Values of the needed jets at every step.
 
     Parameters
     ----------
     run : name -> samples [n]
     needed : jets of signals
+    like : another grid, from which a jet is taken that has the same samples and filter
     """
     samples = samples_of(model, run)
     size = next(iter(samples.values())).size
@@ -118,8 +125,20 @@ def grid_of(model: CompiledModel, run: Mapping[str, npt.ArrayLike], design: Weak
         signal.name: of_hold(samples[signal.name]) if signal.hold == "zoh" else samples[signal.name]
         for signal in model.signals
     }
-    jets = {jet: filtered(raw[jet.of], weights_of(design, jet.order))[places] for jet in needed if jet.of in raw}
+    known = _in_common(like, raw, design, orders) if like is not None and np.array_equal(places, like.places) else {}
+    jets = {
+        jet: known[jet] if jet in known else filtered(raw[jet.of], weights_of(design, jet.order))[places]
+        for jet in needed
+        if jet.of in raw
+    }
     return Grid(design, jets, raw, places, (slice(0, len(places)),))
+
+
+def _in_common(like: Grid, raw: Mapping[str, Float], design: WeakDesign, orders: set[int]) -> dict[Jet, Float]:
+    """Jets of another grid with the same steps that these samples and this design have too."""
+    filters = {one for one in orders if np.array_equal(weights_of(design, one), weights_of(like.design, one))}
+    names = {name for name, x in raw.items() if name in like.raw and np.array_equal(x, like.raw[name])}
+    return {jet: x for jet, x in like.jets.items() if jet.of in names and jet.order in filters}
 
 
 def segments_of(samples: Mapping[str, Float]) -> list[slice]:

@@ -120,16 +120,20 @@ def record_of(
     if any(one.has(Integral) for one in compiled.channels.opaque.values()):
         segments = _longest_of_each(segments, run)
     size = len(next(iter(samples.values())))
+    last = compiled.channels.last
+    if times is not None or (last is not None and last.grid.raw_size != size) or len(segments) > 1:
+        last = None
     records, firsts = [], []
     refused = PvidError("no window of the run is whole: every one has a missing sample")
     for part in segments:
         own = {name: values[part] for name, values in samples.items()}
         try:
-            grid = grid_of(compiled.model, own, design, compiled.channels.needed)
+            grid = grid_of(compiled.model, own, design, compiled.channels.needed, None if last is None else last.grid)
         except PvidError as error:
             refused = error
             continue
-        records.append(compiled.channels.record(grid, times))
+        channels = compiled.channels
+        records.append(channels.record(grid, times) if last is None else channels.record_like(grid, last))
         firsts.append(part.start)
     if not records:
         raise refused
@@ -181,6 +185,7 @@ class WeakRows:
     def of(cls, compiled: Compiled, run: Mapping[str, npt.ArrayLike], design: WeakDesign) -> WeakRows:
         """Those of a run: name -> samples."""
         rows = cls(compiled, record_of(compiled, run, design))
+        compiled.channels.last = rows.record if len(rows.record.grid.parts) == 1 else None
         if NUMBER in run:
             grid = rows.record.grid
             rows.recordings = np.asarray(run[NUMBER])[grid.places[grid.design.hop * rows.numbers]].astype(np.int64)
@@ -293,11 +298,13 @@ class WeakRows:
 
     def white_nuisances(self, kinds: Sequence[int], whitener: Whitener) -> Float:
         """Nuisance columns of a group [windows, nuisances, R]."""
-        parts = self._whitened(kinds, whitener)
-        plans = [self.compiled.channels.rows[kind] for kind in kinds]
-        return np.concatenate([x[:, row.thetas + 1 :] for x, row in zip(parts, plans, strict=True)], axis=1)
+        firsts = [self.compiled.channels.rows[kind].thetas + 1 for kind in kinds]
+        return np.concatenate(self._whitened(kinds, whitener, firsts), axis=1)
 
-    def _whitened(self, kinds: Sequence[int], whitener: Whitener) -> list[Float]:
-        """Columns of each kind [windows, columns, R]: they fill the kind's own rows."""
-        k = self.functions.count
-        return [whitener.of(self.columns[kind], slice(place * k, (place + 1) * k)) for place, kind in enumerate(kinds)]
+    def _whitened(self, kinds: Sequence[int], whitener: Whitener, firsts: Sequence[int] = ()) -> list[Float]:
+        """Columns of each kind, from the first that is wanted on [windows, columns, R]: they fill the kind's own
+        rows."""
+        k, chosen = self.functions.count, [self.columns[kind] for kind in kinds]
+        if firsts:
+            chosen = [one[:, first:] for one, first in zip(chosen, firsts, strict=True)]
+        return [whitener.of(one, slice(place * k, (place + 1) * k)) for place, one in enumerate(chosen)]

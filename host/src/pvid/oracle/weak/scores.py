@@ -77,24 +77,27 @@ class Scores:
         moved = np.einsum("wkp,wk->p", self.slopes, self.whitened(change))
         return np.asarray(-self.unit * (self.inverse @ moved))
 
-    def white(self, one: Candidate) -> Float:
-        """Column of a candidate [windows, rows of all kinds]."""
-        return self.whitened(one.change(self.theta))
+    def white(self, candidates: Sequence[Candidate]) -> Float:
+        """Columns of candidates [windows, candidates, rows of all kinds]."""
+        return self._whitened([one.change(self.theta) for one in candidates])
 
     def whitened(self, change: Sequence[Float]) -> Float:
-        """Of the change of each kind's raw residuals [windows, K]."""
+        """Of the change of each kind's raw residuals [windows, K]: [windows, rows of all kinds]."""
+        return np.asarray(self._whitened([change])[:, 0])
+
+    def _whitened(self, changes: Sequence[Sequence[Float]]) -> Float:
         out = []
         for white in self.fit.white:
-            own = np.concatenate([change[kind] for kind in white.kinds], axis=1)
-            out.append(self._without_nuisances(white, white.whitener.of(own[:, np.newaxis, :])[:, 0]))
-        return np.concatenate(out, axis=1)
+            own = np.stack([np.concatenate([one[kind] for kind in white.kinds], axis=1) for one in changes], axis=1)
+            out.append(self._without_nuisances(white, white.whitener.of(own)))
+        return np.concatenate(out, axis=2)
 
     def _without_nuisances(self, white: WhiteRows, rows: Float) -> Float:
-        nuisances = self.fit.rows.white_nuisances(white.kinds, white.whitener)
-        if not nuisances.shape[1]:
+        plans = self.fit.rows.compiled.channels.rows
+        if not any(plans[kind].nuisances for kind in white.kinds):
             return rows
-        q = np.linalg.qr(nuisances.transpose(0, 2, 1))[0]
-        return np.asarray(rows - np.einsum("wkn,wn->wk", q, np.einsum("wkn,wk->wn", q, rows)))
+        q = np.linalg.qr(self.fit.rows.white_nuisances(white.kinds, white.whitener).transpose(0, 2, 1))[0]
+        return np.asarray(rows - (rows @ q) @ q.transpose(0, 2, 1))
 
     def _folds(self) -> list[npt.NDArray[np.intp]]:
         """Windows of each part of the run."""
@@ -114,7 +117,7 @@ class Scores:
     def rests(self, candidates: Sequence[Candidate]) -> Float:
         """Columns beside all parameters, of length 1 [candidates, windows * rows of all kinds]."""
         n = self.slopes.shape[-1]
-        c = np.array([self.white(one).ravel() for one in candidates]).reshape(len(candidates), -1)
+        c = self.white(candidates).transpose(1, 0, 2).reshape(len(candidates), -1)
         slopes = self.slopes.reshape(-1, n)
         rest = c - (c @ slopes) @ self.inverse.T @ slopes.T
         return np.asarray(rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300))
@@ -122,7 +125,7 @@ class Scores:
     def of(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """With their scores, that of the largest share first."""
         r, slopes = self.residuals, self.slopes
-        c = np.stack([self.white(one) for one in candidates], axis=-1)
+        c = np.ascontiguousarray(self.white(candidates).transpose(0, 2, 1))
         known = np.concatenate([one.known for one in self.fit.white], axis=1)
         parts = self._folds()
         jj = np.array([_products(slopes[own], slopes[own]) for own in parts])
