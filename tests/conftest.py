@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from pendulum_plant import Simulation, simulate, standard_sensors
 from processes import children_of
 
 from pvid.core.native import Native
-from pvid.sim.pendulum import Simulation, simulate, standard_sensors
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -25,15 +25,15 @@ settings.load_profile("seeded")
 # each of its workers a file at a time, these first and in this order: the longest before the others, so that they
 # end together.
 SLOW = (
-    *("tools/pages", "board/targets", "bench/campaign_run", "tools/wheel", "identification/refined"),
+    *("tools/pages", "board/targets", "tools/wheel", "identification/refined"),
     *("cli/design_cost", "cli/identify_in_c", "log/log", "deploy/deploy", "twin/strong_bits_q31", "cli/cli"),
     *("show/report", "board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
-    *("bench/refine_bench", "bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
+    *("bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
     *("board/ports", "tools/notebooks", "cli/run_input", "identification/wild_samples", "models/scale_errors"),
-    *("bench/campaign_refined", "cli/identify_run", "tools/consumer", "twin/weak_q31"),
+    *("cli/identify_run", "tools/consumer", "twin/weak_q31"),
     *("board/refined_stream", "fleet/batch", "twin/misfit", "twin/gate", "twin/weak_f32", "twin/refinement"),
-    *("cli/api", "core/strong_q31", "codegen/build", "bench/strong_bytes", "bench/year", "show/view"),
-    *("twin/second_stage", "deploy/deploy_avr", "bench/cost", "bench/strong_mechanisms", "bench/side_by_side"),
+    *("cli/api", "core/strong_q31", "codegen/build", "bench/year", "show/view"),
+    *("twin/second_stage", "deploy/deploy_avr", "bench/strong_mechanisms"),
     *(
         "bench/accidents",
         "identification/own_mechanisms",
@@ -41,17 +41,17 @@ SLOW = (
         "bench/hard",
         "twin/kinds_q31",
     ),
-    *("core/sizes_agree", "board/mechanism_board", "codegen/generated_q31", "sim/pendulum", "twin/compare"),
+    *("core/sizes_agree", "board/mechanism_board", "codegen/generated_q31", "twin/compare"),
     *("core/trust_q31",),
     *("board/port", "codegen/generated_f32", "cli/readme", "core/read_while_stepping", "log/export"),
     *("codegen/strong_model", "log/untrusted", "board/field", "core/weak_engine_q31", "oracle/missing"),
-    *("core/bad_config", "model/elimination", "oracle/weak_identify", "link/link", "bench/campaign_judge"),
-    *("core/dead_zone", "oracle/weak_choice", "codegen/weak_c", "oracle/oracle"),
+    *("core/bad_config", "model/elimination", "oracle/weak_identify", "link/link"),
+    *("core/dead_zone", "oracle/weak_choice", "codegen/weak_c"),
     *("sim/rigs", "core/arithmetic_options", "core/equation_error", "cli/demo_run", "bench/model_boards"),
     *("core/dropped_calls", "bench/build_choices", "board/generated", "tools/core_rooms", "board/strong_image"),
     *("codegen/model_q31", "core/freeze", "core/recorded_hashes", "twin/estimator_q31", "bench/mechanisms"),
     *("cli/output", "tools/proofs", "show/pictures", "tools/docs", "codegen/refine", "tools/loops"),
-    *("bench/campaign_population", "twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
+    *("twin/kinds", "bench/random_models", "board/refined_board", "identification/skew"),
     *("tools/analysis", "board/engine_boards", "oracle/strong_described", "core/snapshot", "codegen/random"),
     *("paper/paper", "tools/mutate", "oracle/weak_engine", "show/answer_figure"),
 )

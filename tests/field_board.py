@@ -18,16 +18,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pendulum_plant import simulate, standard_sensors
 
+from pvid.base.toml_text import toml_document
 from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.stream_image import settings_number
 from pvid.codegen.weak_library import weak_native
 from pvid.core.weak_native import WeakIdentifier
 from pvid.link import frames as link
+from pvid.log.rig import mechanism_in
+from pvid.models.model import Mechanism
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Run
 from pvid.settings.enums import Reason
-from pvid.sim.pendulum import simulate, standard_sensors
 from pvid.twin import fnv
 
 SAMPLES_A_FRAME = 16
@@ -78,6 +81,14 @@ def board() -> MechanismBoard:
 def text() -> str:
     """Of its log."""
     return board().text()
+
+
+@cache
+def mechanism() -> Mechanism:
+    """Of its log."""
+    found = mechanism_in(toml_document(text()))
+    assert found is not None
+    return found
 
 
 @cache

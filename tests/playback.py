@@ -18,6 +18,7 @@ from typing import Any
 import configurations
 import numpy as np
 import numpy.typing as npt
+from pendulum_plant import simulate, standard_sensors
 
 from pvid.core.native import Identifier, Native
 from pvid.rig.file import RigFile
@@ -26,7 +27,6 @@ from pvid.settings.f32 import StrongConfig
 from pvid.settings.q31 import StrongConfigQ31
 from pvid.setup.f32 import strong_config
 from pvid.setup.q31 import counts_of, scale_of, strong_config_q31
-from pvid.sim.pendulum import simulate, standard_sensors
 
 Config = StrongConfig | StrongConfigQ31
 Samples = tuple[npt.NDArray[Any], npt.NDArray[Any]]

@@ -38,7 +38,7 @@ COMMAND = re.compile(r"(?:\./tools/|build/venv/|cmake |cd |cc |pip |head |python
 
 # ---- commands that are not executed, only parsed: pattern, reason
 NOT_EXECUTED = (
-    (r"^\./tools/pvid (bench|campaign)\b", "takes minutes to hours; tests/bench executes its short form"),
+    (r"^\./tools/pvid bench\b", "takes minutes to hours; tests/bench executes its short form"),
     (r"^\./tools/pvid log /dev/ttyACM0 \w+\.csv", "needs a board; tests/log/test_text_table.py has one that prints"),
     (r"^\./tools/pvid demo", "tests/cli/test_cli.py and test_demo_run.py execute it"),
     (r"^\./tools/pvid sizes", "builds every image; tests/board/test_targets.py measures some of them"),

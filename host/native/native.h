@@ -3,7 +3,6 @@
 #ifndef PVID_NATIVE_H
 #define PVID_NATIVE_H
 
-#include "pendulum.h"
 #include "pvid/crc32.h"
 #include "replay.h"
 #include "replay_q31.h"

@@ -15,7 +15,7 @@ from processes import children_of
 
 from pvid.board.target import HOST_TARGET
 from pvid.log.reader import LogReader, LogStream
-from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 
 PATIENCE_S = 120
 
@@ -46,7 +46,7 @@ def runs(pid: int) -> bool:
 @pytest.fixture
 def logger(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     """`pvid log` of this machine's build in a process group of its own, as a shell would start it; it has recorded."""
-    RigFile.standard().write(tmp_path / "rig.toml")
+    MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(tmp_path / "rig.toml")
     command = [sys.executable, "-m", "pvid", "log", HOST_TARGET, "a.pvlog", "--rig", "rig.toml"]
     process = subprocess.Popen(
         command,

@@ -11,11 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from conftest import ROOT
+from pendulum_plant import STANDARD_PENDULUM, simulate, standard_sensors
 from program import pvid
 
 from pvid.cli.demo import target
 from pvid.rig.run import write_run
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 
 @pytest.fixture(scope="module")

@@ -67,7 +67,7 @@ NAMED = {  # with the rig file in the place of its own option
     "model build": ["model", "build", "dc_motor", "--rig", "FILE", "-o", "built"],
     "deploy": ["deploy", "dc_motor", "--rig", "FILE", "-o", "deployed", "--for", "arduino"],
 }
-READ_NO_FILES = {"demo", "simulate", "ports", "sizes", "schema", "models", "bench", "campaign"}
+READ_NO_FILES = {"demo", "simulate", "ports", "sizes", "schema", "models", "bench"}
 
 
 def run(arguments: list[str]) -> Result:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from pendulum_plant import STANDARD_PENDULUM, STANDARD_RELEASE, simulate
 
-from bench.refine_imperfect import truth_of
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED
 from pvid.base.errors import PvidError
 from pvid.board.mechanism_board import MechanismBoard, board_of
@@ -25,12 +25,11 @@ from pvid.identification.analysis import analysed
 from pvid.identification.core import identify_in_c
 from pvid.log.rig_choice import rig_of
 from pvid.models.simulated_rig import simulated_rig
-from pvid.rig.file import Refine, RigFile
 from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.run import write_run
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
 from pvid.settings.weak import WeakConfig
-from pvid.sim.pendulum import STANDARD_PENDULUM, standard_sensors
 from pvid.twin.printed import PrintedTwin
 
 
@@ -237,19 +236,20 @@ def test_both_stages_in_c_refine_a_pendulum_of_its_own_rig_file(tmp_path: Path) 
 
 def test_the_options_of_a_rig_file_reach_the_second_stage_in_c_and_a_board(tmp_path: Path) -> None:
     """Dry friction and a slant without which nothing is refined; the board's frames have eight refined parameters."""
-    phi, y = standard_sensors().measure(*truth_of(0.2, 3e-4, 0.02, 15.0), 0)
+    dry = 3e-4 * STANDARD_PENDULUM.g * STANDARD_PENDULUM.l2  # of each joint [m^2/s^2]
+    rough = replace(STANDARD_PENDULUM, dry1=dry, dry2=dry, slant=0.02)
+    release = (1.88 * STANDARD_RELEASE[0], 1.88 * STANDARD_RELEASE[1])  # 0.2 rad
     run = tmp_path / "run.csv"
-    columns = np.stack([np.arange(len(phi)) / 1000, phi, y], axis=1)
-    np.savetxt(run, columns, fmt="%.9g", delimiter=",", header="t,phi,y", comments="")
-    rig = RigFile.standard()
+    write_run(run, simulate(rough, duration=15.0, release=release, truth="full").run)
+    rig = MechanismRig("kapitza", 1000.0, known={"l1": 0.3}, sensor={"y": {"gain_sd": 0.0}}, known_sd={"l1": 0.0})
     rig.write(run.with_suffix(".toml"))
     bare = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
     assert not bare["refinement"]["adopted"]
-    chosen = replace(rig, refine=Refine(dry_friction=True, slant=True))
+    chosen = replace(rig, refine={"dry_friction": True, "slant": True})
     chosen.write(run.with_suffix(".toml"))
     shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json", "--on", HOST_TARGET).stdout)
     assert shown["refinement"]["adopted"]
-    friction = 3e-4 * STANDARD_PENDULUM.g * STANDARD_PENDULUM.l2 / STANDARD_PENDULUM.l1**2
+    friction = dry / STANDARD_PENDULUM.l1**2
     truth = {**simulated_rig("kapitza").truth, "f1": friction, "f2": friction, "slant": np.sin(0.02)}
     for name in ("w", "d1", "d2", "f1", "f2", "slant"):
         one = shown["parameters"][name]
@@ -265,7 +265,8 @@ def test_a_small_motion_with_dry_friction_is_refined_behind_the_long_windows_of_
     assert (
         pvid("simulate", run, "--truth", "f1=0.0033", "--truth", "f2=0.0033", "--duration", "20").return_value == DONE
     )
-    replace(RigFile.standard(), refine=Refine(dry_friction=True)).write(run.with_suffix(".toml"))
+    rig = MechanismRig("kapitza", 1000.0, known={"l1": 0.3}, refine={"dry_friction": True})
+    rig.write(run.with_suffix(".toml"))
     shown = json.loads(pvid("identify", run, "--core", "f32", "--refine", "--json").stdout)
     assert shown["refinement"]["adopted"] and shown["refinement"]["clash"] < 4.0
     for name in ("w", "d1", "d2"):

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
+from pendulum_plant import simulate
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
 from pvid.base.figure_file import format_of
 from pvid.base.replacing import replacing
-from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import write_run
-from pvid.sim.pendulum import simulate
 
 PVID = [sys.executable, "-P", "-m", "pvid"]
 READER_GONE = 141
@@ -113,7 +113,7 @@ def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
         path.write_text("old", encoding="utf-8")
     with files_up_to(100), replacing():
         with pytest.raises(PvidError, match="rig.toml: cannot be written: File too large"):
-            RigFile.standard().write(names[0])
+            MechanismRig("kapitza").write(names[0])
         with pytest.raises(PvidError, match="cannot write the figure .*File too large"):
             save(figure, names[1], dpi=50)
         with pytest.raises(PvidError, match="run.csv cannot be written: File too large"):

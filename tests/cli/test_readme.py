@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT
+from pendulum_plant import STANDARD_PENDULUM, Truth, simulate
 
 from pvid.board import sizes
 from pvid.cli.main import commands
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, sources_of
-from pvid.rig.file import RigFile
-from pvid.sim.pendulum import STANDARD_PENDULUM, Truth, simulate
+from pvid.rig.mechanism_file import MechanismRig
 
 DOCS = ROOT / "host" / "docs"
 README = ROOT / "README.md"
@@ -51,7 +51,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The README's, with the files that its command writes for the standard rig."""
     folder = tmp_path_factory.mktemp("program")
     (folder / "example.c").write_text(blocks(README)[0], encoding="utf-8")
-    RigFile.standard().write(folder / "rig.toml")
+    MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(folder / "rig.toml")
     written = re.search(r"/\* \./tools/pvid (model build .*) -o kapitza \*/", text_of(README))
     assert written is not None
     command = [sys.executable, "-P", "-m", "pvid", *written[1].split(), "-o", "kapitza"]

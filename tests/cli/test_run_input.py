@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from click.testing import CliRunner, Result
+from pendulum_plant import STANDARD_PENDULUM, simulate, standard_sensors
 
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
@@ -22,7 +23,6 @@ from pvid.log.rig_choice import rig_of
 from pvid.rig.file import rig_path_of
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Run, read_run, write_run
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
 

@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from bench.board_engine import PUBLISHED, FixedBoard, FloatBoard, board_of
-from bench.pendulum import RIGS, cramer_rao, design_for, model_for
+from bench.board_engine import PUBLISHED, FixedBoard, FloatBoard
+from bench.hard import Case, board, simulation_for
 from pvid.configuration.weak import config_for_simulated_rig
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.identify import ready
 from pvid.settings.enums import Core
+from pvid.sim.bound import bound
 from pvid.sim.imperfections import Imperfections
-from pvid.sim.pendulum import STANDARD_PENDULUM
 from pvid.sim.simulated_run import RigSimulation
 
-RIG = replace(RIGS[0], bits=17)
-TRUTH = STANDARD_PENDULUM.linear
-FAR = TRUTH * np.array([0.65, 0.5, 1.5])
+FINE = Case("an encoder of 17 bits", coarser=1 / 8)
 
 
 @pytest.mark.parametrize("core", ["f32", "q31"])
 def test_a_large_step_leaves_standard_errors(core: Core) -> None:
     """A fine encoder and a guess that is far off: after the first steps nothing is left of the residuals' sum of
     squares in float32. Without a floor under it the core publishes standard errors of exactly 0."""
-    board = board_of(model_for(RIG), RIG.signals(0), design_for(RIG), np.append(TRUTH, 0.0), core)
-    found = board.answer(RIG.signals(1), np.append(FAR, 0.0))
+    rig = simulation_for("kapitza", FINE)
+    far = rig.truth * np.array([0.65, 0.5, 1.5, 1.0])
+    found = board("kapitza", core, FINE.coarser).answer(rig.run(1), far)
     of_publications = found.errors[np.isin(found.reasons, PUBLISHED)]
     assert len(of_publications) and (of_publications > 0).all()
-    assert (found.se[:3] > 0.5 * cramer_rao(RIG) * TRUTH).all()
+    assert (found.se > 0.5 * bound(rig)).all()
 
 
 @pytest.mark.parametrize("core", ["f32", "q31"])
@@ -47,12 +44,12 @@ def test_the_scatter_of_the_windows_makes_standard_errors_honest(core: Core) -> 
     of_rig = dict(zip(simulation.model.p_names, simulation.truth, strict=True))
     names = ready(compiled).model.p_names
     truth = np.array([of_rig.get(name, 0.0) for name in names])
-    board = (
+    own = (
         FixedBoard(engine_for_simulated_rig(compiled))
         if core == "q31"
         else FloatBoard(compiled, config_for_simulated_rig(compiled))
     )
-    answers = [board.answer(simulation.run(seed, Imperfections(process={1: 3e-4})), truth) for seed in range(24)]
+    answers = [own.answer(simulation.run(seed, Imperfections(process={1: 3e-4})), truth) for seed in range(24)]
     assert all(one.published for one in answers)
     relative = np.array([(one.p - truth) / one.se for one in answers])
     of_load = [names.index(name) for name in ("J", "b", "Tc")]

@@ -1,4 +1,4 @@
-"""The trust of the fixed-point weak engine: what it publishes, what it holds back, and float32's verdicts beside it."""
+"""The trust of the fixed-point weak form: what it publishes, what it holds back, and float32's verdicts beside it."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ import pytest
 from weak_rig import assert_same
 
 from bench.board_engine import PUBLISHED, Answer, FixedBoard
-from bench.hard import CASES, TRUTH, Case
+from bench.hard import CASES, Case, board, simulation_for
+from bench.mechanisms import start_of
 from pvid.settings.enums import Core, Reason
-from pvid.sim.pendulum import standard_start
 from pvid.twin.printed import PrintedTwin
 
 VERDICTS = (*PUBLISHED, Reason.HELD_NOT_EXCITED, Reason.HELD_SINGULAR, Reason.HELD_UNCERTAIN)
 
+NAMES = ("kapitza", "dc_motor")
 SEEDS = 2
-DURATION_S = 20.0
+SECONDS = 20
 SETTLED = 12  # windows
 
 
@@ -26,10 +27,10 @@ def case(label: str) -> Case:
 
 
 @lru_cache
-def played(label: str, seed: int, core: Core = "q31") -> Answer:
-    one = case(label)
-    run = one.run(seed, duration=DURATION_S)
-    return one.board(core).answer({"phi": run.phi, "y": run.y}, np.append(standard_start(seed), 0.0))
+def played(name: str, label: str, seed: int, core: Core = "q31") -> Answer:
+    of = simulation_for(name, case(label))
+    run = {key: x[: SECONDS * 1000] for key, x in of.run(seed).items()}
+    return board(name, core, case(label).coarser).answer(run, start_of(of, seed))
 
 
 def verdicts(found: Answer) -> list[Reason]:
@@ -37,83 +38,63 @@ def verdicts(found: Answer) -> list[Reason]:
     return [Reason(int(one)) for one in found.reasons if one in VERDICTS]
 
 
-@pytest.mark.parametrize(
-    "label",
-    [
-        "no drive, free swing",
-        "no drive, no motion",
-        "drive, no motion",
-        "drive x0.03, 14 bits",
-        "slow mode only, one tone, 14 bits",
-        "slow mode only, 14 bits",
-        "fast mode only, 14 bits",
-    ],
-)
-def test_estimate_without_information_is_not_published(label: str) -> None:
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("label", ["no drive", "no drive, no motion", "drive x0.01"])
+def test_estimate_without_information_is_not_published(name: str, label: str) -> None:
     for seed in range(SEEDS):
-        found = played(label, seed)
-        assert not found.published
-        assert (found.se[:3] > 0.4 * found.p[:3]).all()  # the start's, which may be half wrong
+        assert not played(name, label, seed).published
 
 
-@pytest.mark.parametrize(
-    "label", ["encoder of 14 bits", "start x0.05, angle up to 14 LSB, 14 bits", "drive x0.1, 14 bits"]
-)
-def test_sufficient_data_are_published_with_errors(label: str) -> None:
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("label", ["as shipped", "sensors 4 times as coarse"])
+def test_sufficient_data_are_published_with_errors(name: str, label: str) -> None:
     for seed in range(SEEDS):
-        found = played(label, seed)
+        found = played(name, label, seed)
         assert found.published
-        # 18 numbers within 4 standard errors: 6e-5 of such numbers lie beyond
-        assert (np.abs(found.p[:3] - TRUTH) < 4 * found.se[:3]).all()
+        # 44 numbers within 4.5 standard errors: 3e-4 of such sets lie beyond
+        truth = simulation_for(name, case(label)).truth
+        assert (np.abs(found.p - truth) < 4.5 * found.se).all()
 
 
-@pytest.mark.parametrize("label", ["full equations, 0.107 rad, 14 bits", "friction of 0.0001 m^2/s, 14 bits"])
-def test_another_mechanism_raises_the_alarm(label: str) -> None:
+@pytest.mark.parametrize("name", NAMES)
+def test_noise_that_the_settings_do_not_contain_raises_the_alarm(name: str) -> None:
     for seed in range(SEEDS):
-        found = played(label, seed)
+        found = played(name, "10 times the noise that the settings contain", seed)
         assert not found.published or found.alarm
 
 
-@pytest.mark.parametrize(
-    "label", ["encoder of 14 bits", "full equations, 0.107 rad, 14 bits", "drive x0.03, 14 bits", "drive, no motion"]
-)
-def test_the_verdicts_are_those_of_float32(label: str) -> None:
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("label", ["as shipped", "10 times the noise that the settings contain", "drive x0.01"])
+def test_the_verdicts_are_those_of_float32(name: str, label: str) -> None:
     """Window by window once p has settled: from a poor start fixed point repeats its first steps, float32 does not."""
     for seed in range(SEEDS):
-        fixed, floating = (played(label, seed, core) for core in ("q31", "f32"))
+        fixed, floating = (played(name, label, seed, core) for core in ("q31", "f32"))
         one, other = verdicts(fixed), verdicts(floating)
         assert len(one) == len(other) > 20
         apart = [pair for pair in zip(one[SETTLED:], other[SETTLED:], strict=True) if pair[0] != pair[1]]
-        # Equations that do not fit keep moving p, by about the step above which it has not converged: rounding decides.
-        assert len(apart) <= (1 if one[-1] == Reason.MISFIT else 0)
-        assert all(set(pair) == {Reason.HELD_UNCERTAIN, Reason.MISFIT} for pair in apart)
+        # Where information just suffices or just not, rounding decides.
+        assert len(apart) <= len(one) / 10
         assert (fixed.published, fixed.alarm) == (floating.published, floating.alarm)
 
 
-def test_published_estimate_changes_only_when_trusted() -> None:
-    found = played("full equations, 0.107 rad, 14 bits", 0)
+@pytest.mark.parametrize("name", NAMES)
+def test_published_estimate_changes_only_when_trusted(name: str) -> None:
+    found = played(name, "10 times the noise that the settings contain", 0)
     changed = 1 + np.flatnonzero((found.history[1:] != found.history[:-1]).any(axis=1))
     assert len(changed) and np.isin(found.reasons[changed], PUBLISHED).all()
     assert np.array_equal(found.history[-1], found.p)
 
 
-@pytest.mark.parametrize(
-    "label",
-    [
-        "drive x0.03, 14 bits",
-        "drive, no motion",
-        "slow mode only, 14 bits",
-        "full equations, 0.107 rad, 14 bits",
-    ],
-)
-def test_the_twin_has_the_same_integers_where_it_is_hard(label: str) -> None:
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("label", ["drive x0.01", "no drive", "10 times the noise that the settings contain"])
+def test_the_twin_has_the_same_integers_where_it_is_hard(name: str, label: str) -> None:
     """8 s: windows that are held, steps back to a refuge, an alarm. What is published is compared as well."""
-    one, start = case(label), np.append(standard_start(3), 0.0)
-    run, board = one.run(3, duration=8.0), one.board("q31")
-    assert isinstance(board, FixedBoard)
-    readings = board.samples({"phi": run.phi, "y": run.y})
-    identifier = board.identifier(start)
-    twin = PrintedTwin(identifier.sources, board.config_from(start))
+    of, made = simulation_for(name, case(label)), board(name, "q31", case(label).coarser)
+    assert isinstance(made, FixedBoard)
+    start = start_of(of, 3)
+    readings = made.samples({key: x[:8000] for key, x in of.run(3).items()})
+    identifier = made.identifier(start)
+    twin = PrintedTwin(identifier.sources, made.config_from(start))
     assert_same(identifier.run_samples(readings), twin.run(readings))
-    for name in ("se", "correlation"):
-        assert np.ravel(identifier.estimate[name]).tolist() == list(getattr(twin.estimate, name)), name
+    for key in ("se", "correlation"):
+        assert np.ravel(identifier.estimate[key]).tolist() == list(getattr(twin.estimate, key)), key

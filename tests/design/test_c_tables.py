@@ -17,7 +17,7 @@ from pvid.cli.main import commands
 from pvid.core.sources import INCLUDES, source
 from pvid.design.c_tables import bank_header, float_array, float_literal
 from pvid.design.fir import finite_difference, savitzky_golay
-from pvid.rig.file import RigFile
+from pvid.rig.mechanism_file import MechanismRig
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
@@ -82,6 +82,6 @@ def test_a_name_that_is_not_c_is_refused() -> None:
 
 
 def test_the_weak_forms_tables_are_printed_elsewhere(tmp_path: Path) -> None:
-    RigFile.standard().write(tmp_path / "rig.toml")
+    MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(tmp_path / "rig.toml")
     with pytest.raises(PvidError, match="`pvid model build kapitza --rig RIG"):
         CliRunner().invoke(commands, ["tables", "--form", "weak"], standalone_mode=False, catch_exceptions=False)

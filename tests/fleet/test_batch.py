@@ -15,6 +15,7 @@ import pyarrow.parquet
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT
+from pendulum_plant import simulate, standard_sensors
 from program import pvid
 
 from pvid.base.cluster import _distributed
@@ -26,7 +27,6 @@ from pvid.fleet import run as fleet
 from pvid.fleet.row import EQUAL, Question, Row, row_of
 from pvid.fleet.store import Store, read_rows
 from pvid.fleet.summary import counts_of, drifts_of, page
-from pvid.sim.pendulum import simulate, standard_sensors
 
 LOG = ROOT / "tests" / "data" / "logs" / "two_samples.pvlog"
 DAY = 86400.0

@@ -9,6 +9,7 @@ from math import pi
 
 import numpy as np
 import numpy.typing as npt
+from pendulum_plant import STANDARD_DRIVE, STANDARD_PENDULUM, Pendulum, simulate, standard_sensors
 from test_own_mechanisms import read, recorded
 
 from pvid.identification.analysis import analysed
@@ -20,7 +21,6 @@ from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak.verdict import Judged
 from pvid.rig.run import Recording
-from pvid.sim.pendulum import STANDARD_DRIVE, STANDARD_PENDULUM, Pendulum, simulate, standard_sensors
 
 Float = npt.NDArray[np.float64]
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import pytest
+from pendulum_plant import simulate
 
 from pvid.identification.advice import advice_on
 from pvid.identification.analysis import analysed
@@ -20,7 +21,6 @@ from pvid.oracle.weak.identify import identify
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.rig.sensor_steps import with_resolutions
-from pvid.sim.pendulum import simulate
 
 Float = npt.NDArray[np.float64]
 

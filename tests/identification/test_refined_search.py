@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pendulum_plant import SLIP, STANDARD_PENDULUM
 from refinements import (
     DAMPED,
     PENDULUM,
@@ -33,7 +34,6 @@ from pvid.identification.refinement.starts import starts_of
 from pvid.identification.values import outputs_at
 from pvid.models.mechanisms import compiled_of
 from pvid.rig.run import Origin, Recording
-from pvid.sim.pendulum import SLIP, STANDARD_PENDULUM
 from pvid.sim.simulated_run import simulation_of
 
 BOTH = ("kapitza", "isolator")

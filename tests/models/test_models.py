@@ -4,7 +4,6 @@ gradient; and the pendulum's own against closed forms."""
 from __future__ import annotations
 
 import re
-from dataclasses import asdict
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +17,9 @@ from pvid.core.native import Native
 from pvid.models.kapitza.physical import linear, physical
 from pvid.models.model import Mechanism, Model
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.file import RigFile
 
 Float = npt.NDArray[np.float64]
 
-STANDARD = RigFile.standard()
 every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 # a product of units with whole powers
 UNIT = re.compile(r"(1|[A-Za-z]+(\^\d)?)([ /][A-Za-z]+(\^\d)?)*")
@@ -51,14 +48,6 @@ def test_parameters_are_mapped_then_offset_then_nuisance(model: Model) -> None:
     roles = [order.index(one.role) for one in model.parameters]
     assert roles == sorted(roles) and roles.count(0) == model.n_mapped > 0 and roles.count(1) <= 1
     assert [one.name for one in model.answers] == [*model.physical_names, *(one.name for one in model.published)]
-
-
-def test_the_rig_file_holds_constants_guess_and_scales_of_its_model() -> None:
-    model = MODELS[DEFAULT]
-    assert STANDARD.mechanism.model is model
-    assert STANDARD.mechanism.constants == {"l1": 0.3}
-    assert set(asdict(STANDARD.nominal)) == set(model.physical_names)
-    assert STANDARD.scale_sd == {"y_gain": 0.0, "l1": 0.0}
 
 
 @every_model
@@ -133,7 +122,7 @@ def test_outside_the_physical_region_nothing_is_claimed(p: tuple[float, float, f
 
 def test_errors_of_the_physical_parameters_by_the_delta_method() -> None:
     """Against the gradient by central differences and a covariance with every entry in play."""
-    truth, mechanism = linear(9.5, 0.12, 0.08, 0.3), STANDARD.mechanism
+    truth, mechanism = linear(9.5, 0.12, 0.08, 0.3), Mechanism(MODELS[DEFAULT], {"l1": 0.3})
     root = np.array([[0.3, 0.0, 0.0], [-0.02, 0.05, 0.0], [0.01, 0.04, 0.02]])
     covariance = root @ root.T
     h = 1e-5

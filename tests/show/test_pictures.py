@@ -19,7 +19,6 @@ from selenium import webdriver
 from pvid.link import frames as link
 from pvid.log.file import LogWriter
 from pvid.log.reader import LogStream
-from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
 from pvid.show.log_figure import write_log_figure
 from pvid.show.page import page
@@ -71,7 +70,7 @@ def test_terminal_view_always_fits_80_by_24(
     for worst in (False, True):
         frames = [link.encode(told(message), i & 0xFFFF, tick) for i, (tick, message) in enumerate(sent)]
         console = Console(width=80, height=24, force_terminal=True, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
-        mechanism, stream = RigFile.standard().mechanism, LogStream()
+        mechanism, stream = field_board.mechanism(), LogStream()
         view = LiveView(console, "/dev/ttyACM0 -> run.pvlog", mechanism, "http://127.0.0.1:8765/")
         writer = LogWriter(tmp_path / f"{worst}.pvlog")
         writer.begin("/dev/ttyACM0", None)
@@ -132,5 +131,5 @@ def test_the_page_fits_1280_by_800_and_no_words_overlap(log: Path, pictures: Pat
 
 
 def test_figure_of_a_log_has_a_title_and_its_titles_fit(log: Path, pictures: Path) -> None:
-    assert write_log_figure(log, RigFile.standard().mechanism, pictures / "log.png")
+    assert write_log_figure(log, field_board.mechanism(), pictures / "log.png")
     assert 50_000 < (pictures / "log.png").stat().st_size < 1_000_000

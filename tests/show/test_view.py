@@ -31,12 +31,11 @@ from pvid.log.reader import Account, LogReader, LogStream, Record
 from pvid.log.values import UNKNOWN_RIG, Rows, Values
 from pvid.log.words import kappa_share, kappa_words, reason_words
 from pvid.models.model import Mechanism
-from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
 from pvid.show.view import LiveView, sparkline
 
 TICKS = 12_000
-MECHANISM = RigFile.standard().mechanism
+MECHANISM = field_board.mechanism()
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The strong form's verdict on itself in both cores: its bits, when it raises the alarm, and what identify prints."""
+"""The strong form's verdict on itself in both cores: its bits, and when it raises the alarm."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy.typing as npt
 import pytest
 from lanes import assert_lanes_equal
 
-from bench.strong_pendulum import identify
 from pvid.cases import CASES
 from pvid.core.native import Native
 from pvid.rig.file import RigFile
@@ -150,12 +149,3 @@ def test_gradient_of_a_row_is_that_of_its_innovation(changed: Run) -> None:
         # of third order in 0.001, and an innovation rounded to a few units
         rounding = 5 / (0.002 * estimator.start[a])
         assert np.abs(gradient[a] * units[a] - slope).max() < 1e-4 * np.abs(slope).max() + rounding
-
-
-@both_cores
-def test_identify_prints_the_finding(core: str, native: Native) -> None:
-    for bits, doubted in ((20, False), (14, True)):
-        run = simulate(sensors=standard_sensors(bits), truth="linear", duration=20.0, seed=1).run
-        answer = identify(run, rig_of(bits, core), native)
-        assert answer.identified
-        assert answer.alarm is doubted

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -70,178 +70,156 @@ def bench_pages(names: tuple[str, ...], docs: Path) -> int:
     return DONE
 
 
-# name, module, help: the module has HEADER, STEPS (of the progress bar) and MODULE_table(native, progress)
+# ---- tables of cases: a row or some for each mechanism ----
+
+Rows = Iterable[tuple[str, ...]]
+Tables = Iterable[tuple[str, tuple[str, ...], Rows]]  # marker on the page, header, rows
+Advance = Callable[[], object]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A command that measures mechanisms and writes tables.
+
+    Attributes
+    ----------
+    number : of runs or ticks: default, what the option `name` is called, and its help
+    make : tables from the names of mechanisms, the number and what is called at each step
+    usual : mechanisms, where none is named
+    """
+
+    name: str
+    about: str
+    make: Callable[[tuple[str, ...], int, Advance], Tables]
+    number: tuple[int, str, str] = (20, "--seeds", "Runs of each case.")
+    usual: tuple[str, ...] = ()
+
+
+def _of_mechanisms(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
+    from bench import mechanisms
+
+    return mechanisms.tables(names, seeds, seeds // 4, lambda _: advance())
+
+
+def _of_engine(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
+    from bench import engine
+
+    return [
+        ("engine", engine.HEADER, engine.table(names, seeds, advance)),
+        ("engine-q31", engine.FIXED_HEADER, engine.fixed_table(names, seeds, advance)),
+    ]
+
+
+def _of_refinement(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
+    from bench import refine_mechanisms as bench_of
+
+    return [
+        ("refine-mechanisms", bench_of.HEADER, bench_of.refined_rows(names, seeds, advance)),
+        ("refine-friction", bench_of.IMPERFECT, bench_of.friction_rows(names, seeds // 2)),
+    ]
+
+
+def _of_hard(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
+    from bench import hard
+
+    return [("hard", hard.HEADER, hard.rows(names, seeds, advance))]
+
+
+def _of_accidents(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
+    from bench import accidents
+
+    return [("accidents", accidents.HEADER, accidents.rows(names, seeds, advance))]
+
+
+def _of_longevity(names: tuple[str, ...], ticks: int, advance: Advance) -> Tables:
+    from bench import longevity
+
+    return [("longevity", longevity.HEADER, longevity.rows(names, ticks, advance))]
+
+
+def _of_methods(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
+    from bench import methods
+
+    return [("compare-methods", methods.HEADER, methods.rows(names, seeds, advance))]
+
+
+def _of_strong(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
+    from bench import strong_mechanisms
+
+    return [("strong-mechanisms", strong_mechanisms.HEADER, strong_mechanisms.rows_of(names, advance))]
+
+
+def _of_float(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
+    from bench import costs
+
+    return costs.float_tables(names, advance)
+
+
+def _of_fixed(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
+    from bench import costs
+
+    return costs.fixed_tables(names, advance)
+
+
+_ONCE = (1, "--runs", "Of each image.")
 TABLES = (
-    ("laws", "laws", "Both laws on exact derivatives: how many of 40 starts reach 1 % and 0.01 %."),
-    ("strong", "strong", "Errors of the strong form by encoder resolution and differentiator."),
-    (
-        "pendulum",
-        "pendulum",
-        "The pendulum through the weak engine: errors over 80 seeds, beside the Cramer-Rao bound.",
+    Table("mechanisms", "Errors in float64 beside the Cramer-Rao bound, and of imperfect rigs.", _of_mechanisms),
+    Table("engine", "Errors of the weak form in C beside float64, and in fixed point beside float32.", _of_engine),
+    Table("refine-mechanisms", "Both stages in C: errors beside the Cramer-Rao bound.", _of_refinement),
+    Table("hard", "Coarse sensors, noise, little drive, no motion: what is published, and what is wrong.", _of_hard),
+    Table(
+        "accidents",
+        "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them.",
+        _of_accidents,
+        (3, "--seeds", "Runs of each case."),
+        ("kapitza", "dc_motor", "cart_pendulum"),
     ),
-    ("hard", "hard", "Noise until the answer fails, little motion or drive, one mode, friction, large angles."),
-    ("accidents", "accidents", "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them."),
+    Table(
+        "longevity",
+        "Millions of ticks of every disturbance, with and without forgetting.",
+        _of_longevity,
+        (1_000_000, "--ticks", "Of each run."),
+    ),
+    Table(
+        "compare-methods",
+        "Weak form, strong form, output error and pysindy's weak form (needs pysindy).",
+        _of_methods,
+        (3, "--seeds", "Runs of each case."),
+    ),
+    Table("strong-mechanisms", "The strong form on boards: its bits and the cost of a tick.", _of_strong, _ONCE),
+    Table("float-cost", "Where instructions and bytes of float32 go on a Cortex-M4F (needs QEMU).", _of_float, _ONCE),
+    Table("fixed-cost", "Where instructions and bytes of fixed point go (needs QEMU).", _of_fixed, _ONCE),
 )
 
 
-def _add_table(name: str, module: str, about: str) -> None:
-    @bench.command(name=name, help=about)
+def _add_table(one: Table) -> None:
+    default, option, about = one.number
+
+    @bench.command(name=one.name, help=one.about)
+    @click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
+    @click.option(option, "number", default=default, show_default=True, type=click.IntRange(min=1), help=about)
     @UPDATE
-    def command(update: Path | None) -> int:
-        table = importlib.import_module(f"bench.{module}")
-        with progress_bar(name, table.STEPS) as advance:
-            rows = list(getattr(table, f"{module}_table")(Native(), progress=advance))
-        put_table(update, name, markdown(table.HEADER, rows))
+    def command(chosen: tuple[str, ...], number: int, update: Path | None) -> int:
+        from pvid.models.mechanisms import names
+
+        if unknown := set(chosen) - set(names()):
+            raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
+        some = chosen or one.usual or tuple(names())
+        with progress_bar(one.name, None) as advance:
+            done = count(1)
+            made = one.make(some, number, lambda: advance(next(done)))
+            tables = [(marker, header, list(rows)) for marker, header, rows in made]
+        for marker, header, rows in tables:
+            if rows:
+                put_table(update, marker, markdown(header, rows))
         return DONE
 
 
 for _table in TABLES:
-    _add_table(*_table)
+    _add_table(_table)
 
 
-@bench.command(name="refine")
-@click.option("--seeds", default=80, show_default=True, type=click.IntRange(min=2), help="Runs of each case.")
-@click.option("--imperfect", default=20, show_default=True, type=click.IntRange(min=2), help="Of each imperfection.")
-@UPDATE
-def bench_refine(seeds: int, imperfect: int, update: Path | None) -> int:
-    """The refinement behind the weak engine: errors beside the Cramer-Rao bound, and on imperfect rigs."""
-    from bench import refine, refine_cases, refine_imperfect, refine_step
-
-    runs = seeds * len(refine_cases.CASES) + imperfect * (len(refine_imperfect.FAULTS) + len(refine_step.CHANGES))
-    with progress_bar("refine", runs) as advance:
-        done = count(1)
-        rows = refine.refine_table(seeds, lambda: advance(next(done)))
-        wrong = refine_imperfect.imperfect_table(imperfect, lambda: advance(next(done)))
-        changed = refine_step.step_table(imperfect, lambda: advance(next(done)))
-    put_table(update, "refine", markdown(refine.HEADER, rows))
-    put_table(update, "refine-imperfect", markdown(refine_imperfect.HEADER, wrong))
-    put_table(update, "refine-step", markdown(refine_step.HEADER, changed))
-    return DONE
-
-
-@bench.command(name="refine-options")
-@click.option("--seeds", default=40, show_default=True, type=click.IntRange(min=2), help="Runs of each case.")
-@UPDATE
-def bench_refine_options(seeds: int, update: Path | None) -> int:
-    """The refinement of the pendulum in C with dry friction and a slanted slide, and what that costs."""
-    from bench import refine_options
-
-    with progress_bar("refine-options", seeds * len(refine_options.CASES)) as advance:
-        done = count(1)
-        rows = refine_options.options_table(seeds, lambda: advance(next(done)))
-    put_table(update, "refine-options", markdown(refine_options.HEADER, rows))
-    put_table(update, "refine-options-cost", markdown(refine_options.COST_HEADER, refine_options.cost_table()))
-    return DONE
-
-
-@bench.command(name="refine-rigs")
-@click.option("--rigs", default=120, show_default=True, type=click.IntRange(min=1), help="How many.")
-@click.option("--seed", default=7, show_default=True, type=click.IntRange(min=0), help="Of the rigs.")
-@UPDATE
-def bench_refine_rigs(rigs: int, seed: int, update: Path | None) -> int:
-    """Both stages of the pendulum in C on the random rigs of a campaign."""
-    from bench import refine_rigs
-
-    with progress_bar("refine-rigs", rigs) as advance:
-        done = count(1)
-        found = refine_rigs.outcomes_of(rigs, seed, lambda: advance(next(done)))
-    put_table(update, "refine-rigs", markdown(refine_rigs.HEADER, refine_rigs.table_of(found)))
-    return DONE
-
-
-@bench.command(name="refine-mechanisms")
-@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
-@UPDATE
-def bench_refine_mechanisms(seeds: int, update: Path | None) -> int:
-    """Both stages in C on the other mechanisms: errors beside the Cramer-Rao bound."""
-    from bench import refine_mechanisms
-
-    with progress_bar("refine-mechanisms", seeds * len(refine_mechanisms.cases())) as advance:
-        done = count(1)
-        rows = refine_mechanisms.refined_rows(seeds, lambda: advance(next(done)))
-    put_table(update, "refine-mechanisms", markdown(refine_mechanisms.HEADER, rows))
-    cases = [(name, case) for name, _, case in refine_mechanisms.cases() if name in refine_mechanisms.FRICTION]
-    wrong = [row for name, case in cases for row in refine_mechanisms.imperfect_rows(name, case, seeds // 2)]
-    put_table(update, "refine-friction", markdown(refine_mechanisms.IMPERFECT, wrong))
-    return DONE
-
-
-@bench.command(name="mechanisms")
-@click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
-@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
-@click.option("--imperfect", default=5, show_default=True, type=click.IntRange(min=0), help="Of each imperfection.")
-@UPDATE
-def bench_mechanisms(chosen: tuple[str, ...], seeds: int, imperfect: int, update: Path | None) -> int:
-    """The shipped mechanisms on simulated rigs, beside the Cramer-Rao bound, and on imperfect rigs."""
-    from bench import mechanisms
-    from pvid.models.mechanisms import names
-
-    unknown = set(chosen) - set(names())
-    if unknown:
-        raise PvidError(f"no such mechanism: {', '.join(sorted(unknown))}; there are {', '.join(names())}")
-    some = chosen or names()
-    cases = sum(mechanisms.number_of_cases(name) for name in some) if imperfect else 0
-    with progress_bar("mechanisms", 2 * seeds * len(some) + imperfect * cases) as advance:
-        tables = mechanisms.tables(some, seeds, imperfect, advance)
-    for marker, header, rows in tables:
-        if rows:
-            put_table(update, marker, markdown(header, rows))
-    return DONE
-
-
-@bench.command(name="engine")
-@click.option("--mechanism", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
-@click.option("--seeds", default=20, show_default=True, type=click.IntRange(min=2), help="Runs of each.")
-@click.option("--fixed", is_flag=True, help="In fixed point, beside those of float32.")
-@UPDATE
-def bench_engine(chosen: tuple[str, ...], seeds: int, fixed: bool, update: Path | None) -> int:
-    """Errors of the weak engine in C beside those of the float64 oracle on the shipped mechanisms."""
-    from bench import engine, engine_q31
-    from pvid.models.mechanisms import names
-
-    some = chosen or names()
-    if fixed:
-        with progress_bar("engine", seeds * len(engine.cases(some))) as advance:
-            done = iter(range(1, seeds * len(engine.cases(some)) + 1))
-            rows = list(engine_q31.table(some, seeds, lambda: advance(next(done))))
-        put_table(update, "engine-q31", markdown(engine_q31.HEADER, rows))
-        return DONE
-    with progress_bar("engine", seeds * len(engine.cases(some))) as advance:
-        done = iter(range(1, seeds * len(engine.cases(some)) + 1))
-        rows = list(engine.table(some, seeds, lambda: advance(next(done))))
-    put_table(update, "engine", markdown(engine.HEADER, rows))
-    return DONE
-
-
-@bench.command(name="fixed-cost")
-@click.option("--mechanism", default="kapitza", show_default=True, help="Of the shipped ones.")
-@UPDATE
-def bench_fixed_cost(mechanism: str, update: Path | None) -> int:
-    """Where the instructions of a tick and the bytes of the state of the engine in fixed point go (needs QEMU)."""
-    from bench import fixed_cost
-
-    put_table(update, "fixed-tick", markdown(fixed_cost.HEADER, fixed_cost.tick_rows(mechanism)))
-    put_table(update, "fixed-state", markdown(fixed_cost.STATE_HEADER, fixed_cost.state_rows(mechanism)))
-    return DONE
-
-
-@bench.command(name="float-cost")
-@click.option("--mechanism", default="kapitza", show_default=True, help="Of the shipped ones.")
-@UPDATE
-def bench_float_cost(mechanism: str, update: Path | None) -> int:
-    """Where instructions and bytes of the engine in float32 go on a Cortex-M4F, and those of all mechanisms (needs
-    QEMU)."""
-    from bench import float_cost
-    from pvid.models.mechanisms import names
-
-    put_table(update, "float-tick", markdown(float_cost.TICK_HEADER, float_cost.tick_rows(mechanism)))
-    put_table(update, "float-state", markdown(float_cost.STATE_HEADER, float_cost.state_rows(mechanism)))
-    put_table(update, "float-text", markdown(float_cost.TEXT_HEADER, float_cost.text_rows(mechanism)))
-    with progress_bar("mechanisms", len(names())) as advance:
-        done = iter(range(1, len(names()) + 1))
-        rows = list(float_cost.mechanism_rows(lambda: advance(next(done))))
-    put_table(update, "float-mechanisms", markdown(float_cost.MECHANISMS_HEADER, rows))
-    return DONE
+# ---- commands of their own ----
 
 
 @bench.command(name="cycles")
@@ -256,19 +234,6 @@ def bench_cycles(processes: int, update: Path | None) -> int:
         rows = list(cycles.cycle_rows(processes, lambda: advance(next(done))))
     put_table(update, "cycles", markdown(cycles.HEADER, rows))
     return DIFFERENT if any(row[-1] != "equal" for row in rows) else DONE
-
-
-@bench.command(name="cost")
-@UPDATE
-def bench_cost(update: Path | None) -> int:
-    """Instructions a tick by stage, by callgrind, beside recursive least squares (needs valgrind)."""
-    from bench import cost
-
-    with tempfile.TemporaryDirectory() as folder:
-        costs = {level: cost.stage_costs(cost.build(Path(folder), level=level)) for level in ("-O2", "-O3")}
-        state_bytes = cost.state_bytes(Path(folder))
-    put_table(update, "cost", cost.as_markdown(costs, state_bytes))
-    return DONE
 
 
 @bench.command(name="missing")
@@ -315,42 +280,6 @@ def bench_cell(folder: Path | None, update: Path | None) -> int:
     return DONE
 
 
-@bench.command(name="tick-methods")
-@UPDATE
-def bench_tick_methods(update: Path | None) -> int:
-    """A tick of recursive least squares, U-D, a Kalman filter and the strong form, on a Cortex-M4F."""
-    from bench import tick_methods
-
-    with progress_bar("methods", tick_methods.STEPS) as advance:
-        rows = list(tick_methods.rows_of(Native(), progress=advance))
-    put_table(update, "tick-methods", markdown(tick_methods.HEADER, rows))
-    return DONE
-
-
-@bench.command(name="strong-bytes")
-@UPDATE
-def bench_strong_bytes(update: Path | None) -> int:
-    """Where the bytes of code and state of the strong form go on a Cortex-M4F; its cost in fixed point."""
-    from bench import strong_bytes
-
-    put_table(update, "strong-text", markdown(strong_bytes.TEXT_HEADER, strong_bytes.text_rows()))
-    put_table(update, "strong-state", markdown(strong_bytes.STATE_HEADER, strong_bytes.state_rows()))
-    put_table(update, "strong-fixed", markdown(strong_bytes.FIXED_HEADER, strong_bytes.fixed_rows()))
-    return DONE
-
-
-@bench.command(name="strong-mechanisms")
-@UPDATE
-def bench_strong_mechanisms(update: Path | None) -> int:
-    """The strong form of every described mechanism on emulated boards: its bits and the cost of a tick."""
-    from bench import strong_mechanisms
-
-    with progress_bar("mechanisms", strong_mechanisms.STEPS) as advance:
-        rows = list(strong_mechanisms.rows_of(progress=advance))
-    put_table(update, "strong-mechanisms", markdown(strong_mechanisms.HEADER, rows))
-    return DONE
-
-
 @bench.command(name="build-choices")
 @UPDATE
 def bench_build_choices(update: Path | None) -> int:
@@ -381,30 +310,6 @@ def bench_model_boards(boards: tuple[str, ...], update: Path | None) -> int:
         rows = list(model_boards.rows_of(names, advance))
     put_table(update, "model-boards", markdown(model_boards.HEADER, rows))
     return DIFFERENT if any(row[-1] == "DIFFERENT" for row in rows) else DONE
-
-
-@bench.command(name="strong-schedules")
-@UPDATE
-def bench_strong_schedules(update: Path | None) -> int:
-    """Final p of the strong form's schedules against that of all sums at every row, 40 seeds."""
-    from bench import strong_schedules
-
-    with progress_bar("samplings", len(strong_schedules.SAMPLINGS)) as advance:
-        rows = list(strong_schedules.schedule_rows(Native(), progress=advance))
-    put_table(update, "strong-schedules", markdown(strong_schedules.HEADER, rows))
-    return DONE
-
-
-@bench.command(name="compare-methods")
-@UPDATE
-def bench_compare_methods(update: Path | None) -> int:
-    """Weak form, strong form, output error and pysindy's weak form on the shipped mechanisms (needs pysindy)."""
-    from bench import methods
-
-    with progress_bar("methods", len(methods.MECHANISMS) * len(methods.METHODS)) as advance:
-        rows = list(methods.rows(progress=lambda: advance(1)))
-    put_table(update, "compare-methods", markdown(methods.HEADER, rows))
-    return DONE
 
 
 def _put_rigs(rigs: Sequence[Rig], update: Path | None, prefix: str = "") -> None:
@@ -469,53 +374,6 @@ def bench_recordings(folder: Path, checkouts: Path | None, update: Path | None) 
     for fault in faults:
         write_stderr(f"pvid: {fault}")
     return DIFFERENT if faults else DONE
-
-
-@bench.command(name="longevity")
-@click.option("--ticks", type=click.IntRange(50_000), help="Of each run. Default: 10^7; 10^6 held out.")
-@click.option("--scenario", "chosen", multiple=True, help="Only this one; may be given again. Default: all.")
-@click.option(
-    "--columns",
-    "columns",
-    multiple=True,
-    help="Likewise: weak, strong, weak-q31, strong-q31, strong-fine, peers.",
-)
-@click.option("--processes", default=2, show_default=True, type=click.IntRange(1, 64), help="At a time.")
-@click.option("--held-out", is_flag=True, help="Disturbances of other sizes, times, seeds and drives.")
-@UPDATE
-def bench_longevity(
-    ticks: int | None,
-    chosen: tuple[str, ...],
-    columns: tuple[str, ...],
-    processes: int,
-    held_out: bool,
-    update: Path | None,
-) -> int:
-    """Millions of ticks of every disturbance, beside textbook and UD recursive least squares (needs gcc).
-
-    What is done is kept in build/longevity, for the present core: the next call goes on from there.
-    """
-    from bench import longevity_tables as kept
-    from bench.longevity import COLUMNS, OURS
-    from bench.longevity_signals import HELD_OUT, SCENARIOS
-
-    for name, given, known in (("scenario", chosen, SCENARIOS), ("column", columns, COLUMNS)):
-        unknown = set(given) - set(known)
-        if unknown:
-            raise PvidError(f"no such {name}: {', '.join(sorted(unknown))}; there are {', '.join(known)}")
-    scenarios = chosen or tuple(SCENARIOS)
-    if held_out:
-        ticks = ticks or kept.HELD_OUT_TICKS
-        tasks = kept.tasks_of((one for one in HELD_OUT if one.kind in scenarios), columns or OURS, ticks)
-    else:
-        ticks = ticks or kept.TICKS
-        tasks = kept.tasks_of((SCENARIOS[name] for name in scenarios), columns or COLUMNS, ticks)
-    with tempfile.TemporaryDirectory() as folder, progress_bar("longevity", len(tasks)) as advance:
-        kept.run_missing(tasks, Path(folder), processes, advance)
-    for marker, header, rows in [kept.held_out_table(ticks)] if held_out else kept.tables(ticks):
-        if rows:
-            put_table(update, marker, markdown(header, rows))
-    return DONE
 
 
 @bench.command(name="reading")
@@ -679,17 +537,17 @@ def bench_field_log(target: str, samples: int, out: Path) -> int:
 @bench.command(name="year")
 @click.option("--on", "target", default="mps2-an386", show_default=True, help="Emulator, or stream-host.")
 @click.option("--core", default="f32", show_default=True, type=click.Choice(["f32", "q31"]))
-@click.option("--form", default="weak", show_default=True, type=click.Choice(["weak", "strong"]))
 @click.option("--samples", default=20_000, show_default=True, help="At each passage.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("year.pvlog"), show_default=True)
-def bench_year(target: str, core: Core, form: str, samples: int, out: Path) -> int:
+def bench_year(target: str, core: Core, samples: int, out: Path) -> int:
     """A year at 1 kHz, by a tick counter started before each passage of 2^32: log, verify, exports, plot, page."""
-    from bench.year import emulated_year, passages_of_a_year, rig_of
+    from bench.year import emulated_year, passages_of_a_year
+    from pvid.rig.mechanism_file import MechanismRig
 
     if out.exists():
         raise PvidError(f"{out} exists")
-    rig = rig_of(core, form)
-    passages = tuple(range(1, 1 + passages_of_a_year(rig.sample_rate or 0.0)))
+    rig = MechanismRig("kapitza", 1000.0, known={"l1": 0.3})
+    passages = tuple(range(1, 1 + passages_of_a_year(1000.0)))
     with progress_bar("verifying", None) as advance:
         year = emulated_year(target, passages, samples, out, rig, core, advance)
     click.echo(f"{year.passages} passages of 2^32 ticks; {year.verdict.text}")
@@ -697,20 +555,6 @@ def bench_year(target: str, core: Core, form: str, samples: int, out: Path) -> i
     for sentence in year.faults:
         click.echo(f"pvid: {sentence}", err=True)
     return DIFFERENT if year.faults or not year.verdict.verified else DONE
-
-
-@bench.command(name="side-by-side")
-@UPDATE
-def bench_side_by_side(update: Path | None) -> int:
-    """Every method on the same data: both forms, a Kalman filter, output error (counts need valgrind)."""
-    from bench import cost, side_by_side
-
-    with tempfile.TemporaryDirectory() as folder:
-        counted = {one.stage: one.instructions for one in cost.stage_costs(cost.build(Path(folder)))}
-    with progress_bar("side by side", side_by_side.NUMBER_OF_ROWS) as advance:
-        rows = list(side_by_side.side_by_side(Native(), instructions=counted, progress=advance))
-    put_table(update, "side-by-side", markdown(side_by_side.HEADER, rows))
-    return DONE
 
 
 @bench.command(name="long")

@@ -23,14 +23,11 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.board import mechanism_image, mechanism_image_q31, replay_image
 from pvid.board.boards import Board, one_at_a_time
-from pvid.core.native import Native
 from pvid.core.sources import build_folder
-from pvid.settings.enums import Core
 
 PACKAGE = "pythondata_cpu_cv32e40p"
 CLOCKS_MHZ = (16, 48, 100)
 RATE_HZ = 1000
-STRONG_TICKS = 1000
 HEADER = (
     "identifier",
     "FPU",
@@ -97,21 +94,11 @@ def _fixed_engine(model: str) -> Case:
     return _case(f"weak, q31, {model}", run, mechanism_image_q31.build_fixed_image, mechanism_image_q31.native_hashes)
 
 
-def _strong(core: Core) -> Case:
-    run = replay_image.standard_run(STRONG_TICKS, core)
-    native = Native()
-    return _case(
-        f"strong, {core}, kapitza", run, replay_image.build_image, lambda one: replay_image.native_hashes(one, native)
-    )
-
-
 # What is made of each row of the table, and the cores that play it.
 _ROWS: tuple[tuple[Callable[[], Case], tuple[Hardware, ...]], ...] = (
     (lambda: _float_engine("kapitza"), FPUS),
     (lambda: _float_engine("dc_motor"), FPUS),
-    (lambda: _strong("f32"), FPUS),
     (lambda: _fixed_engine("kapitza"), (WITHOUT,)),
-    (lambda: _strong("q31"), (WITHOUT,)),
 )
 STEPS = sum(len(cores) for _, cores in _ROWS)
 

@@ -1,187 +1,117 @@
-"""Where it gets hard: noise until the answer fails, little motion, little drive, one mode, friction, large angles.
+"""Where it gets hard, for any mechanism: coarse sensors, little drive, little motion, none, noise that nobody gave.
 
-Every run has an unknown encoder offset of 0.02 rad. The engine runs as on a board: its settings are made once for the
-encoder, its own trust alone judges. What must not happen is a published answer that is far from the truth by its own
-standard errors and raises no alarm, more often than chance explains.
+The weak form runs as on a board: its settings are made once, from a run of the shipped rig; its own trust alone judges.
+What must not happen is a published answer that is far from the truth by its own standard errors and raises no alarm,
+more often than chance explains.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
 from bench.board_engine import Answer, FixedBoard, FloatBoard, board_of
-from bench.pendulum import RIGS, design_for, model_for
+from bench.mechanisms import design_of, size_of, start_of
 from pvid.configuration.weak import neglected_part
-from pvid.core.native import Native
-from pvid.rig.run import Run
+from pvid.models.drive import Drive, Scaled
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
 from pvid.settings.enums import Core
-from pvid.sim.pendulum import (
-    STANDARD_DRIVE,
-    STANDARD_PENDULUM,
-    STANDARD_RELEASE,
-    Sensors,
-    Tone,
-    Truth,
-    simulate,
-    standard_sensors,
-    standard_start,
-)
+from pvid.sim.simulated_run import PERFECT, RigSimulation
 
 Float = npt.NDArray[np.float64]
 
-SEEDS = 40
-RATE_HZ = 1000.0
-ZERO = 0.02  # rad, what the encoder reads at rest
-LARGEST = 0.107  # rad, |phi| of the standard rig (linear equations 0.106, full ones 0.108)
-TRUTH = STANDARD_PENDULUM.linear
-HEADER = (
-    "case",
-    "published",
-    "w %",
-    "d1 %",
-    "d2 %",
-    "s.e. of w %",
-    "in 3 s.e. %",
-    "alarm",
-    "wrong, no alarm",
-    "else held",
-    "fixed point: published",
-    "fixed point: wrong, no alarm",
-    "by chance",
-    "fault",
-)
-NOISE_LSB = 0.5  # of an encoder that nothing else is known of
+SEEDS = 20
 RARE = 1e-3  # probability below which chance is no explanation
+BEYOND = 3.0  # standard errors
+HEADER = (
+    *("mechanism", "case", "published", "RMS %", "in 3 s.e. %", "alarm", "wrong, no alarm", "else held"),
+    *("fixed point: published", "fixed point: wrong, no alarm", "by chance", "fault"),
+)
 
 
 @dataclass(frozen=True)
 class Case:
-    """One row: the standard rig but for what is said.
+    """What differs from a shipped rig.
 
     Attributes
     ----------
-    label : in words
-    bits, noise_lsb : of the encoder
-    told : whether the rig file gives this noise; otherwise it has NOISE_LSB
-    drive : factor on the amplitude of the tones
-    tones : of the pivot, before that factor
-    release : absolute angles at the start [rad]
-    damping : viscous friction of both joints [m^2/s]
-    truth : equations of motion
+    coarser : factor on the resolution of each sensor, and so on its noise; the settings contain it
+    noisier : factor on the noise alone, which the settings do not contain
+    drive, start : factors on the drives, and on the first sample's coordinates and rates
+    whole : with the equations of the refinement, where it has its own; those of the rows neglect something
     """
 
     label: str
-    bits: int = 14
-    noise_lsb: float = NOISE_LSB
-    told: bool = True
+    coarser: float = 1.0
+    noisier: float = 1.0
     drive: float = 1.0
-    tones: tuple[Tone, ...] = STANDARD_DRIVE
-    release: tuple[float, float] = STANDARD_RELEASE
-    damping: float = 0.0
-    truth: Truth = "linear"
-
-    @property
-    def sensors(self) -> Sensors:
-        """With the zero."""
-        return replace(standard_sensors(self.bits), phi_noise_lsb=self.noise_lsb, phi_zero=ZERO)
-
-    def board(self, core: Core = "f32") -> FloatBoard | FixedBoard:
-        """The engine with the settings for this encoder."""
-        noise = self.noise_lsb if self.told else NOISE_LSB
-        return _board(self.bits, noise, core, self.neglected)
-
-    @property
-    def neglected(self) -> float:
-        """As a recording of the rig gives it; 0 where its equations are linear."""
-        return 0.0 if self.truth == "linear" else _neglected(replace(self, bits=14, noise_lsb=NOISE_LSB))
-
-    def run(self, seed: int, duration: float = 40.0) -> Run:
-        """What the sensors see in `duration` [s]; both cores get the same."""
-        return _run(self, seed, duration)
+    start: float = 1.0
+    whole: bool = False
 
 
-@lru_cache(maxsize=SEEDS)
-def _run(case: Case, seed: int, duration: float) -> Run:
-    pendulum = replace(STANDARD_PENDULUM, damping1=case.damping, damping2=case.damping)
-    tones = tuple(replace(tone, amplitude_m=case.drive * tone.amplitude_m) for tone in case.tones if case.drive)
-    return simulate(pendulum, tones, case.sensors, RATE_HZ, duration, case.release, case.truth, seed).run
+CASES = (
+    *(Case("as shipped" if k == 1 else f"sensors {k} times as coarse", coarser=k) for k in (1, 4, 16, 64, 256)),
+    Case("10 times the noise that the settings contain", noisier=10.0),
+    *(Case(f"drive x{k:g}", drive=k) for k in (0.3, 0.1, 0.03, 0.01)),
+    Case("no drive", drive=0.0),
+    Case("no drive, no motion", drive=0.0, start=0.0),
+    *(Case(f"equations that the rows neglect, motion x{k:g}", start=k, whole=True) for k in (1, 0.5, 0.25)),
+)
 
 
-def modes() -> Float:
-    """Release angles (phi1, phi1 + phi) of the slow and the fast mode with phi = 1 rad, [2, 2]."""
-    w, d1, d2 = TRUTH
-    big_l2 = d1 - d2 - 1
-    stiffness = w * np.array([[1, -big_l2], [-1, big_l2 + d2]])  # of (phi1, phi), theory.md (1)
-    squares, shapes = np.linalg.eig(stiffness)
-    shapes = shapes[:, np.argsort(squares)]
-    return np.asarray([[shape[0] / shape[1], shape[0] / shape[1] + 1] for shape in shapes.T])
+def cases_of(name: str) -> tuple[Case, ...]:
+    """That a mechanism can have."""
+    own = bool(compiled_of(name).refinement.equations)
+    return tuple(one for one in CASES if own or not one.whole)
 
 
-def _released(factor: float) -> tuple[float, float]:
-    return factor * STANDARD_RELEASE[0], factor * STANDARD_RELEASE[1]
+@cache
+def simulation_for(name: str, case: Case) -> RigSimulation:
+    """The rig of a case."""
+    compiled, rig = compiled_of(name), simulated_rig(name)
+    signals = tuple(
+        replace(one, resolution=one.resolution * case.coarser, noise=one.noise * case.noisier)
+        if one.kind == "sensor"
+        else one
+        for one in compiled.signals
+    )
+    keys = ("start", "whole_start")
+    starts = {key: {name: case.start * value for name, value in getattr(rig, key).items()} for key in keys}
+    changed = replace(rig, drive=_drives(rig, case.drive), **starts)
+    return RigSimulation.of(replace(compiled, signals=signals), changed, whole=case.whole)
 
 
-def _in_mode(which: int, phi: float) -> tuple[float, float]:
-    a1, a2 = phi * modes()[which]
-    return float(a1), float(a2)
+def _drives(rig: SimulatedRig, by: float) -> dict[str, Drive | Servo]:
+    found: dict[str, Drive | Servo] = {}
+    for name, one in rig.drive.items():
+        if isinstance(one, Servo):
+            tones = tuple((by * size, hz, phase) for size, hz, phase in one.reference.tones)
+            found[name] = replace(one, reference=replace(one.reference, tones=tones))
+        else:
+            found[name] = one if by == 1 else Scaled(one, by, 1.0)
+    return found
 
 
-def _cases() -> Iterator[Case]:
-    for bits in range(14, 7, -1):
-        yield Case(f"encoder of {bits} bits", bits=bits)
-    for noise in (1, 2, 4, 8, 16, 32, 64, 128, 256, 512):
-        yield Case(f"14 bits, noise of {noise} LSB", noise_lsb=noise)
-    yield Case("14 bits, noise of 64 LSB, phi_lsb set for 0.58", noise_lsb=64, told=False)
-    for bits, factors in ((14, (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)), (12, (0.2, 0.1, 0.05))):
-        for factor in factors:
-            largest = LARGEST * factor / standard_sensors(bits).phi_lsb
-            shown = f"{largest:.0f}" if largest > 10 else f"{largest:.1f}"
-            label = f"start x{factor:g}, angle up to {shown} LSB, {bits} bits"
-            yield Case(label, release=_released(factor), bits=bits)
-    for bits in (14, 12):
-        for factor in (0.3, 0.1, 0.03, 0.01):
-            yield Case(f"drive x{factor:g}, {bits} bits", drive=factor, bits=bits)
-    yield Case("no drive, free swing", drive=0.0)
-    yield Case("no drive, no motion", drive=0.0, release=(0.0, 0.0))
-    yield Case("drive, no motion", release=(0.0, 0.0))
-    slow, fast = _in_mode(0, 0.08), _in_mode(1, 0.05)
-    for bits in (16, 14, 12):
-        yield Case(f"slow mode only, one tone, {bits} bits", tones=(Tone(6e-3, 1.1, 0.3),), release=slow, bits=bits)
-        yield Case(f"slow mode only, {bits} bits", release=slow, bits=bits)
-        yield Case(f"fast mode only, {bits} bits", release=fast, bits=bits)
-    for damping in (3e-6, 1e-5, 3e-5, 1e-4, 3e-4):
-        yield Case(f"friction of {damping:g} m^2/s, 14 bits", damping=damping)
-    yield Case("friction of 0.0001 m^2/s, 12 bits", damping=1e-4, bits=12)
-    for factor in (0.25, 0.5, 1.0):
-        yield Case(f"full equations, {LARGEST * factor:.3f} rad, 14 bits", release=_released(factor), truth="full")
-    for factor in (0.5, 1.0):
-        yield Case(
-            f"full equations, {LARGEST * factor:.3f} rad, 12 bits", release=_released(factor), truth="full", bits=12
-        )
+@cache
+def board(name: str, core: Core, coarser: float, whole: bool = False) -> FloatBoard | FixedBoard:
+    """With settings from a run of the shipped rig with these sensors; where it is of whole equations, what the rows
+    neglect is part of the standard errors, by the largest of the recorded signals."""
+    of = simulation_for(name, Case("", coarser=coarser, whole=whole))
+    run = of.run(0)
+    return board_of(of.model, run, design_of(of, PERFECT), of.truth, core, neglected_part(of.model, run))
 
 
-CASES = tuple(_cases())
-
-
-@lru_cache(maxsize=4)
-def _board(bits: int, noise_lsb: float, core: Core, neglected: float) -> FloatBoard | FixedBoard:
-    """From a run of the standard rig with the encoder's resolution."""
-    rig = replace(RIGS[0], bits=bits, zero=ZERO)
-    model, p = model_for(rig, noise=noise_lsb), np.append(TRUTH, ZERO)
-    return board_of(model, rig.signals(0), design_for(rig), p, core, neglected)
-
-
-@lru_cache(maxsize=4)
-def _neglected(case: Case) -> float:
-    run = case.run(0)
-    return neglected_part(model_for(RIGS[0]), {"phi": run.phi, "y": run.y})
+def answer_of(name: str, case: Case, seed: int, core: Core = "f32") -> Answer:
+    """A run of a case, from a start within +-50 %."""
+    of = simulation_for(name, case)
+    return board(name, core, case.coarser, case.whole).answer(of.run(seed), start_of(of, seed))
 
 
 @dataclass(frozen=True)
@@ -190,122 +120,108 @@ class Outcome:
 
     Attributes
     ----------
-    published, alarmed : [seeds]
-    errors, standard_errors : of w, d1, d2, relative to the truth [seeds, 3], published or not
-    correlation : of these errors as published [seeds, 3, 3]
-    held : reason of the runs that were not published
+    published, alarmed : [runs]
+    errors, se : of the parameters, over their sizes [runs, n_p]
+    correlation : of the errors as published [runs, n_p, n_p]
+    held : reasons of the runs that published nothing
     """
 
     published: npt.NDArray[np.bool_]
     alarmed: npt.NDArray[np.bool_]
     errors: Float
-    standard_errors: Float
+    se: Float
     correlation: Float
-    held: tuple[str, ...]
+    held: tuple[str, ...] = field(default=())
+
+    @classmethod
+    def of(cls, name: str, case: Case, found: Sequence[Answer]) -> Outcome:
+        """Of the answers to the runs of a case."""
+        of = simulation_for(name, case)
+        size = size_of(of)
+        return cls(
+            np.array([one.published for one in found]),
+            np.array([one.alarm for one in found]),
+            np.array([(one.p - of.truth) / size for one in found]),
+            np.array([one.se / size for one in found]),
+            np.array([one.correlation for one in found]),
+            tuple(one.last.text for one in found if not one.published),
+        )
 
     @property
     def covered(self) -> npt.NDArray[np.bool_]:
-        """Truths within 3 standard errors, [seeds, 3]."""
-        return np.asarray(np.abs(self.errors) <= 3 * self.standard_errors)
-
-    @property
-    def wrong(self) -> int:
-        """Runs that publish, raise no alarm, and have w, d1 or d2 beyond 3 standard errors."""
-        return int((self.silent & ~self.covered.all(axis=1)).sum())
+        """Errors within three standard errors [runs, n_p]."""
+        return np.asarray(np.abs(self.errors) <= BEYOND * self.se)
 
     @property
     def silent(self) -> npt.NDArray[np.bool_]:
-        """Runs that publish and raise no alarm [seeds]."""
+        """Runs that publish without an alarm [runs]."""
         return self.published & ~self.alarmed
 
     @property
+    def wrong(self) -> int:
+        """Silent runs with a parameter beyond three standard errors."""
+        return int((self.silent & ~self.covered.all(axis=1)).sum())
+
+    @property
     def chance(self) -> float:
-        """Probability that normal errors with the published covariance put w, d1 or d2 beyond 3 standard errors."""
+        """Probability of such a run under normal errors with the published covariance."""
         if not self.silent.any():
             return 0.0
-        normal = stats.multivariate_normal(
-            cov=np.median(self.correlation[self.silent], axis=0), allow_singular=True, seed=0
-        )
-        return 1.0 - float(normal.cdf(np.full(3, 3.0), lower_limit=np.full(3, -3.0)))
+        cov = np.median(self.correlation[self.silent], axis=0)
+        beyond = np.full(len(cov), BEYOND)
+        normal = stats.multivariate_normal(cov=cov, allow_singular=True, seed=0)
+        return max(0.0, 1.0 - float(normal.cdf(beyond, lower_limit=-beyond)))
 
     @property
     def fault(self) -> str:
-        """What chance does not explain of the runs without alarm, or nothing.
-
-        The number of wrong ones, or a mean error: each would be reported in one of 1000 rows without a fault.
-        """
+        """What chance explains in fewer than one of 1000 rows; "": nothing."""
         runs = int(self.silent.sum())
         if not runs:
             return ""
         if stats.binom.sf(self.wrong - 1, runs, self.chance) < RARE:
             return "wrong"
-        mean = np.mean((self.errors / self.standard_errors)[self.silent], axis=0)
-        beyond = 3 * 2 * stats.norm.sf(np.abs(mean).max() * np.sqrt(runs))  # of three parameters, either sign
+        mean = np.abs(np.mean((self.errors / self.se)[self.silent], axis=0))
+        beyond = 2 * mean.size * stats.norm.sf(mean.max() * np.sqrt(runs))
         return "biased" if beyond < RARE else ""
 
 
-def answer_of(case: Case, seed: int, core: Core = "f32") -> Answer:
-    """A run of a case, from a start within +-50 %."""
-    run = case.run(seed)
-    return case.board(core).answer({"phi": run.phi, "y": run.y}, np.append(standard_start(seed), 0.0))
-
-
 def run_case(
-    case: Case, seeds: int = SEEDS, core: Core = "f32", progress: Callable[[int], None] = lambda _: None
+    name: str, case: Case, seeds: int = SEEDS, core: Core = "f32", progress: Callable[[], object] = lambda: None
 ) -> Outcome:
-    """All seeds of a case; progress is told the runs done."""
-    found: list[Answer] = []
+    """All runs of a case."""
+    found = []
     for seed in range(seeds):
-        progress(seed)
-        found.append(answer_of(case, seed, core))
-    return Outcome(
-        published=np.array([one.published for one in found]),
-        alarmed=np.array([one.alarm for one in found]),
-        errors=np.array([one.p[:3] for one in found]) / TRUTH - 1,
-        standard_errors=np.array([one.se[:3] for one in found]) / TRUTH,
-        correlation=np.array([one.correlation[:3, :3] for one in found]),
-        held=tuple(one.last.text for one in found if not one.published),
-    )
+        found.append(answer_of(name, case, seed, core))
+        progress()
+    return Outcome.of(name, case, found)
 
 
-def row(case: Case, outcome: Outcome, fixed: Outcome) -> tuple[str, ...]:
-    """The outcomes in float32 and in fixed point as text.
-
-    RMS errors, median standard error and coverage are those of the published runs in float32.
-    """
-    shown = outcome.published
-    runs = len(shown)
-    figures = ["-"] * 5
+def row(name: str, case: Case, floating: Outcome, fixed: Outcome) -> tuple[str, ...]:
+    """Cells as in HEADER; errors are the RMS over all parameters of the published runs in float32."""
+    shown, runs = floating.published, len(floating.published)
+    figures = ["-", "-"]
     if shown.any():
-        rms = 100 * np.sqrt(np.mean(np.square(outcome.errors[shown]), axis=0))
-        middle = 100 * float(np.median(outcome.standard_errors[shown, 0]))
-        covered = 100 * outcome.covered[shown].mean(axis=0)
-        figures = [*(f"{value:.2g}" for value in (*rms, middle)), "/".join(f"{share:.0f}" for share in covered)]
-    reasons = Counter(outcome.held).most_common(1)
+        rms = 100 * np.sqrt(np.mean(np.square(floating.errors[shown])))
+        figures = [f"{rms:.2g}", f"{100 * floating.covered[shown].mean():.0f}"]
+    reasons = Counter(floating.held).most_common(1)
     return (
+        name,
         case.label,
         f"{shown.sum()}/{runs}",
         *figures,
-        f"{(shown & outcome.alarmed).sum()}/{shown.sum()}" if shown.any() else "-",
-        str(outcome.wrong),
+        f"{(shown & floating.alarmed).sum()}/{shown.sum()}" if shown.any() else "-",
+        str(floating.wrong),
         reasons[0][0] if reasons else "",
         f"{fixed.published.sum()}/{runs}",
         str(fixed.wrong),
-        f"{outcome.silent.sum() * outcome.chance:.2f}" if outcome.silent.any() else "-",
-        ", ".join(f"{core}: {one.fault}" for core, one in (("f32", outcome), ("q31", fixed)) if one.fault),
+        f"{floating.silent.sum() * floating.chance:.2f}" if floating.silent.any() else "-",
+        ", ".join(f"{core}: {one.fault}" for core, one in (("f32", floating), ("q31", fixed)) if one.fault),
     )
 
 
-STEPS = len(CASES) * SEEDS
-
-
-def hard_table(
-    _native: Native, seeds: int = SEEDS, progress: Callable[[int], None] = lambda _: None
-) -> Iterator[tuple[str, ...]]:
-    """All rows; progress is told the runs done."""
-    for place, case in enumerate(CASES):
-
-        def advance(done: int, before: int = place * seeds) -> None:
-            progress(before + done)
-
-        yield row(case, run_case(case, seeds, "f32", advance), run_case(case, seeds, "q31"))
+def rows(names: Sequence[str], seeds: int, progress: Callable[[], object]) -> Iterator[tuple[str, ...]]:
+    """All cases of mechanisms."""
+    for name in names:
+        for case in cases_of(name):
+            floating = run_case(name, case, seeds, "f32", progress)
+            yield row(name, case, floating, run_case(name, case, seeds, "q31"))

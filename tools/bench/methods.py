@@ -24,7 +24,6 @@ from pvid.sim.simulated_run import PERFECT, RigSimulation, simulation_of
 
 Float = npt.NDArray[np.float64]
 
-MECHANISMS = ("dc_motor", "rigid_body", "cart_pendulum", "furuta", "two_link_arm", "two_mass_drive", "battery_2rc")
 SEEDS = 3
 HEADER = (
     "mechanism",
@@ -157,7 +156,7 @@ def recorded(simulation: RigSimulation, seed: int) -> Recording:
 
 
 def rows(
-    mechanisms: tuple[str, ...] = MECHANISMS, seeds: int = SEEDS, progress: Callable[[], object] = int
+    mechanisms: tuple[str, ...], seeds: int = SEEDS, progress: Callable[[], object] = int
 ) -> Iterator[tuple[str, ...]]:
     """Of the table."""
     for name in mechanisms:

@@ -16,7 +16,6 @@ from pvid.configuration.refine import refine_design
 from pvid.configuration.weak import engine_config, samples_of
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.models import mechanisms
-from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import SimulatedRig, simulated_rig
 from pvid.oracle.weak.design import WeakDesign
 from pvid.settings.enums import Reason
@@ -28,7 +27,7 @@ from pvid.sim.simulated_run import RigSimulation
 Float = npt.NDArray[np.float64]
 
 SEEDS = 20
-NAMES = tuple(one for one in mechanisms.names() if one != DEFAULT)  # which has its own page
+NAMES = tuple(mechanisms.names())
 RATES = {"furuta": (1000.0, 1250.0, 2000.0)}  # beside the rig's own [Hz]
 HEADER = (
     *("mechanism", "Hz", "parameter", "bound %", "weak: RMS / bound", "refined: RMS / bound", "RMS / s.e."),
@@ -64,7 +63,7 @@ class Case:
     @classmethod
     def of(cls, name: str, rate: float) -> Case:
         compiled, rig = mechanisms.compiled_of(name), at_rate(simulated_rig(name), rate)
-        simulation = RigSimulation.of(compiled, rig)
+        simulation = RigSimulation.of(compiled, rig, whole=True)
         run, truth = simulation.run(), simulation.truth
         config = engine_config(compiled, run, WeakDesign(rate, rig.window_s, **rig.design), truth)  # type: ignore[arg-type]
         return cls(simulation, config, refine_design(compiled, config, run, truth))
@@ -107,16 +106,16 @@ def run_case(case: Case, seed: int) -> Outcome:
 
 
 @cache
-def cases() -> list[tuple[str, float, Case]]:
-    """All of them."""
-    given = [(name, rate) for name in NAMES for rate in RATES.get(name, (simulated_rig(name).sample_rate,))]
+def cases(names: tuple[str, ...] = NAMES) -> list[tuple[str, float, Case]]:
+    """Of mechanisms."""
+    given = [(name, rate) for name in names for rate in RATES.get(name, (simulated_rig(name).sample_rate,))]
     return [(name, rate, Case.of(name, rate)) for name, rate in given]
 
 
 def rows_of(name: str, rate: float, case: Case, runs: list[Outcome]) -> Iterator[tuple[str, ...]]:
     """A row for each parameter: cells as in HEADER."""
     simulation = case.simulation
-    least, size = bound(simulation), size_of(simulation)
+    least, size = bound(RigSimulation.of(simulation.model, simulation.rig)), size_of(simulation)
     weak = np.sqrt(np.mean([one.weak**2 for one in runs], axis=0))
     refined = [one for one in runs if np.isfinite(one.error).all()]
     first = [one.first for one in runs if np.isfinite(one.first)]
@@ -169,13 +168,19 @@ def imperfect_rows(name: str, case: Case, seeds: int) -> Iterator[tuple[str, ...
         yield name, imperfection.name, f"{len(ratios)} of {seeds}", f"{100 * np.mean(share_of_time):.0f}", *cells
 
 
-def refined_rows(seeds: int, progress: Callable[[], None] = lambda: None) -> list[tuple[str, ...]]:
+def refined_rows(names: tuple[str, ...], seeds: int, progress: Callable[[], object]) -> list[tuple[str, ...]]:
     """Rows of HEADER."""
     rows = []
-    for name, rate, case in cases():
+    for name, rate, case in cases(names):
         runs = []
         for seed in range(seeds):
             runs.append(run_case(case, seed))
             progress()
         rows += list(rows_of(name, rate, case, runs))
     return rows
+
+
+def friction_rows(names: tuple[str, ...], seeds: int) -> list[tuple[str, ...]]:
+    """Rows of IMPERFECT."""
+    given = [(name, case) for name, _, case in cases(names) if name in FRICTION]
+    return [row for name, case in given for row in imperfect_rows(name, case, seeds)]

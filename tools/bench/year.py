@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,8 @@ import numpy as np
 
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
-from pvid.board.mechanism_board import MechanismBoard, board_of_guess
-from pvid.board.mechanism_board_q31 import MechanismBoardQ31
+from pvid.board.mechanism_board import board_of_guess
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import StreamRig, stream_rig
 from pvid.board.target import HOST_TARGET, open_target
 from pvid.link.frames import Configuration, Raw, RawCount, Source
 from pvid.log.export import FORMATS, export_log
@@ -31,7 +29,6 @@ from pvid.log.rig import mechanism_in
 from pvid.log.values import Rows, Values
 from pvid.log.verify import Verdict, Verifier
 from pvid.models.model import Mechanism
-from pvid.rig.file import RigFile
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.settings.enums import Core
 from pvid.show.log_figure import write_log_figure
@@ -62,7 +59,7 @@ def emulated_year(
     passages: tuple[int, ...],
     samples: int,
     log: Path,
-    rig: RigFile | MechanismRig,
+    rig: MechanismRig,
     core: Core,
     progress: Callable[[int], None] | None = None,
 ) -> Year:
@@ -75,7 +72,7 @@ def emulated_year(
     passages
         Which of them, from 1: the tick passes that many times 2^32.
     rig, core
-        Of the strong form a rig file, which has a core of its own.
+        The board's.
     samples
         At least so many at each passage; the counter starts half of them before it.
     log
@@ -90,13 +87,8 @@ def emulated_year(
     """
     if rig.sample_rate is None:
         raise PvidError("the rig file has no sample_rate")
-    board: StreamRig | MechanismBoard | MechanismBoardQ31
-    kept: RigFile | MechanismBoard | MechanismBoardQ31
-    if isinstance(rig, RigFile):
-        board, kept = stream_rig(rig, rig.sample_rate), rig
-    else:
-        board = kept = board_of_guess(rig, core)
-    mechanism = mechanism_in(toml_document(kept.text()))
+    board = board_of_guess(rig, core)
+    mechanism = mechanism_in(toml_document(board.text()))
     assert mechanism is not None
     settings = settings_number(board)
     every = max(1, round(rig.sample_rate / 10))
@@ -109,7 +101,7 @@ def emulated_year(
         Logger(
             source=EmulatorSource(name, lambda: open_target(name, board)),
             out=log,
-            rig=kept.text(),
+            rig=board.text(),
             append=True,
             samples=samples,
             begin=lambda passage=passage: configure(passage),  # type: ignore[misc]
@@ -117,7 +109,7 @@ def emulated_year(
         ).run()
     verdict = Verdict()
     reader = LogReader(log)
-    for stretch in Verifier(kept, progress).stretches(reader):
+    for stretch in Verifier(board, progress).stretches(reader):
         verdict.add(stretch)
     crossed = [*_crossed(log)]
     faults = [] if crossed == [*passages] else [f"passages {crossed} of {[*passages]} are in the log"]
@@ -231,12 +223,3 @@ def _faults_of_page(log: Path) -> Iterator[str]:
         t = curve["t"]
         if not t or np.any(np.diff(t) < 0) or t[-1] == t[0]:
             yield f"the page's time axis of {curve['label']} does not go on"
-
-
-def rig_of(core: Core, form: str) -> RigFile | MechanismRig:
-    """The standard rig with that core and form."""
-    if form == "weak":
-        return MechanismRig("kapitza", 1000.0, known={"l1": 0.3})
-    rig = RigFile.standard()
-    settings: dict[str, Any] = {"core": core, "form": form}
-    return replace(rig, identifier=replace(rig.identifier, **settings))

@@ -54,15 +54,13 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "compare": "Compare the C core with its numpy twin, bit for bit.",
         "verify": "Recompute a log with the numpy twin, bit for bit.",
         "bench": "Measure accuracy, robustness and cost.",
-        "campaign": "Identify many random rigs and count the outcomes.",
     },
 }
 _ELSEWHERE = {
     "schema": ("pvid.cli.tables", "schema"),
     "bench": ("bench.command", "bench"),
-    "campaign": ("bench.campaign.command", "campaign"),
 }
-_IN_A_CLONE = ("bench", "campaign")
+_IN_A_CLONE = ("bench",)
 # Packages that not every installation has, with the extra of pvid that brings them.
 
 
