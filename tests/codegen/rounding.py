@@ -74,20 +74,6 @@ def fixed_bounds_of(made: FixedProgram, given: Float) -> list[Float]:
     return [errors[k] for k in program.results]
 
 
-def values_of(program: Program, given: Float) -> list[Float]:
-    """Every value of the list [vectors] in float64."""
-    values: list[Float] = []
-    nothing = np.zeros(given.shape[1])
-    for one in program.values:
-        if isinstance(one, Literal):
-            values.append(nothing + float(one.value))
-        elif isinstance(one, Argument):
-            values.append(given[one.place])
-        else:
-            values.append(_after(one.kind, [values[k] for k in one.operands], [nothing] * len(one.operands))[0])
-    return values
-
-
 def _after(kind: str, x: list[Float], e: list[Float]) -> tuple[Float, Float]:
     """Value, and what the operands' errors make of it."""
     a, da = x[0], e[0]

@@ -1,4 +1,4 @@
-"""Generated fixed point: C and numpy give the same integers, within the rounding of their formats."""
+"""Generated fixed point: the values of the expressions within the rounding of their formats, in C and its twin."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import sympy as sp
 from described import MOTOR
 from generated import MODELS, VECTORS, Generated, exactly, functions_by_name, vectors
 from generated import SCALED as SCALED_TYPE
-from rounding import SCALED, bounds_of, fixed_bounds_of, values_of
+from rounding import SCALED, bounds_of, fixed_bounds_of
 
 from pvid.base.errors import PvidError
 from pvid.codegen.c_functions import scaled_literal
@@ -22,11 +22,12 @@ from pvid.codegen.formats import bits_of, fixed
 from pvid.codegen.formats import bounds_of as interval_bounds_of
 from pvid.codegen.functions import functions_of
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.operations import program_of
+from pvid.codegen.operations import evaluated, program_of
 from pvid.codegen.self_test import scaled_of
-from pvid.codegen.twin_file import loaded_q31
 from pvid.core.sources import FIRMWARE, INCLUDES
-from pvid.twin.q31.scaled import Scaled
+from pvid.twin.printer.program import loaded
+
+PRINTED = 200  # vectors of the twin
 
 
 @pytest.fixture(scope="module", params=MODELS)
@@ -46,52 +47,45 @@ def inputs(model: FixedModel, beyond: bool = False) -> npt.NDArray[np.int32]:
     return drawn.astype(np.int32)
 
 
-def parameters(model: FixedModel) -> Scaled:
-    """p at random within its range."""
-    return scaled_of(vectors(model.functions, model.functions.theta))
-
-
-def test_c_and_twin_have_the_same_integers(model: FixedModel, tmp_path: Path) -> None:
-    generated, twin = Generated(model.functions, tmp_path), loaded_q31(model)
-    for beyond in (False, True):
-        given, fits = inputs(model, beyond), np.zeros(VECTORS, np.uint8)
-        for one in model.of_inputs:
-            want, within = getattr(twin, one.function.name)(given.astype(np.int64))
-            got = generated.run("every_fixed", one.function, "q31", given, fits)
-            assert (fits == within).all() and within.mean() == (0.5 if beyond else 1.0)
-            assert (got[:, within] == want[:, within]).all(), one.function.name
-            assert np.abs(want[:, within]).max() < 2**31  # int64 in the twin, int32 in C
-    p = parameters(model)
-    pairs = np.empty(p.m.shape, SCALED_TYPE)
-    pairs["m"], pairs["e"] = p.m, p.e
-    for function in model.of_parameters:
-        numbers = getattr(twin, function.name)(p)
-        found = generated.run("every_scaled", function, "q31", pairs)
-        assert (found["m"] == numbers.m).all() and (found["e"] == numbers.e).all(), function.name
-
-
-def test_values_are_those_of_the_expressions_within_rounding(model: FixedModel) -> None:
-    twin = loaded_q31(model)
-    given = inputs(model).astype(np.int64)
+def test_values_are_those_of_the_expressions_within_rounding(model: FixedModel, tmp_path: Path) -> None:
+    """Some of the vectors have the integers of the printed twin; inputs beyond their limits are refused."""
+    functions = model.functions
+    generated = Generated(functions, tmp_path)
+    twin = loaded(generated.files[f"{functions.name}_twin.py"], "twin")
+    given, wild, fits = inputs(model), inputs(model, beyond=True), np.zeros(VECTORS, np.uint8)
     values = given * 2.0 ** -np.array(model.input_bits, np.float64)[:, None]
     for one in model.of_inputs:
-        found = getattr(twin, one.function.name)(given)[0]
+        called = getattr(twin, f"{functions.name}_{one.function.name}_q31")
+        outside = generated.run("every_fixed", one.function, "q31", wild, fits)
+        assert fits.mean() == 0.5
+        for vector, row, within in zip(wild.T[:PRINTED].tolist(), outside.T, fits, strict=False):
+            out = [0] * len(row)
+            assert called(vector, out) == within and (out == row.tolist() or not within)
+        found = generated.run("every_fixed", one.function, "q31", given, fits)
+        assert fits.all()
         bounds = fixed_bounds_of(one.made, values)
-        right = exactly(model.functions, one.function, values)
+        right = exactly(functions, one.function, values)
         for label, integer, bits, wanted, bound in zip(
             one.function.labels, found, one.made.result_bits, right, bounds, strict=True
         ):
             assert (np.abs(integer * 2.0**-bits - wanted) <= bound).all(), label
-    p = parameters(model)
-    exact_p = np.ldexp(p.m.astype(np.float64), p.e.astype(np.int32))
+    pairs = scaled_of(vectors(functions, functions.theta))
+    given_p = np.empty(pairs.shape[:-1], SCALED_TYPE)
+    given_p["m"], given_p["e"] = pairs[..., 0], pairs[..., 1]
+    exact_p = np.ldexp(given_p["m"].astype(np.float64), given_p["e"])
     for function in model.of_parameters:
-        numbers = getattr(twin, function.name)(p)
+        found = generated.run("every_scaled", function, "q31", given_p)
         bounds = bounds_of(function.program, exact_p, SCALED)
-        right = exactly(model.functions, function, exact_p)
-        for k, (label, wanted, bound) in enumerate(zip(function.labels, right, bounds, strict=True)):
-            value = np.ldexp(numbers.m[k].astype(np.float64), numbers.e[k].astype(np.int32))
+        right = exactly(functions, function, exact_p)
+        for label, number, wanted, bound in zip(function.labels, found, right, bounds, strict=True):
+            value = np.ldexp(number["m"].astype(np.float64), number["e"])
             assert (np.abs(value - wanted) <= bound).all(), label
             assert np.median(bound / np.maximum(np.abs(wanted), 1e-30)) < 1e-6, label
+        for vector, row in zip(given_p.T[:PRINTED].tolist(), found.T.tolist(), strict=False):
+            results = [twin.pvid_scaled_q31() for _ in row]
+            called = getattr(twin, f"{functions.name}_{function.name}_q31")
+            called([twin.pvid_scaled_q31(*one) for one in vector], results)
+            assert [(one.m, one.e) for one in results] == row, function.name
 
 
 def test_no_value_leaves_its_bounds(model: FixedModel) -> None:
@@ -103,8 +97,8 @@ def test_no_value_leaves_its_bounds(model: FixedModel) -> None:
     reach = np.array(model.reaches)[:, None]
     given = random.uniform(-reach, reach, (len(reach), 2000))
     given[:, :200] = np.sign(given[:, :200]) * reach
-    for values, (low, high) in zip(values_of(whole, given), bounds, strict=True):
-        assert low <= values.min() and values.max() <= high
+    for values, (low, high) in zip(evaluated(whole, given), bounds, strict=True):
+        assert low <= np.min(values) and np.max(values) <= high
 
 
 def test_objects_hold_no_floating_point(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Expressions that nobody chose: C and numpy give the same bits, and the values within rounding."""
+"""Expressions that nobody chose: C and its printed twin give the same bits, and the values within rounding."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import random
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,27 +15,16 @@ import sympy as sp
 from generated import WARNINGS
 from rounding import FLOAT32, bounds_of, fixed_bounds_of
 
-from pvid.codegen import c_functions, numpy_f32, numpy_q31
+from pvid.codegen import c_functions
 from pvid.codegen.formats import bits_of, fixed
 from pvid.codegen.operations import program_of
-from pvid.codegen.twin_file import namespace
-from pvid.core.sources import INCLUDES, source
+from pvid.core.sources import FOLDERS, INCLUDES, source
 from pvid.model.signals import sgn
+from pvid.twin.printer.program import printed_module
 
-COUNT, VECTORS = 60, 500
+COUNT, VECTORS, PRINTED = 60, 500, 40  # expressions, vectors, vectors of the twin
 NAMES = sp.symbols("q1 q2 v1 u", real=True)
 REACH = (3.0, 40.0, 900.0, 0.02)
-HEAD = """
-import numpy as np
-import numpy.typing as npt
-
-from pvid.twin.f32 import elementary
-from pvid.twin.q31 import elementary as elementary_q31
-from pvid.twin.q31.integer import Int
-
-Float32 = npt.NDArray[np.float32]
-_F = np.float32
-"""
 HEAD_C = """
 #include "pvid/elementary.h"
 #include "pvid/elementary_q31.h"
@@ -85,19 +75,13 @@ class Case:
             ]
         )
 
-    @property
-    def twins(self) -> str:
-        """The same in numpy."""
-        integers = numpy_q31.fixed_function(f"g{self.number}", self.fixed, [2**30] * len(NAMES), "Random.")
-        return f"{numpy_f32.function(f'f{self.number}', self.program, 'Random.')}\n\n\n{integers}"
-
     def exactly(self, given: Float) -> Float:
         """In float64."""
         found = sp.lambdify(NAMES, self.whole, modules=[{"sgn": np.sign}, "numpy"])(*given)
         return np.broadcast_to(np.asarray(found, np.float64), given.shape[1:])
 
 
-def each(library: ctypes.CDLL, name: str, given: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+def each(library: ctypes.CDLL, name: str, given: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The result [vectors] of a function in C."""
     rows = np.ascontiguousarray(given.T)
     out = np.empty(len(rows), rows.dtype)
@@ -120,19 +104,23 @@ def test_random_expressions(tmp_path: Path) -> None:
     sources = [str(tmp_path / "random.c"), *map(str, core)]
     subprocess.run(["gcc", *options, *sources, "-o", str(tmp_path / "random.so"), "-lm"], check=True)
     library = ctypes.CDLL(str(tmp_path / "random.so"))
-    space = namespace("\n\n\n".join([HEAD, *(one.twins for one in cases)]), "random")
+    code = (tmp_path / "random.c").read_text(encoding="utf-8")
+    names = [f"{kind}{k}" for kind in "fg" for k in range(COUNT)]
+    twin = printed_module(core, FOLDERS, {}, names, {"random.c": code})
     drawn = np.random.default_rng(5).uniform(-1, 1, (len(NAMES), VECTORS)) * np.array(REACH)[:, None]
     floats = drawn.astype(np.float32)
     places = np.array([bits_of((-one, one)) for one in REACH])[:, None]
-    integers = np.rint(drawn * 2.0**places).astype(np.int64)
+    integers = np.rint(drawn * 2.0**places).astype(np.int32)
     for one in cases:
-        want = space[f"f{one.number}"](floats)[0]
-        assert (each(library, f"f{one.number}", floats).view(np.uint32) == want.view(np.uint32)).all(), one.whole
+        found, counts = each(library, f"f{one.number}", floats), each(library, f"g{one.number}", integers)
+        for k in range(PRINTED):
+            own, other = [np.float32(0)], [0]
+            getattr(twin, f"f{one.number}")(list(floats[:, k]), own)
+            assert np.float32(own[0]).tobytes() == found[k].tobytes(), one.whole
+            assert getattr(twin, f"g{one.number}")(integers[:, k].tolist(), other) and other[0] == counts[k], one.whole
         given = floats.astype(np.float64)
         bound = bounds_of(one.program, given, FLOAT32)[0]
-        assert (np.abs(want - one.exactly(given)) <= bound).all(), one.whole
-        counts = space[f"g{one.number}"](integers)[0][0]
-        assert (each(library, f"g{one.number}", integers.astype(np.int32)) == counts).all(), one.whole
+        assert (np.abs(found - one.exactly(given)) <= bound).all(), one.whole
         given = integers * 2.0**-places
         bound = fixed_bounds_of(one.fixed, given)[0]
         assert (np.abs(counts * 2.0 ** -one.fixed.result_bits[0] - one.exactly(given)) <= bound).all(), one.whole

@@ -1,11 +1,10 @@
-"""The refinement's functions: C and numpy have the same bits, values and derivatives are those of the equations."""
+"""The refinement's functions: C and its twin have the same bits, values and derivatives are those of the equations."""
 
 from __future__ import annotations
 
 import ctypes
 import subprocess
 import sys
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,18 +16,19 @@ import sympy as sp
 from conftest import ROOT
 
 from pvid.base.errors import PvidError
-from pvid.codegen import files_refine, refine_twin
-from pvid.codegen.operations import Argument, Literal, Operation
+from pvid.codegen import files_refine
+from pvid.codegen.operations import Operation
 from pvid.codegen.refine import RefineFunctions, refine_functions, refine_functions_of
 from pvid.core.host_compiler import host_compiler
 from pvid.core.model_library import NATIVE, core_of, of_second_stage
-from pvid.core.sources import INCLUDES, source
+from pvid.core.sources import FOLDERS, INCLUDES, source
 from pvid.model import Model
 from pvid.model.signals import Jet, sgn
 from pvid.models import mechanisms
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.cores import FLOAT
+from pvid.twin.printer.program import printed_module
 
 WARNINGS = (
     "-Werror",
@@ -39,7 +39,7 @@ WARNINGS = (
     "-Wdouble-promotion",
     "-Wshadow",
 )
-VECTORS = 200
+VECTORS, PRINTED = 200, 40  # PRINTED: of the twin
 # Names, and options of the refinement behind them.
 NAMES = (*mechanisms.names(), "kapitza slant", "kapitza dry_friction slant")
 
@@ -149,41 +149,43 @@ class InC:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_c_and_twin_have_the_same_bits(name: str, tmp_path: Path) -> None:
+def test_c_and_its_printed_twin_have_the_same_bits(name: str, tmp_path: Path) -> None:
+    """And the values of the lists in float64, to float32."""
     made = functions(name)
-    in_c, twin, given = (
-        InC(made, tmp_path),
-        refine_twin.loaded(made),
-        dict(given_of(name)),
-    )
-    given["m"] = twin.constants(given["r"])[0]
+    in_c, given, sizes = InC(made, tmp_path), dict(given_of(name)), sizes_of(made)
+    given["m"] = in_c("constants", given)["m"]
     given["row"] = np.random.default_rng(1).normal(size=(made.moving - made.skew, VECTORS)).astype(np.float32)
     assert np.isfinite(given["m"]).all()
-    for function in made.functions.values():
-        if function.name == "region":
+    texts = {one: (tmp_path / one).read_text() for one in ("pvid/refine_shape.h", "refine_model_f32.h", "each.c")}
+    twin = printed_module([source("elementary_f32.c")], FOLDERS, {}, [f"each_{one}" for one in made.functions], texts)
+    for function in made.functions:
+        if function == "region":
             continue
-        want = getattr(twin, function.name)(*(given[key] for key, _ in function.given))
-        got = in_c(function.name, given)
-        for (key, n), b in zip(function.written, want, strict=True):
-            if key == "U":  # the core needs none
-                continue
-            if key == "Zr":  # the core has the columns behind the motion's
-                b = b.reshape(len(made.outputs), -1, VECTORS)
-                assert (b[:, : made.moving - made.skew] == 0).all()
-                b = b[:, made.moving - made.skew :].reshape(-1, VECTORS)
-            elif key == "Zv" and np.isnan(got[key]).all():
-                assert (b == 0).all()
-                continue
-            else:
-                assert len(b) == n
-            assert got[key].shape == b.shape and np.isfinite(b).all(), key
-            assert (np.ascontiguousarray(got[key]).view(np.uint32) == b.view(np.uint32)).all(), key
+        got, (read, written) = in_c(function, given), arrays_of(made, function)
+        out = {key: [np.float32(np.nan)] * (PRINTED * sizes[key]) for key in written}
+        if function == "chart":
+            out["row"] = list(given["row"][:, :PRINTED].T.ravel())
+        with np.errstate(all="ignore"):
+            flat = (list(given[key][:, :PRINTED].T.ravel()) for key in read)
+            getattr(twin, f"each_{function}")(PRINTED, *flat, *out.values())
+        wanted = made.functions[function].values(**given)
+        for key, values in out.items():
+            own = np.ascontiguousarray(got[key][:, :PRINTED].T)
+            assert np.array(values, np.float32).tobytes() == own.tobytes(), key
+            if key == "Zv" and np.isnan(got[key]).all():  # the core knows that no output depends on v
+                assert not np.any(wanted.get(key, 0.0))
+            elif key in wanted and key != "Zr":  # of which the core has the columns behind the motion's
+                size = np.abs(wanted[key]).max(initial=1.0)
+                np.testing.assert_allclose(got[key], wanted[key], rtol=1e-3, atol=1e-4 * size)
     given["r"] = given["r"].copy()
     given["r"][0, ::2] *= -1  # every model's first parameter is positive
     found = np.zeros(VECTORS, bool)
     arrays = np.ascontiguousarray(given["r"].T), found
     in_c.library.each_region(VECTORS, *(x.ctypes.data_as(ctypes.c_void_p) for x in arrays))
-    assert (found == twin.region(given["r"])).all() and not found[::2].any() and found[1::2].all()
+    assert not found[::2].any() and found[1::2].all()
+    possible = [False] * PRINTED
+    twin.each_region(PRINTED, list(given["r"][:, :PRINTED].T.ravel()), possible)
+    assert possible == found[:PRINTED].tolist()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -298,29 +300,7 @@ def charted(made: RefineFunctions, given: Given, by_motion: Float) -> Float:
 
 def evaluated(made: RefineFunctions, name: str, given: Given) -> list[Float]:
     """What a function writes, in float64."""
-    one = made.functions[name]
-    arguments = np.concatenate([given[key] for key, _ in one.given if len(given[key])])
-    does: dict[str, Callable[..., Any]] = {
-        "+": np.add,
-        "-": np.subtract,
-        "*": np.multiply,
-        "/": np.divide,
-        "neg": np.negative,
-        "sin": np.sin,
-        "cos": np.cos,
-        "abs": np.abs,
-        "sqrt": np.sqrt,
-    }
-    places: list[Any] = []
-    for value in one.program.values:
-        if isinstance(value, Argument):
-            places.append(arguments[value.place])
-        elif isinstance(value, Literal):
-            places.append(float(value.value))
-        else:
-            places.append(does[value.kind](*(places[k] for k in value.operands)))
-    flat = np.array([np.broadcast_to(places[k], arguments.shape[1:]) for k in one.program.results])
-    return np.split(flat, np.cumsum([n for _, n in one.written])[:-1])
+    return list(made.functions[name].values(**given).values())
 
 
 def test_the_pendulums_are_as_lean_as_those_by_hand() -> None:

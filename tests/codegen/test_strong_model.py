@@ -15,7 +15,7 @@ from generated import WARNINGS
 
 from pvid.base.errors import PvidError
 from pvid.codegen import files_strong
-from pvid.codegen.operations import Argument, Literal, Program
+from pvid.codegen.operations import Program, evaluated
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
 from pvid.codegen.strong_library import strong_native
 from pvid.codegen.strong_sums import StrongSums, chains_of, over, strong_sums_of, times
@@ -68,18 +68,7 @@ def rows_of(strong: StrongFunctions, inputs: Float) -> Float:
 
 def values_of(program: Program, arguments: Float) -> Float:
     """The results of a program in float64."""
-    functions = {"neg": np.negative, "sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "abs": np.abs, "sign": np.sign}
-    pairs = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
-    values: list[Float] = []
-    for place, one in enumerate(program.values):
-        if isinstance(one, Literal):
-            values.append(np.asarray(float(program.literal(place))))
-        elif isinstance(one, Argument):
-            values.append(arguments[one.place])
-        else:
-            given = [values[k] for k in one.operands]
-            values.append(pairs[one.kind](*given) if one.kind in pairs else functions[one.kind](*given))
-    return np.array([np.broadcast_to(values[k], arguments.shape[1:]) for k in program.results])
+    return np.array(np.broadcast_arrays(*evaluated(program, arguments)))
 
 
 def config_of(name: str, divider: int = 8, weights: Float32 | None = None) -> StrongModelConfig:

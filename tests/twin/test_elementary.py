@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 from typing import Any
 
@@ -10,10 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pvid.core.sources import INCLUDES, source
-from pvid.twin.f32 import elementary
-from pvid.twin.q31 import elementary as elementary_q31
-from pvid.twin.q31.scaled import Scaled, scaled
+from pvid.core.sources import FOLDERS, INCLUDES, source
+from pvid.twin.printer.program import printed_module
 
 LOOPS = """
 #include "pvid/elementary.h"
@@ -28,7 +27,7 @@ FLOATS(cosine, pvid_cos_f32(x[k]))
 FLOATS(sign, pvid_sign_f32(x[k]))
 FLOATS(magnitude, pvid_magnitude_f32(x[k]))
 FLOATS(soft_sign, pvid_soft_sign_f32(x[k], 0.75f))
-FLOATS(tanh, pvid_tanh_f32(x[k]))
+FLOATS(tanh_f32, pvid_tanh_f32(x[k]))
 INTEGERS(sine_7, pvid_sin_q31(x[k], 7))
 INTEGERS(sine_30, pvid_sin_q31(x[k], 30))
 INTEGERS(cosine_0, pvid_cos_q31(x[k], 0))
@@ -36,7 +35,7 @@ INTEGERS(cosine_26, pvid_cos_q31(x[k], 26))
 INTEGERS(sign_q31, pvid_sign_q31(x[k]))
 INTEGERS(soft_sign_q31, pvid_soft_sign_q31(x[k] / 2, 12345))
 INTEGERS(product, pvid_fixed_product_q31(x[k], 1000003, 30))
-INTEGERS(quotient, pvid_fixed_quotient_q31(1000003, x[k], 9))
+INTEGERS(fixed_quotient, pvid_fixed_quotient_q31(1000003, x[k], 9))
 INTEGERS(shifted, pvid_fixed_shift_q31(x[k], 5))
 NUMBERS(scaled_sine, pvid_scaled_sin_q31(x[k]))
 NUMBERS(scaled_cosine, pvid_scaled_cos_q31(x[k]))
@@ -44,6 +43,10 @@ NUMBERS(scaled_sign, pvid_scaled_sign_q31(x[k]))
 NUMBERS(scaled_magnitude, pvid_scaled_magnitude_q31(x[k]))
 NUMBERS(scaled_quotient, pvid_scaled_quotient_q31(x[(k * 7u) % n], x[k]))
 """
+OF_FLOATS = ("sine", "cosine", "sign", "magnitude", "soft_sign", "tanh_f32")
+NAMES = tuple(re.findall(r"^[A-Z]+\((\w+), pvid", LOOPS, re.MULTILINE))
+CORE = tuple(f"{one}.c" for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31"))
+COUNT = 3000
 PAIR = np.dtype([("m", np.int32), ("e", np.int32)])
 
 
@@ -51,7 +54,7 @@ PAIR = np.dtype([("m", np.int32), ("e", np.int32)])
 def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     folder = tmp_path_factory.mktemp("elementary")
     (folder / "loops.c").write_text(LOOPS, encoding="utf-8")
-    core = [str(source(f"{one}.c")) for one in ("elementary_f32", "elementary_q31", "scaled_q31", "integer_q31")]
+    core = [str(source(one)) for one in CORE]
     options = ["-std=c99", "-O2", "-shared", "-fPIC", "-ffp-contract=off", *INCLUDES]
     target = folder / "loops.so"
     subprocess.run(["gcc", *options, str(folder / "loops.c"), *core, "-o", str(target), "-lm"], check=True)
@@ -76,52 +79,37 @@ def floats() -> npt.NDArray[np.float32]:
         return np.concatenate([sizes, angles, quarters, special]).astype(np.float32)
 
 
-@pytest.mark.parametrize("name", ["sine", "cosine", "sign", "magnitude", "soft_sign", "tanh"])
-def test_floats(name: str, library: ctypes.CDLL, floats: npt.NDArray[np.float32]) -> None:
-    with np.errstate(all="ignore"):
-        twin = (
-            elementary.soft_sign(floats, np.float32(0.75)) if name == "soft_sign" else getattr(elementary, name)(floats)
-        )
-    found = by_c(library, name, floats)
-    assert (np.isnan(found) == np.isnan(twin)).all()
-    numbers = ~np.isnan(twin)
-    assert (found[numbers].view(np.uint32) == twin[numbers].view(np.uint32)).all()
-
-
-def test_integers(library: ctypes.CDLL) -> None:
+def test_the_printed_functions_have_the_bits_of_c(library: ctypes.CDLL, floats: npt.NDArray[np.float32]) -> None:
+    """Of floats, integers and numbers of any size."""
     random = np.random.default_rng(2)
-    x = random.integers(-(2**31) + 1, 2**31, 100_000).astype(np.int32)
-    x[:3] = 0, 2**31 - 1, -(2**31) + 1
-    wide = x.astype(np.int64)
-    half = np.sign(wide) * (np.abs(wide) // 2)  # C divides towards 0
-    for name, twin in {
-        "sine_7": elementary_q31.sine(wide, 7),
-        "sine_30": elementary_q31.sine(wide, 30),
-        "cosine_0": elementary_q31.cosine(wide, 0),
-        "cosine_26": elementary_q31.cosine(wide, 26),
-        "sign_q31": elementary_q31.sign(wide),
-        "soft_sign_q31": elementary_q31.soft_sign(half, 12345),
-        "product": elementary_q31.product(wide, 1000003, 30),
-        "quotient": elementary_q31.quotient(1000003, wide, 9),
-        "shifted": elementary_q31.shift(wide, 5),
-    }.items():
-        assert (by_c(library, name, x) == twin).all(), name
-
-
-def test_numbers_of_any_size(library: ctypes.CDLL) -> None:
-    random = np.random.default_rng(3)
-    m = random.integers(-(2**30), 2**30 + 1, 100_000)
-    m[:5] = 0
-    x = scaled(m, random.integers(-70, 20, len(m)))
-    pairs = np.empty(len(m), PAIR)
-    pairs["m"], pairs["e"] = x.m, x.e
-    turned = np.arange(len(m)) * 7 % len(m)
-    for name, twin in {
-        "scaled_sine": elementary_q31.scaled_sine(x),
-        "scaled_cosine": elementary_q31.scaled_cosine(x),
-        "scaled_sign": elementary_q31.scaled_sign(x),
-        "scaled_magnitude": elementary_q31.scaled_magnitude(x),
-        "scaled_quotient": elementary_q31.scaled_quotient(Scaled(x.m[turned], x.e[turned]), x),
-    }.items():
-        found = by_c(library, name, pairs)
-        assert (found["m"] == twin.m).all() and (found["e"] == twin.e).all(), name
+    integers = random.integers(-(2**31) + 1, 2**31, COUNT).astype(np.int32)
+    integers[:3] = 0, 2**31 - 1, -(2**31) + 1
+    twin = printed_module([*map(source, CORE)], FOLDERS, {}, NAMES, {"loops.c": LOOPS})
+    for name in NAMES:
+        given: list[Any]
+        out: list[Any]
+        if name in OF_FLOATS:
+            x: npt.NDArray[Any] = np.concatenate([floats[-9:], random.choice(floats, COUNT)])
+            given, out = list(x), [np.float32(0)] * len(x)
+        elif name.startswith("scaled"):
+            x = np.zeros(COUNT, PAIR)
+            m = random.integers(-(2**30), 2**30 + 1, COUNT)
+            short = np.abs(m) < 2**29  # numbers have all their digits, or are 0
+            m[short], m[:5] = np.where(m < 0, -1, 1)[short] * 2**29, 0
+            x["m"], x["e"] = m, np.where(m == 0, 0, random.integers(-100, -10, COUNT))
+            given, out = [twin.pvid_scaled_q31(*one) for one in x.tolist()], [twin.pvid_scaled_q31() for _ in x]
+        else:
+            x = integers
+            given, out = x.tolist(), [0] * len(x)
+        with np.errstate(all="ignore"):
+            getattr(twin, name)(len(x), given, out)
+        found = by_c(library, name, x)
+        if name in OF_FLOATS:
+            own = np.array(out, np.float32)
+            assert np.array_equal(np.isnan(found), np.isnan(own)), name
+            numbers = ~np.isnan(own)
+            assert found[numbers].tobytes() == own[numbers].tobytes(), name
+        elif name.startswith("scaled"):
+            assert [(one.m, one.e) for one in out] == found.tolist(), name
+        else:
+            assert out == found.tolist(), name

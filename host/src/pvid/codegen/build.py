@@ -15,7 +15,7 @@ from pvid.codegen import (
     files_weak,
     files_weak_q31,
     self_test,
-    twins,
+    twin_file,
 )
 from pvid.codegen.generated import GeneratedModel
 
@@ -31,7 +31,7 @@ PRINTERS = (
     files_strong_design.printed,
     files_refine.printed,
     files_refine.printed_design,
-    twins.printed,
+    twin_file.printed,
     self_test.printed,
     cmake.printed,
 )

@@ -121,11 +121,6 @@ def c_literal(value: Fraction) -> str:
     return float_literal(float32_of(value))
 
 
-def python_literal(value: Fraction) -> str:
-    """As in _F(0.25)."""
-    return f"_F({float_literal(float32_of(value)).removesuffix('f')})"
-
-
 def check_literals(program: Program) -> None:
     """PvidError for a constant of the list that float32 does not have."""
     for one in program.values:

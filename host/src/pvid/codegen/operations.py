@@ -1,16 +1,19 @@
 """SymPy expressions as one list of three-address operations.
 
 Every printer reads this list: an operation has at most two operands, each value is computed once, and the order of the
-operands is fixed here. So what is printed in C and in numpy rounds alike.
+operands is fixed here. `evaluated` computes it in float64.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 from typing import Literal as OneOf
 
+import numpy as np
+import numpy.typing as npt
 import sympy as sp
 
 from pvid.base.errors import PvidError
@@ -92,6 +95,34 @@ class Program:
     def kinds(self) -> set[Kind]:
         """Kinds of the operations."""
         return {one.kind for one in self.values if isinstance(one, Operation)}
+
+
+_IN_FLOAT64: Mapping[str, Callable[..., Any]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "neg": np.negative,
+    "sin": np.sin,
+    "cos": np.cos,
+    "sign": np.sign,
+    "soft_sign": lambda v, width: v / (np.abs(v) + width),
+    "abs": np.abs,
+    "sqrt": np.sqrt,
+}
+
+
+def evaluated(program: Program, given: Sequence[Any] | npt.NDArray[np.float64]) -> list[Any]:
+    """The results in float64, each a number or [...], from the arguments, each a number or [...]."""
+    values: list[Any] = []
+    for one in program.values:
+        if isinstance(one, Literal):
+            values.append(float(one.value))
+        elif isinstance(one, Argument):
+            values.append(given[one.place])
+        else:
+            values.append(_IN_FLOAT64[one.kind](*(values[place] for place in one.operands)))
+    return [values[place] for place in program.results]
 
 
 def program_of(

@@ -25,13 +25,15 @@ import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+import numpy.typing as npt
 import sympy as sp
 
 from pvid.base.errors import PvidError
 from pvid.base.recent import Recent
 from pvid.base.wording import listed
 from pvid.codegen.functions import identifiers, with_values
-from pvid.codegen.operations import Argument, Builder, Literal, Operation, Program, Value
+from pvid.codegen.operations import Argument, Builder, Literal, Operation, Program, Value, evaluated
 from pvid.model.compiled import CompiledModel
 from pvid.model.signals import Integral, Jet, jets, sgn
 
@@ -68,6 +70,9 @@ class RefinedParameter:
     sign: str = ""
 
 
+Float = npt.NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class RefineFunction:
     """A generated function.
@@ -84,6 +89,15 @@ class RefineFunction:
     given: tuple[tuple[str, int], ...]
     written: tuple[tuple[str, int], ...]
     program: Program
+
+    def values(self, **arrays: npt.ArrayLike) -> dict[str, Float]:
+        """What it writes in float64 [entries, ...] from the arrays that it reads, and others [entries, ...]."""
+        read = [np.asarray(arrays[key], np.float64) for key, _ in self.given]
+        found = evaluated(self.program, [row for one in read for row in one])
+        shape = np.broadcast_shapes(*(one.shape[1:] for one in read))
+        whole = np.array([np.broadcast_to(one, shape) for one in found]).reshape(len(found), *shape)
+        ends = np.cumsum([n for _, n in self.written])
+        return {key: whole[end - n : end] for (key, n), end in zip(self.written, ends, strict=True)}
 
 
 @dataclass(frozen=True)

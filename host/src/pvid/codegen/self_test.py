@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import ModuleType
 
 import numpy as np
 import numpy.typing as npt
@@ -12,14 +13,14 @@ from pvid.codegen.files_functions import SIZES
 from pvid.codegen.fixed_model import FixedModel
 from pvid.codegen.functions import Function, ModelFunctions
 from pvid.codegen.generated import GeneratedModel
-from pvid.codegen.twin_file import loaded, loaded_q31
-from pvid.twin.q31.integer import Int
-from pvid.twin.q31.scaled import Scaled
+from pvid.codegen.twin_file import text
+from pvid.twin.printer.program import loaded
 
 VECTORS = 8
 
 Float = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
+Int = npt.NDArray[np.int64]
 
 _FAULTS = """\
 /* How many results differ. */
@@ -95,27 +96,24 @@ def fixed_inputs_of(fixed: FixedModel, count: int = VECTORS) -> Int:
     return np.rint(spread([-one for one in fixed.limits], fixed.limits, count)).astype(np.int64)
 
 
-def scaled_of(values: Float) -> Scaled:
-    """The nearest numbers of 30 digits, of float64."""
+def scaled_of(values: Float) -> Int:
+    """m and e of the nearest numbers of 30 digits [..., 2], of float64 [...]."""
     fraction, exponent = np.frexp(values)  # 1/2 <= |fraction| < 1, or 0
     m = np.rint(fraction * 2.0**30).astype(np.int64)
     full = np.abs(m) == 2**30
-    return Scaled(np.where(full, m >> 1, m), np.where(m == 0, 0, exponent.astype(np.int64) - 30 + full))
+    return np.stack([np.where(full, m >> 1, m), np.where(m == 0, 0, exponent.astype(np.int64) - 30 + full)], axis=-1)
 
 
 def printed(model: GeneratedModel) -> dict[str, str]:
-    """NAME_test.c."""
-    return {f"{model.name}_test.c": source(model.functions, model.command, model.fixed.made)}
-
-
-def source(functions: ModelFunctions, command: str, fixed: FixedModel | None = None) -> str:
-    """The program; it returns 0 if all bits are equal."""
+    """NAME_test.c, a program that returns 0 if all bits are equal."""
+    functions, fixed = model.functions, model.fixed.made
+    twin = loaded(text(model), f"{model.name}_twin.py")
     name = functions.name
-    tables, checks = _float_cases(functions)
+    tables, checks = _float_cases(functions, twin)
     cores = ["_f32"]
     headers = [f'#include "{name}.h"']
     if fixed:
-        more, others = _fixed_cases(fixed)
+        more, others = _fixed_cases(fixed, twin)
         tables += more
         checks += others
         cores += ["_fixed", "_scaled"]
@@ -124,7 +122,7 @@ def source(functions: ModelFunctions, command: str, fixed: FixedModel | None = N
     about = [
         f"The functions of {name} on {VECTORS} inputs each, compared with the bits of their numpy twin.",
         "",
-        *banner(functions, command),
+        *banner(functions, model.command),
     ]
     program = [
         f"unsigned {name}_faults(void);",
@@ -153,17 +151,20 @@ def source(functions: ModelFunctions, command: str, fixed: FixedModel | None = N
         *(_FAULTS.format(core=core, **_CORES[core]) for core in cores),
         "\n".join(program),
     ]
-    return "\n\n".join(parts) + "\n"
+    return {f"{name}_test.c": "\n\n".join(parts) + "\n"}
 
 
-def _float_cases(functions: ModelFunctions) -> tuple[list[str], list[str]]:
+def _float_cases(functions: ModelFunctions, twin: ModuleType) -> tuple[list[str], list[str]]:
     """Tables, and the calls that compare."""
-    twin = loaded(functions)
     tables, checks = [], []
     for one in functions.functions:
-        given = inputs_of(functions, one)
-        for word, values in (("in", given), ("out", getattr(twin, one.name)(given))):
-            bits = np.ascontiguousarray(values.T).view(np.uint32).tolist()
+        given = inputs_of(functions, one).T
+        found = np.zeros((len(given), len(one.labels)), np.float32)
+        with np.errstate(all="ignore"):
+            for row, out in zip(given, found, strict=True):
+                getattr(twin, f"{functions.name}_{one.name}_f32")(list(row), out)
+        for word, values in (("in", given), ("out", found)):
+            bits = np.ascontiguousarray(values).view(np.uint32).tolist()
             tables.append(
                 _table(functions, one, word, "f32", "uint32_t", [[f"0x{x:08X}u" for x in row] for row in bits])
             )
@@ -171,21 +172,27 @@ def _float_cases(functions: ModelFunctions) -> tuple[list[str], list[str]]:
     return tables, checks
 
 
-def _fixed_cases(fixed: FixedModel) -> tuple[list[str], list[str]]:
-    functions, twin = fixed.functions, loaded_q31(fixed)
+def _fixed_cases(fixed: FixedModel, twin: ModuleType) -> tuple[list[str], list[str]]:
+    functions = fixed.functions
     tables, checks = [], []
-    given = fixed_inputs_of(fixed)
+    counts = fixed_inputs_of(fixed).T.tolist()
     for case in fixed.of_inputs:
         one = case.function
-        for word, values in (("in", given), ("out", getattr(twin, one.name)(given)[0])):
-            rows = [[str(x) for x in row] for row in values.T.tolist()]
+        found = [[0] * len(one.labels) for _ in counts]
+        for row, out in zip(counts, found, strict=True):
+            assert getattr(twin, f"{functions.name}_{one.name}_q31")(row, out)
+        for word, values in (("in", counts), ("out", found)):
+            rows = [[str(x) for x in row] for row in values]
             tables.append(_table(functions, one, word, "q31", "int32_t", rows))
         checks.append(_check(functions, one, "q31", "fixed"))
-    p = scaled_of(parameters_of(functions))
+    number = twin.pvid_scaled_q31
+    p = [[number(*one) for one in row] for row in scaled_of(parameters_of(functions).T).tolist()]
     for one in fixed.of_parameters:
-        for word, numbers in (("in", p), ("out", getattr(twin, one.name)(p))):
-            pairs = zip(numbers.m.T.tolist(), numbers.e.T.tolist(), strict=True)
-            rows = [[f"{{{m}, {e}}}" for m, e in zip(*row, strict=True)] for row in pairs]
+        results = [[number() for _ in one.labels] for _ in p]
+        for given, out in zip(p, results, strict=True):
+            getattr(twin, f"{functions.name}_{one.name}_q31")(given, out)
+        for word, numbers in (("in", p), ("out", results)):
+            rows = [[f"{{{x.m}, {x.e}}}" for x in row] for row in numbers]
             tables.append(_table(functions, one, word, "q31", "pvid_scaled_q31", rows))
         checks.append(_check(functions, one, "q31", "scaled"))
     return tables, checks

@@ -13,7 +13,6 @@ import sympy as sp
 from pvid.base.errors import PvidError
 from pvid.base.wording import listed
 from pvid.codegen.refine import RefineFunctions, check_outputs, is_measured, refine_functions, ring_of, signs_of
-from pvid.codegen.refine_twin import GeneratedRefine
 from pvid.codegen.weak import weak_model_of
 from pvid.configuration.weak import Run, simulated_run_of
 from pvid.design.refine import refine_config
@@ -133,27 +132,27 @@ def refine_settings(
             range_ = _HALF_TURN * _step_of(model.signal(name))
         source = Source.SAMPLED if order == -1 else sources.get(place, Source.SAMPLED)
         signal.append(RefineSignal(place, order, scale, range_, source))
-    motion, states, r = GeneratedRefine(made), list(_states(made, run, rate)), r_of(made, p)
+    states, r = list(_states(made, run, rate)), r_of(made, p)
     if not states:
         raise PvidError(f"{model.name}: the run is too short for the second stage, or its samples are missing")
     if made.runge_kutta and model.refinement.equations:  # whose motion is not that of the weak form's windows
-        block_s = min(block_s, _slow_s(motion, r))
+        block_s = min(block_s, _slow_s(made, r))
     rig = RefineRig(
         sample_rate=rate,
         slow_hz=2.0 / block_s,
-        fast_hz=max(_fastest_hz(motion, r, states), _LEAST / block_s),
+        fast_hz=max(_fastest_hz(made, r, states), _LEAST / block_s),
         signal=tuple(signal),
         sample_sd=tuple(model.signal(name).sd for name in made.outputs),
         prior_sd=tuple(one.prior_sd for one in made.parameters),
         gain_sd=(0.0,) * len(made.parameters),
         state_limit=_state_limit(made, run, rate),
     )
-    rig = _with_steps(rig, made, _jumps(motion, r, states), block_s)
+    rig = _with_steps(rig, made, _jumps(made, r, states), block_s)
     settings = refine_config(rig, model.following.forgetting_s, model.following.outlier_gate)
     if settings.width is not None:
-        settings = replace(settings, width=np.maximum(settings.width, _least_widths(motion, r, states)))
+        settings = replace(settings, width=np.maximum(settings.width, _least_widths(made, r, states)))
     if made.observer:
-        settings = _with_observer(settings, motion, r, states)
+        settings = _with_observer(settings, made, r, states)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
 
 
@@ -176,7 +175,7 @@ def rig_with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) ->
     n = len(made.coordinates)
     angles, rates = rig.state_limit[: n // 2], rig.state_limit[n // 2 :]
     rig = replace(rig, state_limit=tuple(limit for pair in zip(angles, rates, strict=True) for limit in pair))
-    jumps = _jumps(GeneratedRefine(made), r_of(made, p), [_at_rest(made)])
+    jumps = _jumps(made, r_of(made, p), [_at_rest(made)])
     return _with_steps(rig, made, jumps, 2.0 / rig.slow_hz)
 
 
@@ -227,7 +226,7 @@ def _curvature(x: Float, rate: float, block_s: float) -> Float:
     return np.asarray(np.diff(mean, 2) * (rate / step) ** 2)
 
 
-def _fastest_hz(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> float:
+def _fastest_hz(made: RefineFunctions, r: Float, states: Sequence[State]) -> float:
     """Of the motion, as an oscillation that needs as short a step: at most of the run's states.
 
     In the others a soft sign changes, or a large motion is at its fastest for a moment. (With a step for three quarters
@@ -235,18 +234,18 @@ def _fastest_hz(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> f
     """
     found = []
     for q, v in states:
-        rates = np.linalg.eigvals(_slopes(motion, r, q, v))
-        if motion.made.runge_kutta:
+        rates = np.linalg.eigvals(_slopes(made, r, q, v))
+        if made.runge_kutta:
             found.append(np.abs(rates).max() / (2 * np.pi))
         else:
             found.append(max(np.abs(rates.imag).max() / (2 * np.pi), np.abs(rates.real).max() / _STILL / _A_PERIOD))
-    return float(np.quantile(found, _WITH_SIGNS if signs_of(motion.made.model) else _WITHOUT))
+    return float(np.quantile(found, _WITH_SIGNS if signs_of(made.model) else _WITHOUT))
 
 
-def _slow_s(motion: GeneratedRefine, r: Float) -> float:
+def _slow_s(made: RefineFunctions, r: Float) -> float:
     """Two periods of the slowest oscillation at rest; inf: there is none."""
-    at_rest = _at_rest(motion.made)
-    rates = np.abs(np.linalg.eigvals(_slopes(motion, r, *at_rest)).imag)
+    at_rest = _at_rest(made)
+    rates = np.abs(np.linalg.eigvals(_slopes(made, r, *at_rest)).imag)
     return 4 * math.pi / float(rates[rates > 0].min()) if rates.any() else math.inf
 
 
@@ -261,30 +260,36 @@ def r_of(made: RefineFunctions, p: npt.ArrayLike, width: float = _SHARP) -> Floa
     return np.array([given[x.place] if x.place >= 0 else width if x.sign else 0.0 for x in made.parameters])
 
 
-def _slopes(motion: GeneratedRefine, r: Float, q: Float32, v: Float32) -> Float:
+def _slopes(made: RefineFunctions, r: Float, q: Float32, v: Float32) -> Float:
     """Derivatives of the rates of all states by the states."""
-    made, n = motion.made, len(motion.made.coordinates)
-    slopes = motion.jacobian(motion.constants(r.astype(np.float32)), q, v, np.zeros(len(made.inputs), np.float32))
-    K = np.asarray(slopes.K, float)
+    n = len(made.coordinates)
+    found = _values_at(made, "jacobian", r, q, v)
+    K = found["K"].reshape(n, n)
     if made.order == 1:
         return K
-    return np.block([[np.zeros((n, n)), np.eye(n)], [K, np.asarray(slopes.D, float)]])
+    D = found["D"].reshape(n, n) if "D" in found else np.zeros((n, n))
+    return np.block([[np.zeros((n, n)), np.eye(n)], [K, D]])
 
 
-def _with_observer(settings: RefineConfig, motion: GeneratedRefine, r: Float, states: Sequence[State]) -> RefineConfig:
+def _values_at(made: RefineFunctions, name: str, r: Float, q: Float32, v: Float32) -> dict[str, Float]:
+    """What a function writes without inputs."""
+    m = made.functions["constants"].values(r=r)["m"]
+    return made.functions[name].values(r=r, m=m, q=q, v=v, u=np.zeros(len(made.inputs)))
+
+
+def _with_observer(settings: RefineConfig, made: RefineFunctions, r: Float, states: Sequence[State]) -> RefineConfig:
     """With the gain of the steady Kalman filter of the linearised motion, without its frictions, for the noise of the
     inputs' sensors; rows have the noise of its innovations.
 
     A row is the mean of the residuals over a big step: a reading in its middle.
     """
-    made, model = motion.made, motion.made.model
+    model = made.model
     n, step = len(made.coordinates), BIG_STEP * settings.ratio / settings.sample_rate
     smooth = np.where([bool(one.sign) for one in made.parameters], _SOFT, r)
-    single = smooth.astype(np.float32)
-    m, none = motion.constants(single), np.zeros(len(made.inputs), np.float32)
-    slopes = np.mean([_slopes(motion, smooth, q, v) for q, v in states], 0)
-    by_u = np.mean([motion.input_jacobian(m, q, v, none) for q, v in states], 0, np.float64)
-    reading = np.mean([motion.output_jacobian(m, q, v, none, single)[0] for q, v in states], 0, np.float64)
+    slopes = np.mean([_slopes(made, smooth, q, v) for q, v in states], 0)
+    by_u = np.mean([_values_at(made, "jacobian", smooth, q, v)["U"].reshape(n, -1) for q, v in states], 0)
+    read = [_values_at(made, "output_jacobian", smooth, q, v)["Zq"] for q, v in states]
+    reading = np.mean(read, 0).reshape(len(made.outputs), n)
     sd = np.array([model.signal(one.of).sd if is_measured(model, one) else 0.0 for one in made.inputs])
     density = (by_u * sd**2) @ by_u.T / settings.sample_rate
     over, noise = _transition(slopes, density, step / 2)
@@ -311,10 +316,9 @@ def _transition(slopes: Float, density: Float, step: float) -> tuple[Float, Floa
     return over, np.asarray(over @ whole[:n, n:])
 
 
-def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[float, ...]:
+def _jumps(made: RefineFunctions, r: Float, states: Sequence[State]) -> tuple[float, ...]:
     """By how much the rate of each sign's argument jumps at its reversal, for the signs whose widths are refined; a
     friction that starts at 0 is as large there as it may be."""
-    made = motion.made
     r = np.where(
         [one.place < 0 and not one.sign for one in made.parameters], [one.prior_sd for one in made.parameters], r
     )
@@ -324,7 +328,7 @@ def _jumps(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> tuple[
         still, reach = _reversal(made, arguments[made.parameters[place].sign], state[0])
         sharp, soft = r.copy(), r.copy()
         sharp[place], soft[place] = max(_SHARP, _ROUNDED * reach), _SOFT
-        change = _slopes(motion, sharp, still, state[1]) - _slopes(motion, soft, still, state[1])  # of rank 1
+        change = _slopes(made, sharp, still, state[1]) - _slopes(made, soft, still, state[1])  # of rank 1
         return 2 * float(sharp[place]) * abs(float(np.trace(change)))
 
     found = []
@@ -352,11 +356,9 @@ def _reversal(made: RefineFunctions, argument: sp.Expr, q: Float32) -> tuple[Flo
     return still.astype(np.float32), float(np.abs(still[used]).max(initial=0.0))
 
 
-def _least_widths(motion: GeneratedRefine, r: Float, states: Sequence[State]) -> Float32:
+def _least_widths(made: RefineFunctions, r: Float, states: Sequence[State]) -> Float32:
     """Widths of signs below which float32 does not compute them at the largest argument of the run."""
-    made = motion.made
-    m, none = motion.constants(r.astype(np.float32)), np.zeros(len(made.inputs), np.float32)
-    largest = np.max([np.abs(motion.signs(m, q, v, none)) for q, v in states], axis=0)
+    largest = np.max([np.abs(_values_at(made, "signs", r, q, v)["g"]) for q, v in states], axis=0)
     names = [str(one) for one in signs_of(made.model)]
     widths = [float(largest[names.index(one.sign)]) for one in made.parameters if one.sign]
     return np.maximum(_LEAST_WIDTH * np.array(widths), _LEAST_OF_CORE).astype(np.float32)

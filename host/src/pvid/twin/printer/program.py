@@ -20,7 +20,8 @@ from pvid.core.sources import build_folder
 from pvid.twin.printer.directives import Reader
 from pvid.twin.printer.translate import Translator
 
-_HEAD = '''"""The numpy twin of a C core. Printed from C by pvid.twin.printer: do not edit."""
+_ABOUT = "The numpy twin of a C core. Printed from C by pvid.twin.printer: do not edit."
+_HEAD = '''"""{about}"""
 
 from pvid.twin.printer.machine import (
     WHOLE, Array, Place, Pointer, assign_all, bits, clear, f32, fabsf, from_bits, quotient, remainder, share, signed,
@@ -36,6 +37,7 @@ def text_of(
     macros: Mapping[str, str],
     roots: Sequence[str] = (),
     texts: Mapping[str, str] | None = None,
+    about: str = _ABOUT,
 ) -> str:
     """The printed module's text.
 
@@ -46,6 +48,7 @@ def text_of(
     macros : name -> value, as with -D
     roots : functions and tables that are wanted, with all that they need; empty: all
     texts : name -> text of generated files; those that end with .c are sources as well
+    about : the module's docstring
 
     Raises
     ------
@@ -55,7 +58,7 @@ def text_of(
     reader = Reader(folders, macros, texts)
     for one in [*sources, *(Path(name) for name in texts or () if name.endswith(".c"))]:
         reader.read(one)
-    return _HEAD + Translator(reader.unit, [reader.renamed(one) for one in roots]).printed()
+    return _HEAD.format(about=about) + Translator(reader.unit, [reader.renamed(one) for one in roots]).printed()
 
 
 def printed_module(
