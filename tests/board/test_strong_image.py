@@ -43,7 +43,7 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_inertias_of_a_rigid_body_by_either_core(body: Path) -> None:
     truth = simulation_of("rigid_body").rig.truth
-    for core in ("f32", "f64"):
+    for core in ("f32", "q31", "f64"):
         shown = json.loads(pvid("identify", body, "--form", "strong", "--core", core, "--json").stdout)
         assert (shown["identified"], shown["form"], shown["core"]) == (True, "strong", core)
         assert "noise biases its regressors" in shown["warning"]
@@ -58,9 +58,11 @@ def test_inertias_of_a_rigid_body_by_either_core(body: Path) -> None:
 )
 def test_the_board_has_the_hash_of_the_twin(body: Path, target: str) -> None:
     """With a floating-point unit and without: every operation of the generic path."""
-    done = pvid("compare", body, "--form", "strong", "--on", target)
-    host, board = [line.split("│") for line in done.stdout.splitlines() if "rigid" not in line and "equal" in line]
-    assert done.return_value == DONE and host[6] == board[6] and len(host[6].strip()) == 8
+    done = pvid("compare", body, "--form", "strong", "--core", "all", "--on", target)
+    lines = [line.split("│") for line in done.stdout.splitlines() if "rigid" not in line and "equal" in line]
+    assert done.return_value == DONE
+    for core, host, board in zip(("f32", "q31"), lines[::2], lines[1::2], strict=True):
+        assert host[2].strip() == core and host[6] == board[6] and len(host[6].strip()) == 8
 
 
 @pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long) for one in mechanisms.names()])
@@ -86,7 +88,6 @@ def test_noise_that_decides_the_answer_is_no_answer(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (("--core", "q31"), "--core q31: the strong form of rigid_body is in float32 and float64"),
         (("--refine",), "--figure, --refine, --weights and --add are for the weak form"),
         (("--on", "mps2-an386"), "is for `compare`"),
     ],

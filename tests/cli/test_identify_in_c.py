@@ -314,7 +314,6 @@ def test_the_second_stage_is_compared_with_its_twin_too(
     ("command", "arguments", "sentence"),
     [
         ("identify", ("--law", "stationary"), "--law stationary: dc_motor is identified in float64, or in C by"),
-        ("identify", ("--core", "q31", "--form", "strong"), "the strong form of dc_motor is in float32 and float64"),
         ("compare", ("--law", "pseudovelocity"), "--law pseudovelocity: dc_motor is compared in float32"),
     ],
 )

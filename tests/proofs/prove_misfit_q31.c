@@ -31,7 +31,9 @@ static void any_row(uint16_t left)
     misfit.least_rss = any_sum();
     misfit.least_part = any_sum();
     misfit.left = left;
-    if (pvid_misfit_add_q31(&misfit, any_i64(0, SQUARE_MAX), any_i64(-INT64_MAX, INT64_MAX - 1))) {
+    const int64_t signal = pvid_misfit_signal_q31(any_i64(-INT64_MAX, INT64_MAX - 1));
+    /*@ assert 0 <= signal <= SQUARE_MAX; */
+    if (pvid_misfit_add_q31(&misfit, any_i64(0, 8 * SQUARE_MAX), any_i64(0, 8 * SQUARE_MAX))) {
         misfit.rss = any_sum();
         misfit.signal = any_sum();
         (void)pvid_misfit_judge_q31(&misfit);

@@ -76,9 +76,9 @@ pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, co
 void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups);
 
 /*@ requires 0 <= square <= 0x100000000000000;
-    assigns \result, *self \from *self, square, sensitivity;
+    assigns \result, *self \from *self, square, signal;
     ensures \result == 0 || \result == 1; */
-bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity);
+bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t signal);
 
 /*@ assigns \result, *self \from *self;
     ensures \result == 0 || \result == 1; */

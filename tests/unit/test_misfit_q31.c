@@ -18,9 +18,11 @@ static bool block(double e, double sensitivity)
 {
     const int64_t innovation = (int64_t)(e * UNIT);
     for (unsigned rows = misfit.block; rows > 1u; rows--) {
-        assert_false(pvid_misfit_add_q31(&misfit, innovation * innovation, (int64_t)(sensitivity * UNIT)));
+        assert_false(pvid_misfit_add_q31(&misfit, innovation * innovation,
+                                         pvid_misfit_signal_q31((int64_t)(sensitivity * UNIT))));
     }
-    assert_true(pvid_misfit_add_q31(&misfit, innovation * innovation, -(int64_t)(sensitivity * UNIT)));
+    assert_true(
+        pvid_misfit_add_q31(&misfit, innovation * innovation, pvid_misfit_signal_q31(-(int64_t)(sensitivity * UNIT))));
     return pvid_misfit_judge_q31(&misfit);
 }
 
@@ -49,11 +51,11 @@ static void the_squares_of_a_block_add_up(void **state)
 {
     (void)state;
     for (int i = 1; i < 200; i++) {
-        assert_false(pvid_misfit_add_q31(&misfit, 9, 80));
+        assert_false(pvid_misfit_add_q31(&misfit, 9, pvid_misfit_signal_q31(80)));
     }
     assert_int_equal(pvid_scaled_fixed_q31(misfit.rss, 0), 9 * 136); /* the first eight, and 64 twice */
     assert_int_equal(misfit.few_rss, 9 * 63);
-    assert_true(pvid_misfit_add_q31(&misfit, 9, -80));
+    assert_true(pvid_misfit_add_q31(&misfit, 9, pvid_misfit_signal_q31(-80)));
     assert_int_equal(pvid_scaled_fixed_q31(misfit.rss, 0), 9 * 200);
     assert_int_equal(pvid_scaled_fixed_q31(misfit.signal, 0), 6400 * 200);
     (void)pvid_misfit_judge_q31(&misfit);
@@ -98,10 +100,10 @@ static void the_largest_rows_do_not_overflow(void **state)
     pvid_misfit_init_q31(&misfit, (uint32_t)1 << 30, 0);
     const int64_t row_max = PVID_ROW_LIMIT_Q31;
     for (int rows = 1; rows < 65535; rows++) {
-        assert_false(
-            pvid_misfit_add_q31(&misfit, row_max * row_max, ((rows % 2) == 0) ? INT64_MAX / 2 : -(INT64_MAX / 2)));
+        const int64_t signal = pvid_misfit_signal_q31(((rows % 2) == 0) ? INT64_MAX / 2 : -(INT64_MAX / 2));
+        assert_false(pvid_misfit_add_q31(&misfit, 8 * (row_max * row_max), 8 * signal)); /* of eight kinds: clamped */
     }
-    assert_true(pvid_misfit_add_q31(&misfit, row_max * row_max, (int64_t)1 << 31));
+    assert_true(pvid_misfit_add_q31(&misfit, row_max * row_max, pvid_misfit_signal_q31((int64_t)1 << 31)));
     const pvid_scaled_q31 rss = pvid_scaled_of_q31(65535, 56);
     assert_int_equal(misfit.rss.e, rss.e);
     assert_in_range(misfit.rss.m, rss.m - 1200, rss.m); /* 1024 sums, each rounded */

@@ -46,7 +46,7 @@ static const pvid_weak_model_q31 model = {
     .prepare = prepare_of,
     .values = values_of,
 };
-static const pvid_weak_rescale_q31 rescale[1] = {{0, 0, 1}};
+static const pvid_rescale_q31 rescale[1] = {{0, 0, 1}};
 static const pvid_weak_format_q31 formats[GAINS] = {{.value = 3}, {.value = 1}};
 
 /* Channels after the step `ticks - 1` of these jets: those of the step two before it. */

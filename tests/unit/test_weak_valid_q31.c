@@ -32,7 +32,7 @@ static struct {
     pvid_weak_noise_q31 noise[21];
     uint8_t order[1];
     pvid_scaled_q31 variance[1];
-    pvid_weak_rescale_q31 run[1];
+    pvid_rescale_q31 run[1];
     int32_t width[1];
     int32_t weights[PVID_MAX_RING + 2];
     int32_t offset[2];

@@ -17,6 +17,13 @@ typedef struct {
     int32_t e;
 } pvid_scaled_q31;
 
+/* (x 2^-down) multiplier 2^-shift: an exact sum in another format. */
+typedef struct {
+    uint8_t down;       /* 0..62 */
+    uint8_t shift;      /* 0..62 */
+    int32_t multiplier; /* > 0 */
+} pvid_rescale_q31;
+
 /* theta and C as numbers of any size (scaled_q31.h), for models that need no formats, as the model compiler writes
  * them. Set `adapter` to &pvid_read_scaled_q31: then the code that reads such numbers is part of the image, otherwise
  * not. theta is stored with 40 bits at the start and saturates at 2^20 times its size there. */

@@ -71,13 +71,6 @@ typedef struct {
 
 /* ---- the design: tables and formats for a rig ---- */
 
-/* value = (sum 2^-down) multiplier 2^-shift, each rounded half up; the first factor fits an int32. */
-typedef struct {
-    uint8_t down;       /* 0..62 */
-    uint8_t shift;      /* 0..62 */
-    int32_t multiplier; /* > 0 */
-} pvid_weak_rescale_q31;
-
 /* Compensator that gives a jet at a step from the block sums at the steps around it (host/docs/firmware.md): the exact
  * sum of weights times block sums, 2^-down of it rounded half up. */
 typedef struct {
@@ -122,7 +115,7 @@ typedef struct {
     const int32_t *full_scale; /* [samples] of the counts about their offsets */
     const uint8_t *down;       /* [signals] shift of the block sums to 28 bits */
     const pvid_weak_filter_q31 *filter;     /* [jets] */
-    const pvid_weak_rescale_q31 *run;       /* [runs] from twice the sum over the steps to the input of `values` */
+    const pvid_rescale_q31 *run;            /* [runs] from twice the sum over the steps to the input of `values` */
     const int32_t *sign_width;              /* [signs] of the soft sign tanh(v / width), in the format of its argument;
                                                0: the mean of sgn over a step */
     const pvid_weak_integral_q31 *integral; /* [integrands] */

@@ -161,7 +161,8 @@ static pvid_reason take_row(pvid_strong_q31 *self, const int32_t row[PVID_KAPITZ
     }
     const int64_t square = pvid_square_q31(e);
     const int64_t sensitivity = pvid_product_q31(gradient[PVID_KAPITZA_W], estimator->p[PVID_KAPITZA_W]);
-    if (pvid_misfit_add_q31(&self->misfit, square, pvid_round_shift_q31(sensitivity, PVID_KAPITZA_W_BITS))) {
+    if (pvid_misfit_add_q31(&self->misfit, square,
+                            pvid_misfit_signal_q31(pvid_round_shift_q31(sensitivity, PVID_KAPITZA_W_BITS)))) {
         self->alarm = pvid_misfit_judge_q31(&self->misfit);
     }
     if (!passes(self, square)) {

@@ -11,6 +11,7 @@
 #define ROWS_MAX 65535u      /* of a block */
 #define SENSITIVITY_SHIFT 3u /* a sensitivity within 2^31 then has a square like that of a residual */
 #define SENSITIVITY_LIMIT ((int32_t)1 << 28)
+#define SQUARE_LIMIT ((int64_t)1 << 56)
 
 /* Of q: PVID_MISFIT_MOST, PVID_MISFIT_LEAST; and PVID_MISFIT_TIMES. */
 static const pvid_scaled_q31 most = {549755814, -37};
@@ -49,12 +50,16 @@ PVID_COLD void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks,
     begin_block(self);
 }
 
-bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity)
+int64_t pvid_misfit_signal_q31(int64_t sensitivity)
 {
-    const int32_t clamped =
-        (int32_t)pvid_clamp_q31(pvid_round_shift_q31(sensitivity, SENSITIVITY_SHIFT), SENSITIVITY_LIMIT);
-    self->few_rss += square;
-    self->few_signal += pvid_square_q31(clamped);
+    return pvid_square_q31(
+        (int32_t)pvid_clamp_q31(pvid_round_shift_q31(sensitivity, SENSITIVITY_SHIFT), SENSITIVITY_LIMIT));
+}
+
+bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t signal)
+{
+    self->few_rss += (square < SQUARE_LIMIT) ? square : SQUARE_LIMIT;
+    self->few_signal += (signal < SQUARE_LIMIT) ? signal : SQUARE_LIMIT;
     self->left--;
     if ((self->left % PVID_MISFIT_FEW) == 0u) {
         self->rss = pvid_scaled_plus_q31(self->rss, pvid_scaled_of_q31(self->few_rss, 0));

@@ -14,9 +14,12 @@
  * forgetting_groups rows, 0: none. */
 void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups);
 
-/* Adds a row: the square of its residual, at most 2^56, and its sensitivity p[0] dY/dp[0], clamped to +-2^31.
- * Returns true at the end of a block, which must then be judged. */
-bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t sensitivity);
+/* The square of a sensitivity p[0] dY/dp[0], clamped to +-2^31, over 64: at most 2^56. */
+int64_t pvid_misfit_signal_q31(int64_t sensitivity);
+
+/* Adds the rows of an instant: the sum of the squares of their residuals and that of their signals, each clamped to
+ * 2^56. Returns true at the end of a block, which must then be judged. */
+bool pvid_misfit_add_q31(pvid_misfit_q31 *self, int64_t square, int64_t signal);
 
 /* Ends a block. Returns whether it is a misfit. */
 bool pvid_misfit_judge_q31(pvid_misfit_q31 *self);

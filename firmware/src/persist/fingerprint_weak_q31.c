@@ -115,7 +115,7 @@ uint32_t pvid_fingerprint_weak_model_q31(const pvid_weak_model_q31 *model)
 
 /* ---- the tables of a design ---- */
 
-static uint32_t rescale_of(uint32_t hash, const pvid_weak_rescale_q31 *one)
+static uint32_t rescale_of(uint32_t hash, const pvid_rescale_q31 *one)
 {
     const uint8_t shifts[] = {one->down, one->shift};
     return pvid_fingerprint_words(pvid_fingerprint_bytes(hash, shifts, sizeof shifts), &one->multiplier, 1);

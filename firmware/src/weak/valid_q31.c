@@ -114,11 +114,6 @@ static bool kinds_are_valid(const pvid_weak_design_q31 *design)
     return (thetas == model->model->n_theta) && (thetas <= PVID_MAX_THETA_Q31);
 }
 
-static bool rescale_is_valid(const pvid_weak_rescale_q31 *one)
-{
-    return (one->down <= WORD) && (one->shift <= WORD) && (one->multiplier > 0);
-}
-
 /* Largest integer of a signal of this source over full scale. */
 static int64_t reach_of(uint8_t source)
 {
@@ -198,7 +193,7 @@ static bool shifts_are_valid(const pvid_weak_design_q31 *design)
         valid = valid && (one->down <= MOST_UP) && (one->twice >= 1u) && (one->twice <= MOST_UP);
     }
     for (size_t i = 0; i < model->runs; i++) {
-        valid = valid && rescale_is_valid(&design->run[i]);
+        valid = valid && pvid_rescale_is_valid_q31(&design->run[i]);
     }
     for (size_t i = 0; i < model->signs; i++) {
         valid = valid && (design->sign_width[i] >= 0);

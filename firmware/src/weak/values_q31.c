@@ -14,7 +14,7 @@
 
 #include "number/exact.h"
 #include "pvid/elementary_q31.h"
-#include "weak/rescale_q31.h"
+#include "number/rescale_q31.h"
 
 void pvid_weak_values_init_q31(pvid_weak_values_q31 *self, uint16_t lead)
 {
@@ -79,7 +79,7 @@ static void complete_inputs(pvid_weak_values_q31 *self, const pvid_weak_design_q
     int32_t *run = &self->now[PVID_COUNT(PVID_EXACT_JETS, model->jets)];
     int32_t *sign = &run[PVID_COUNT(PVID_EXACT_RUNS, model->runs)];
     for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_RUNS, model->runs); i++) {
-        run[i] = pvid_weak_rescaled_q31(self->run[i], &design->run[i]);
+        run[i] = pvid_rescaled_q31(self->run[i], &design->run[i]);
     }
     for (size_t i = 0; i < PVID_COUNT(PVID_EXACT_SIGNS, model->signs); i++) {
         const int32_t v = self->v[0][i];

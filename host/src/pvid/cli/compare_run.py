@@ -10,13 +10,13 @@ from pvid.base.errors import PvidError
 from pvid.board.compare_on import Outcome
 from pvid.board.engine_board import verify_recording
 from pvid.board.strong_image import compare_on_board
-from pvid.cli.identify_run import IN_C, LAWS, STRONG_FORM, recording_of, strong_core
+from pvid.cli.identify_run import IN_C, LAWS, STRONG_FORM, recording_of
 from pvid.compare.bits import Comparison
 from pvid.compare.strong import StrongComparison
 from pvid.compare.weak import compare_recording as compared
 from pvid.identification.core_refined import compare_both
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.settings.cores import CORES, FLOAT, STRONG
+from pvid.settings.cores import CORES, FLOAT, STRONG, STRONG_CORES
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
 
@@ -79,12 +79,14 @@ def _compared_strong(
     given: Mapping[str, str | None],
 ) -> list[Outcome]:
     """The same by the strong form, on this computer and on emulated boards."""
-    core = strong_core(rig.compiled().name, given)
-    if core != STRONG.name:
-        raise PvidError(f"--core {core} has no twin; omit it")
     recording, model = recording_of(path, rig, columns)
     refuse_too_many_unknowns(model)
     law = given.get("law") or "stationary"
-    with progress_bar(f"{law} law, {FLOAT.name}", len(recording)) as advance:
-        run = StrongComparison.of(model, recording, LAWS[law], advance)
-    return [_compared(STRONG_FORM, core, run.found, law), *(compare_on_board(target, run, law) for target in targets)]
+    chosen = given.get("core") or STRONG.name
+    outcomes = []
+    for core in [one.name for one in STRONG_CORES.values() if chosen in (one.name, "all")]:
+        with progress_bar(f"{law} law, {core}", len(recording)) as advance:
+            run = StrongComparison.of(model, recording, LAWS[law], advance, core)
+        outcomes.append(_compared(STRONG_FORM, core, run.found, law))
+        outcomes += [compare_on_board(target, run, law) for target in targets]
+    return outcomes

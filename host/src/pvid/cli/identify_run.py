@@ -27,7 +27,7 @@ from pvid.oracle.weak.weights import Weights
 from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.rig.together import names_of
-from pvid.settings.cores import CORES, FLOAT, STRONG, STRONG_CORES
+from pvid.settings.cores import CORES, FLOAT, STRONG
 from pvid.settings.enums import Core, Law
 from pvid.setup.weak_sizes import refuse_too_many_unknowns
 
@@ -187,22 +187,14 @@ def _identified_by_strong_form(
     """Identifies a recording by the strong form and prints the answer."""
     from pvid.identification.strong import identify_strong_mechanism
 
-    core = strong_core(rig.compiled().name, given)
+    core = given.get("core") or STRONG.name
     if given.get("on") is not None:
         raise PvidError("--on with the strong form of a described mechanism is for `compare`")
     recording, model = recording_of(path, rig, columns)
-    if core == STRONG.name:
+    if core in CORES:
         refuse_too_many_unknowns(model)
-    answer = identify_strong_mechanism(recording, model, core == STRONG.name, LAWS[given.get("law") or "stationary"])
+    answer = identify_strong_mechanism(recording, model, core, LAWS[given.get("law") or "stationary"])
     return _told(answer, as_json=as_json)
-
-
-def strong_core(name: str, given: Mapping[str, str | None]) -> str:
-    """The arithmetic of the strong form: float32 unless given."""
-    core = given.get("core") or STRONG.name
-    if core not in STRONG_CORES:
-        raise PvidError(f"--core {core}: the strong form of {name} is in float32 and float64; omit --core {core}")
-    return core
 
 
 def _draw(answer: Analysis | CoreAnswer, figure: Path) -> None:

@@ -18,6 +18,7 @@ from pvid.cli.rig_design import model_of_rig, recorded
 from pvid.cli.simulate import ABOVE_0, numbers, of_model, start_option
 
 if TYPE_CHECKING:  # SymPy takes a third of a second to load
+    from pvid.codegen.strong_q31 import FixedStrongEngine
     from pvid.codegen.weak_q31 import FixedEngine
     from pvid.model.compiled import CompiledModel
     from pvid.rig.run import Recording
@@ -179,7 +180,8 @@ def build(
     NAME_design_f32.h has the tables and settings of the weak form for the rig of --run, or for the shipped rig of a
     shipped mechanism; NAME_weak_q31.h and NAME_design_q31.h have them in fixed point. NAME_refine_design_f32.h has the
     settings of the second stage, which fits the full equations (host/docs/firmware.md). With --strong,
-    NAME_strong_design_f32.h has the differentiators and settings of the strong form.
+    NAME_strong_design_f32.h has the differentiators and settings of the strong form, NAME_strong_q31.h and
+    NAME_strong_design_q31.h have it in fixed point.
     """
     from pvid.codegen import build as generated
     from pvid.codegen.fixed_model import Reaches
@@ -208,12 +210,13 @@ def build(
     title = " ".join(["pvid model build", compiled.name, *given])
     options = Options(limits, soft, strong)
     whole = GeneratedModel(compiled, title, options)
-    no_fixed_weak = None
+    no_fixed_weak = no_fixed_strong = None
     if design is not None:
         engine, no_fixed_weak = _fixed_engine(compiled, recording, functions, soft)
         options = replace(options, design=design, fixed_engine=engine)
     if strong:
-        options = replace(options, strong_design=_strong_design_of(compiled, model, recording))
+        strong_design, strong_engine, no_fixed_strong = _strong_design_of(compiled, model, recording)
+        options = replace(options, strong_design=strong_design, strong_engine=strong_engine)
     no_refinement = whole.refinement.refusal
     if design is not None and no_refinement is None:
         refine_design, no_refinement = _refine_design_of(compiled, recording, design, soft)
@@ -226,6 +229,7 @@ def build(
             "fixed point": whole.fixed.refusal,
             "weak form in C": whole.weak.refusal,
             "weak form in fixed point": no_fixed_weak,
+            "strong form in fixed point": no_fixed_strong,
             "refinement in C": no_refinement,
         }
         for what, reason in refusals.items():
@@ -243,21 +247,29 @@ def build(
     return DONE
 
 
-def _strong_design_of(compiled: CompiledModel, model: str, recording: Recording | None) -> StrongModelConfig | None:
-    """Of the strong form for the rig of a recording, or for the shipped rig of a shipped mechanism."""
+def _strong_design_of(
+    compiled: CompiledModel, model: str, recording: Recording | None
+) -> tuple[StrongModelConfig | None, FixedStrongEngine | None, str | None]:
+    """Of the strong form for the rig of a recording, or for the shipped rig of a shipped mechanism; the same in fixed
+    point, or why there is none."""
     from pvid.configuration.strong import strong_design
+    from pvid.configuration.strong_q31 import fixed_design
     from pvid.models.mechanisms import names as names_of_shipped
     from pvid.rig.run import Recording
     from pvid.sim.simulated_run import simulation_of
 
-    if recording is not None:
-        return strong_design(compiled, recording).config
-    if model not in names_of_shipped():
-        return None
-    simulation = simulation_of(model)
-    run = simulation.run()
-    signals = {one.name: run[one.name] for one in compiled.signals}
-    return strong_design(compiled, Recording(run["t"], signals, simulation.rig.sample_rate)).config
+    if recording is None:
+        if model not in names_of_shipped():
+            return None, None, None
+        simulation = simulation_of(model)
+        run = simulation.run()
+        signals = {one.name: run[one.name] for one in compiled.signals}
+        recording = Recording(run["t"], signals, simulation.rig.sample_rate)
+    design = strong_design(compiled, recording)
+    try:
+        return design.config, fixed_design(compiled, recording, design).engine, None
+    except PvidError as error:
+        return design.config, None, str(error)
 
 
 def _refine_design_of(

@@ -106,7 +106,7 @@ def source(made: FixedWeak, parameters: ParametersQ31, command: str) -> str:
             c_comment(banner(made.functions.functions, command)),
             f'#include "{name}_weak_q31.h"\n\n#include <stddef.h>\n\n#include "pvid/elementary_q31.h"',
             _functions(made, name).rstrip(),
-            _parameters(parameters, name).rstrip(),
+            parameters_in_c(parameters, name).rstrip(),
             *(one for one in _model(made, name) if one),
             "",
         ]
@@ -119,7 +119,7 @@ def together(made: FixedWeak, parameters: ParametersQ31, design: WeakDesignQ31, 
         [
             '#include "pvid/weak_q31.h"\n#include "pvid/elementary_q31.h"\n\n#include <stddef.h>',
             _functions(made, prefix).rstrip(),
-            _parameters(parameters, prefix).rstrip(),
+            parameters_in_c(parameters, prefix).rstrip(),
             *_model(made, prefix),
             *_design(design, prefix),
         ]
@@ -163,12 +163,14 @@ def _place(place: int) -> str:
     return "PVID_WEAK_NONE" if place == NONE else str(place)
 
 
-def _structs(kind: str, name: str, entries: Iterable[Sequence[object]]) -> str:
+def structs(kind: str, name: str, entries: Iterable[Sequence[object]]) -> str:
+    """A constant array of structs; "" of none."""
     lines = [f"    {{{', '.join(map(str, one))}}}," for one in entries]
     return "\n".join([f"static const {kind} {name}[{len(lines)}] = {{", *lines, "};"]) if lines else ""
 
 
-def _numbers(kind: str, name: str, values: Iterable[int]) -> str:
+def numbers(kind: str, name: str, values: Iterable[int]) -> str:
+    """A constant array of integers; "" of none."""
     given = [str(int(one)) for one in values]
     rows = [f"    {', '.join(given[k : k + _WIDTH])}," for k in range(0, len(given), _WIDTH)]
     return "\n".join([f"static const {kind} {name}[{len(given)}] = {{", *rows, "};"]) if given else ""
@@ -203,11 +205,11 @@ def _model(made: FixedWeak, prefix: str) -> list[str]:
         "};",
     ]
     return [
-        _structs("pvid_weak_signal", f"{prefix}_signal", [(one.sample, int(one.source)) for one in model.signal]),
-        _structs("pvid_weak_jet", f"{prefix}_jet", [(one.signal, one.order) for one in model.jet]),
-        _structs("pvid_weak_channel", f"{prefix}_channel", channels),
-        _structs("pvid_weak_term_q31", f"{prefix}_term", [(x.channel, x.order, x.column) for x in model.term]),
-        _structs("pvid_weak_kind", f"{prefix}_kind", kinds),
+        structs("pvid_weak_signal", f"{prefix}_signal", [(one.sample, int(one.source)) for one in model.signal]),
+        structs("pvid_weak_jet", f"{prefix}_jet", [(one.signal, one.order) for one in model.jet]),
+        structs("pvid_weak_channel", f"{prefix}_channel", channels),
+        structs("pvid_weak_term_q31", f"{prefix}_term", [(x.channel, x.order, x.column) for x in model.term]),
+        structs("pvid_weak_kind", f"{prefix}_kind", kinds),
         "\n".join(struct),
     ]
 
@@ -216,28 +218,26 @@ def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
     parts, filters = [], []
     for k, one in enumerate(design.filter):
         weights = f"{prefix}_weights_{k}_q31"
-        parts.append(_numbers("PVID_TABLE int32_t", weights, one.weights))
+        parts.append(numbers("PVID_TABLE int32_t", weights, one.weights))
         filters.append((one.half, one.down, weights))
     formats = [(one.value, one.lift, one.own, one.plain, one.ramp) for one in design.format]
     tables = {
-        "full_scale": _numbers("int32_t", f"{prefix}_full_scale_q31", design.full_scale),
-        "down": _numbers("uint8_t", f"{prefix}_down_q31", design.down),
-        "filter": _structs("pvid_weak_filter_q31", f"{prefix}_filter_q31", filters),
-        "run": _structs(
-            "pvid_weak_rescale_q31", f"{prefix}_run_q31", [(x.down, x.shift, x.multiplier) for x in design.run]
-        ),
-        "sign_width": _numbers("int32_t", f"{prefix}_sign_width_q31", design.sign_width),
-        "integral": _structs("pvid_weak_integral_q31", f"{prefix}_integral_q31", design.integral),
-        "format": _structs("pvid_weak_format_q31", f"{prefix}_format_q31", formats),
-        "factor": _structs("pvid_scaled_q31", f"{prefix}_factor_q31", design.factor),
-        "noise": _structs(
+        "full_scale": numbers("int32_t", f"{prefix}_full_scale_q31", design.full_scale),
+        "down": numbers("uint8_t", f"{prefix}_down_q31", design.down),
+        "filter": structs("pvid_weak_filter_q31", f"{prefix}_filter_q31", filters),
+        "run": structs("pvid_rescale_q31", f"{prefix}_run_q31", [(x.down, x.shift, x.multiplier) for x in design.run]),
+        "sign_width": numbers("int32_t", f"{prefix}_sign_width_q31", design.sign_width),
+        "integral": structs("pvid_weak_integral_q31", f"{prefix}_integral_q31", design.integral),
+        "format": structs("pvid_weak_format_q31", f"{prefix}_format_q31", formats),
+        "factor": structs("pvid_scaled_q31", f"{prefix}_factor_q31", design.factor),
+        "noise": structs(
             "pvid_weak_noise_q31",
             f"{prefix}_noise_q31",
             [(x.kind, x.power, x.a, x.b, f"{{{x.factor[0]}, {x.factor[1]}}}") for x in design.noise],
         ),
-        "error_order": _numbers("uint8_t", f"{prefix}_error_order_q31", design.error_order),
-        "error_variance": _structs("pvid_scaled_q31", f"{prefix}_error_variance_q31", design.error_variance),
-        "circle": _numbers("PVID_TABLE int32_t", f"{prefix}_circle_q31", design.circle.tolist()),
+        "error_order": numbers("uint8_t", f"{prefix}_error_order_q31", design.error_order),
+        "error_variance": structs("pvid_scaled_q31", f"{prefix}_error_variance_q31", design.error_variance),
+        "circle": numbers("PVID_TABLE int32_t", f"{prefix}_circle_q31", design.circle.tolist()),
     }
     sizes = ("functions", "power", "decimation", "sum_shift", "hop")
     struct = [
@@ -254,9 +254,9 @@ def _design(design: WeakDesignQ31, prefix: str) -> list[str]:
 
 def configuration(config: WeakConfigQ31, prefix: str) -> str:
     """PREFIX_config_q31, behind the design."""
-    parts = [_numbers("int32_t", f"{prefix}_offset_q31", config.offset)]
+    parts = [numbers("int32_t", f"{prefix}_offset_q31", config.offset)]
     if config.drive_min is not None:
-        parts.append(_numbers("int32_t", f"{prefix}_drive_min_q31", config.drive_min))
+        parts.append(numbers("int32_t", f"{prefix}_drive_min_q31", config.drive_min))
     drive = f"{prefix}_drive_min_q31" if config.drive_min is not None else "NULL"
     struct = [
         f"static const pvid_weak_config_q31 {prefix}_config_q31 = {{",
@@ -266,16 +266,16 @@ def configuration(config: WeakConfigQ31, prefix: str) -> str:
         f"    .compensation = {'true' if config.compensation else 'false'},",
         f"    .iterations = {config.iterations},",
         "    .estimator = {",
-        *(f"        {one}," for one in _fields(config.estimator)),
+        *(f"        {one}," for one in fields_of(config.estimator)),
         "    },",
-        f"    .trust = {{{', '.join(_fields(config.trust))}}},",
-        f"    .gate = {{{', '.join(_fields(config.gate))}}},",
+        f"    .trust = {{{', '.join(fields_of(config.trust))}}},",
+        f"    .gate = {{{', '.join(fields_of(config.gate))}}},",
         "};",
     ]
     return "\n\n".join([*parts, "\n".join(struct)])
 
 
-def _fields(settings: EstimatorConfigQ31 | TrustConfigQ31 | GateConfigQ31) -> list[str]:
+def fields_of(settings: EstimatorConfigQ31 | TrustConfigQ31 | GateConfigQ31) -> list[str]:
     """ ".field = value" in C, in the order of the header."""
     values = {one.name: getattr(settings, one.name) for one in fields(settings)}
     return [
@@ -380,7 +380,7 @@ static const pvid_model_q31 {prefix}_model_q31 = {{
 """
 
 
-def _parameters(made: ParametersQ31, prefix: str) -> str:
+def parameters_in_c(made: ParametersQ31, prefix: str) -> str:
     """PREFIX_model_q31 and its functions."""
     functions = made.functions
     generated = [

@@ -14,6 +14,7 @@ from pvid.codegen.fixed_model import FixedModel, Reaches, fixed_model, reaches_o
 from pvid.codegen.functions import ModelFunctions, functions_of
 from pvid.codegen.refine import RefineFunctions, check_outputs, refine_functions
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
+from pvid.codegen.strong_q31 import FixedStrongEngine
 from pvid.codegen.weak import WeakFunctions, weak_functions_of, weak_model_of
 from pvid.codegen.weak_q31 import FixedEngine
 from pvid.model.compiled import CompiledModel
@@ -38,6 +39,7 @@ class Options:
     design : of the weak form for a rig; None: no NAME_design_f32.h
     fixed_engine : the fixed-point weak form for a rig; None: no NAME_weak_q31.h
     strong_design : settings of the strong form for a rig; None: no NAME_strong_design_f32.h
+    strong_engine : the fixed-point strong form for a rig; None: no NAME_strong_q31.h
     refine_design : settings of the refinement for a rig; None: no NAME_refine_design_f32.h
     """
 
@@ -47,6 +49,7 @@ class Options:
     design: WeakConfig | None = None
     fixed_engine: FixedEngine | None = None
     strong_design: StrongModelConfig | None = None
+    strong_engine: FixedStrongEngine | None = None
     refine_design: RefineConfig | None = None
 
 

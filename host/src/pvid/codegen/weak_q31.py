@@ -101,7 +101,7 @@ def fixed_weak(made: WeakFunctions, given: JetReaches | None = None) -> FixedWea
         gain_most=_most(values)[:gains],
         integrand_most=_most(values)[gains:],
     )
-    limits = _limits(inputs)
+    limits = limits_of(inputs)
     return FixedWeak(
         functions=made,
         reaches=tuple(reaches),
@@ -144,7 +144,8 @@ def _most(made: FixedProgram) -> tuple[int, ...]:
     )
 
 
-def _limits(bounds: Sequence[Interval]) -> tuple[int, ...]:
+def limits_of(bounds: Sequence[Interval]) -> tuple[int, ...]:
+    """Largest integer of each input within these bounds, in its format."""
     return tuple(math.floor(max(map(abs, one)) * 2.0 ** bits_of(one)) for one in bounds)
 
 

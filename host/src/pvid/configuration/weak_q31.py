@@ -25,8 +25,8 @@ from pvid.setup.weak import drive_min_of, with_soft_widths
 from pvid.setup.weak_q31 import config_of_q31, row_formats, with_noisy_means
 
 _INPUT_BITS = 15  # of an input that is known exactly: counts of its reach
-_HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
-_FULL_SCALE = 1.5  # over the reach of a signal
+HIGHEST_JET = 2.0  # reach of a derivative over the largest of the run
+FULL_SCALE = 1.5  # over the reach of a signal
 _SE_BITS = 24  # of se_max
 _PART_BITS = 30  # of neglected
 _ON_GRID = 1e-3  # of a count: digits of a file
@@ -67,17 +67,17 @@ def fixed_engine(
     lsb = lsb_of(compiled, functions.samples)
     largest = [float(np.nanmax(np.abs(np.asarray(run[one], np.float64)))) for one in functions.samples]
     limits = most_counts(functions.signal, len(lsb), found.tables.decimation)
-    tops = [max(_FULL_SCALE * known[one].reach, top) for one, top in zip(functions.samples, largest, strict=True)]
+    tops = [max(FULL_SCALE * known[one].reach, top) for one, top in zip(functions.samples, largest, strict=True)]
     if between_counts:
         lsb = tuple(
-            _finer(step, run[one], limit / (top / step))
+            finer(step, run[one], limit / (top / step))
             for one, step, top, limit in zip(functions.samples, lsb, tops, limits, strict=True)
         )
     full_scale = tuple(
         max(round(min(top / step, limit)), 16) for step, top, limit in zip(lsb, tops, limits, strict=True)
     )
     of_jets = {str(jet): x for jet, x in found.rows.record.grid.jets.items()}
-    reaches = {one: _HIGHEST_JET * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in functions.jet_names}
+    reaches = {one: HIGHEST_JET * float(np.max(np.abs(of_jets[one]))) or 1.0 for one in functions.jet_names}
     seconds = len(next(iter(of_jets.values()))) * found.tables.decimation / design.sample_rate
     made = fixed_weak(functions, JetReaches(run_s=max(2 * seconds, _LONGEST_RUN_S), of=reaches))
     parameters_of = found.rows.compiled.parameters
@@ -102,7 +102,7 @@ def fixed_engine(
     return FixedEngine(compiled, made, parameters, config, design.sample_rate, lsb)
 
 
-def _finer(step: float, samples: npt.ArrayLike, room: float) -> float:
+def finer(step: float, samples: npt.ArrayLike, room: float) -> float:
     """A count for samples: the sensor's, by a power of 2 finer where they lie between counts. room: at most so much."""
     counts = np.asarray(samples, np.float64) / step
     if room < 2 or np.nanmax(np.abs(counts - np.rint(counts))) < _ON_GRID:

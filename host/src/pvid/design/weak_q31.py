@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
+from pvid.design.rescale_q31 import rescale_to, shift_to
 from pvid.settings.weak import NONE, Source, WeakChannel, WeakDesign32, WeakJet, WeakSignal
 from pvid.settings.weak_q31 import Rescale, WeakDesignQ31, WeakFilterQ31, WeakFormatQ31, WeakModelQ31, WeakNoiseQ31
 
@@ -89,11 +90,6 @@ def most_counts(signals: Sequence[WeakSignal], samples: int, decimation: int) ->
         room = math.floor((2**31 - 1) / (_REACH[one.source] * decimation**2))
         found[one.sample] = min(found[one.sample], room)
     return found
-
-
-def shift_to(most: float, bits: float) -> int:
-    """Shift right, not negative, that brings |x| <= most to 2^bits at most."""
-    return max(0, math.ceil(math.log2(most) - bits)) if most > 0 else 0
 
 
 def fixed_design(model: WeakModelQ31, sizes: WeakDesign32, sensing: Sensing, formats: Formats) -> WeakDesignQ31:
@@ -201,21 +197,6 @@ def scaled_number(x: float) -> tuple[int, int]:
     m, e = math.frexp(x)
     whole = round(m * 2.0**30)
     return (whole // 2, e - 29) if abs(whole) == 2**30 else (whole, e - 30)
-
-
-def rescale_to(most: float, gain: float, name: str) -> Rescale:
-    """From sums of at most `most` to `gain` times them."""
-    down = shift_to(most, _WORD)
-    factor = gain * 2.0**down
-    shift = 30 - math.floor(math.log2(factor))
-    multiplier = round(factor * 2.0**shift)
-    if multiplier == 2**31:
-        multiplier, shift = 2**30, shift - 1
-    if not 0 <= shift <= 62:
-        raise PvidError(
-            f"the fixed-point weak form cannot hold {name}: its unit and that of its sensor differ too much"
-        )
-    return Rescale(down, shift, multiplier)
 
 
 class _Block:

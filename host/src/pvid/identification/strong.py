@@ -10,7 +10,9 @@ import numpy as np
 
 from pvid.base.wording import listed
 from pvid.codegen.strong_library import strong_native
+from pvid.codegen.strong_library_q31 import StrongNativeQ31
 from pvid.configuration.strong import StrongDesign, strong_design
+from pvid.configuration.strong_q31 import strong_design_to_identify
 from pvid.identification.analysis import refuse_constant
 from pvid.identification.answer import Answer, Value
 from pvid.identification.values import unless_held, values_of
@@ -20,7 +22,7 @@ from pvid.oracle.weak.parameters import UNKNOWN
 from pvid.oracle.weak.verdict import Judged, Verdict
 from pvid.oracle.weak.verdict import Reason as Doubt
 from pvid.rig.run import Recording
-from pvid.settings.cores import FLOAT, STRONG_CORES
+from pvid.settings.cores import STRONG, STRONG_CORES, STRONG_FIXED
 from pvid.settings.enums import Law, Reason
 
 _UNKNOWN_OF_RANGE = 0.5  # as in the verdict of the weak form
@@ -73,7 +75,8 @@ class StrongAnswer(Answer):
     @property
     def identifier(self) -> str:
         """Form and arithmetic."""
-        return f"strong form, {'float64' if self.hash is None else f'C in {FLOAT.words}'}"
+        core = STRONG_CORES.get(self.core)
+        return f"strong form, {'float64' if core is None else f'C in {core.words}'}"
 
     @property
     def lines(self) -> list[str]:
@@ -98,9 +101,13 @@ class StrongAnswer(Answer):
 
 
 def identify_strong_mechanism(
-    recording: Recording, model: CompiledModel, in_c: bool = True, law: Law = Law.STATIONARY
+    recording: Recording, model: CompiledModel, core: str = STRONG.name, law: Law = Law.STATIONARY
 ) -> StrongAnswer:
     """Parameters of a mechanism from a recording without missing samples: by the C core, or by the analysis alone.
+
+    Parameters
+    ----------
+    core : f32, q31; f64: the analysis
 
     Raises
     ------
@@ -108,12 +115,19 @@ def identify_strong_mechanism(
         When the recording is too short, or the strong form of the model needs what the core does not have.
     """
     refuse_constant(recording, model)
-    design = strong_design(model, recording, law)
+    fixed = strong_design_to_identify(model, recording, law) if core == STRONG_FIXED.name else None
+    design = strong_design(model, recording, law) if fixed is None else fixed.base
     fitted = design.fitted
     reason: Reason | None = None
     running: int | None = None
     p, noise = fitted.p, fitted.noise
-    if in_c:
+    if fixed is not None:
+        stepped = StrongNativeQ31(fixed.engine).started()
+        record = stepped.run_samples(fixed.counts, sums=False)
+        p = fixed.engine.values(record.p[-1])
+        noise = np.maximum(noise, fixed.engine.values(stepped.assess()["se"][: len(p)]))
+        reason, running = _last(record.reason.tolist()), stepped.running_hash
+    elif core == STRONG.name:
         identifier = strong_native(design.strong, design.config).identifier_of(design.config)
         record = identifier.run_samples(design.samples, sums=False)
         p = record.p[-1].astype(np.float64)
@@ -128,7 +142,6 @@ def identify_strong_mechanism(
     verdict = Verdict(tuple(_doubts(model, p, design, noise, unknown, held)))
     change = fitted.change[np.newaxis]
     values = values_of(model, p, np.diag(noise**2), change, judged, verdict, of_known=False)
-    core = STRONG_CORES[0 if in_c else 1]
     return StrongAnswer(model, design, values, core, reason, running, verdict, unknown, recording)
 
 

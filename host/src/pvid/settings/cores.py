@@ -37,5 +37,6 @@ STRONG = CoreBuild(
     ("_q31", "_strong_f32", "_weak_f32", "_refine_f32", "fingerprint_f32"),
     "strong",
 )
-STRONG_CORES = (STRONG.name, "f64")  # of a described mechanism: in C, and its analysis in float64
+STRONG_FIXED = CoreBuild("q31", "fixed point", None, ("_f32", "_strong_q31", "_weak_q31", "fingerprint_q31"), "strong")
+STRONG_CORES: Mapping[str, CoreBuild] = {one.name: one for one in (STRONG, STRONG_FIXED)}
 CORES: Mapping[str, CoreBuild] = {one.name: one for one in (FLOAT, FIXED)}

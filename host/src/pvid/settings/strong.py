@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from pvid.settings.parts import EstimatorConfig, GateConfig
+from pvid.settings.parts import EstimatorConfig, EstimatorConfigQ31, GateConfig, GateConfigQ31
 from pvid.settings.tables import Folded
+from pvid.settings.weak_q31 import Rescale
 
 
 @dataclass(frozen=True)
@@ -38,3 +39,32 @@ class StrongModelConfig(Folded):
     def bank(self) -> StrongModelConfig:
         """The bank, whose fields are among these."""
         return self
+
+
+@dataclass(frozen=True, eq=False)
+class StrongModelConfigQ31(Folded):
+    """Settings of the strong form in fixed point, as in NAME_strong_q31.h.
+
+    Attributes
+    ----------
+    sample_rate : [Hz]
+    weights, stride, centre : the folded bank in integers, int32 [5, half]; see pvid.design.bank_q31
+    full_scale, offset : of the readings of each signal [counts]
+    input : from the sum of its filter to each input of the rows
+    entry : from the value of each entry of the rows, N then Y of each kind, to the format of the estimator
+    rows_per_second : for the memories of gate and alarm
+    estimator : rows are in standard deviations, row_sd 2^(8 + y_bits)
+    gate : on the innovations of an instant
+    """
+
+    sample_rate: float
+    weights: npt.NDArray[np.int32]
+    stride: int
+    centre: int
+    full_scale: tuple[int, ...]
+    offset: tuple[int, ...]
+    input: tuple[Rescale, ...]
+    entry: tuple[Rescale, ...]
+    rows_per_second: int
+    estimator: EstimatorConfigQ31
+    gate: GateConfigQ31 = GateConfigQ31()

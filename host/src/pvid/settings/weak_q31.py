@@ -47,7 +47,7 @@ class WeakModelQ31:
 
 @dataclass(frozen=True)
 class Rescale:
-    """pvid_weak_rescale_q31: (x 2^-down) multiplier 2^-shift."""
+    """pvid_rescale_q31: (x 2^-down) multiplier 2^-shift."""
 
     down: int
     shift: int

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypedDict
 
 import numpy as np
 
@@ -47,8 +48,8 @@ def row_formats(rows: WeakRows, p: Float, errors: Sequence[EquationError] | None
         entries = np.abs(white.regressors).max(axis=(0, 2))
         terms = entries * np.abs(theta[kind])
         largest = max(largest, float(np.abs(white.known).max()), float(terms.max()))
-        n_bits += [_bits(float(one)) for one in entries]
-    y_bits = min(_bits(largest), _MOST_Y_BITS)
+        n_bits += [bits_of_row(float(one)) for one in entries]
+    y_bits = min(bits_of_row(largest), _MOST_Y_BITS)
     if y_bits < _LEAST_Y_BITS:
         raise PvidError(
             f"{rows.compiled.model.name}: the residual Y - N theta is {largest:.3g} of its standard deviations large,"
@@ -85,7 +86,8 @@ def with_noisy_means(sizes: WeakDesign32, rows: WeakRows, p: Float) -> WeakDesig
     return replace(sizes, error_variance=variance)
 
 
-def _bits(largest: float) -> int:
+def bits_of_row(largest: float) -> int:
+    """The format of an entry of a row that is this large in a run: three bits are left free."""
     return max(min(_ROW_BITS - _MARGIN_BITS - math.frexp(largest)[1], 64), -64) if largest > 0 else 0
 
 
@@ -106,29 +108,13 @@ def config_of_q31(
     formats : as of row_formats
     overlap : inflation of variances because windows share samples, as in float32
     """
-    p = parameters.checked(start)
-    unknowns, following = parameters.model.unknowns, parameters.model.following
+    following = parameters.model.following
     windows_hz = sample_rate / (design.hop * design.decimation)
-    start_sd = np.abs(parameters.unit(p)) / np.sqrt(parameters.prior(p))
-    lower = [min(one.low, value) for one, value in zip(unknowns, p, strict=True)]
-    upper = [max(one.high, value) for one, value in zip(unknowns, p, strict=True)]
     n_bits, y_bits = formats
-
-    def whole(values: Sequence[float] | Float, least: int = -(2**31)) -> tuple[int, ...]:
-        return tuple(
-            max(min(round(float(x) * 2.0**bits), 2**31 - 1), least) for x, bits in zip(values, p_bits, strict=True)
-        )
-
-    positive = [1 if one.positive else -(2**31) for one in unknowns]
-    low = tuple(max(x, least) for x, least in zip(whole(lower), positive, strict=True))
     return WeakConfigQ31(
         design=design,
         estimator=EstimatorConfigQ31(
-            start=tuple(max(x, y) for x, y in zip(whole(p), low, strict=True)),
-            start_sd=whole(start_sd, 1),
-            lower=low,
-            upper=whole(upper),
-            p_bits=tuple(p_bits),
+            **start_q31(parameters, p_bits, start),
             n_bits=tuple(n_bits),
             y_bits=y_bits,
             row_sd=2 ** (8 + y_bits),
@@ -140,3 +126,37 @@ def config_of_q31(
         offset=tuple(offset),
         gate=gate_config_q31(GateConfig(following.outlier_gate, following.patience_s(1 / windows_hz)), windows_hz),
     )
+
+
+class StartQ31(TypedDict):
+    """Of an estimator, in the formats p_bits."""
+
+    start: tuple[int, ...]
+    start_sd: tuple[int, ...]
+    lower: tuple[int, ...]
+    upper: tuple[int, ...]
+    p_bits: tuple[int, ...]
+
+
+def start_q31(parameters: Parameters, p_bits: Sequence[int], start: Float | None = None) -> StartQ31:
+    """The guesses, or `start`, their standard deviations and bounds."""
+    p = parameters.checked(start)
+    unknowns = parameters.model.unknowns
+    start_sd = np.abs(parameters.unit(p)) / np.sqrt(parameters.prior(p))
+    lower = [min(one.low, value) for one, value in zip(unknowns, p, strict=True)]
+    upper = [max(one.high, value) for one, value in zip(unknowns, p, strict=True)]
+
+    def whole(values: Sequence[float] | Float, least: int = -(2**31)) -> tuple[int, ...]:
+        return tuple(
+            max(min(round(float(x) * 2.0**bits), 2**31 - 1), least) for x, bits in zip(values, p_bits, strict=True)
+        )
+
+    positive = [1 if one.positive else -(2**31) for one in unknowns]
+    low = tuple(max(x, least) for x, least in zip(whole(lower), positive, strict=True))
+    return {
+        "start": tuple(max(x, y) for x, y in zip(whole(p), low, strict=True)),
+        "start_sd": whole(start_sd, 1),
+        "lower": low,
+        "upper": whole(upper),
+        "p_bits": tuple(p_bits),
+    }

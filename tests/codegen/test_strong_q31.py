@@ -1,0 +1,245 @@
+"""The printed strong form in fixed point: bits of C and twin on wild runs, accuracy, refusals of init and of models."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from pvid.base.errors import PvidError
+from pvid.codegen.strong_library_q31 import StrongNativeQ31
+from pvid.codegen.strong_twin_q31 import StrongTwinQ31
+from pvid.configuration.strong import strong_design
+from pvid.configuration.strong_q31 import StrongDesignQ31, fixed_design
+from pvid.design.bank_q31 import integer_bank
+from pvid.design.fir import ORDERS, savitzky_golay
+from pvid.oracle.strong_described import StrongModel, StrongRows, StrongSettings, all_rows
+from pvid.rig.run import Recording
+from pvid.settings.enums import Law, Reason, Status
+from pvid.settings.record import Record
+from pvid.sim.simulated_run import simulation_of
+from pvid.twin import fnv
+
+Int32 = npt.NDArray[np.int32]
+
+MOST = np.iinfo(np.int32).max
+
+
+@cache
+def recording(name: str) -> Recording:
+    simulation = simulation_of(name)
+    run = simulation.run(seed=1)
+    return Recording(run.pop("t"), run, simulation.rig.sample_rate)
+
+
+@cache
+def made(name: str, law: Law = Law.STATIONARY) -> tuple[StrongDesignQ31, StrongNativeQ31]:
+    model, run = simulation_of(name).model, recording(name)
+    design = fixed_design(model, run, strong_design(model, run, law))
+    return design, StrongNativeQ31(design.engine)
+
+
+def wild(counts: Int32, window: int, seed: int) -> Int32:
+    """The run with what sensors do: stuck, dead, jumping, at the ends of the word, noisy, swapped in time."""
+    random = np.random.default_rng(seed)
+    out = np.tile(counts[: 3 * window], (3, 1)).astype(np.int64)
+    ticks, signals = out.shape
+    largest = np.abs(counts).max(axis=0)
+    for place in range(window, ticks, window // 2):
+        part, one = (
+            slice(place, place + int(random.integers(1, window // 3))),
+            int(random.integers(signals)),
+        )
+        kind = int(random.integers(7))
+        if kind == 0:
+            out[part, one] = out[place, one]
+        elif kind == 1:
+            out[part] = 0
+        elif kind == 2:
+            out[place, one] = random.choice([MOST, -MOST, -MOST - 1])
+        elif kind == 3:
+            out[part, one] += random.integers(-largest[one], largest[one] + 1)
+        elif kind == 4:
+            out[part, one] += random.integers(-largest[one], largest[one] + 1, len(out[part]))
+        elif kind == 5:
+            out[part] = out[part][::-1]
+        else:
+            out[part, one] *= 40
+    return np.clip(out, -MOST - 1, MOST).astype(np.int32)
+
+
+def difference(core: Record, twin: Record) -> str:
+    for name in ("reason", "p", "sums", "exponent"):
+        ticks = np.nonzero(
+            np.any(
+                np.atleast_2d(getattr(core, name) != getattr(twin, name)).reshape(len(core.p), -1),
+                1,
+            )
+        )
+        if len(ticks[0]):
+            return f"{name} at tick {ticks[0][0]}"
+    return ""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rigid_body",
+        "dc_motor",
+        *(
+            pytest.param(one, marks=pytest.mark.long)
+            for one in (
+                "kapitza",
+                "cart_pendulum",
+                "two_link_arm",
+                "furuta",
+                "two_mass_drive",
+            )
+        ),
+    ],
+)
+def test_c_has_the_bits_of_its_twin_whatever_the_sensors_do(name: str) -> None:
+    design, native = made(name)
+    readings = wild(design.counts, design.engine.config.window, seed=3)
+    identifier, twin = native.started(), StrongTwinQ31(design.engine)
+    cuts = np.linspace(0, len(readings), 5).astype(int)
+    seen: set[int] = set()
+    hashed = fnv.START
+    for part, (first, last) in enumerate(zip(cuts, cuts[1:], strict=False)):
+        core, own = (
+            identifier.run_samples(readings[first:last]),
+            twin.run(readings[first:last]),
+        )
+        assert difference(core, own) == ""
+        hashed = int(fnv.running_hashes(own, hashed)[-1])
+        assert identifier.running_hash == hashed
+        seen |= set(core.reason.tolist())
+        if part == 1:
+            identifier.gap()
+            twin.gap()
+        identifier.freeze(part == 2)
+        twin.freeze(part == 2)
+    wanted = {
+        Reason.UPDATED,
+        Reason.WARMING_UP,
+        Reason.ACCUMULATED,
+        Reason.REJECTED_SATURATED,
+        Reason.HELD_FROZEN,
+    }
+    assert wanted <= seen
+    lower, upper = (
+        design.engine.config.estimator.lower,
+        design.engine.config.estimator.upper,
+    )
+    assert np.all((core.p >= lower) & (core.p <= upper))
+
+
+@pytest.mark.parametrize("name", ["dc_motor", "rigid_body", "cart_pendulum", "two_link_arm"])
+def test_the_estimate_is_that_of_all_rows_in_float64(name: str) -> None:
+    """Of those up to the last solve. A sixteenth of a standard error is 0.2 % of it beside the noise."""
+    design, native = made(name)
+    identifier = native.started()
+    record = identifier.run_samples(design.counts, sums=False)
+    oracle, run, fitted = StrongModel(simulation_of(name).model), recording(name), design.base.fitted
+    rows = oracle.rows(run.signals, run.sample_rate, StrongSettings(fitted.taps, fitted.degree, 1))
+    first = int(np.argmax(record.reason != Reason.WARMING_UP))
+    last = int(np.nonzero(np.isin(record.reason, [Reason.UPDATED, Reason.MISFIT]))[0][-1])
+    begin = first + 1 - fitted.taps - (2 if any(design.engine.made.strong.held) else 0)
+    part = slice(begin, begin + last + 1 - first)
+    used = StrongRows([one[part] for one in rows.regressors], [one[part] for one in rows.known], rows.times[part])
+    p, _ = all_rows(oracle.parameters, used, oracle.parameters.checked(None))
+    found = design.engine.values(record.p[-1])
+    assert np.all(np.abs(found - p) < fitted.noise / 16)
+    assert identifier.counters["rejected_saturated"] == 0
+    se = design.engine.values(identifier.assess()["se"][: len(p)])
+    assert np.all((se > fitted.noise / 2) & (se < 50 * fitted.noise))  # correlation: half a window
+
+
+def test_the_papers_law_alone_is_gain_0_at_every_row() -> None:
+    design, native = made("rigid_body", Law.PSEUDOVELOCITY)
+    own = design.engine.config.estimator
+    assert (own.gain, own.divider) == (0, 1)
+    record = native.started().run_samples(design.counts[:2000])
+    assert difference(record, StrongTwinQ31(design.engine).run(design.counts[:2000])) == ""
+    assert np.all(record.reason[record.reason != Reason.WARMING_UP] == Reason.UPDATED)
+
+
+@pytest.mark.parametrize("taps", [9, 61, 401])
+@pytest.mark.parametrize("largest", [16, 2**20, 28 * 2**24])
+def test_integer_weights_keep_the_sums_within_their_word_and_the_bank(taps: int, largest: int) -> None:
+    bank = savitzky_golay(taps, 8)
+    whole = integer_bank(bank, largest)
+    for order in range(ORDERS):
+        size = int(np.abs(whole.weights[order].astype(np.int64)).sum()) + (whole.centre if order == 0 else 0)
+        assert size * 4 * largest <= 2**62
+        off = np.abs(whole.weights[order] / 2.0 ** whole.bits[order] - bank.weights[order]).max()
+        assert off <= 2.0 ** -(whole.bits[order] + 1)
+    assert np.abs(whole.weights.astype(np.int64)).max() <= 2**30
+
+
+def test_the_window_at_full_scale_ends_no_word() -> None:
+    """Each sample has the sign of its weight, order by order: the largest sums there are."""
+    design, native = made("dc_motor")
+    config = design.engine.config
+    full = np.array(config.full_scale)
+    parts = []
+    for order in range(ORDERS):
+        side = np.sign(config.weights[order])
+        signs = np.concatenate([(1 - 2 * (order % 2)) * side[::-1], [1 if order == 0 else -1], side])
+        parts.append(np.where(signs == 0, 1, signs)[:, None] * full)
+    readings = np.tile(np.concatenate(parts), (2, 1)).astype(np.int32)
+    core = native.started().run_samples(readings)
+    assert difference(core, StrongTwinQ31(design.engine).run(readings)) == ""
+
+
+def _set(struct: Any, path: str, value: Any) -> None:
+    *parts, last = path.split(".")
+    for one in parts:
+        struct = struct[int(one)] if one.isdigit() else getattr(struct, one)
+    if last.isdigit():
+        struct[int(last)] = value
+    else:
+        setattr(struct, last, value)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "status"),
+    [
+        ("bank.half", 1, Status.BAD_HALF),
+        ("bank.half", 4096, Status.BAD_HALF),
+        ("bank.stride", 0, Status.BAD_STRIDE),
+        ("bank.stride", 9, Status.BAD_STRIDE),
+        ("bank.centre", 0, Status.BAD_CENTRE),
+        ("bank.centre", 2**30 + 1, Status.BAD_CENTRE),
+        ("full_scale.0", 0, Status.BAD_FULL_SCALE),
+        ("full_scale.1", 2**24 + 1, Status.BAD_FULL_SCALE),
+        ("full_scale.2", 2**24, Status.BAD_FULL_SCALE),  # the weights are for less
+        ("input.0.shift", 63, Status.BAD_SHIFT),
+        ("input.1.down", 63, Status.BAD_SHIFT),
+        ("entry.2.multiplier", 0, Status.BAD_SHIFT),
+        ("rows_per_second", 0, Status.BAD_DRIVE_TICKS),
+        ("rows_per_second", 2**30 + 1, Status.BAD_DRIVE_TICKS),
+        ("estimator.p_bits.0", 3, Status.BAD_FORMAT),
+        ("estimator.divider", 0, Status.BAD_DIVIDER),
+        ("estimator.row_sd", 0, Status.BAD_ROW_SD),
+        ("estimator.start_sd.1", 0, Status.BAD_START_SD),
+        ("gate.sigmas", 1, Status.BAD_GATE_SIGMAS),
+    ],
+)
+def test_init_names_the_field_that_it_refuses(field: str, value: int, status: Status) -> None:
+    native = made("dc_motor")[1]
+    identifier = native.started()
+    _set(identifier.config_struct, field, value)
+    assert identifier.initialise() is status
+    assert not any(identifier.state_bytes)
+
+
+def test_an_integral_since_the_start_of_the_run_is_refused_in_a_sentence() -> None:
+    with pytest.raises(
+        PvidError,
+        match="the strong form in fixed point has no state for the integral of i",
+    ):
+        made("battery_2rc")
