@@ -217,9 +217,6 @@ def _set(struct: Any, path: str, value: Any) -> None:
         ("full_scale.0", 0, Status.BAD_FULL_SCALE),
         ("full_scale.1", 2**24 + 1, Status.BAD_FULL_SCALE),
         ("full_scale.2", 2**24, Status.BAD_FULL_SCALE),  # the weights are for less
-        ("input.0.shift", 63, Status.BAD_SHIFT),
-        ("input.1.down", 63, Status.BAD_SHIFT),
-        ("entry.2.multiplier", 0, Status.BAD_SHIFT),
         ("rows_per_second", 0, Status.BAD_DRIVE_TICKS),
         ("rows_per_second", 2**30 + 1, Status.BAD_DRIVE_TICKS),
         ("estimator.p_bits.0", 3, Status.BAD_FORMAT),

@@ -6,6 +6,8 @@
  *   STRONG_HELD, STRONG_HELD_SIGNALS                    whether any input is held, and which
  *   STRONG(verb), strong_q31, strong_config_q31         names of its functions and types
  *   strong_model, strong_p_bits                         theta and C (pvid/model_q31.h), and the formats of p
+ *   input, entry                                        rescalings of the filters' sums, and of N and Y of all kinds
+ *   blocks                                              the kinds in theta and M
  *   add_tap, add_middle, row                            its functions
  *
  * Counts are exact up to the filters' sums; one rescaling brings a sum to an input of the row, one an entry of the row
@@ -25,7 +27,6 @@
 #include "number/scaled_q31.h"
 #include "number/unroll.h"
 #include "solve/assess_q31.h"
-#include "solve/information_q31.h"
 #include "solve/row_q31.h"
 #include "strong/fir_window.h"
 
@@ -34,9 +35,8 @@
 #define GATE_MEMORY_ROWS 32u
 #define GATE_FLOOR_BITS 20 /* 1e-6 of row_sd^2 */
 
-#define HELD_UNITS 24                       /* of a held input in a count: its mean is exact in them */
-#define POINT_MOST (HELD_UNITS + 4)         /* largest value of its mean over full scale, in them */
-#define SENSITIVITY_MOST ((int64_t)1 << 40) /* of a term of p[0] dY/dp[0] */
+#define HELD_UNITS 24               /* of a held input in a count: its mean is exact in them */
+#define POINT_MOST (HELD_UNITS + 4) /* largest value of its mean over full scale, in them */
 #define ROW_RATE_MAX ((uint32_t)1 << 30)
 
 /* Whether init has accepted a configuration. */
@@ -95,27 +95,12 @@ static PVID_COLD pvid_status window_init(strong_q31 *self, const strong_config_q
     return PVID_OK;
 }
 
-static PVID_COLD bool rescales_are_valid(const strong_config_q31 *config)
-{
-    bool valid = true;
-    for (size_t i = 0; i < STRONG_INPUTS; i++) {
-        valid = valid && pvid_rescale_is_valid_q31(&config->input[i]);
-    }
-    for (size_t i = 0; i < STRONG_COLUMNS; i++) {
-        valid = valid && pvid_rescale_is_valid_q31(&config->entry[i]);
-    }
-    return valid;
-}
-
 static PVID_COLD pvid_status prepare(strong_q31 *self, const strong_config_q31 *config)
 {
     memset(self, 0, sizeof *self);
     pvid_status status = window_init(self, config);
     if (status != PVID_OK) {
         return status;
-    }
-    if (!rescales_are_valid(config)) {
-        return PVID_BAD_SHIFT;
     }
     if ((config->rows_per_second < 1u) || (config->rows_per_second > ROW_RATE_MAX)) {
         return PVID_BAD_DRIVE_TICKS;
@@ -239,42 +224,45 @@ static PVID_NOINLINE void filter(const strong_q31 *self, int32_t in[STRONG_INPUT
         older = (older < stride) ? ((older + length) - stride) : (older - stride);
         add_tap(&bank->weights[i], bank->half, x, self->points[newer], self->points[older], sum);
     }
+    PVID_UNROLL
     for (size_t i = 0; i < STRONG_INPUTS; i++) {
-        in[i] = pvid_rescaled_q31(sum[i], &self->config->input[i]);
+        in[i] = pvid_rescaled_q31(sum[i], &input[i]);
     }
 }
 
 /* ---- rows ---- */
 
-/* What p[0] does to theta: its part of C times p[0], or start_sd[0] where p[0] may be zero. */
+/* What p[0] does to theta: its part of C times p[0], or start_sd[0] where p[0] may be zero, in one format. */
 static PVID_NOINLINE void sense(strong_q31 *self)
 {
     const pvid_estimator_q31 *estimator = &self->estimator;
-    int64_t c[STRONG_C];
-    strong_model.jacobian(estimator->p, c);
-    memset(self->sense, 0, sizeof self->sense);
     const int32_t reference =
         pvid_is_positive_q31(&strong_model, 0) ? estimator->p[0] : estimator->settings.start_sd[0];
-    for (size_t k = 0; k < STRONG_C; k++) {
-        if (strong_model.c_column[k] == 0u) {
-            const pvid_scaled_q31 own = pvid_scaled_times_q31(pvid_scaled_of_q31(c[k], estimator->c_exponent[k]),
-                                                              pvid_scaled_of_q31(reference, 0));
-            self->sense[strong_model.c_row[k]] = own.m;
-            self->sense_shift[strong_model.c_row[k]] = (int16_t)pvid_clamp_q31(-(int64_t)own.e, INT16_MAX);
-        }
+    const pvid_scaled_q31 by = pvid_scaled_of_q31(reference, 0);
+    int64_t c[STRONG_C];
+    pvid_scaled_q31 own[STRONG_C]; /* those of p[0] are the first */
+    strong_model.jacobian(estimator->p, c);
+    const size_t end = (strong_model.c_column[0] == 0u) ? pvid_column_end_q31(&strong_model, 0) : 0u;
+    int32_t largest = PVID_ZERO_EXPONENT_Q31;
+    for (size_t k = 0; k < end; k++) {
+        own[k] = pvid_scaled_times_q31(pvid_scaled_of_q31(c[k], estimator->c_exponent[k]), by);
+        largest = ((own[k].m != 0) && (own[k].e > largest)) ? own[k].e : largest;
+    }
+    memset(self->sense, 0, sizeof self->sense);
+    self->sense_shift = (int16_t)-(largest + 1);
+    for (size_t k = 0; k < end; k++) {
+        self->sense[strong_model.c_row[k]] = (int32_t)pvid_scaled_fixed_q31(own[k], self->sense_shift); /* <= 2^29 */
     }
 }
 
-/* Sum over the entries of p[0] dY/dp[0]. */
+/* p[0] dY/dp[0] of a row. */
 static inline int64_t sensitivity(const strong_q31 *self, const pvid_block *block, const int32_t n[])
 {
     int64_t sum = 0;
     for (size_t i = 0; i < block->n; i++) {
-        const size_t j = block->first + i;
-        sum += pvid_clamp_q31(pvid_scale_q31(pvid_short_product_q31(n[i], self->sense[j]), self->sense_shift[j]),
-                              SENSITIVITY_MOST);
+        sum += pvid_short_product_q31(n[i], self->sense[block->first + i]); /* |n| <= 2^28, at most 31 terms */
     }
-    return sum;
+    return pvid_scale_q31(sum, self->sense_shift);
 }
 
 static PVID_COLD pvid_reason refuse(strong_q31 *self)
@@ -284,13 +272,10 @@ static PVID_COLD pvid_reason refuse(strong_q31 *self)
 }
 
 /* Adds the rows of an instant and solves when it is time; counts an update during the alarm. */
-static PVID_NOINLINE pvid_reason add(strong_q31 *self, const pvid_block block[STRONG_KINDS],
-                                     const int32_t n[STRONG_COLUMNS], const int32_t e[STRONG_KINDS])
+static PVID_NOINLINE pvid_reason add(strong_q31 *self, const int32_t n[STRONG_COLUMNS], const int32_t e[STRONG_KINDS])
 {
-    size_t at = 0;
     for (size_t k = 0; k < STRONG_KINDS; k++) {
-        pvid_estimator_add_row_q31(&self->estimator, &block[k], &n[at], e[k], pvid_square_q31(e[k]));
-        at += block[k].n + 1u;
+        pvid_estimator_add_row_q31(&self->estimator, &blocks[k], &n[blocks[k].first + k], e[k], pvid_square_q31(e[k]));
     }
     const pvid_reason reason = pvid_estimator_update_q31(&self->estimator);
     if ((reason != PVID_UPDATED) || !self->alarm) {
@@ -304,32 +289,28 @@ static PVID_NOINLINE pvid_reason add(strong_q31 *self, const pvid_block block[ST
 static pvid_reason take(strong_q31 *self, const int32_t in[STRONG_INPUTS])
 {
     int32_t n[STRONG_COLUMNS];
+    int32_t e[STRONG_KINDS];
+    int64_t square = 0;
+    int64_t signal = 0;
     if (!row(in, n)) {
         return refuse(self);
+    }
+    PVID_UNROLL
+    for (size_t i = 0; i < STRONG_COLUMNS; i++) {
+        n[i] = pvid_rescaled_q31(n[i], &entry[i]);
     }
     if ((self->misfit.left % PVID_MISFIT_FEW) == 0u) {
         sense(self);
     }
-    pvid_block block[STRONG_KINDS];
-    int32_t e[STRONG_KINDS];
-    int64_t square = 0;
-    int64_t signal = 0;
-    size_t theta = 0;
-    size_t at = 0;
     for (size_t k = 0; k < STRONG_KINDS; k++) {
+        const int32_t *own = &n[blocks[k].first + k];
         int64_t rest;
-        pvid_information_block_q31(&strong_model, theta, &block[k]);
-        for (size_t i = at; i <= (at + block[k].n); i++) {
-            n[i] = pvid_rescaled_q31(n[i], &self->config->entry[i]);
-        }
-        if (!pvid_estimator_innovation_q31(&self->estimator, &block[k], &n[at], n[at + block[k].n], &rest)) {
+        if (!pvid_estimator_innovation_q31(&self->estimator, &blocks[k], own, own[blocks[k].n], &rest)) {
             return refuse(self);
         }
         e[k] = (int32_t)rest;
         square += pvid_square_q31(e[k]);
-        signal += pvid_misfit_signal_q31(sensitivity(self, &block[k], &n[at]));
-        theta += block[k].n;
-        at += block[k].n + 1u;
+        signal += pvid_misfit_signal_q31(sensitivity(self, &blocks[k], own));
     }
     if (pvid_misfit_add_q31(&self->misfit, square, signal)) {
         self->alarm = pvid_misfit_judge_q31(&self->misfit);
@@ -338,7 +319,7 @@ static pvid_reason take(strong_q31 *self, const int32_t in[STRONG_INPUTS])
         pvid_count_up(&self->estimator.counters.rejected_outlier);
         return PVID_REJECTED_OUTLIER;
     }
-    return add(self, block, n, e);
+    return add(self, n, e);
 }
 
 pvid_reason STRONG(step)(strong_q31 *self, const int32_t reading[STRONG_SIGNALS])

@@ -4,6 +4,7 @@
 #include <stddef.h>
 
 #include "number/integer_q31.h"
+#include "number/rescale_q31.h"
 #include "weak/sums_q31.h"
 #include "weak/values_q31.h"
 #include "weak/weak_front_q31.h"

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pvid.codegen import c_functions, describe
 from pvid.codegen.c_text import banner, c_comment, for_cpp, guarded, initialised, inner
 from pvid.codegen.files_weak import size_check
-from pvid.codegen.files_weak_q31 import fields_of, numbers, parameters_in_c
+from pvid.codegen.files_weak_q31 import fields_of, numbers, parameters_in_c, structs
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong_q31 import FixedStrong, FixedStrongEngine
 from pvid.core.sizes import smallest
@@ -20,8 +20,6 @@ typedef struct {{
     pvid_bank_q31 bank; /* of all derivatives */
     int32_t full_scale[{upper}_SIGNALS]; /* of a reading about its offset, 1..2^24 [counts] */
     int32_t offset[{upper}_SIGNALS];     /* reading of each sensor at 0 [counts] */
-    pvid_rescale_q31 input[{upper}_INPUTS];  /* from the sum of its filter to each input of the rows */
-    pvid_rescale_q31 entry[{upper}_COLUMNS]; /* from N, then Y, of each kind to the formats of the estimator */
     uint32_t rows_per_second;    /* 1..2^30, for the memories of gate and alarm */
     pvid_gate_config_q31 gate;   /* outlier gate on the innovations of an instant; zeros: none */
     pvid_estimator_config_q31 estimator; /* start, bounds, formats ..; model is ignored. divider: rows from solve to
@@ -38,8 +36,8 @@ typedef struct {{
     bool frozen;
     bool alarm;       /* the last block of rows was a misfit: see pvid/misfit.h */
 {past}    int32_t points[PVID_MAX_WINDOW][{upper}_SIGNALS];
-    int32_t sense[{upper}_THETA];       /* p[0] dtheta/dp[0], mantissas of 30 bits */
-    int16_t sense_shift[{upper}_THETA]; /* right shift of N_i sense_i to units of Y */
+    int32_t sense[{upper}_THETA]; /* p[0] dtheta/dp[0] 2^sense_shift in units of Y per N */
+    int16_t sense_shift;
     pvid_gate_q31 gate;
     pvid_misfit_q31 misfit;
     pvid_estimator_q31 estimator; /* p, in the formats p_bits of the settings, and counters */
@@ -92,7 +90,7 @@ def files_of(engine: FixedStrongEngine, command: str) -> dict[str, str]:
     name = engine.name
     return {
         f"{name}_q31.h": header(engine, command),
-        f"{name}_q31.c": source(engine.made, command),
+        f"{name}_q31.c": source(engine, command),
         f"{name}_design_q31.h": design_header(engine, command),
     }
 
@@ -146,8 +144,9 @@ def header(engine: FixedStrongEngine, command: str) -> str:
     return guarded(f"{name}_q31", about, body)
 
 
-def source(made: FixedStrong, command: str) -> str:
+def source(engine: FixedStrongEngine, command: str) -> str:
     """NAME_strong_q31.c."""
+    made, config = engine.made, engine.config
     strong, name = made.strong, made.name
     counted = ["SIGNALS", "INPUTS", "KINDS", "COLUMNS"]
     held = ", ".join("true" if one else "false" for one in strong.held)
@@ -168,8 +167,11 @@ def source(made: FixedStrong, command: str) -> str:
         [
             c_comment(banner(strong.functions, command)),
             f'#include "{name}_q31.h"\n\n#include <stddef.h>\n\n#include "number/integer_q31.h"\n'
-            '#include "pvid/elementary_q31.h"',
+            '#include "solve/kinds.h"\n#include "pvid/elementary_q31.h"',
             "\n".join(names),
+            "/* From the sum of its filter to each input of the rows; from N, then Y, of each kind to the estimator's\n"
+            " * formats. */\n" + _rescales("input", config.input) + "\n" + _rescales("entry", config.entry),
+            "/* The kinds in theta and M. */\n" + structs("pvid_block", "blocks", _blocks(made)),
             *_filters(made),
             "/* N, then Y, of each kind. False iff an input is beyond its reach. */\n"
             + c_functions.fixed_function(signature, made.row, made.limits),
@@ -254,8 +256,6 @@ def design_header(engine: FixedStrongEngine, command: str) -> str:
         "bank": inner(bank),
         "full_scale": _listed(config.full_scale),
         "offset": _listed(config.offset),
-        "input": _rescales(config.input),
-        "entry": _rescales(config.entry),
         "rows_per_second": f"{config.rows_per_second}u",
         "gate": f"{{{', '.join(fields_of(config.gate))}}}",
         "estimator": "\n".join(["{", *(f"        {one}," for one in fields_of(own)), "    }"]),
@@ -277,5 +277,15 @@ def _listed(values: tuple[int, ...]) -> str:
     return f"{{{', '.join(map(str, values))}}}"
 
 
-def _rescales(values: tuple[Rescale, ...]) -> str:
-    return f"{{{', '.join(f'{{{one.down}, {one.shift}, {one.multiplier}}}' for one in values)}}}"
+def _rescales(name: str, values: tuple[Rescale, ...]) -> str:
+    return structs("pvid_rescale_q31", name, [(one.down, one.shift, one.multiplier) for one in values])
+
+
+def _blocks(made: FixedStrong) -> list[tuple[int, int, int]]:
+    """First entry, entries and first moment of each kind."""
+    found, moments = [], 0
+    for kind in made.strong.functions.kinds:
+        n = len(kind.theta)
+        found.append((kind.theta.start, n, moments))
+        moments += n * (n + 1) // 2
+    return found
