@@ -7,6 +7,7 @@
 #ifndef PVID_PVID_Q31_H
 #define PVID_PVID_Q31_H
 
+#include "pvid/bank_q31.h"
 #include "pvid/crc32.h"
 #include "pvid/differentiator_q31.h"
 #include "pvid/estimator_q31.h"
