@@ -23,6 +23,8 @@ from pvid.codegen.generated import GeneratedModel, Options
 from pvid.codegen.refine import refine_functions
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.refine import refine_design, refine_settings
+from pvid.configuration.strong import strong_design
+from pvid.configuration.strong_q31 import fixed_design
 from pvid.configuration.weak import config_for_simulated_rig, samples_of, simulated_run_of
 from pvid.configuration.weak_q31 import engine_for_rig_like_the_shipped
 from pvid.core.host_compiler import host_compiler
@@ -31,7 +33,9 @@ from pvid.core.sources import INCLUDES, source
 from pvid.model import Integral, Model
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import compiled_of
+from pvid.rig.run import Recording
 from pvid.setup.weak_sizes import sizes_of_design
+from pvid.sim.simulated_run import simulation_of
 
 USER = """
 cmake_minimum_required(VERSION 3.20)
@@ -140,6 +144,25 @@ def test_the_strong_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
     run(*command, "-DPVID_MAX_P=5")
     done = subprocess.run(compiled, capture_output=True, text=True, check=False)
     assert done.returncode != 0 and "compile pvid and this file with -DPVID_MAX_P=6" in done.stdout
+
+
+def test_the_fixed_point_strong_form_is_an_option_of_the_folder(tmp_path: Path) -> None:
+    """With the sizes that its header names."""
+    simulation = simulation_of("rigid_body")
+    found = simulation.run(seed=1)
+    recording = Recording(found.pop("t"), found, simulation.rig.sample_rate)
+    engine = fixed_design(simulation.model, recording, strong_design(simulation.model, recording)).engine
+    whole = generated_model(simulation.model, strong=True, strong_engine=engine)
+    build(whole, tmp_path / "rigid_body")
+    check(whole, tmp_path / "rigid_body")
+    (tmp_path / "CMakeLists.txt").write_text(STRONG.format(root=ROOT), encoding="utf-8")
+    command = ("cmake", "-S", tmp_path, "-B", tmp_path / "b", "-G", "Ninja", "-DRIGID_BODY_STRONG_Q31=ON")
+    run(*command, *(f"-D{macro}={size}" for macro, size in engine.sizes.items()))
+    compiled = ("ninja", "-C", str(tmp_path / "b"), "rigid_body/CMakeFiles/rigid_body.dir/rigid_body_strong_q31.c.o")
+    run(*compiled)
+    run(*command, "-DPVID_MAX_THETA_Q31=14")
+    done = subprocess.run(compiled, capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "compile pvid and this file with -DPVID_MAX" in done.stdout
 
 
 def test_the_weak_form_and_its_refinement_are_options_of_the_folder(tmp_path: Path) -> None:

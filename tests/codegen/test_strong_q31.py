@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import subprocess
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from generated import WARNINGS
 
 from pvid.base.errors import PvidError
+from pvid.codegen.files_strong_q31 import files_of
 from pvid.codegen.strong_library_q31 import StrongNativeQ31
 from pvid.codegen.strong_twin_q31 import StrongTwinQ31
 from pvid.configuration.strong import strong_design
 from pvid.configuration.strong_q31 import StrongDesignQ31, fixed_design
+from pvid.core.model_library import core_of
+from pvid.core.sizes import options_of, raised
+from pvid.core.sources import INCLUDES
 from pvid.design.bank_q31 import integer_bank
 from pvid.design.fir import ORDERS, savitzky_golay
 from pvid.oracle.strong_described import StrongModel, StrongRows, StrongSettings, all_rows
 from pvid.rig.run import Recording
+from pvid.settings.cores import STRONG_FIXED
 from pvid.settings.enums import Law, Reason, Status
 from pvid.settings.record import Record
 from pvid.sim.simulated_run import simulation_of
@@ -232,6 +240,65 @@ def test_init_names_the_field_that_it_refuses(field: str, value: int, status: St
     _set(identifier.config_struct, field, value)
     assert identifier.initialise() is status
     assert not any(identifier.state_bytes)
+
+
+PROGRAM = """\
+#include <stdio.h>
+#include "{name}_design_q31.h"
+#include "pvid/fnv_q31.h"
+int main(void)
+{{
+    static {name}_q31 identifier;
+    int32_t reading[{upper}_SIGNALS];
+    uint32_t hash = 2166136261u;
+    if ({name}_init_q31(&identifier, &{name}_config) != PVID_OK) {{
+        return 2;
+    }}
+    while (fread(reading, sizeof reading, 1, stdin) == 1) {{
+        hash = pvid_fnv_estimator_q31(hash, &identifier.estimator, {name}_step_q31(&identifier, reading));
+    }}
+    printf("%u", (unsigned)hash);
+    return 0;
+}}
+"""
+
+
+@pytest.fixture
+def sources(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """A folder with the generated files of a mechanism and a program that steps it through its standard input."""
+    engine = made(request.param)[0].engine
+    program = PROGRAM.format(name=engine.name, upper=engine.name.upper())
+    for name, text in {**files_of(engine, "a test"), "program.c": program}.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize("sources", ["dc_motor", "two_link_arm"], indirect=True)
+def test_the_generated_files_compile_without_a_warning_and_in_cpp(sources: Path) -> None:
+    design = made(next(sources.glob("*_strong_q31.c")).name.removesuffix("_strong_q31.c"))[0]
+    sizes = options_of(raised(design.engine.sizes))
+    (sources / "main.cpp").write_text(f'#include "{design.engine.name}_q31.h"\n')
+    options = [*WARNINGS, *sizes, *INCLUDES, f"-I{sources}", "-fsyntax-only"]
+    code = sources / f"{design.engine.name}_q31.c"
+    subprocess.run(["gcc", "-std=c99", *options, str(code)], check=True)
+    plain = [one for one in options if one not in ("-Wmissing-prototypes", "-Wstrict-prototypes")]
+    subprocess.run(["g++", *plain, str(sources / "main.cpp")], check=True)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("sources", ["dc_motor"], indirect=True)
+def test_no_operation_of_a_wild_run_is_undefined(sources: Path) -> None:
+    design, native = made("dc_motor")
+    options = ["-std=c99", "-O2", "-fsanitize=undefined,address", "-fno-sanitize-recover=all", *INCLUDES]
+    options += [f"-I{sources}", *options_of(raised(design.engine.sizes))]
+    code = map(str, [*sources.glob("*.c"), *core_of(STRONG_FIXED, False)])
+    subprocess.run(["gcc", *options, *code, "-o", str(sources / "program")], check=True)
+    for seed in range(8):
+        readings = wild(design.counts, design.engine.config.window, seed)
+        done = subprocess.run([sources / "program"], input=readings.tobytes(), capture_output=True, check=False)
+        identifier = native.started()
+        identifier.run_samples(readings)
+        assert (done.returncode, int(done.stdout or -1)) == (0, identifier.running_hash), done.stderr
 
 
 def test_an_integral_since_the_start_of_the_run_is_refused_in_a_sentence() -> None:

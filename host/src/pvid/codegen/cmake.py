@@ -29,19 +29,20 @@ if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
   target_compile_options({name} PRIVATE {options})
 endif()
 
-# {name}_strong.h, an identifier from derivatives of the signals: includes files of strong/ of pvid's sources.
+# {name}_strong.h, an identifier from derivatives of the signals: includes strong/strong_f32.h of pvid's sources; and
+# {name}_strong_q31.h, the same with integers only, with the formats of a rig.
 option({upper}_STRONG "Build the strong form of {name}" OFF)
-if({upper}_STRONG AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_f32.c)
+option({upper}_STRONG_Q31 "Build the fixed-point strong form of {name}" OFF)
+if(({upper}_STRONG AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_f32.c)
+   OR ({upper}_STRONG_Q31 AND EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_q31.c))
   get_target_property({name}_pvid pvid::pvid ALIASED_TARGET)
   if(NOT {name}_pvid)
     message(FATAL_ERROR "{upper}_STRONG needs the sources of pvid: add_subdirectory or FetchContent, not find_package")
   endif()
   get_target_property({name}_pvid_sources ${{{name}_pvid}} SOURCE_DIR)
-  target_sources({name} PRIVATE {name}_strong_f32.c)
   target_include_directories({name} PRIVATE ${{{name}_pvid_sources}}/src)
-  if(EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{name}_strong_q31.c)
-    target_sources({name} PRIVATE {name}_strong_q31.c)
-  endif()
+  target_sources({name} PRIVATE $<$<BOOL:${{{upper}_STRONG}}>:{name}_strong_f32.c>
+                                $<$<BOOL:${{{upper}_STRONG_Q31}}>:{name}_strong_q31.c>)
 endif()
 
 # {name}_weak.h, the model for pvid/weak.h: needs a pvid of the sizes that its header names.
