@@ -12,7 +12,6 @@ import numpy.typing as npt
 import pytest
 from generated import WARNINGS
 
-from pvid.base.errors import PvidError
 from pvid.codegen.files_strong_q31 import files_of
 from pvid.codegen.strong_library_q31 import StrongNativeQ31
 from pvid.codegen.strong_twin_q31 import StrongTwinQ31
@@ -301,9 +300,28 @@ def test_no_operation_of_a_wild_run_is_undefined(sources: Path) -> None:
         assert (done.returncode, int(done.stdout or -1)) == (0, identifier.running_hash), done.stderr
 
 
-def test_an_integral_since_the_start_of_the_run_is_refused_in_a_sentence() -> None:
-    with pytest.raises(
-        PvidError,
-        match="the strong form in fixed point has no state for the integral of i",
-    ):
-        made("battery_2rc")
+def test_an_integral_since_the_start_of_the_run_goes_on_over_a_gap() -> None:
+    """Of the current of a battery: bits of the twin, and the step of the rows where the current is unknown."""
+    design, native = made("battery_2rc")
+    readings = design.counts[:600].copy()
+    readings[200] = MOST
+    identifier, twin = native.started(), StrongTwinQ31(design.engine)
+    assert difference(identifier.run_samples(readings), twin.run(readings)) == ""
+    down = design.engine.config.integral_down[0]
+    rates = design.engine.made.integrands
+    assert rates is not None
+    unit = design.engine.config.sample_rate * 2.0 ** (1 + rates.result_bits[0])
+    place = [one.name for one in design.engine.made.strong.signals].index("i")
+    current = design.counts[:600, place] * design.engine.lsb[place]
+    current[200] = current[199]
+    expected = float(np.sum((current[1:] + current[:-1]) / 2) / design.engine.config.sample_rate)
+    assert down >= 0 and identifier.state.integral[0] / unit == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_alarm_has_a_reference_where_a_block_has_few_rows() -> None:
+    """Fewer than the rows between two looks at what p[0] does."""
+    design, native = made("battery_2rc")
+    identifier = native.started()
+    assert identifier.state.misfit.block < 64
+    identifier.run_samples(design.counts[:400])
+    assert identifier.state.misfit.least_part.e < 60  # 2^120 where there is none

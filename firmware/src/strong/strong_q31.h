@@ -3,12 +3,13 @@
  * Included once by NAME_strong_q31.c, behind what `pvid model build` prints of a model:
  *
  *   STRONG_KINDS, _SIGNALS, _INPUTS, _COLUMNS, _P, _C   counts; columns: of N and Y of all kinds, C: its non-zeros
- *   STRONG_HELD, STRONG_HELD_SIGNALS                    whether any input is held, and which
+ *   STRONG_CHANNELS, _INTEGRANDS                        signals and integrals since the start of the run; these alone
+ *   STRONG_HELD, STRONG_HELD_CHANNELS                   whether any input is held, and which
  *   STRONG(verb), strong_q31, strong_config_q31         names of its functions and types
  *   strong_model, strong_p_bits                         theta and C (pvid/model_q31.h), and the formats of p
  *   input, entry                                        rescalings of the filters' sums, and of N and Y of all kinds
  *   blocks                                              the kinds in theta and M
- *   add_tap, add_middle, row                            its functions
+ *   add_tap, add_middle, row, integrands, raw_inputs    its functions
  *
  * Counts are exact up to the filters' sums; one rescaling brings a sum to an input of the row, one an entry of the row
  * to the format of the estimator, which is that of estimator_q31.h. All saturate. Source: theory.md 2 and 4, (5).
@@ -90,6 +91,11 @@ static PVID_COLD pvid_status window_init(strong_q31 *self, const strong_config_q
             return PVID_BAD_FULL_SCALE;
         }
     }
+#if STRONG_INTEGRANDS
+    if (!sums_fit(bank, PVID_FULL_SCALE_LIMIT_Q31)) {
+        return PVID_BAD_FULL_SCALE;
+    }
+#endif
     self->length = (uint16_t)((2u * (uint32_t)bank->half * bank->stride) + 1u);
     window_reset(self);
     return PVID_OK;
@@ -171,13 +177,40 @@ static inline bool counts_of(const strong_config_q31 *config, const int32_t read
     return within;
 }
 
+#if STRONG_INTEGRANDS
+/* The counts, and the integrals since the start of the run by the trapezoid rule; a reading beyond full scale or reach
+ * repeats the one before. An integral saturates at twice its reach, where the rows refuse it. */
+static void integrate(strong_q31 *self, const int32_t counts[STRONG_SIGNALS], bool within, int32_t now[STRONG_CHANNELS])
+{
+    int32_t rate[STRONG_INTEGRANDS];
+    memcpy(rate, self->integrand, sizeof rate);
+    bool fresh = false;
+    if (within) {
+        int32_t in[STRONG_INPUTS] = {0};
+        raw_inputs(counts, in);
+        fresh = integrands(in, rate);
+    }
+    for (size_t i = 0; i < STRONG_INTEGRANDS; i++) {
+        if (self->is_running) {
+            const int64_t twice = (int64_t)self->integrand[i] + rate[i];
+            self->integral[i] = pvid_clamp_q31(self->integral[i] + twice, PVID_WIDE / 2);
+        }
+        self->integrand[i] = rate[i];
+        now[STRONG_SIGNALS + i] = (int32_t)pvid_clamp_q31(pvid_round_shift_q31(self->integral[i], integral_down[i]),
+                                                          PVID_FULL_SCALE_LIMIT_Q31);
+    }
+    self->is_running = self->is_running || fresh;
+    memcpy(now, counts, STRONG_SIGNALS * sizeof counts[0]);
+}
+#endif
+
 #if STRONG_HELD
 /* The values at the instant of the sample before the last: of a held input 24 times its mean around the instant, exact
  * to the fourth order. False until there are four samples. */
-static bool centre(strong_q31 *self, int32_t counts[STRONG_SIGNALS])
+static bool centre(strong_q31 *self, int32_t counts[STRONG_CHANNELS])
 {
-    static const bool held[STRONG_SIGNALS] = STRONG_HELD_SIGNALS;
-    for (size_t i = 0; i < STRONG_SIGNALS; i++) {
+    static const bool held[STRONG_CHANNELS] = STRONG_HELD_CHANNELS;
+    for (size_t i = 0; i < STRONG_CHANNELS; i++) {
         int32_t *past = self->past[i];
         const int32_t now = counts[i];
         counts[i] = held[i] ? ((13 * (past[1] + past[2])) - (past[0] + now)) : past[2];
@@ -192,7 +225,7 @@ static bool centre(strong_q31 *self, int32_t counts[STRONG_SIGNALS])
 #endif
 
 /* Takes a count of each signal. Returns whether the window is full. */
-static inline bool window_takes(strong_q31 *self, int32_t counts[STRONG_SIGNALS])
+static inline bool window_takes(strong_q31 *self, int32_t counts[STRONG_CHANNELS])
 {
 #if STRONG_HELD
     if (!centre(self, counts)) {
@@ -299,7 +332,7 @@ static pvid_reason take(strong_q31 *self, const int32_t in[STRONG_INPUTS])
     for (size_t i = 0; i < STRONG_COLUMNS; i++) {
         n[i] = pvid_rescaled_q31(n[i], &entry[i]);
     }
-    if ((self->misfit.left % PVID_MISFIT_FEW) == 0u) {
+    if (((self->misfit.left % PVID_MISFIT_FEW) == 0u) || (self->misfit.left == self->misfit.block)) {
         sense(self);
     }
     for (size_t k = 0; k < STRONG_KINDS; k++) {
@@ -327,12 +360,19 @@ pvid_reason STRONG(step)(strong_q31 *self, const int32_t reading[STRONG_SIGNALS]
     if (!is_ready(self)) {
         return PVID_NOT_READY;
     }
+    int32_t now[STRONG_CHANNELS];
+#if STRONG_INTEGRANDS
     int32_t counts[STRONG_SIGNALS];
-    if (!counts_of(self->config, reading, counts)) {
+    const bool within = counts_of(self->config, reading, counts);
+    integrate(self, counts, within, now);
+#else
+    const bool within = counts_of(self->config, reading, now);
+#endif
+    if (!within) {
         window_reset(self);
         return refuse(self);
     }
-    if (!window_takes(self, counts)) {
+    if (!window_takes(self, now)) {
         return PVID_WARMING_UP;
     }
     if (self->frozen) {

@@ -35,8 +35,8 @@ typedef struct {{
     uint8_t before;   /* samples in front of a held input's mean */
     bool frozen;
     bool alarm;       /* the last block of rows was a misfit: see pvid/misfit.h */
-{past}    int32_t points[PVID_MAX_WINDOW][{upper}_SIGNALS];
-    int32_t sense[{upper}_THETA]; /* p[0] dtheta/dp[0] 2^sense_shift in units of Y per N */
+{past}    int32_t points[PVID_MAX_WINDOW][{upper}_CHANNELS];
+{integrals}    int32_t sense[{upper}_THETA]; /* p[0] dtheta/dp[0] 2^sense_shift in units of Y per N */
     int16_t sense_shift;
     pvid_gate_q31 gate;
     pvid_misfit_q31 misfit;
@@ -124,13 +124,21 @@ def header(engine: FixedStrongEngine, command: str) -> str:
     ]
     counts = {
         "SIGNALS": len(strong.signals),
+        "CHANNELS": strong.channels,
         "INPUTS": len(functions.inputs),
         "KINDS": len(functions.kinds),
         "THETA": made.parameters.model.n_theta,
         "COLUMNS": functions.columns,
     }
-    past = f"    int32_t past[{upper}_SIGNALS][3]; /* of the counts, around a held input */\n"
-    text = _HEADER.format(name=name, upper=upper, past=past if any(strong.held) else "")
+    past = f"    int32_t past[{upper}_CHANNELS][3]; /* of the counts, around a held input */\n"
+    integrals = ""
+    if strong.integrals:
+        counts["INTEGRANDS"] = len(strong.integrals)
+        integrals = (
+            f"    int64_t integral[{upper}_INTEGRANDS]; /* since the start of the run */\n"
+            f"    int32_t integrand[{upper}_INTEGRANDS];\n    bool is_running;\n"
+        )
+    text = _HEADER.format(name=name, upper=upper, past=past if any(strong.held) else "", integrals=integrals)
     body = [
         '#include "pvid/bank_q31.h"',
         '#include "pvid/estimator_q31.h"',
@@ -148,15 +156,16 @@ def source(engine: FixedStrongEngine, command: str) -> str:
     """NAME_strong_q31.c."""
     made, config = engine.made, engine.config
     strong, name = made.strong, made.name
-    counted = ["SIGNALS", "INPUTS", "KINDS", "COLUMNS"]
-    held = ", ".join("true" if one else "false" for one in strong.held)
+    counted = ["SIGNALS", "CHANNELS", "INPUTS", "KINDS", "COLUMNS"]
+    held = ", ".join("true" if one else "false" for one in (*strong.held, *[False] * len(strong.integrals)))
     names = [
         f"#define STRONG(verb) {name}_##verb##_q31",
         *(f"#define STRONG_{one} {name.upper()}_{one}" for one in counted),
         f"#define STRONG_P {len(made.parameters.p_bits)}u",
         f"#define STRONG_C {len(made.parameters.c_bits)}u",
         f"#define STRONG_HELD {int(any(strong.held))}",
-        f"#define STRONG_HELD_SIGNALS {{{held}}}",
+        f"#define STRONG_HELD_CHANNELS {{{held}}}",
+        f"#define STRONG_INTEGRANDS {len(strong.integrals)}",
         f"#define strong_model {name}_model_q31",
         f"#define strong_p_bits {name}_p_bits",
         f"typedef {name}_config_q31 strong_config_q31;",
@@ -175,6 +184,7 @@ def source(engine: FixedStrongEngine, command: str) -> str:
             *_filters(made),
             "/* N, then Y, of each kind. False iff an input is beyond its reach. */\n"
             + c_functions.fixed_function(signature, made.row, made.limits),
+            *_integrals(engine),
             parameters_in_c(made.parameters, name).rstrip(),
             '#include "strong/strong_q31.h"\n',
         ]
@@ -208,6 +218,26 @@ def _filters(made: FixedStrong) -> list[str]:
             " const int32_t newer[], const int32_t older[], int64_t sum[])",
             [*left, *differences, *taps],
         ),
+    ]
+
+
+def _integrals(engine: FixedStrongEngine) -> list[str]:
+    """What strong/strong_q31.h integrates."""
+    made, config = engine.made, engine.config
+    if made.integrands is None:
+        return []
+    places = sorted(config.raw.items())
+    raw = [f"in[{k}] = pvid_rescaled_q31(counts[{place}], &raw[{at}]);" for at, (k, (place, _)) in enumerate(places)]
+    signature = "static bool integrands(const int32_t in[], int32_t out[])"
+    return [
+        '#include "number/rescale_q31.h"',
+        _rescales("raw", tuple(one for _, (_, one) in places))
+        + "\n"
+        + numbers("uint8_t", "integral_down", config.integral_down),
+        "/* The inputs that are signals, from their counts. */\n"
+        + c_functions.definition("static void raw_inputs(const int32_t counts[], int32_t in[])", raw),
+        "/* Rates of the integrals. False iff an input is beyond its reach. */\n"
+        + c_functions.fixed_function(signature, made.integrands, made.limits),
     ]
 
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pvid.base.errors import PvidError
-from pvid.base.wording import listed
 from pvid.codegen.fixed_model import symmetric
 from pvid.codegen.formats import FixedProgram, Interval, bits_of, fixed
 from pvid.codegen.functions import RowKind
@@ -28,6 +26,7 @@ class FixedStrong:
     reaches : largest value of each input of the rows
     row : inputs -> N, Y of each kind, one kind after the other
     limits : largest integer of each input
+    integrands : rates of the integrals since the start of the run, from the signals among the inputs; None: none
     parameters : functions of p
     """
 
@@ -35,6 +34,7 @@ class FixedStrong:
     reaches: tuple[float, ...]
     row: FixedProgram
     limits: tuple[int, ...]
+    integrands: FixedProgram | None
     parameters: ParametersQ31
 
     @property
@@ -58,18 +58,14 @@ def fixed_strong(strong: StrongFunctions, reaches: Sequence[float], bounds: Sequ
     Raises
     ------
     PvidError
-        Where fixed point cannot compute the rows, theta or C, or the form needs an integral since the start.
+        Where fixed point cannot compute the rows, theta or C.
     """
     functions = strong.functions
-    if strong.integrals:
-        needed = listed([one.meaning for one in strong.integrals])
-        raise PvidError(
-            f"{functions.model.name}: the strong form in fixed point has no state for the {needed}; use --core f32, or "
-            "the weak form"
-        )
     given = [symmetric(one) for one in reaches]
     row = fixed(strong.row.program, given, f"{functions.name}, row")
-    return FixedStrong(strong, tuple(reaches), row, limits_of(given), fixed_parameters(functions, bounds))
+    rates = functions.integrands.program
+    integrands = fixed(rates, given, f"{functions.name}, integrands") if strong.integrals else None
+    return FixedStrong(strong, tuple(reaches), row, limits_of(given), integrands, fixed_parameters(functions, bounds))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,8 +16,9 @@ from pvid.configuration.strong import StrongDesign, strong_design
 from pvid.configuration.weak_q31 import FULL_SCALE, HIGHEST_JET, finer, lsb_of
 from pvid.design.bank_q31 import FULL_SCALE_LIMIT, HELD_MOST, HELD_UNITS, BankQ31, integer_bank
 from pvid.design.fir import FirBank, savitzky_golay
-from pvid.design.rescale_q31 import rescale_to
+from pvid.design.rescale_q31 import rescale_to, shift_to
 from pvid.model.compiled import CompiledModel
+from pvid.model.evaluation import numpy_function
 from pvid.oracle.strong_described import StrongModel, StrongRows, StrongSettings, residuals
 from pvid.oracle.weak.front import of_hold
 from pvid.oracle.weak.functions import Float
@@ -32,6 +34,7 @@ _LARGEST_BITS = 25  # of the largest term of a row over its noise, at most: smal
 _VALUE_BITS = 30  # of an entry as the rows' function returns it
 _DIGITS = 8  # bits of the largest entry that its rounding leaves, at least
 _GAIN_ONE = 1 << 30
+_LONGER_RUN = 8.0  # of the recording, for integrals since its start: the bits that the formats of rows leave free
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +77,7 @@ def fixed_design(
     bank = savitzky_golay(fitted.taps, fitted.degree)
     raw = _signals(strong, recording)
     lsb, full_scale = _counting(model, strong, recording.signals, between_counts)
-    values = _inputs(strong, raw, bank, recording.sample_rate)
-    reaches = [HIGHEST_JET * float(np.max(np.abs(one))) or 1.0 for one in values]
+    reaches = _reaches(strong, raw, bank, recording)
     oracle = StrongModel(model)
     parameters = oracle.parameters
     bounds = [
@@ -86,7 +88,9 @@ def fixed_design(
     rows = oracle.rows(recording.signals, recording.sample_rate, StrongSettings(fitted.taps, fitted.degree, 1))
     units = _units(made, oracle, rows, fitted.p)
     n_bits, y_bits = _formats(oracle, rows, fitted.p, units)
-    whole = integer_bank(bank, max(full_scale) * (HELD_MOST if any(strong.held) else 1))
+    top = FULL_SCALE_LIMIT if strong.integrals else max(full_scale)
+    whole = integer_bank(bank, top * (HELD_MOST if any(strong.held) else 1))
+    down, units_of_integrals = _integrals(made, recording.sample_rate)
     literally = base.config.estimator.law is Law.PSEUDOVELOCITY
     config = StrongModelConfigQ31(
         sample_rate=recording.sample_rate,
@@ -95,7 +99,7 @@ def fixed_design(
         centre=whole.centre,
         full_scale=full_scale,
         offset=(0,) * len(full_scale),
-        input=_rescaled_inputs(made, whole, lsb, recording.sample_rate),
+        input=_rescaled_inputs(made, whole, (*lsb, *units_of_integrals), recording.sample_rate),
         entry=_rescaled_entries(made, units, n_bits, y_bits),
         rows_per_second=max(round(recording.sample_rate), 1),
         estimator=EstimatorConfigQ31(
@@ -107,6 +111,8 @@ def fixed_design(
             correlation=round(base.config.estimator.correlation * 2**16),
             divider=base.config.estimator.divider,
         ),
+        raw=_raw(made, lsb),
+        integral_down=down,
     )
     engine = FixedStrongEngine(made, config, lsb)
     return StrongDesignQ31(base, engine, _counts(strong, recording.signals, lsb))
@@ -141,10 +147,55 @@ def _counts(strong: StrongFunctions, run: Mapping[str, npt.ArrayLike], lsb: Sequ
     return np.asarray(np.clip(np.stack(columns, axis=1), -most, most), np.int32)
 
 
-def _inputs(strong: StrongFunctions, raw: Sequence[Float], bank: FirBank, sample_rate: float) -> list[Float]:
-    """Each input of the rows [instants]; those that are integrals are 0."""
-    derivatives = [bank.apply(x, sample_rate) for x in raw]
-    return [derivatives[one.channel][one.order] if one.channel < len(raw) else np.zeros(1) for one in strong.sources]
+def _reaches(strong: StrongFunctions, raw: Sequence[Float], bank: FirBank, recording: Recording) -> list[float]:
+    """Of each input of the rows, with room for more motion and a longer run."""
+    functions, rate = strong.functions, recording.sample_rate
+    derivatives = [bank.apply(x, rate) for x in raw]
+    samples: list[Float | None] = [None] * len(functions.inputs)
+    for k, one in enumerate(functions.inputs):
+        place = strong.raw_places(one)
+        if place is not None:
+            samples[k] = np.asarray(recording.signals[strong.signals[place].name], np.float64)
+    symbols = [one.symbol for one in functions.inputs]
+    zero = np.zeros(len(raw[0]))
+    given = [zero if one is None else one for one in samples]
+    found = []
+    for source in strong.sources:
+        if source.channel < len(raw):
+            raw_most = 0.0 if source.order or not strong.integrals else float(np.max(np.abs(raw[source.channel])))
+            found.append(HIGHEST_JET * max(float(np.max(np.abs(derivatives[source.channel][source.order]))), raw_most))
+        else:
+            expression = functions.integrands.expressions[source.channel - len(raw)]
+            rates = numpy_function(symbols, expression)(*given) * np.ones(len(zero))
+            found.append(_LONGER_RUN * float(np.max(np.abs(np.cumsum(rates)))) / rate)
+    return [one or 1.0 for one in found]
+
+
+def _integrals(made: FixedStrong, sample_rate: float) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Shift of each integral to a count, and the value of a count; twice its reach is full scale."""
+    strong = made.strong
+    if made.integrands is None:
+        return (), ()
+    downs, units = [], []
+    for k, bits in enumerate(made.integrands.result_bits):
+        reach = next(
+            x for x, one in zip(made.reaches, strong.sources, strict=True) if one.channel == len(strong.signals) + k
+        )
+        unit = 2.0**-bits / (2 * sample_rate)
+        downs.append(shift_to(2 * reach / unit, math.log2(FULL_SCALE_LIMIT)))
+        units.append(unit * 2.0 ** downs[-1])
+    return tuple(downs), tuple(units)
+
+
+def _raw(made: FixedStrong, lsb: Sequence[float]) -> dict[int, tuple[int, Rescale]]:
+    """The inputs that are signals, where there are integrals."""
+    strong = made.strong
+    found = {}
+    for k, (one, bits, reach) in enumerate(zip(strong.functions.inputs, made.input_bits, made.reaches, strict=True)):
+        place = strong.raw_places(one)
+        if made.integrands is not None and place is not None:
+            found[k] = place, rescale_to(2 * reach / lsb[place], lsb[place] * 2.0**bits, one.meaning)
+    return found
 
 
 def _units(made: FixedStrong, oracle: StrongModel, rows: StrongRows, p: Float) -> tuple[float, ...]:
@@ -194,7 +245,8 @@ def _rescaled_inputs(made: FixedStrong, bank: BankQ31, lsb: Sequence[float], sam
         made.strong.functions.inputs, made.strong.sources, made.reaches, made.input_bits, strict=True
     ):
         unit = lsb[one.channel] * sample_rate**one.order / 2.0 ** bank.bits[one.order]
-        unit /= HELD_UNITS if made.strong.held[one.channel] else 1
+        held = one.channel < len(made.strong.signals) and made.strong.held[one.channel]
+        unit /= HELD_UNITS if held else 1
         found.append(rescale_to(2 * reach / unit, unit * 2.0**bits, given.meaning))
     return tuple(found)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,6 +56,8 @@ class StrongModelConfigQ31(Folded):
     rows_per_second : for the memories of gate and alarm
     estimator : rows are in standard deviations, row_sd 2^(8 + y_bits)
     gate : on the innovations of an instant
+    raw : place of an input that is a signal -> the signal, and from its count to the input; for integrals
+    integral_down : shift of each integral to a count
     """
 
     sample_rate: float
@@ -68,3 +71,5 @@ class StrongModelConfigQ31(Folded):
     rows_per_second: int
     estimator: EstimatorConfigQ31
     gate: GateConfigQ31 = GateConfigQ31()
+    raw: Mapping[int, tuple[int, Rescale]] = field(default_factory=dict)
+    integral_down: tuple[int, ...] = ()
