@@ -40,6 +40,7 @@ def test_a_disturbance_is_in_the_middle_third_alone(one: Disturbance) -> None:
 def test_a_far_answer_without_an_alarm_is_marked() -> None:
     assert "**9.0 s.e.**" in Outcome(1, 0, 2.0, 9.0, Reason.UPDATED).cell
     assert Outcome(1, 0, 2.0, 9.0, Reason.MISFIT).cell == f"2 %, {Reason.MISFIT.text}"
+    assert Outcome(1, 0, 0.01, 9.0, Reason.UPDATED).cell == "0.01 %"  # of the motion's bias
     assert Outcome(1, 3, 2.0, 9.0, Reason.UPDATED).cell == "NOT FINITE"
 
 

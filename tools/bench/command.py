@@ -171,8 +171,8 @@ TABLES = (
         "accidents",
         "Wild, lost, repeated and stuck samples, jumps, drifts: what `identify` makes of them.",
         _of_accidents,
-        (3, "--seeds", "Runs of each case."),
-        ("kapitza", "dc_motor", "cart_pendulum"),
+        (2, "--seeds", "Runs of each case."),
+        ("kapitza", "rigid_body"),
     ),
     Table(
         "longevity",

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -83,7 +84,9 @@ def simulation_for(name: str, case: Case) -> RigSimulation:
         for one in compiled.signals
     )
     keys = ("start", "whole_start")
-    starts = {key: {name: case.start * value for name, value in getattr(rig, key).items()} for key in keys}
+    starts: dict[str, Any] = {
+        key: {name: case.start * value for name, value in getattr(rig, key).items()} for key in keys
+    }
     changed = replace(rig, drive=_drives(rig, case.drive), **starts)
     return RigSimulation.of(replace(compiled, signals=signals), changed, whole=case.whole)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import re
 import socket
 import subprocess
@@ -30,7 +29,7 @@ from rich.console import Console
 
 from bench.liar_board import TICKS, Flood, HangUp, LyingBoard, Pause, Step, honest_samples, mechanism, rig
 from bench.liar_board import board as honest_board
-from bench.lies import BEHAVIOURS, Behaviour
+from bench.lies import Behaviour
 from pvid.base.errors import PvidError
 from pvid.board.target import Target
 from pvid.link.frames import Raw
@@ -361,10 +360,3 @@ def _drain(connection: socket.socket) -> None:
     with suppress(OSError):
         while connection.recv(1 << 16):
             pass
-
-
-def performances(folder: Path) -> Iterator[Performance]:
-    """Every behaviour's."""
-    os.makedirs(folder, exist_ok=True)
-    for behaviour in BEHAVIOURS.values():
-        yield perform(behaviour, folder)
