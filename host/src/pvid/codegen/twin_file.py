@@ -26,4 +26,4 @@ def text(model: GeneratedModel) -> str:
     roots = [f"{name}_{one.name}_{core}" for core in cores for one in functions.functions]
     sources = [source(f"{one}.c") for one in _CORE]
     about = [f"{model.compiled.title}: its functions, printed from their C.", "", *banner(functions, model.command)]
-    return text_of(sources, [*PUBLIC_FOLDERS, SRC], {}, roots, texts, about="\n".join(about))
+    return text_of(sources, [*PUBLIC_FOLDERS, SRC], {}, roots, texts, about="\n".join([*about, ""]))

@@ -70,7 +70,7 @@ def printed_module(
 ) -> ModuleType:
     """The printed module, loaded; as `text_of`. Its text stays in the cache of builds."""
     every = [*sources, *(one for folder in folders for one in sorted(folder.glob("**/*.h")))]
-    printer = [Path(__file__).with_name(f"{name}.py") for name in ("directives", "translate", "machine", "program")]
+    printer = sorted(Path(__file__).parent.glob("*.py"))
     key = hashlib.sha256(repr((sorted(macros.items()), list(roots), sorted((texts or {}).items()))).encode())
     for one in [*every, *printer]:
         key.update(one.name.encode() + b"\0" + one.read_bytes())
