@@ -93,6 +93,7 @@ def test_three_files_through_the_command_line(runs: Path, tmp_path: Path) -> Non
     good = rows["a/run.npz"]
     assert good["identified"] and good["samples"] == 8000
     assert abs(good["g"] - 9.5) < 5 * good["g_se"] and table.schema.field("g").metadata[b"unit"] == b"m/s^2"
+    assert 0.9 < good["predicted"] <= 1 and rows["b/broken.csv"]["predicted"] is None
     assert rows["b/broken.csv"]["g"] is None and rows["b/broken.csv"]["identified"] is None
     assert "<svg" in (tmp_path / "fleet.html").read_text() and not (tmp_path / "fleet.partial.jsonl").exists()
 

@@ -15,9 +15,12 @@ import pvid
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.identification.analysis import analysed
-from pvid.identification.judge import judged
+from pvid.identification.judge import judged, with_sensors
 from pvid.identification.refinement.inputs import second_derivative_of
+from pvid.identification.road import identified
+from pvid.identification.sensor_prediction import SensorPrediction
 from pvid.identification.validation import validated
+from pvid.model import sgn
 from pvid.model.compiled import CompiledModel
 from pvid.model.description import Model
 from pvid.models.mechanisms import compiled_of
@@ -47,6 +50,49 @@ def test_the_truth_predicts_every_sensor_to_its_noise(name: str) -> None:
         assert one.r2 > 0.99
         rms = np.sqrt(np.mean((found.measured[one.name] - found.simulated[one.name]) ** 2))
         assert rms == pytest.approx(one.rms, rel=1e-6)
+
+
+def test_poor_prediction_of_an_explained_run_is_a_doubt_where_it_is_more_than_noise() -> None:
+    model, run, _ = recording("dc_motor")
+    answer = analysed(Recording(run.t[:6000], {name: x[:6000] for name, x in run.signals.items()}, 1000.0), model)
+    assert answer.verdict.word == "good"
+    good = SensorPrediction("i", "A", 1e-3, 0.01, 1.0)
+    noisy, poor = (SensorPrediction("phi", "rad", 1e-3, 0.7, of_noise) for of_noise in (1.2, 8.0))
+    assert with_sensors(answer, (good, noisy)).verdict == answer.verdict
+    doubted = with_sensors(answer, (good, poor))
+    assert doubted.verdict.word == "not_explained" and doubted.prediction == (good, poor)
+    assert "predicts 51 % of phi" in str(doubted.verdict.warning)
+    assert {one.word for one in doubted.values.values()} == {"not_explained"}
+    assert doubted.as_json()["verdict"] == "not_explained"
+
+
+def test_a_term_that_no_prediction_misses_is_told_and_one_that_is_missed_is_not() -> None:
+    def told(friction: float) -> str:
+        t, h, z, x = np.arange(6000) / 500, 1 / 2000, np.zeros(2), np.zeros(6000)
+        force = 4 * np.sin(2 * np.pi * 0.7 * t) + 3 * np.sin(2 * np.pi * 1.9 * t)
+
+        def slope(z: Float, f: float) -> Float:
+            return np.array([z[1], (f - 1.7 * z[1] - 82 * z[0] - friction * np.tanh(z[1] / 1e-3)) / 1.3])
+
+        for n, f in enumerate(force):
+            x[n] = z[0]
+            for _ in range(4):
+                a = slope(z, f)
+                b = slope(z + h / 2 * a, f)
+                d = slope(z + h / 2 * b, f)
+                z = z + h / 6 * (a + 2 * b + 2 * d + slope(z + h * d, f))
+        x += np.random.default_rng(1).normal(0, 3e-5, 6000)
+        model = Model("cart")
+        given = model.input("F", "N", hold="zoh", reach=12, gain_sd=0)
+        place = model.sensor("x", "m", resolution=0, noise=3e-5, reach=0.5)
+        m, c, k = model.unknown("m", "kg", 1), model.unknown("c", "N*s/m", 1), model.unknown("k", "N/m", 60)
+        dry = model.unknown("Fc", "N", 0.5)
+        model.equation(m * place.d(2) + c * place.d() + k * place + dry * sgn(place.d()) - given)
+        answer = identified(Recording(t, {"F": force, "x": x}, 500.0), model.compiled("cart"))
+        return " ".join(one.text for one in answer.verdict.reasons)
+
+    assert "Without Fc, motion that was not fitted is predicted as well" in told(0.0)
+    assert "Without Fc," not in told(0.2)
 
 
 def test_a_wrong_parameter_predicts_worse() -> None:

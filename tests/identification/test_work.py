@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from pvid.identification.answer import Analysis
 from pvid.identification.road import identified
 from pvid.models.mechanisms import compiled_of
 from pvid.oracle.weak import work
@@ -25,12 +26,12 @@ RUN = MOTOR.run(3)
 RATE = MOTOR.rig.sample_rate
 
 
-def units_of(run: Run) -> tuple[float, tuple[str, ...]]:
-    """Work of the road, prediction included, and its advice."""
+def units_of(run: Run) -> tuple[float, Analysis]:
+    """Work of the road, prediction included, and its answer."""
     recording = Recording(np.arange(len(run["V"])) / RATE, dict(run), RATE)
     with work.limited(1e9) as counted:
         answer = identified(recording, compiled_of("dc_motor"))
-    return counted.whole - counted.left, answer.advice
+    return counted.whole - counted.left, answer
 
 
 def allowed(run: Run) -> float:
@@ -60,14 +61,23 @@ def test_what_nothing_fits_ends_with_the_right_advice(bad: Callable[[Run], Run],
     """Search, checks and names, advice and judge may do 8.3 times what is allowed to a search, and some fits make their
     least passes beyond it; without a limit some of these runs do 50 times as much."""
     run = bad(RUN)
-    units, said = units_of(run)
+    units, answer = units_of(run)
     assert units < 10 * allowed(run)
-    assert said[0].startswith(advice) if advice else not any("--columns" in one for one in said)
+    if advice:
+        assert answer.advice[0].startswith(advice)
+    else:
+        assert not answer.identified and not answer.advice
+        named = answer.found.named
+        assert named is None or not named.complete
+        causes = [one.text for one in answer.found.verdict.reasons if one.name in ("missing", "sensor", "friction")]
+        assert not causes
+        unknown = [one.text for one in answer.found.verdict.reasons if one.name == "unexplained"]
+        assert all("no term that was tried explains it" in one for one in unknown)
 
 
 def test_a_good_run_does_a_part_of_the_work_that_is_allowed() -> None:
-    units, said = units_of(RUN)
-    assert not said and units < 0.7 * allowed(RUN)
+    units, answer = units_of(RUN)
+    assert not answer.advice and units < 0.7 * allowed(RUN)
 
 
 def test_an_allowance_grows_with_the_samples_and_not_with_a_sensor_that_chatters() -> None:

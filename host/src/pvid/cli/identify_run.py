@@ -136,7 +136,7 @@ def identify_run(
             model = more.model
     with working("identifying"):
         in_float = False if in_c else refine
-        answer = identified(recording, model, weights, refine=in_float, predict=not (in_c and refine), own=of_each)
+        answer = identified(recording, model, weights, refine=in_float, own=of_each)
     if without is not None:
         with_them: dict[str, Any] = {"added": list(more.terms), "without": _values_json(without.values)}
         if not as_json:

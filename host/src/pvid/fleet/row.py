@@ -79,6 +79,7 @@ class Row:
     failure : why there is no result; None: there is one
     parameters : name -> (value, standard error, unit); empty where nothing was identified
     took : seconds of work
+    predicted : R^2 of the worst predicted sensor, of motion that was not fitted; None: it was not looked at
     se_apart : name -> standard error without the part of scale, which recordings of one rig have in common
     """
 
@@ -95,6 +96,7 @@ class Row:
     failure: str | None = None
     parameters: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
     took: float = 0.0
+    predicted: float | None = None
     se_apart: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -137,6 +139,7 @@ def row_of(given: str | tuple[str, ...], question: Question) -> Row:
         _all_verified(places, question) if question.verify else None,
         parameters={name: (one.value, one.se, one.unit) for name, one in result.parameters.items()},
         took=time.monotonic() - start,
+        predicted=min((one["r2"] for one in result.details.get("prediction", {}).values()), default=None),
         se_apart={name: result.se_apart(name) for name in result.parameters},
     )
 

@@ -83,6 +83,7 @@ class Store:
             "identified": arrow.bool_(),
             "began": arrow.float64(),
             "took": arrow.float64(),
+            "predicted": arrow.float64(),
         }
         schema = [arrow.field(name, kinds.get(name, arrow.string())) for name in _FIXED]
         for name, unit in units.items():
@@ -121,13 +122,13 @@ def read_rows(path: Path) -> list[Row]:
         table = parquet.read_table(path)
     except Exception as error:  # pyarrow's own kinds, which cannot be named without importing it
         raise PvidError(f"{path}: exists and is not a Parquet file: choose another name for -o") from error
-    if not set(_FIXED) <= set(table.column_names):
+    if not set(_FIXED) - {"predicted"} <= set(table.column_names):  # which files of version 0.1 do not have
         raise PvidError(f"{path}: exists and was not written by pvid batch: choose another name for -o")
     names = [name for name in table.column_names if name not in _FIXED and name + _SE in table.column_names]
     units = {name: (table.schema.field(name).metadata or {}).get(b"unit", b"").decode() for name in names}
     return [
         Row(
-            **{name: one[name] for name in _FIXED},
+            **{name: one.get(name) for name in _FIXED},
             parameters={name: (one[name], one[name + _SE], units[name]) for name in names if one[name] is not None},
             se_apart={name: se for name in names if (se := one.get(name + _SE_APART)) is not None},
         )

@@ -35,6 +35,7 @@ from pvid.oracle.weak.identify import Identified, allowance_of, ready
 from pvid.oracle.weak.rows import WeakRows
 from pvid.oracle.weak.solve import Fit
 from pvid.oracle.weak.verdict import Reason, Verdict
+from pvid.oracle.weak.words import worst
 from pvid.rig.run import Recording
 
 Float = npt.NDArray[np.float64]
@@ -50,6 +51,8 @@ _SIMULATED = 120  # times that the samples of both halves are simulated with all
 _NEAR = 4  # passes of a fit that begins at that to all data
 _DESCRIBED = 0.5  # R^2 that an estimate has at least that replaces the usual one
 PREDICTED = 0.9  # R^2 of motion that was not seen, below which the equations do not describe it
+_NOTHING, _NO_WORSE = 1e-6, 0.01  # of a parameter: its term is gone; by the logarithm of the rms: it is not missed
+_OF_NOISE = 3.0  # times the sensor's: a smaller error of a prediction is noise
 
 _USUAL = "the usual estimate"
 # Doubts of the usual estimate alone: another has its own, or is one of those that were compared.
@@ -121,9 +124,40 @@ def with_prediction(answer: Analysis) -> Analysis:
                 usual = [trial.of_fit(trial.fit)]
             else:
                 usual = trial.estimates(_USUAL, found.design, found.fit.start, _WEIGHTS[:1])
+            small = [k for k, one in enumerate(found.judged) if one.status == "near_zero"]
+            if usual and small and trial.fit is None and trial.is_as_good_without(usual[0], small):
+                answer = _with_superfluous(answer, [answer.model.p_names[k] for k in small])
     except FAILURES:  # they cannot be simulated on this run
         return answer
-    return replace(answer, prediction=usual[0].sensors) if usual else answer
+    return with_sensors(answer, usual[0].sensors) if usual else answer
+
+
+def _with_superfluous(answer: Analysis, names: Sequence[str]) -> Analysis:
+    """The answer; the bounds of these parameters are told with the comparison of the models with and without them."""
+    more = (
+        f" Without {listed(names)}, motion that was not fitted is predicted as well: the equations need no such term."
+    )
+    reasons = tuple(
+        replace(one, text=one.text + more) if one.name == "near_zero" else one for one in answer.found.verdict.reasons
+    )
+    return replace(answer, found=replace(answer.found, verdict=Verdict(reasons)))
+
+
+def with_sensors(answer: Analysis, sensors: tuple[SensorPrediction, ...]) -> Analysis:
+    """The answer with these predictions, and a doubt where one is poor and more than noise."""
+    answer = replace(answer, prediction=sensors)
+    poor = [one for one in sensors if one.r2 < PREDICTED and not (one.of_noise or np.inf) < _OF_NOISE]
+    if not poor or not answer.identified:
+        return answer
+    reasons = [*answer.found.verdict.reasons, _unpredicted(poor, "it explains what was fitted alone")]
+    found = replace(answer.found, verdict=Verdict(verdict.sorted_by_gravity(reasons)))
+    values = {name: replace(one, word=worst([one.word, "not_explained"])) for name, one in answer.values.items()}
+    return replace(answer, found=found, values=values)
+
+
+def _unpredicted(poor: Sequence[SensorPrediction], because: str) -> Reason:
+    shares = listed(f"{100 * max(one.r2, 0.0):.0f} % of {one.name}" for one in poor)
+    return Reason("unpredicted", f"Of motion that was not fitted the answer predicts {shares}: {because}.")
 
 
 def _judged(answer: Analysis) -> Analysis:
@@ -261,6 +295,13 @@ class _Trial:
             one, sensors=sensors, of_recordings=of_recordings, score=float(np.mean(np.log(np.maximum(rms, motion.sd))))
         )
 
+    def is_as_good_without(self, one: Candidate, small: Sequence[int]) -> bool:
+        """Whether motion is predicted as well with nothing of these positive parameters [places in p]."""
+        first, second = (half.copy() for half in one.halves)
+        for half in (first, second):
+            half[[self._motion.problem.kernel.made.places_of_p[k] for k in small]] *= _NOTHING
+        return self._scored(replace(one, halves=(first, second), score=np.inf)).score < one.score + _NO_WORSE
+
     def of_fit(self, fit: RefinedFit) -> Candidate:
         """The refinement that gave the answer, with one of each half from there on, scored."""
         problem, found = fit.problem, fit.found
@@ -277,7 +318,7 @@ class _Trial:
     def refined(self, best: Candidate) -> Candidate | None:
         """The refinement from an estimate on: it is weighted by what that reaches, not by the sensors' noise."""
         motion, samples = self._motion, self._block
-        if not np.isfinite(best.score) or self._is_spent:
+        if self._is_spent or not any(one.r2 > 0 for one in best.sensors):  # no motion near the recorded one
             return None
         sd = np.maximum(motion.sd, [one.rms for one in best.sensors])
 
@@ -358,9 +399,7 @@ def _published(answer: Analysis, chosen: Candidate, usual: Candidate | None, ali
         text = f"The answer predicts {listed(worse)}: did something change, or does a parameter differ there (--own)?"
         reasons.append(Reason("unpredicted", text))
     if poor:
-        shares = listed(f"{100 * max(one.r2, 0.0):.0f} % of {one.name}" for one in poor)
-        text = f"Of motion that was not fitted the answer predicts {shares}: the equations lack something that matters."
-        reasons.append(Reason("unpredicted", text))
+        reasons.append(_unpredicted(poor, "the equations lack something that matters"))
     judged_found: Identified = replace(
         found,
         p=chosen.p,

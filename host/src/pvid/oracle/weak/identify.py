@@ -249,7 +249,7 @@ def _judged(
             if named is not None:
                 for other in (named.fit, named.further) if named.complete else ():
                     lacking = lacking.also(other.p - fit.p)
-                reasons += of_missing(fit, lacking, named)
+                reasons += of_missing(fit, lacking, named, min(found.r2))
         if lacking is not None and (unknown := of_unexplained(compiled, found, lacking)):
             lacking = lacking.also(library.scores.by_parts())
             reasons += unknown

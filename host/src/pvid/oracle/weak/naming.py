@@ -20,6 +20,9 @@ from pvid.oracle.weak.terms import CONSTANT, SOFT, Act, Candidate, Law
 from pvid.oracle.weak.verdict import Name, Reason, of_some
 
 _GROSS = 100.0  # chi^2, from which motion that is left unexplained is a doubt
+# Terms that explain less than this part of the rest, or of equations that explain less than this of their motion, are
+# no hint at the cause.
+_HINT = 0.5
 
 
 @dataclass(frozen=True)
@@ -91,8 +94,13 @@ def _over(number: float, factor: float | None) -> float | None:
     return number / factor if factor and np.isfinite(number) else None
 
 
-def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
-    """The doubt about an estimate and its cause; "unknown" where no cause explains it."""
+def of_missing(fit: Fit, lacking: Missing, found: Explained, r2: float) -> list[Reason]:
+    """The doubt about an estimate and its cause; "unknown" where no cause explains it.
+
+    Parameters
+    ----------
+    r2 : least of the equations
+    """
     model, p, terms = fit.rows.compiled.bare, fit.p, terms_of(fit, found)
     relative = lacking.error / np.maximum(np.abs(p), 1e-300)
     worst = [k for k in np.argsort(-relative) if lacking.visible[k]]
@@ -104,7 +112,8 @@ def of_missing(fit: Fit, lacking: Missing, found: Explained) -> list[Reason]:
         biased = listed(f"{model.p_names[k]} by {percent(relative[k])}" for k in worst)
         text = f"The equations lack something, or a signal is not what was recorded: it may bias {biased}. "
         best = f"of what was tried most is explained by this, {percent(found.share)}: {causes}."
-        text += f"The cause is unknown: {best if terms else 'no term that was tried explains it.'}"
+        hint = terms and min(found.share, r2) > _HINT
+        text += f"The cause is unknown: {best if hint else 'no term that was tried explains it.'}"
         return [Reason("unexplained", text, of=of_visible)]
     if terms[0].text.startswith(("equation", "the ")):  # a signal's name keeps its letters
         causes = causes[0].upper() + causes[1:]
