@@ -238,7 +238,7 @@ PROOFS = (
             *("pvid_differentiator_init_layout_q31", "pvid_differentiator_step_q31", "pvid_differentiator_reset_q31"),
             *("pvid_kapitza_strong_row_q31", "pvid_kapitza_estimator_innovate_q31", "acceleration"),
             *("pvid_kapitza_estimator_init_q31", "pvid_kapitza_estimator_take_q31"),
-            *("pvid_misfit_init_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
+            *("pvid_misfit_init_q31", "pvid_misfit_signal_q31", "pvid_misfit_add_q31", "pvid_misfit_judge_q31"),
         ),
     ),
     Proof(

@@ -6,16 +6,24 @@ from dataclasses import replace
 
 import pytest
 
-from bench.strong_mechanisms import HEADER, ON, comparison_of, row_of
+from bench.strong_mechanisms import FIXED_HEADER, HEADER, ON, comparison_of, fixed_row_of, row_of
 from pvid.board.strong_image import play_on_board
 
 
 @pytest.mark.slow
 def test_a_row_has_the_cost_of_each_board_and_equal_bits() -> None:
     row = row_of("rigid_body")
-    assert len(row) == len(HEADER) and row[0] == "rigid_body" and row[-1] == "equal"
+    assert len(row) == len(HEADER) and row[0] == "rigid_body" and row[HEADER.index("bits")] == "equal"
     means = [int(cell.split(" / ")[0]) for cell in row[3 : 3 + len(ON)]]
     assert means[0] * 5 < min(means[1:])  # soft float
+
+
+@pytest.mark.slow
+def test_without_a_floating_point_unit_a_tick_of_integers_is_cheaper() -> None:
+    row = fixed_row_of("battery_2rc")
+    assert len(row) == len(FIXED_HEADER) and row[-1] == "equal"
+    means = [int(cell.split(" / ")[0]) for cell in row[3 : 3 + len(ON)]]
+    assert max(means[1:]) < 5 * means[0]
 
 
 def test_a_wrong_hash_is_found() -> None:

@@ -75,6 +75,10 @@ pvid_reason pvid_kapitza_estimator_take_q31(pvid_kapitza_estimator_q31 *self, co
     assigns *self \from drive_ticks, forgetting_groups; */
 void pvid_misfit_init_q31(pvid_misfit_q31 *self, uint32_t drive_ticks, uint32_t forgetting_groups);
 
+/*@ assigns \result \from sensitivity;
+    ensures 0 <= \result <= 0x100000000000000; */
+int64_t pvid_misfit_signal_q31(int64_t sensitivity);
+
 /*@ requires 0 <= square <= 0x100000000000000;
     assigns \result, *self \from *self, square, signal;
     ensures \result == 0 || \result == 1; */

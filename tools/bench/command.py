@@ -144,9 +144,15 @@ def _of_methods(names: tuple[str, ...], seeds: int, advance: Advance) -> Tables:
 
 
 def _of_strong(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
-    from bench import strong_mechanisms
+    from bench import strong_mechanisms as strong
 
-    return [("strong-mechanisms", strong_mechanisms.HEADER, strong_mechanisms.rows_of(names, advance))]
+    return [("strong-mechanisms", strong.HEADER, strong.rows_of(names, advance))]
+
+
+def _of_strong_fixed(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
+    from bench import strong_mechanisms as strong
+
+    return [("strong-fixed", strong.FIXED_HEADER, strong.rows_of(names, advance, strong.fixed_row_of))]
 
 
 def _of_float(names: tuple[str, ...], _: int, advance: Advance) -> Tables:
@@ -187,6 +193,7 @@ TABLES = (
         (3, "--seeds", "Runs of each case."),
     ),
     Table("strong-mechanisms", "The strong form on boards: its bits and the cost of a tick.", _of_strong, _ONCE),
+    Table("strong-fixed", "The same of the strong form in fixed point.", _of_strong_fixed, _ONCE),
     Table("float-cost", "Where instructions and bytes of float32 go on a Cortex-M4F (needs QEMU).", _of_float, _ONCE),
     Table("fixed-cost", "Where instructions and bytes of fixed point go (needs QEMU).", _of_fixed, _ONCE),
 )

@@ -20,29 +20,44 @@ from pvid.board.strong_image import play_on_board
 from pvid.compare.strong import StrongComparison
 from pvid.core.sources import ROOT
 from pvid.rig.run import Recording
+from pvid.settings.enums import Core
 from pvid.sim.simulated_run import simulation_of
 
 ON = ("mps2-an386", "microbit", "virt-rv32imac")
 TICKS = 1200
+FIXED_HEADER = ("mechanism", "samples of a window", "state [B]", *(BOARDS[one].core for one in ON), "bits")
 HEADER = (
-    *("mechanism", "samples of a window", "state [B]", *(BOARDS[one].core for one in ON), "bits"),
+    *FIXED_HEADER,
     *("entries of theta", "RLS of them, Cortex-M4F", "RLS as U D U^T"),
 )
 COST = ROOT / "tests" / "cost"
 _ROWS = 400  # of a baseline: its path does not depend on them
 
 
-def comparison_of(name: str, ticks: int = TICKS) -> StrongComparison:
+def comparison_of(name: str, ticks: int = TICKS, core: Core = "f32") -> StrongComparison:
     """The first samples of a mechanism's shipped rig through the strong form in C on this machine and its twin."""
     simulation = simulation_of(name)
     run = simulation.run(seed=1)
     signals = {one.name: run[one.name][:ticks] for one in simulation.model.signals}
-    return StrongComparison.of(simulation.model, Recording(run["t"][:ticks], signals, simulation.rig.sample_rate))
+    recording = Recording(run["t"][:ticks], signals, simulation.rig.sample_rate)
+    return StrongComparison.of(simulation.model, recording, core=core)
 
 
 def row_of(name: str) -> tuple[str, ...]:
-    """A row of the table: instructions of a tick, mean / longest, on each board; whether all bits are the twin's."""
+    """A row of the table in float32, with the costs of the baselines."""
     run = comparison_of(name)
+    sizes = [len(one.theta) for one in run.design.strong.functions.kinds]
+    peers = (str(sum(peer_cost(peer, n) for n in sizes)) for peer in ("rls", "ud"))
+    return *_cells(name, run), " + ".join(map(str, sizes)), *peers
+
+
+def fixed_row_of(name: str) -> tuple[str, ...]:
+    """A row of the table in fixed point, as in FIXED_HEADER."""
+    return _cells(name, comparison_of(name, core="q31"))
+
+
+def _cells(name: str, run: StrongComparison) -> tuple[str, ...]:
+    """Instructions of a tick, mean / longest, on each board; whether all bits are the twin's."""
     costs, equal, state = [], run.found.equal, "-"
     for target in ON:
         try:
@@ -53,10 +68,7 @@ def row_of(name: str) -> tuple[str, ...]:
         costs.append(f"{report.instructions_mean:.0f} / {report.instructions_longest:.0f}")
         equal = equal and report.differs_at(run.hashes) is None
         state = str(report.state_bytes) if state == "-" else state
-    sizes = [len(one.theta) for one in run.design.strong.functions.kinds]
-    peers = (str(sum(peer_cost(peer, n) for n in sizes)) for peer in ("rls", "ud"))
-    cells = name, str(run.design.config.window), state, *costs, "equal" if equal else "DIFFERENT"
-    return *cells, " + ".join(map(str, sizes)), *peers
+    return name, str(run.design.config.window), state, *costs, "equal" if equal else "DIFFERENT"
 
 
 @cache
@@ -123,8 +135,10 @@ static const int replay_config = 1000000;
 """
 
 
-def rows_of(names: Sequence[str], progress: Callable[[], object]) -> Iterator[tuple[str, ...]]:
-    """All rows."""
+def rows_of(
+    names: Sequence[str], progress: Callable[[], object], row: Callable[[str], tuple[str, ...]] = row_of
+) -> Iterator[tuple[str, ...]]:
+    """All rows of a table."""
     for name in names:
-        yield row_of(name)
+        yield row(name)
         progress()

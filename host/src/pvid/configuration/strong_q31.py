@@ -52,6 +52,16 @@ class StrongDesignQ31:
     engine: FixedStrongEngine
     counts: npt.NDArray[np.int32]
 
+    @property
+    def strong(self) -> StrongFunctions:
+        """Functions of the strong form, named NAME_strong."""
+        return self.base.strong
+
+    @property
+    def config(self) -> StrongModelConfigQ31:
+        """Settings in fixed point."""
+        return self.engine.config
+
 
 def strong_design_to_identify(model: CompiledModel, recording: Recording, law: Law = Law.STATIONARY) -> StrongDesignQ31:
     """Formats and settings for a recording without missing samples, with the window that float32 gets; raises as
