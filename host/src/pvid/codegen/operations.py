@@ -1,7 +1,7 @@
 """SymPy expressions as one list of three-address operations.
 
 Every printer reads this list: an operation has at most two operands, each value is computed once, and the order of the
-operands is fixed here. `evaluated` computes it in float64.
+operands is fixed here. `evaluated` computes it in numpy.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Program:
         return {one.kind for one in self.values if isinstance(one, Operation)}
 
 
-_IN_FLOAT64: Mapping[str, Callable[..., Any]] = {
+_IN_NUMPY: Mapping[str, Callable[..., Any]] = {
     "+": np.add,
     "-": np.subtract,
     "*": np.multiply,
@@ -112,8 +112,8 @@ _IN_FLOAT64: Mapping[str, Callable[..., Any]] = {
 }
 
 
-def evaluated(program: Program, given: Sequence[Any] | npt.NDArray[np.float64]) -> list[Any]:
-    """The results in float64, each a number or [...], from the arguments, each a number or [...]."""
+def evaluated(program: Program, given: Sequence[Any] | npt.NDArray[Any]) -> list[Any]:
+    """The results, each a number or [...], from the arguments, each a number or [...], in their type."""
     values: list[Any] = []
     for one in program.values:
         if isinstance(one, Literal):
@@ -121,7 +121,7 @@ def evaluated(program: Program, given: Sequence[Any] | npt.NDArray[np.float64]) 
         elif isinstance(one, Argument):
             values.append(given[one.place])
         else:
-            values.append(_IN_FLOAT64[one.kind](*(values[place] for place in one.operands)))
+            values.append(_IN_NUMPY[one.kind](*(values[place] for place in one.operands)))
     return [values[place] for place in program.results]
 
 

@@ -24,6 +24,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,9 +71,6 @@ class RefinedParameter:
     sign: str = ""
 
 
-Float = npt.NDArray[np.float64]
-
-
 @dataclass(frozen=True)
 class RefineFunction:
     """A generated function.
@@ -90,9 +88,9 @@ class RefineFunction:
     written: tuple[tuple[str, int], ...]
     program: Program
 
-    def values(self, **arrays: npt.ArrayLike) -> dict[str, Float]:
-        """What it writes in float64 [entries, ...] from the arrays that it reads, and others [entries, ...]."""
-        read = [np.asarray(arrays[key], np.float64) for key, _ in self.given]
+    def values(self, **arrays: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
+        """What it writes [entries, ...] from the arrays that it reads, and others [entries, ...], in their type."""
+        read = [arrays[key] for key, _ in self.given]
         found = evaluated(self.program, [row for one in read for row in one])
         shape = np.broadcast_shapes(*(one.shape[1:] for one in read))
         whole = np.array([np.broadcast_to(one, shape) for one in found]).reshape(len(found), *shape)

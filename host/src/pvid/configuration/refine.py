@@ -272,9 +272,11 @@ def _slopes(made: RefineFunctions, r: Float, q: Float32, v: Float32) -> Float:
 
 
 def _values_at(made: RefineFunctions, name: str, r: Float, q: Float32, v: Float32) -> dict[str, Float]:
-    """What a function writes without inputs."""
-    m = made.functions["constants"].values(r=r)["m"]
-    return made.functions[name].values(r=r, m=m, q=q, v=v, u=np.zeros(len(made.inputs)))
+    """What a function writes without inputs; computed in float32, as in the core."""
+    single = r.astype(np.float32)
+    m = made.functions["constants"].values(r=single)["m"]
+    found = made.functions[name].values(r=single, m=m, q=q, v=v, u=np.zeros(len(made.inputs), np.float32))
+    return {key: one.astype(np.float64) for key, one in found.items()}
 
 
 def _with_observer(settings: RefineConfig, made: RefineFunctions, r: Float, states: Sequence[State]) -> RefineConfig:
