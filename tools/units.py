@@ -88,23 +88,21 @@ def ports() -> list[Unit]:
 
 
 def applications(machine: str) -> list[Unit]:
-    """`replay` and, but for an AVR, `stream`, of the strong form in every core; of the weak form what differs."""
+    """`replay` and, but for an AVR, `stream`, of the weak form in every core; of the strong form what differs."""
     found: list[Unit] = []
     board = '-DPVID_BOARD_NAME="board"'
-    for core_name in (0, 1):
-        kind = (RIG, board, f"-DSTREAM_CORE={core_name}", "-DSTREAM_FORM=0")
-        replay, stream = FIRMWARE / "apps" / "replay", FIRMWARE / "apps" / "stream"
-        first = core_name == 0
+    replay, stream = FIRMWARE / "apps" / "replay", FIRMWARE / "apps" / "stream"
+    for number, core_name in enumerate(("f32", "q31")):
+        kind = (RIG, board, f"-DSTREAM_CORE={number}", "-DSTREAM_FORM=2")
         found += _units(machine, [replay / "main.c"], *kind)
-        if first:
+        if number == 0:
             found += _units(machine, [replay / "report.c"], *kind)
         if machine != "avr":
-            found += _units(machine, [stream / f"identifier_{('f32', 'q31')[core_name]}.c"], *kind)
-            found += _units(machine, [stream / "main.c"], *kind)
-            if first:
-                found += _units(machine, [stream / "answers.c", stream / "sensor.c"], *kind)
-                engine = (RIG, board, "-DSTREAM_CORE=0", "-DSTREAM_FORM=2")
-                found += _units(machine, [stream / "identifier_weak_f32.c", stream / "sensor_recording.c"], *engine)
+            found += _units(machine, [stream / f"identifier_weak_{core_name}.c", stream / "main.c"], *kind)
+            if number == 0:
+                found += _units(machine, [stream / "answers.c", stream / "sensor_recording.c"], *kind)
+                strong = (RIG, board, "-DSTREAM_CORE=0", "-DSTREAM_FORM=0")
+                found += _units(machine, [stream / "identifier_strong_f32.c"], *strong)
     return found
 
 

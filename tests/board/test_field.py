@@ -12,44 +12,37 @@ import field_board
 import numpy as np
 import numpy.typing as npt
 import pytest
-from test_stream import KINDS, SHORT, rig_of
+from test_stream import KINDS, SHORT
 
 from pvid.base.errors import PvidError
 from pvid.board.field import FieldRecord, collect
 from pvid.board.mechanism_board import MechanismBoard, board_of_guess
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
-from pvid.board.replay_image import standard_run
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import StreamRig
+from pvid.board.strong_board import StrongBoard
 from pvid.board.target import HOST_TARGET, Target, open_target
 from pvid.codegen.weak_library import weak_native
 from pvid.configuration.nominal_run import nominal_run
 from pvid.core.native import Native
 from pvid.link.frames import SCHEMA_TEXT, Core, Source, encode
 from pvid.link.port import Port
-from pvid.rig.file import RigFile
-from pvid.twin.sensor import SensorConstants, counts
 
 TICKS = 9000  # two announcements more in the weak form's 1 kHz
-RIG = RigFile.standard()
-Simulated = StreamRig | MechanismBoard | MechanismBoardQ31
+Simulated = MechanismBoard | MechanismBoardQ31 | StrongBoard
 
 
 @cache
 def standard_rig(form: str, core: str = "f32") -> Simulated:
-    """Of a board that simulates a sensor, or reads a simulation of a rig's guess."""
+    """Of a board that reads a simulation of a rig's guess."""
     if form == "strong":
-        return rig_of(standard_run(5000, core))
+        return StrongBoard.of_guess(field_board.rig())
     board = board_of_guess(field_board.rig(), core)
     return replace(board, recording=board.recording[:TICKS])  # type: ignore[arg-type]
 
 
 def sensed(rig: Simulated) -> tuple[npt.NDArray[Any], ...]:
     """The samples as the identifier takes them, in its order."""
-    if not isinstance(rig, StreamRig):
-        return tuple(rig.recording.T)
-    constants = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
-    return rig.from_counts(counts(constants, TICKS))
+    return tuple(rig.recording.T)
 
 
 def expected(rig: Simulated, first: int, last: int) -> tuple[npt.NDArray[Any], ...]:
@@ -93,8 +86,6 @@ def test_a_board_samples_by_itself(name: str, form: str, core: str, native: Nati
     assert record.hello is not None and record.status is not None
     assert (record.hello.sample_rate, Core(record.hello.core).name) == (rig.sample_rate, core.upper())
     assert record.hello.form_name == form
-    if isinstance(rig, StreamRig):
-        assert record.hello.p_unit == tuple(np.asarray(rig.p_unit, np.float32).tolist())
     assert sorted(record.estimates) == list(range(500, max(record.estimates) + 1, 500))
 
 
@@ -187,14 +178,6 @@ def test_sensors_read_a_recording_over_and_over_where_it_is_wanted() -> None:
     with open_target(HOST_TARGET, board) as target:
         record = collect(target, 2000, begin=board)
     assert np.array_equal(np.stack(record.samples(0, 2000), axis=1), np.tile(board.recording, (3, 1))[:2000])
-
-
-def test_the_sensors_motion_stays_what_it_was() -> None:
-    lsb = RIG.sensor.phi_lsb, RIG.sensor.y_lsb
-    long = counts(SensorConstants.standard(RIG.l1, 1000.0, *lsb), 600_000) * np.array(lsb)
-    first, last = np.abs(long[:60_000]).max(axis=0), np.abs(long[-60_000:]).max(axis=0)
-    assert np.allclose(first, last, rtol=0.1)  # after 10 minutes neither grown nor died away
-    assert 0.05 < first[0] < 0.15 and 0.005 < first[1] < 0.015
 
 
 def test_errors_of_a_board_without_a_recording_contain_what_small_angles_neglect() -> None:

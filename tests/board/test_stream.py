@@ -24,8 +24,7 @@ from pvid.board.mechanism_board import MechanismBoard
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.mechanism_image import mechanism_run
 from pvid.board.mechanism_image_q31 import fixed_run
-from pvid.board.replay_image import SAMPLING, ReplayRun, native_hashes, standard_run
-from pvid.board.stream_rig import StreamRig
+from pvid.board.strong_board import StrongBoard
 from pvid.board.target import HOST_TARGET, Playback, Target, judge, open_target, play, verify
 from pvid.codegen.weak_library import weak_native
 from pvid.core.native import Native
@@ -34,11 +33,10 @@ from pvid.link.port import Port
 from pvid.models.registry import DEFAULT
 from pvid.models.simulated_rig import simulated_rig
 from pvid.rig.mechanism_file import MechanismRig
-from pvid.sim.pendulum import STANDARD_PENDULUM
 
 TICKS = 5000
 LONG = 10_000
-KINDS = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
+KINDS = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"))
 EMULATED = (
     "microbit",
     "mps2-an385",
@@ -52,7 +50,7 @@ EMULATED = (
 )
 # Every form and core on the host, each core on a board; test_targets.py proves the bits of all boards, and the long
 # form streams to all of them.
-SHORT = {*((HOST_TARGET, *kind) for kind in KINDS), ("mps2-an386", "weak", "f32"), ("virt-rv32imac", "strong", "q31")}
+SHORT = {*((HOST_TARGET, *kind) for kind in KINDS), ("mps2-an386", "weak", "f32"), ("virt-rv32imac", "weak", "q31")}
 STREAMED = [
     pytest.param(name, *kind, marks=() if (name, *kind) in SHORT else pytest.mark.long)
     for name in (HOST_TARGET, *EMULATED)
@@ -65,18 +63,7 @@ def form(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-Played = StreamRig | MechanismBoard | MechanismBoardQ31
-
-
-def rig_of(run: ReplayRun) -> StreamRig:
-    """What an image is made for that plays it."""
-    return StreamRig(
-        config=run.config,
-        sample_rate=SAMPLING.rate,
-        l1=STANDARD_PENDULUM.l1,
-        phi_lsb=float(run.phi_lsb),
-        y_lsb=float(run.y_lsb),
-    )
+Played = MechanismBoard | MechanismBoardQ31 | StrongBoard
 
 
 @dataclass(frozen=True)
@@ -91,8 +78,9 @@ class Standard:
 @cache
 def standard(form: str, core: str = "f32") -> Standard:
     if form == "strong":
-        run = standard_run(TICKS, core)
-        return Standard(rig_of(run), run.samples, native_hashes(run, Native()))
+        strong = StrongBoard.of_shipped_rig(DEFAULT)
+        signals = tuple(strong.recording[:TICKS].T)
+        return Standard(strong, signals, strong.hashes(Native(), *signals))
     rig = MechanismRig(DEFAULT, known=simulated_rig(DEFAULT).knowns)
     if core == "q31":
         fixed = fixed_run(DEFAULT, TICKS)
@@ -139,13 +127,11 @@ def test_every_target_computes_the_bits_of_the_host(name: str, form: str, core: 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("core", ["f32", "q31"])
-def test_a_long_run_stays_equal_on_two_boards_at_once(core: str, native: Native) -> None:
-    run = standard_run(LONG, core)
-    phi, y = run.samples
-    rig = rig_of(run)
+def test_a_long_run_stays_equal_on_two_boards_at_once(native: Native) -> None:
+    rig = StrongBoard.of_shipped_rig(DEFAULT)
+    y, phi = rig.recording[:LONG].T
     with ThreadPoolExecutor(2) as pool:
-        verdicts = list(pool.map(lambda name: verify(name, rig, native, phi, y), ("mps2-an386", "virt-rv32imac")))
+        verdicts = list(pool.map(lambda name: verify(name, rig, native, y, phi), ("mps2-an386", "virt-rv32imac")))
     for verdict in verdicts:
         assert verdict.equal, verdict.text
         assert verdict.playback.done == LONG and len(verdict.playback.hashes) == LONG // 500

@@ -12,26 +12,20 @@ import pytest
 from conftest import ROOT
 
 from pvid.base.errors import PvidError
-from pvid.board import mechanism_image, mechanism_image_q31, replay_image, sizes
+from pvid.board import mechanism_image, mechanism_image_q31, sizes
 from pvid.board.boards import BOARDS, Board, run
 from pvid.board.engine_image import engine_image
 from pvid.board.replay_image import (
     REPORT_EVERY,
     ReplayReport,
-    build_image,
-    native_hashes,
     parse_report,
     play,
-    standard_run,
-    twin_hashes,
 )
-from pvid.core.native import Native
+from pvid.board.strong_image import hashes_of, standard_run
+from pvid.codegen.strong_twin import StrongModelTwin
 from pvid.models.registry import DEFAULT
-from pvid.settings.enums import Core
 
-CORES = ("f32", "q31")
-FORMS_AND_CORES = [*((form, core) for form in ("strong", "weak") for core in CORES), (sizes.REFINED, "f32")]
-LONG = ("mps2-an386", "virt-rv32imac")
+FORMS_AND_CORES = [*sizes.ALL, (sizes.REFINED, "f32")]
 TIMEOUT_S = 300.0  # a stuck emulator ends here; the slowest run takes some 10 s alone on the machine
 
 Measured = dict[sizes.Configuration, tuple[sizes.Footprint, ReplayReport]]
@@ -64,7 +58,7 @@ def expected_hashes(form: str, core: str) -> npt.NDArray[np.uint32]:
     """Running hash after every tick of the run that `pvid sizes` plays: of the weak form that of the twin, which other
     tests compare with the C core here; of the others that of the C core, since their twins are slow."""
     if form == "strong":
-        return native_hashes(standard_run(sizes.TICKS, core), Native())
+        return hashes_of(standard_run(DEFAULT))
     if core == "q31":
         return mechanism_image_q31.twin_hashes(mechanism_image_q31.fixed_run(DEFAULT, long=True))
     return mechanism_image.twin_hashes(mechanism_image.mechanism_run(DEFAULT, long=True))
@@ -78,11 +72,11 @@ def assert_same_hashes(report: ReplayReport, expected: npt.NDArray[np.uint32]) -
     assert report.hash == int(expected[-1])
 
 
-@pytest.mark.ticks(short=1500, long=40_000)
-@pytest.mark.parametrize("core", CORES)
-def test_the_host_computes_the_bits_of_the_strong_twin(core: str, native: Native, ticks: int) -> None:
-    replay = standard_run(ticks, core)
-    assert np.array_equal(native_hashes(replay, native), twin_hashes(replay))
+@pytest.mark.ticks(short=1500, long=5000)
+def test_the_host_computes_the_bits_of_the_strong_twin(ticks: int) -> None:
+    design = standard_run(DEFAULT)
+    samples = design.samples[:ticks]
+    assert np.array_equal(hashes_of(design)[:ticks], StrongModelTwin(design.strong, design.config).run(samples).hash)
 
 
 def test_the_host_computes_the_bits_of_the_weak_twin() -> None:
@@ -109,27 +103,6 @@ def test_every_board_computes_the_bits_of_the_host(form: str, core: str, measure
     assert boards >= there.intersection(wanted)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("core", CORES)
-@pytest.mark.parametrize("name", LONG)
-def test_long_runs_end_with_the_bits_of_the_host(name: str, core: str, native: Native) -> None:
-    replay = standard_run(40_000, core)
-    image, _ = build_image(BOARDS[name], replay)
-    assert_same_hashes(play(BOARDS[name], image, TIMEOUT_S), native_hashes(replay, native))
-
-
-def test_missing_samples_have_the_bits_of_the_host(native: Native, monkeypatch: pytest.MonkeyPatch) -> None:
-    # by way of long runs: their samples stand in a file that the assembler takes in
-    monkeypatch.setattr(replay_image, "MANY_TICKS", 1000)
-    replay = standard_run(2000)
-    counts = replay.counts.copy()
-    counts[1500:1507], counts[1722, 1] = replay_image.MISSING, replay_image.MISSING
-    replay = replace(replay, counts=counts)
-    assert np.isnan(replay.phi).any()
-    image, _ = build_image(BOARDS["mps2-an386"], replay)
-    assert_same_hashes(play(BOARDS["mps2-an386"], image, TIMEOUT_S), native_hashes(replay, native))
-
-
 def test_the_weak_form_restarts_its_windows_alike_where_samples_are_missing() -> None:
     replay = mechanism_image.mechanism_run(DEFAULT)
     counts = replay.counts.copy()
@@ -139,19 +112,6 @@ def test_the_weak_form_restarts_its_windows_alike_where_samples_are_missing() ->
     assert np.isnan(replay.samples).any()
     image, _ = mechanism_image.build_mechanism_image(BOARDS["mps2-an386"], replay)
     assert_same_hashes(play(BOARDS["mps2-an386"], image, TIMEOUT_S), mechanism_image.native_hashes(replay))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("core", "cycles"), [("f32", 56_100), ("q31", 159_000)])
-def test_the_strong_form_on_an_avr_has_the_same_bits_where_it_fits(native: Native, core: Core, cycles: int) -> None:
-    """A product of the port, not of the core: the figures in firmware.md and benchmarks/cost.md are from here."""
-    replay = standard_run(1000, core)
-    image, _ = build_image(BOARDS["atmega2560"], replay)
-    report = play(BOARDS["atmega2560"], image, TIMEOUT_S)
-    assert_same_hashes(report, native_hashes(replay, native))
-    assert report.instructions_mean == pytest.approx(cycles, rel=0.05)  # clock cycles
-    with pytest.raises(PvidError, match="the image does not fit: .* lacks"):
-        build_image(BOARDS["atmega328p"], replay)
 
 
 def mean_of(measured: Measured, board: str, form: str, core: str) -> int:
@@ -169,31 +129,6 @@ def test_the_weak_form_in_integers_keeps_its_limits(measured: Measured) -> None:
     for board, most in (("microbit", 500), ("mps2-an386", 260)):
         assert mean_of(measured, board, "weak", "q31") <= most, board
         assert measured[sizes.Configuration(BOARDS[board], "weak", "q31")][1].state_bytes <= 4096, board
-
-
-@pytest.mark.parametrize(
-    ("board", "ratio"), [("microbit", 1.2), pytest.param("virt-rv32imac", 2.0, marks=pytest.mark.long)]
-)
-def test_the_strong_form_in_integers_costs_less_than_soft_float_at_every_row(
-    board: str, ratio: float, measured: Measured
-) -> None:
-    assert ratio * mean_of(measured, board, "strong", "q31") <= mean_of(measured, board, "strong", "f32")
-
-
-@pytest.mark.parametrize(
-    ("board", "least"), [("microbit", 1.96), pytest.param("virt-rv32imac", 3.4, marks=pytest.mark.long)]
-)
-def test_the_strong_form_costs_half_of_soft_float_with_a_solve_at_every_fourth_row(
-    board: str, least: float, native: Native
-) -> None:
-    reports = {}
-    for core in ("q31", "f32"):
-        replay = standard_run(1500, core, divider=4)  # all alike from the 500th on
-        image, _ = build_image(BOARDS[board], replay)
-        reports[core] = play(BOARDS[board], image, TIMEOUT_S)
-        assert reports[core].hash == int(native_hashes(replay, native)[-1])
-    ratio = reports["f32"].instructions_mean / reports["q31"].instructions_mean
-    assert ratio >= least  # 1.970 and 3.5 as measured; 1.999 before rows had kinds
 
 
 def test_no_figure_exceeds_its_budget(measured: Measured) -> None:

@@ -63,11 +63,10 @@ NAMED = {  # with the rig file in the place of its own option
     "verify": ["verify", "foreign.pvlog", "--rig", "FILE"],
     "export": ["export", "foreign.pvlog", "--rig", "FILE", "--to", "csv"],
     "layout": ["layout", "foreign.pvlog", "--rig", "FILE", "--for", "foxglove"],
-    "tables": ["tables", "--rig", "FILE"],
     "model build": ["model", "build", "dc_motor", "--rig", "FILE", "-o", "built"],
     "deploy": ["deploy", "dc_motor", "--rig", "FILE", "-o", "deployed", "--for", "arduino"],
 }
-READ_NO_FILES = {"demo", "simulate", "ports", "sizes", "schema", "models", "bench"}
+READ_NO_FILES = {"demo", "simulate", "ports", "sizes", "schema", "tables", "models", "bench"}
 
 
 def run(arguments: list[str]) -> Result:

@@ -20,8 +20,7 @@ from pendulum_plant import STANDARD_PENDULUM, simulate, standard_sensors
 from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.log.rig_choice import rig_of
-from pvid.rig.file import rig_path_of
-from pvid.rig.mechanism_file import MechanismRig
+from pvid.rig.mechanism_file import MechanismRig, rig_path_of
 from pvid.rig.run import Run, read_run, write_run
 
 Float = npt.NDArray[np.float64]

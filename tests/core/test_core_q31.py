@@ -12,7 +12,6 @@ import pytest
 from click.testing import CliRunner
 from conftest import ROOT
 
-from pvid.base.errors import PvidError
 from pvid.cli.main import commands
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, source
 from pvid.rig.file import RigFile
@@ -125,11 +124,3 @@ def test_an_encoder_without_a_resolution_has_the_step_that_the_run_shows(
     command = ["identify", str(recorded[0]), "--rig", str(tmp_path / "rig.toml"), "--core", "q31"]
     done = CliRunner().invoke(commands, command)
     assert done.exit_code == 0 and "nothing identified" not in done.stderr
-
-
-def test_a_guess_beyond_the_fixed_point_format_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "rig.toml"
-    path.write_text("l1 = 0.3\nsample_rate = 1000\n[nominal]\nl2 = 1e6\nrho2 = 0.0132\n", encoding="utf-8")
-    command = ["tables", "--core", "q31", "--rig", str(path)]
-    with pytest.raises(PvidError, match="the fixed-point core cannot hold a row of the strong form"):
-        CliRunner().invoke(commands, command, catch_exceptions=False, standalone_mode=False)

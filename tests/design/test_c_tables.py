@@ -8,16 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pvid.base.errors import PvidError
-from pvid.cli.main import commands
 from pvid.core.sources import INCLUDES, source
 from pvid.design.c_tables import bank_header, float_array, float_literal
 from pvid.design.fir import finite_difference, savitzky_golay
-from pvid.rig.mechanism_file import MechanismRig
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
@@ -79,9 +76,3 @@ def test_the_command_prints_and_checks(tmp_path: Path) -> None:
 def test_a_name_that_is_not_c_is_refused() -> None:
     with pytest.raises(PvidError, match="3d"):
         float_array("3d", np.zeros(3, np.float32), "nothing")
-
-
-def test_the_weak_forms_tables_are_printed_elsewhere(tmp_path: Path) -> None:
-    MechanismRig("kapitza", 1000.0, known={"l1": 0.3}).write(tmp_path / "rig.toml")
-    with pytest.raises(PvidError, match="`pvid model build kapitza --rig RIG"):
-        CliRunner().invoke(commands, ["tables", "--form", "weak"], standalone_mode=False, catch_exceptions=False)

@@ -39,7 +39,7 @@ from pvid.log.file import LOG_MESSAGES, LOG_SCHEMA, LogWriter
 from pvid.log.history import History
 from pvid.log.reader import OTHER_KINDS, Account, LogReader, LogStream, Record
 from pvid.log.recorder import Logger, Recorder
-from pvid.log.rig import recording_of_log, rig_of_log
+from pvid.log.rig import document_of_log, recording_of_log
 from pvid.log.tail import LogTail
 from pvid.log.values import Values
 from pvid.show import patience
@@ -152,8 +152,7 @@ def test_frames_of_the_logger_s_kind_from_the_line_are_not_the_logger_s(tmp_path
     ]
     assert (account.foreign, account.damaged, account.missing, account.samples) == (10, 0, 0, 2 * TICKS)
     assert account.unix_ns < 2**62
-    rig = rig_of_log(path)
-    assert rig is not None and rig.l1 == 0.3
+    assert document_of_log(path) == {"l1": 0.3}
 
 
 def test_a_log_that_is_appended_to_keeps_its_key_and_one_without_a_key_opens(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-/* What the board samples in field mode. sensor.c simulates a rig, sensor_recording.c reads a recording; a board with
+/* What the board samples in field mode. sensor_recording.c reads a recording; a board with
  * sensors has its own in their place. */
 #ifndef SENSOR_H
 #define SENSOR_H

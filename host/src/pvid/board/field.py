@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.stream_image import Streamed, settings_number
-from pvid.board.stream_rig import StreamRig
 from pvid.board.target import Target, refusal
-from pvid.cases import Samples
 from pvid.link.frames import (
     Code,
     Configuration,
@@ -39,6 +39,8 @@ from pvid.link.frames import (
     Status,
     encode,
 )
+
+Samples = npt.NDArray[Any]  # [ticks, samples]: float32, or int32 counts
 
 RESEND_S = 1.0  # without an answer a Configure is sent again
 
@@ -124,7 +126,7 @@ def collect(
     target: Target,
     ticks: int,
     *,
-    begin: StreamRig | Streamed | None = None,
+    begin: Streamed | None = None,
     source: Source = Source.SENSOR_PACED,
     hash_every: int = 500,
     estimate_every: int = 500,

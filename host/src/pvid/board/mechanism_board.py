@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import secrets
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +15,9 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.base.wording import printable
+from pvid.board.float_board import FloatBoard, recording_header
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
-from pvid.board.stream_image import StreamImage, c_string
-from pvid.board.stream_rig import MOST_TICKS, SLOWEST
+from pvid.board.stream_image import MOST_TICKS, SLOWEST, StreamImage, c_string
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions, refine_functions, widths
@@ -39,7 +38,7 @@ from pvid.core.native import Native
 from pvid.core.sizes import raised
 from pvid.core.weak_native import RefinedIdentifier
 from pvid.design.c_tables import float_literal
-from pvid.link.frames import MAX_P, Configuration, Configure, Core, Form, Message, Sample, Source
+from pvid.link.frames import Configuration, Core, Form
 from pvid.link.names import BoardNames, shown_of_refined
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import constants_of
@@ -60,35 +59,27 @@ from pvid.setup.weak_sizes import sizes_of_design
 from pvid.sim.simulated_run import RigSimulation
 from pvid.twin.printed import PrintedTwin
 
+if TYPE_CHECKING:
+    from pvid.board.strong_board import StrongBoard
+
 _COMMAND = "pvid log"
-_PER_PARAMETER = ("start", "start_sd", "lower", "upper")
-_SINGLE = ("row_sd", "forgetting_s", "feedback_hz", "divider")
 _ARRAYS: dict[str, type[np.generic]] = {"error_order": np.uint8}  # the others are float32
-_TABLE = "engine"
+TABLE = "engine"
 _SHORT, _WORDS = 16, 12  # numbers that are written as such; words in a line
 
 
 @dataclass(frozen=True, eq=False)
-class MechanismBoard:
-    """What a stream image is made for.
+class MechanismBoard(FloatBoard):
+    """What a stream image of the weak form is made for.
 
     Attributes
     ----------
-    rig : of the mechanism
-    compiled : the model with the values of the rig
-    config : settings and tables of the engine
-    recording
-        what the board's sensors read, float32 [ticks, samples]; empty where the board has sensors of its own
     refine : settings of the second stage; None: without
     repeats : the sensors read the recording over and over
     """
 
-    configure_frame = Configure
-    matrix = "covariance"  # of an estimate
-    rig: MechanismRig
-    compiled: CompiledModel
+    form = Form.WEAK
     config: WeakConfig
-    recording: npt.NDArray[np.float32]
     refine: RefineConfig | None = None
     repeats: bool = False
 
@@ -199,24 +190,6 @@ class MechanismBoard:
         return shown_of_refined(len(made.parameters), len(widths(made)), made.places_of_p)
 
     @property
-    def p_names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(name for name, _ in self.names.parameters)
-
-    @property
-    def sample_rate(self) -> float:
-        """Ticks a second."""
-        return self.config.sample_rate
-
-    @property
-    def _shared(self) -> WeakConfig:
-        """The settings of an image: neutral values for what a Configure frame brings."""
-        ones = np.ones(len(self.compiled.unknowns), np.float32)
-        neutral: dict[str, Any] = {**dict.fromkeys(_PER_PARAMETER, ones), "row_sd": 1.0, "forgetting_s": 0.0}
-        own = replace(self.config.estimator, feedback_hz=0.0, divider=1, law=Law.STATIONARY, **neutral)
-        return replace(self.config, estimator=own)
-
-    @property
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
         model, design = self.config.design.model, self.config.design
@@ -243,7 +216,7 @@ class MechanismBoard:
         return StreamImage(
             number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
             macros=macros,
-            files={**code, "stream_recording.h": _recording(self.recording)},
+            files={**code, "stream_recording.h": recording_header(self.recording)},
             form="weak",
             core="f32",
             identifier="weak_f32",
@@ -251,46 +224,6 @@ class MechanismBoard:
             sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
             refined=self.refine is not None,
         )
-
-    def configure(
-        self, settings: int, hash_every: int, estimate_every: int, source: Source = Source.PC, first_tick: int = 0
-    ) -> Configuration:
-        """The frame that configures a board whose image has these `settings`, with a new session number."""
-        own = self.config.estimator
-        places: dict[str, Any] = {
-            name: (*getattr(own, name).tolist(), *[0.0] * (MAX_P - len(own.start))) for name in _PER_PARAMETER
-        }
-        return Configure(
-            session=secrets.randbelow(2**32 - 1) + 1,
-            settings=settings,
-            form=int(Form.WEAK),
-            source=int(source),
-            hash_every=hash_every,
-            estimate_every=estimate_every,
-            law=int(own.law),
-            first_tick=first_tick,
-            **places,
-            **{name: getattr(own, name) for name in _SINGLE},
-        )
-
-    def configured(self, frame: Configuration) -> WeakConfig:
-        """The settings with the values of a Configure frame.
-
-        Raises
-        ------
-        PvidError
-            For one of the other core, or a law that there is not.
-        """
-        if not isinstance(frame, self.configure_frame):
-            raise PvidError("the board's image contains another core than the log's settings")
-        if frame.law not in list(Law):
-            raise PvidError(f"the board was configured with law {frame.law}, which does not exist")
-        own = self.config.estimator
-        places: dict[str, Any] = {
-            name: np.array(getattr(frame, name)[: len(own.start)], np.float32) for name in _PER_PARAMETER
-        }
-        single = {name: getattr(frame, name) for name in _SINGLE}
-        return replace(self.config, estimator=replace(own, law=Law(frame.law), **places, **single))
 
     def twin_of(self, frame: Configuration) -> PrintedTwin:
         """The twin with the values of a Configure frame; raises as `configured`."""
@@ -303,14 +236,6 @@ class MechanismBoard:
     def without_recording(self) -> MechanismBoard:
         """The same, for a board that gets its samples from the PC."""
         return replace(self, recording=self.recording[:1])
-
-    def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[np.float32]:
-        """Signals [ticks] as the identifier takes them [ticks, samples]."""
-        return np.stack([np.asarray(one, np.float32) for one in signals], axis=1)
-
-    def frame(self, readings: npt.NDArray[Any]) -> Message:
-        """The frame of consecutive ticks [ticks, samples]."""
-        return Sample.of_values(*readings.T)
 
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the engine on this machine [ticks]."""
@@ -328,8 +253,8 @@ class MechanismBoard:
 
     def text(self) -> str:
         """The rig file with the engine's settings, for a log; `parse` gives the same board back."""
-        lines = [f"{name} = {_written(value)}" for name, value in _flat(self.config, self.refine).items()]
-        return "\n".join([self.rig.text(), f"[{_TABLE}]", *lines, ""])
+        lines = [f"{name} = {written(value)}" for name, value in _flat(self.config, self.refine).items()]
+        return "\n".join([self.rig.text(), f"[{TABLE}]", *lines, ""])
 
     @classmethod
     def of_tables(cls, rig: MechanismRig, engine: Mapping[str, Any]) -> MechanismBoard:
@@ -372,7 +297,7 @@ _KINDS: tuple[type[MechanismBoard] | type[MechanismBoardQ31], ...] = (MechanismB
 BOARDS = dict(zip(CORES, _KINDS, strict=True))
 
 
-def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismBoardQ31 | None:
+def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismBoardQ31 | StrongBoard | None:
     """From the text of a log; None: that of another kind of rig.
 
     Parameters
@@ -385,7 +310,7 @@ def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismB
         Where it breaks off, or names a mechanism that is not shipped and not that of this call.
     """
     document = toml_document(text)
-    engine = document.pop(_TABLE, None)
+    engine = document.pop(TABLE, None)
     if not isinstance(engine, dict):
         return None
     former = mechanism_of_former(document)
@@ -398,29 +323,13 @@ def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismB
     else:
         rig = replace(rig, model=asked_for(model))
     try:
+        if engine.pop("form", "") == "strong":
+            from pvid.board.strong_board import StrongBoard
+
+            return StrongBoard.of_tables(rig, engine)
         return BOARDS[engine.pop("core", FLOAT.name)].of_tables(rig, engine)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
-
-
-def _recording(samples: npt.NDArray[np.float32]) -> str:
-    rows = [f"    {{{', '.join(float_literal(value) for value in row)}}}," for row in samples]
-    return "\n".join(
-        [
-            "/* Generated by pvid.board.mechanism_board: do not edit. */",
-            "#ifndef STREAM_RECORDING_H",
-            "#define STREAM_RECORDING_H",
-            "",
-            "#define STREAM_PUT pvid_put_f32",
-            f"#define RECORDED_TICKS {len(samples)}u",
-            f"static const float recorded[RECORDED_TICKS][{samples.shape[1]}] = {{",
-            *rows,
-            "};",
-            "",
-            "#endif",
-            "",
-        ]
-    )
 
 
 # ---- the text of the settings: numbers as Python writes them, which read back exactly; long tables as their bits
@@ -442,44 +351,46 @@ def _flat(config: WeakConfig, refine: RefineConfig | None) -> dict[str, Any]:
     return {name: value for name, value in found.items() if value is not None}
 
 
-def _written(value: Any) -> str:
+def written(value: Any) -> str:
+    """A setting in the text of a log."""
     match value:
         case bool():
             return str(value).lower()
         case IntEnum():
             return str(int(value))
         case WeakFilter():
-            return _written(value.weights)
+            return written(value.weights)
         case RefineSignal():
-            return _written([value.sample, value.order, value.scale, value.range, int(value.source)])
+            return written([value.sample, value.order, value.scale, value.range, int(value.source)])
         case np.ndarray() if value.size > _SHORT:  # the bits
             words = [f"{word:08x}" for word in value.view(np.uint32).tolist()]
             rows = [" ".join(words[k : k + _WORDS]) for k in range(0, len(words), _WORDS)]
             return "\n".join(["'''", *rows, "'''"])
         case WeakNoise():
-            return _written([value.kind, value.power, value.a, value.b, float(value.factor)])
+            return written([value.kind, value.power, value.a, value.b, float(value.factor)])
         case np.ndarray():
-            return _written(value.tolist())
+            return written(value.tolist())
         case tuple() | list():
             apart = ",\n" if len(value) > _SHORT else ", "
-            return f"[{apart.join(map(_written, value))}]"
+            return f"[{apart.join(map(written, value))}]"
         case _:
             return repr(value)
 
 
-def _array(value: Any, kind: type[np.generic] = np.float32) -> npt.NDArray[Any]:
+def array_of(value: Any, kind: type[np.generic] = np.float32) -> npt.NDArray[Any]:
+    """Numbers, or the bits of a long table."""
     if isinstance(value, str):
         return np.array([int(word, 16) for word in value.split()], np.uint32).view(np.float32)
     return np.array(value, kind)
 
 
-def _part(engine: Mapping[str, Any], name: str) -> dict[str, Any]:
+def part_of(engine: Mapping[str, Any], name: str) -> dict[str, Any]:
     """The keys of a part without its name."""
     return {key.removeprefix(f"{name}_"): value for key, value in engine.items() if key.startswith(f"{name}_")}
 
 
 def _refine(engine: Mapping[str, Any]) -> RefineConfig | None:
-    given = _part(engine, "refine")
+    given = part_of(engine, "refine")
     if not given:
         return None
     signal = tuple(
@@ -487,25 +398,25 @@ def _refine(engine: Mapping[str, Any]) -> RefineConfig | None:
         for sample, order, scale, range_, source in given.pop("signal")
     )
     arrays: dict[str, Any] = {
-        key: _array(value) if isinstance(value, list | str) else value for key, value in given.items()
+        key: array_of(value) if isinstance(value, list | str) else value for key, value in given.items()
     }
     return RefineConfig(**{"second": None, **arrays}, signal=signal)
 
 
 def _config(compiled: CompiledModel, engine: Mapping[str, Any]) -> WeakConfig:
     def part(name: str) -> dict[str, Any]:
-        return _part(engine, name)
+        return part_of(engine, name)
 
     def arrays(values: dict[str, Any]) -> dict[str, Any]:
         return {
-            key: _array(value, _ARRAYS.get(key, np.float32)) if isinstance(value, list | str) else value
+            key: array_of(value, _ARRAYS.get(key, np.float32)) if isinstance(value, list | str) else value
             for key, value in values.items()
         }
 
     design = part("design")
-    filters = tuple(WeakFilter(_array(one)) for one in design.pop("filter"))
+    filters = tuple(WeakFilter(array_of(one)) for one in design.pop("filter"))
     at_steps = design.pop("compensator", None)
-    compensators = filters if at_steps is None else tuple(WeakFilter(_array(one)) for one in at_steps)
+    compensators = filters if at_steps is None else tuple(WeakFilter(array_of(one)) for one in at_steps)
     noise = tuple(WeakNoise(kind, power, a, b, np.float32(x)) for kind, power, a, b, x in design.pop("noise"))
     made = WeakDesign32(
         model=weak_model_of(compiled), filter=filters, compensator=compensators, noise=noise, **arrays(design)

@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import StreamImage, c_string
-from pvid.board.stream_rig import MOST_TICKS, SLOWEST
+from pvid.board.stream_image import MOST_TICKS, SLOWEST, StreamImage, c_string
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31

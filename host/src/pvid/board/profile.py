@@ -13,14 +13,14 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, one_at_a_time, prepare_emulator
 from pvid.board.engine_image import engine_image
 from pvid.board.refined_image import build_refined_image
-from pvid.board.replay_image import build_image, parse_report, standard_run
+from pvid.board.replay_image import parse_report
 from pvid.board.sizes import refined_replay
+from pvid.board.strong_image import build_image, measured_from, standard_run
 from pvid.core.sources import ROOT
 from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Form
 from pvid.settings.forms import FORMS
 
-TICKS = 5000
 TIMEOUT_S = 300.0
 PLUGIN = BUILD / "qemu_profile.so"
 LEAST_SHARE = 0.01  # of a tick: functions below it stand in one line together
@@ -109,8 +109,9 @@ def refined(board: Board) -> Profile:
 
 def _strong(board: Board, core: Core, model: str) -> tuple[Path, str, int]:
     """Image, the function that is counted, the first tick that counts."""
-    run = standard_run(TICKS, core)
-    return build_image(board, run)[0], f"pvid_strong_step_{core}", run.measure_from
+    design = standard_run(model)
+    step = f"{design.strong.functions.name}_step_f32"
+    return build_image(board, design)[0], step, measured_from(len(design.samples), design.config.window)
 
 
 def _weak(board: Board, core: Core, model: str) -> tuple[Path, str, int]:

@@ -14,13 +14,13 @@ from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.engine_image import engine_image
 from pvid.board.refined_image import RefinedRun, build_refined_image, published_run
-from pvid.board.replay_image import ReplayReport, build_image, play, standard_run
+from pvid.board.replay_image import ReplayReport, play
 from pvid.board.stack_bound import stack_bound
+from pvid.board.strong_image import build_image, standard_run
 from pvid.models.registry import DEFAULT
 from pvid.settings.cores import CORES
 from pvid.settings.forms import FORMS
 
-TICKS = 5000
 REFINED_TICKS = 21_000  # the refinement finds its track in the first 6 600; the last 16 half windows count
 TIMEOUT_S = 300.0
 ALLOWANCE = 1.02
@@ -42,7 +42,7 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Configuration:
-    """A board, the arithmetic and the form of the identifier; the weak form is that of the shipped rig of `model`.
+    """A board, the arithmetic and the form of the identifier, of the shipped rig of `model`.
     "refined" is the weak form with the refinement behind it."""
 
     board: Board
@@ -58,7 +58,7 @@ class Configuration:
 
 
 WEAK, REFINED = "weak", "refined"
-ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"), ("strong", "q31"))
+ALL = (("weak", "f32"), ("weak", "q31"), ("strong", "f32"))
 
 # An AVR: what its memory holds, in fixed point alone, since its float32 division differs at the extremes.
 ON_AVR = {"atmega2560": (("weak", "q31"),), "atmega328p": ()}
@@ -143,9 +143,11 @@ class BuiltImage:
 
 
 def _strong(configuration: Configuration) -> BuiltImage:
-    run = standard_run(TICKS, configuration.core)
-    tables = r"\.(s?rodata|progmem\.data)\.replay_(config_)?weights$"
-    return BuiltImage(*build_image(configuration.board, run), ((CODE, CORE),), ((tables, "replay"),))
+    design = standard_run(configuration.model)
+    name = design.strong.functions.name
+    tables = ((rf"\.s?rodata\.{name}_(weights|config)", "replay"),)
+    own = rf"{name}_f32\.c"
+    return BuiltImage(*build_image(configuration.board, design), ((CODE, CORE), (CODE, own)), tables)
 
 
 def _weak(configuration: Configuration) -> BuiltImage:

@@ -8,63 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
-from pvid.board.stream_rig import StreamRig
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.model_library import core_options, of_second_stage
 from pvid.core.sizes import options_of, roomy
-from pvid.core.sources import FIRMWARE, core_sources, left_out
-from pvid.design.c_tables import float_literal
+from pvid.core.sources import FIRMWARE, SRC, core_sources, left_out
 from pvid.link.frames import Configuration, Source
-from pvid.link.names import names_of
-from pvid.models.registry import DEFAULT, MODELS
-from pvid.settings.enums import Core
-from pvid.twin.sensor import SensorConstants
+from pvid.settings.enums import Core, Form
 
 HOST = "host"
-
-
-def _tables(rig: StreamRig) -> str:
-    """stream_tables.h: `stream_config`, without what Configure brings, and what it points to."""
-    return rig.case.header(rig.case.shared(rig.config), rig.l1, "stream_config", "pvid.board.stream_image")
-
-
-def _macros(rig: StreamRig) -> list[str]:
-    """stream_rig.h but for the number of it all."""
-    units = ", ".join(float_literal(np.float32(unit)) for unit in rig.p_unit[: len(MODELS[DEFAULT].parameters)])
-    form, core = rig.case.form, rig.case.core
-    sensor = SensorConstants.standard(rig.l1, rig.sample_rate, rig.phi_lsb, rig.y_lsb)
-    return [
-        f"#define STREAM_CORE {int(rig.core)}",
-        f"#define STREAM_FORM {int(rig.form)}",
-        f"#define STREAM_TYPE pvid_{form}_{core}",
-        f"#define STREAM_CONFIG pvid_{form}_config_{core}",
-        f"#define STREAM_INIT pvid_{form}_init_{core}",
-        f"#define STREAM_STEP pvid_{form}_step_{core}",
-        f"#define STREAM_N_P {rig.n_p}u",
-        f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(rig.sample_rate))}",
-        f"#define STREAM_PHI_LSB {float_literal(np.float32(rig.phi_lsb))}",
-        f"#define STREAM_Y_LSB {float_literal(np.float32(rig.y_lsb))}",
-        f"#define STREAM_P_UNIT {{{units}}}",
-        f"#define STREAM_SENSOR_CONSTANTS {sensor.c_initializer}",
-    ]
-
-
-def _described(rig: StreamRig) -> list[str]:
-    """What follows from the rest, or no bit depends on, and is not in the number."""
-    model = MODELS[DEFAULT]
-    assess, assessed = rig.case.assess_call
-    return [
-        f"#define STREAM_HASH {rig.case.hash_function}",
-        f"#define STREAM_ASSESS {assess}",
-        f"#define STREAM_ASSESSED {assessed}",
-        f"#define STREAM_SAMPLES {len(model.channels)}u",
-        "#define STREAM_PHI 0u",
-        "#define STREAM_Y 1u",
-        f"#define STREAM_NAMES {c_string(names_of(model).text)}",
-    ]
+SLOWEST = 1.0  # ticks a second: the image counts the time between two samples in 32 bits of nanoseconds
+MOST_TICKS = 40_000  # of a simulation that an image contains
 
 
 def c_string(text: str) -> str:
@@ -81,7 +35,7 @@ class StreamImage:
     number : CRC-32 of all that the bits depend on
     macros : lines of stream_rig.h
     files : generated headers and sources by name
-    form : weak, strong, or weak for the engine of any mechanism
+    form : weak or strong
     core : arithmetic
     identifier : firmware/apps/stream/identifier_<identifier>.c
     sensor : a file of firmware/apps/stream
@@ -92,7 +46,7 @@ class StreamImage:
     number: int
     macros: list[str]
     files: dict[str, str]
-    form: str
+    form: Form
     core: Core
     identifier: str
     sensor: str
@@ -112,7 +66,7 @@ class StreamImage:
 
 
 class Streamed(Protocol):
-    """What else than a StreamRig an image can be made for."""
+    """What an image can be made for."""
 
     @property
     def stream_image(self) -> StreamImage: ...
@@ -122,27 +76,9 @@ class Streamed(Protocol):
     ) -> Configuration: ...
 
 
-def image_of(rig: StreamRig | Streamed) -> StreamImage:
-    """What its image is compiled from."""
-    if not isinstance(rig, StreamRig):
-        return rig.stream_image
-    return StreamImage(
-        number=settings_number(rig),
-        macros=[*_macros(rig), *_described(rig)],
-        files={"stream_tables.h": _tables(rig)},
-        form=rig.case.form,
-        core=rig.case.core,
-        identifier=rig.case.core,
-        sensor="sensor.c",
-        sizes=rig.case.sizes(rig.config),
-    )
-
-
-def settings_number(rig: StreamRig | Streamed) -> int:
+def settings_number(rig: Streamed) -> int:
     """CRC-32 of the settings and tables an image must hold to be configured for `rig`."""
-    if not isinstance(rig, StreamRig):
-        return rig.stream_image.number
-    return zlib.crc32("\n".join([*_macros(rig), _tables(rig)]).encode())
+    return rig.stream_image.number
 
 
 def _guarded(guard: str, lines: list[str]) -> str:
@@ -150,7 +86,7 @@ def _guarded(guard: str, lines: list[str]) -> str:
     return "\n".join([banner, f"#ifndef {guard}", f"#define {guard}", "", *lines, "", "#endif", ""])
 
 
-def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
+def build_image(rig: Streamed, board: Board | None) -> Path:
     """Builds the stream image for a board, or for this machine (None), under build/targets; returns it.
 
     Raises
@@ -158,7 +94,7 @@ def build_image(rig: StreamRig | Streamed, board: Board | None) -> Path:
     PvidError
         When a compiler is missing or something does not build.
     """
-    image = image_of(rig)
+    image = rig.stream_image
     files = image.headers
     name = f"stream-{zlib.crc32(repr(sorted(files.items())).encode()):08x}"
     folder = BUILD / "runs" / name
@@ -203,6 +139,7 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
         rig.symlink_to(folder)
     own = [
         f"-I{rig.name}",
+        f"-I{SRC}",  # a printed strong form includes its identifier from there
         *options,
         *(f"-I{FIRMWARE / one}" for one in ("link", "ports")),
         f'-DPVID_BOARD_NAME="{HOST}"',

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +16,46 @@ from pvid.board.compare_on import Outcome
 from pvid.board.mechanism_image import build_with, refuse_float_on_avr
 from pvid.board.replay_image import REPORT_EVERY, ReplayReport, play
 from pvid.codegen import files_strong, files_strong_design, files_strong_q31
-from pvid.codegen.strong_library import sizes_of_strong
+from pvid.codegen.strong_library import sizes_of_strong, strong_native
 from pvid.compare.strong import StrongComparison
-from pvid.configuration.strong import StrongDesign
+from pvid.configuration.strong import StrongDesign, five_point_design
 from pvid.configuration.strong_q31 import StrongDesignQ31
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.rig.run import Recording
 from pvid.settings.cores import STRONG, STRONG_FIXED
 from pvid.settings.enums import Core
+from pvid.sim.simulated_run import RigSimulation
 
 MADE_BY = "pvid.board.strong_image"
 MOST_TICKS = 20_000  # of a recording in an image
 _SECONDS_A_TICK = 5e-3  # that an emulator takes at most
 _START_S = 60.0
+STANDARD_TICKS = 5000  # of the standard run
+_RATE_HZ, _SUBSTEPS = 50.0, 200
+_FINER = 64  # times: differences of five points need 20 bits where windows need 14
+
+
+@cache
+def standard_run(name: str) -> StrongDesign:
+    """The shipped rig of a mechanism with finer sensors at 50 Hz, for central differences of five points."""
+    model, rig = compiled_of(name), simulated_rig(name)
+    signals = tuple(replace(one, resolution=one.resolution / _FINER, noise=0.0) for one in model.signals)
+    finer = replace(model, signals=signals)
+    slow = replace(rig, sample_rate=_RATE_HZ, duration=STANDARD_TICKS / _RATE_HZ, substeps=_SUBSTEPS)
+    run = RigSimulation.of(finer, slow).run()
+    return five_point_design(finer, Recording(run.pop("t"), run, _RATE_HZ))
+
+
+def hashes_of(design: StrongDesign) -> npt.NDArray[np.uint32]:
+    """Running hash of the C core on this machine after every tick [ticks]."""
+    identifier = strong_native(design.strong, design.config).identifier_of(design.config)
+    return identifier.run_samples(design.samples, sums=False).hash
+
+
+def measured_from(ticks: int, window: int) -> int:
+    """The first tick that counts in the mean cost of a tick: from there on windows are full."""
+    return min(ticks // 2, 2 * window)
 
 
 def header(design: StrongDesign | StrongDesignQ31) -> str:
@@ -65,7 +96,7 @@ def header(design: StrongDesign | StrongDesignQ31) -> str:
             f"#define REPLAY_IS_FLOAT {int(core == 'f32')}",
             f'#define REPLAY_FORM "{name}"',
             f"#define REPLAY_TICKS {ticks}u",
-            f"#define REPLAY_MEASURE_FROM {min(ticks // 2, 2 * window)}u",
+            f"#define REPLAY_MEASURE_FROM {measured_from(ticks, window)}u",
             f"#define REPLAY_REPORT_EVERY {REPORT_EVERY}u",
             f"#define replay_config {name}_config",
             "",

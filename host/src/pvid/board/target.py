@@ -23,7 +23,6 @@ from pvid.base import subprocesses as child
 from pvid.base.errors import PvidError
 from pvid.board.boards import BOARDS, Board
 from pvid.board.stream_image import Streamed, build_image, settings_number
-from pvid.board.stream_rig import StreamRig
 from pvid.core.native import Native
 from pvid.link.frames import (
     Code,
@@ -49,7 +48,7 @@ _COMING_UP_S = 20.0  # longest wait for an emulator's first word: it always has 
 
 
 class PlayedBoard(Streamed, Protocol):
-    """A board with the engine of a described mechanism, for which a run can be played."""
+    """A board for which a run can be played."""
 
     def readings(self, *signals: npt.ArrayLike) -> npt.NDArray[Any]:
         """The signals [ticks] as the identifier takes them [ticks, samples]."""
@@ -59,9 +58,6 @@ class PlayedBoard(Streamed, Protocol):
 
     def hashes(self, native: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the core on this machine [ticks]."""
-
-
-Played = StreamRig | PlayedBoard
 
 
 class PortGoneError(Exception):
@@ -96,7 +92,7 @@ class Target:
             self.process.wait()
 
 
-def open_target(name: str, rig: StreamRig | Streamed, wrap: Callable[[Port], Port] = lambda port: port) -> Target:
+def open_target(name: str, rig: Streamed, wrap: Callable[[Port], Port] = lambda port: port) -> Target:
     """Starts the emulator of that name with the image for `rig`, or opens a port.
 
     Parameters
@@ -228,7 +224,7 @@ class Player:
     def __init__(
         self,
         target: Target,
-        rig: Played,
+        rig: PlayedBoard,
         signals: tuple[npt.ArrayLike, ...],
         hash_every: int,
         estimate_every: int,
@@ -424,7 +420,7 @@ def refusal(status: BoardStatus) -> str:
 
 def play(
     target: Target,
-    rig: Played,
+    rig: PlayedBoard,
     *signals: npt.ArrayLike,
     hash_every: int = 500,
     estimate_every: int = 0,
@@ -518,7 +514,7 @@ def targets_of(names: tuple[str, ...]) -> list[str]:
 
 def verify(
     name: str,
-    rig: Played,
+    rig: PlayedBoard,
     native: Native,
     *signals: npt.ArrayLike,
     progress: Callable[[int], None] | None = None,

@@ -15,7 +15,6 @@ from pvid.base.console import DIFFERENT, DONE, write_stderr
 from pvid.base.errors import PvidError
 from pvid.base.toml_text import toml_document
 from pvid.board.stream_image import settings_number
-from pvid.board.stream_rig import StreamRig, stream_rig
 from pvid.board.target import EMULATORS, HOST_TARGET, open_target
 from pvid.cli.log_text import record_text
 from pvid.link.frames import Configuration, Source
@@ -30,9 +29,10 @@ from pvid.log.values import UNKNOWN_RIG
 from pvid.models.model import Mechanism
 from pvid.models.registry import names
 from pvid.rig.columns import parsed
-from pvid.rig.file import RigFile, is_strong, load, parsed_file
-from pvid.rig.mechanism_file import channels_of
-from pvid.rig.run import is_run, read_recording
+from pvid.rig.mechanism_file import MechanismRig, channels_of
+from pvid.rig.run import Recording, is_run, read_recording
+from pvid.settings.cores import FLOAT
+from pvid.settings.forms import FORMS
 from pvid.show.page import DEFAULT as LIVE_PAGE
 from pvid.show.page import is_local, page
 from pvid.show.view import LiveView
@@ -40,6 +40,9 @@ from pvid.show.view import LiveView
 if TYPE_CHECKING:
     from pvid.board.mechanism_board import MechanismBoard
     from pvid.board.mechanism_board_q31 import MechanismBoardQ31
+    from pvid.board.strong_board import StrongBoard
+
+    Board = MechanismBoard | MechanismBoardQ31 | StrongBoard
 
 
 @click.command(name="log")
@@ -62,7 +65,14 @@ if TYPE_CHECKING:
     type=click.Choice(("f32", "q31")),
     default="f32",
     show_default=True,
-    help="Arithmetic of the weak form.",
+    help="Arithmetic.",
+)
+@click.option(
+    "--form",
+    type=click.Choice(tuple(FORMS)),
+    default="weak",
+    show_default=True,
+    help="Form of the identifier; strong: in float32, from derivatives of the signals.",
 )
 @click.option(
     "--refine",
@@ -104,6 +114,7 @@ def command(
     model: str | None,
     run_path: Path | None,
     core: str,
+    form: str,
     refine: bool,
     append: bool,
     restart: bool,
@@ -133,7 +144,8 @@ def command(
     emulated = port in (HOST_TARGET, *EMULATORS)
     if is_run(out):
         frames_only = {
-            "--rig": rig_path, "--model": model, "--run": run_path, "--core": core != "f32", "--refine": refine,
+            "--rig": rig_path, "--model": model, "--run": run_path, "--core": core != "f32",
+            "--form": form != "weak", "--refine": refine,
             "--append": append, "--restart": restart, "--paced": paced, "--live": live, "--web": web,
             port: emulated,
         }  # fmt: skip
@@ -147,16 +159,10 @@ def command(
         for needed, given in (("an emulated board", emulated), ("--restart", restart), ("--refine", refine)):
             if given:
                 raise PvidError(f"{needed} needs a mechanism: name it with --model, or its rig file with --rig")
-    strong = load(rig_path) if rig_path is not None and is_strong(parsed_file(rig_path, toml_document)) else None
-    board: StreamRig | MechanismBoard | MechanismBoardQ31 | None
-    text: str | None
-    if strong is not None:
-        board, text = _strong_board(strong, refine), strong.text()
-    else:
-        board = own = _board(rig_path, model, run_path, core, refine)
-        text = None if own is None else own.text()
-        if own is not None and emulated and samples is None:
-            samples = len(own.recording)
+    board = _board(rig_path, model, run_path, core, form, refine)
+    text = None if board is None else board.text()
+    if board is not None and emulated and samples is None:
+        samples = len(board.recording)
     if append:
         refuse_to_append(out, text)
     source = Source.SENSOR_PACED if paced else Source.SENSOR
@@ -203,38 +209,44 @@ def _view(title: str, mechanism: Mechanism, address: str) -> Observer:
 
 
 def _board(
-    rig_path: Path | None, model: str | None, run_path: Path | None, core: str, refine: bool
-) -> MechanismBoard | MechanismBoardQ31 | None:
-    """The board of a mechanism by the weak form; None: none is named."""
+    rig_path: Path | None, model: str | None, run_path: Path | None, core: str, form: str, refine: bool
+) -> Board | None:
+    """The board of a mechanism; None: none is named."""
     if rig_path is None and model is None and run_path is None:
         return None
     from pvid.board.mechanism_board import BOARDS, MechanismBoard, board_of_guess, refuse_unrefined  # loads SymPy
 
     if refine:
         refuse_unrefined(core)
+    if form == "strong":
+        if refine or core != FLOAT.name:
+            raise PvidError("--form strong is in float32 without a second stage: omit --core and --refine")
+        return _strong_board(rig_path, model, run_path)
     if rig_path is None and run_path is None and model in names():
         return MechanismBoard.of_shipped_rig(model, refined=True) if refine else BOARDS[core].of_shipped_rig(model)
     rig = rig_of(run_path, rig_path, (), model)
     if run_path is None:
         return board_of_guess(rig, core, refine)
-    recording = read_recording(run_path, rig.sample_rate, parsed(None, channels_of(rig.compiled())))
+    recording = _recording(run_path, rig)
     if refine:
         return MechanismBoard.of_recording(rig, recording, refined=True)
     return BOARDS[core].of_recording(rig, recording)
 
 
-def _strong_board(rig: RigFile, refine: bool) -> StreamRig:
-    """The board of a rig file that asks for the pendulum's strong form."""
-    if refine:
-        raise PvidError("--refine is behind the weak form: the rig file has form strong")
-    if rig.sample_rate is None:
-        raise PvidError("sample_rate is required in the rig file: the board samples on its own clock")
-    return stream_rig(rig, rig.sample_rate)
+def _recording(run_path: Path, rig: MechanismRig) -> Recording:
+    return read_recording(run_path, rig.sample_rate, parsed(None, channels_of(rig.compiled())))
 
 
-def _configurations(
-    board: StreamRig | MechanismBoard | MechanismBoardQ31, source: Source
-) -> Callable[[], Configuration]:
+def _strong_board(rig_path: Path | None, model: str | None, run_path: Path | None) -> StrongBoard:
+    from pvid.board.strong_board import StrongBoard
+
+    if rig_path is None and run_path is None and model in names():
+        return StrongBoard.of_shipped_rig(model)
+    rig = rig_of(run_path, rig_path, (), model)
+    return StrongBoard.of_guess(rig) if run_path is None else StrongBoard.of_recording(rig, _recording(run_path, rig))
+
+
+def _configurations(board: Board, source: Source) -> Callable[[], Configuration]:
     """Makes configurations with an estimate and a hash ten times a second."""
     settings = settings_number(board)
     every = max(1, min(65535, round(board.sample_rate / 10)))

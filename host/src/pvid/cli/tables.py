@@ -1,79 +1,34 @@
-"""`pvid tables` and `pvid schema`: C headers of the strong form and of the link, printed or checked."""
+"""`pvid tables` and `pvid schema`: C headers of derivative filters and of the link, printed or checked."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
-from pvid.base.console import DIFFERENT, DONE, write_stderr
+from pvid.base.console import DIFFERENT, DONE
 from pvid.base.errors import PvidError
-from pvid.cases import CASES
 from pvid.design.c_tables import bank_header
 from pvid.design.fir import finite_difference, savitzky_golay
-from pvid.rig.file import load
-from pvid.settings.forms import FORMS
-
-_NAMES = {"strong": "strong_config", "fir": "fir_bank"}
-_FIR = {"points": 241, "degree": 12, "difference": False, "stride": 1, "block": 1}
 
 
 @click.command(name="tables")
-@click.option(
-    "--form", type=click.Choice([*FORMS, "fir"]), default="strong", show_default=True, help="Form of the tables."
-)
-@click.option("--core", type=click.Choice(["f32", "q31"]), help="Arithmetic.  [default: f32]")
-@click.option("--rig", "rig_path", type=click.Path(path_type=Path), help="The rig file (TOML); strong only.")
-@click.option("--name", help="Name in C.  [default: strong_config, fir_bank]")
+@click.option("--form", type=click.Choice(["fir"]), default="fir", help="A bank of derivative filters.")
+@click.option("--name", default="fir_bank", show_default=True, help="Name in C.")
 @click.option("--check", type=click.Path(path_type=Path), help="Compare this file with the output instead of printing.")
-@click.option("--points", type=int, help="fir: points of the Savitzky-Golay window, odd.  [default: 241]")
-@click.option("--degree", type=int, help="fir: degree of its polynomial, 4 to 12.  [default: 12]")
-@click.option("--difference", is_flag=True, default=None, help="fir: five-point central differences instead.")
-@click.option("--stride", type=int, help="fir: points from tap to tap.  [default: 1]")
-@click.option("--block", type=int, help="fir: samples whose mean is a point, odd.  [default: 1]")
-def command(
-    form: str,
-    core: str | None,
-    rig_path: Path | None,
-    name: str | None,
-    check: Path | None,
-    **fir: Any,
-) -> int:
-    """Prints a header for the C core.
+@click.option("--points", type=int, default=241, show_default=True, help="Points of the Savitzky-Golay window, odd.")
+@click.option("--degree", type=int, default=12, show_default=True, help="Degree of its polynomial, 4 to 12.")
+@click.option("--difference", is_flag=True, help="Five-point central differences instead.")
+@click.option("--stride", type=int, default=1, show_default=True, help="Points from tap to tap.")
+@click.option("--block", type=int, default=1, show_default=True, help="Samples whose mean is a point, odd.")
+def command(form: str, name: str, check: Path | None, **fir: Any) -> int:
+    """Prints a header with a bank of derivative filters (pvid_fir_bank_f32) for the C core.
 
-    strong: the whole configuration for init, with its tables. fir: a bank of derivative filters for a configuration of
-    the strong form in float32 that is written by hand (pvid_fir_bank_f32). The weak form's are printed by `pvid model
-    build`.
-
-    For q31 the bits to spare at full scale are printed on standard error.
+    `pvid model build --strong --run RUN` chooses the bank of a rig and prints the whole configuration; this command is
+    for a bank of your own.
     """
-    if form not in _NAMES:
-        raise PvidError("the weak form's configuration is printed by `pvid model build kapitza --rig RIG -o FOLDER`")
-    name = name or _NAMES[form]
-    if form == "fir":
-        if rig_path is not None:
-            raise PvidError("--form fir does not depend on a rig: omit --rig")
-        if core == "q31":
-            raise PvidError("--form fir has float32 filters only: the fixed-point bank is part of --form strong")
-        given = {key: value for key, value in fir.items() if value is not None}
-        return _print_header(_fir(name, **{**_FIR, **given}), check)
-    if any(value is not None for value in fir.values()):
-        raise PvidError("--points, --degree, --difference, --stride and --block are for --form fir")
-    if rig_path is None:
-        raise PvidError(f"--form {form} needs --rig FILE")
-    core = core or "f32"
-    rig = load(rig_path)
-    rig = replace(rig, identifier=replace(rig.identifier, form=form, core=core))  # type: ignore[arg-type]
-    made_by = f"pvid tables --form {form} --core {core} --rig {rig_path.name}"
-    if rig.sample_rate is None:
-        raise PvidError(f"{rig_path}: sample_rate is required to compute the tables")
-    case = CASES[form, core]
-    config: Any = case.settings(rig, rig.sample_rate)
-    for fact in case.facts(config):
-        write_stderr(fact)
-    return _print_header(case.header(config, rig.l1, name, f"{made_by} --name {name}"), check)
+    return _print_header(_fir(name, **fir), check)
 
 
 @click.command(name="schema")

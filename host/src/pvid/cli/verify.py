@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import click
 
 from pvid.base.console import DIFFERENT, DONE, NOTHING_IDENTIFIED, progress_bar
-from pvid.base.toml_text import toml_document
 from pvid.cli.input import log_argument, log_rig
-from pvid.link.frames import Core
+from pvid.link.frames import Core, Form
 from pvid.log.reader import LogReader
-from pvid.log.rig import engine_text_of_log, hello_of_log, rig_of_log
+from pvid.log.rig import engine_text_of_log, hello_of_log
 from pvid.log.rig_choice import rig_of
-from pvid.rig.file import RigFile, is_strong, load, parsed_file
 
 if TYPE_CHECKING:
     from pvid.log.verify import EngineBoard
@@ -23,19 +21,17 @@ if TYPE_CHECKING:
 _MOST_STRETCHES = 100  # that are printed
 
 
-def _rig_of(log: Path, rig_path: Path | None, model: str | None) -> RigFile | EngineBoard | None:
-    """Of the strong form the rig file; of the weak form the board, whose settings are in the log or follow from the
-    rig file."""
-    text = None if rig_path is not None else engine_text_of_log(log)
-    if text is None and rig_path is None:
-        return rig_of_log(log)
-    if rig_path is not None and is_strong(parsed_file(rig_path, toml_document)):
-        return load(rig_path)
+def _board_of(log: Path, rig_path: Path | None, model: str | None) -> EngineBoard | None:
+    """The board, whose settings are in the log or follow from the rig file; None: there is neither."""
     from pvid.board.mechanism_board import board_of, board_of_guess  # loads SymPy
 
+    text = None if rig_path is not None else engine_text_of_log(log)
     if text is not None:
         return board_of(text, model)
-    rig, hello = rig_of(None, rig_path, (), model), hello_of_log(log)
+    hello = hello_of_log(log)
+    if rig_path is None or (hello is not None and hello.form == Form.STRONG):
+        return None
+    rig = rig_of(None, rig_path, (), model)
     rate = rig.sample_rate or (None if hello is None else hello.sample_rate)
     core = "q31" if hello is not None and hello.core == Core.Q31 else "f32"
     return board_of_guess(replace(rig, sample_rate=rate), core)
@@ -57,11 +53,11 @@ def command(log: Path, rig_path: Path | None, model: str | None, partial: bool) 
     """
     from pvid.log.verify import Verdict, Verifier  # the twins, which other commands do not need
 
-    rig = _rig_of(log, rig_path, model)
+    board = _board_of(log, rig_path, model)
     reader = LogReader(log)
     verdict = Verdict()
     with progress_bar("verifying", None) as advance:
-        for stretch in Verifier(rig, advance).stretches(reader):
+        for stretch in Verifier(board, advance).stretches(reader):
             if verdict.stretches < _MOST_STRETCHES or stretch.difference is not None:
                 click.echo(stretch.text)
             verdict.add(stretch)

@@ -8,16 +8,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.base.errors import PvidError
 from pvid.codegen import files_strong
 from pvid.codegen.strong import StrongFunctions
+from pvid.core.refusals import refused
 from pvid.core.sizes import raised
 from pvid.core.sources import PUBLIC_FOLDERS, SRC, source
+from pvid.settings.enums import Status
 from pvid.settings.record import Record
 from pvid.settings.strong import StrongModelConfig
+from pvid.twin import fnv
 from pvid.twin.printer.program import printed_module
 from pvid.twin.printer.values import filled
 
-_CORE = ("differentiator_f32", "elementary_f32", "finite_f32", "fnv", "gate_f32", "misfit_f32", "settings_f32")
+_CORE = (
+    *("assess_f32", "cholesky_f32", "differentiator_f32", "elementary_f32", "finite_f32"),
+    *("fnv", "gate_f32", "misfit_f32", "settings_f32"),
+)
 _MADE_BY = "the twin"
 _LAYOUT = """\
 #include "pvid/layout.h"
@@ -30,7 +37,17 @@ uint32_t pvid_layout(void)
 
 
 class StrongModelTwin:
-    """The strong form of a model in numpy, in the state after its init."""
+    """The strong form of a model in numpy, in the state after its init.
+
+    Attributes
+    ----------
+    samples, n_p : numbers of signals and of parameters
+    reach : ticks from a sample until the identifier has processed it completely, at most
+    running_hash : FNV-1a after the last tick
+    refinement : None: the strong form has no second stage
+    """
+
+    refinement = None
 
     def __init__(self, strong: StrongFunctions, config: StrongModelConfig) -> None:
         self._name = strong.functions.name
@@ -39,19 +56,23 @@ class StrongModelTwin:
             [source(f"{one}.c") for one in _CORE],
             [*PUBLIC_FOLDERS, SRC],
             {name: str(value) for name, value in raised(sizes).items()},
-            [f"{self._name}_{verb}_f32" for verb in ("init_layout", "step", "read_sums")],
+            [f"{self._name}_{verb}_f32" for verb in ("init_layout", "step", "read_sums", "assess")],
             {**files_strong.files_of(strong, _MADE_BY), "layout.c": _LAYOUT},
         )
         self._config = filled(self._module, f"{self._name}_config_f32", config)
         self._state = getattr(self._module, f"{self._name}_f32")()
         status = self._function("init_layout")(self._state, self._config, self._module.pvid_layout())
-        assert status == 0, status
+        if status != Status.OK:
+            raise PvidError(refused(Status(status), config))
+        self.samples, self.n_p = len(strong.signals), len(strong.functions.model.unknowns)
+        self.reach = config.window + config.block * config.estimator.divider
+        self.running_hash = fnv.START
 
     def _function(self, verb: str) -> Any:
         return getattr(self._module, f"{self._name}_{verb}_f32")
 
     def run(self, samples: npt.ArrayLike, progress: Callable[[int], None] | None = None) -> Record:
-        """Steps through a run [ticks, signals] from its first sample: p, sums and reason after every tick."""
+        """Steps through samples [ticks, signals]: p, sums, reason and running hash after every tick."""
         given = np.asarray(samples, np.float32)
         step, read = self._function("step"), self._function("read_sums")
         estimator = self._state.estimator
@@ -65,4 +86,21 @@ class StrongModelTwin:
                 p[tick], all_sums[tick] = estimator.p, sums
                 if progress is not None:
                     progress(1)
-        return Record(p=p, sums=all_sums, reason=reasons)
+        record = Record(p=p, sums=all_sums, reason=reasons)
+        record.hash = fnv.running_hashes(record, self.running_hash)
+        self.running_hash = int(record.hash[-1]) if ticks else self.running_hash
+        return record
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """pvid_counters by name."""
+        counters = self._state.estimator.counters
+        return {name: int(getattr(counters, name)) for name in type(counters).__slots__}
+
+    @property
+    def estimate(self) -> Any:
+        """The present estimate with its standard errors: pvid_estimate_f32 as printed."""
+        estimate = self._module.pvid_estimate_f32()
+        with np.errstate(all="ignore"):
+            self._function("assess")(self._state, estimate)
+        return estimate

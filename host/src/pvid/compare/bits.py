@@ -6,25 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from pvid.cases import case_of
-from pvid.core.native import Native
-from pvid.models.registry import DEFAULT, MODELS
-from pvid.settings.kinds import Settings
 from pvid.settings.record import Record
-from pvid.twin import fnv
-
-P_NAMES = MODELS[DEFAULT].p_names  # the library holds one mechanism
-
-# The float strong form stores equal moments once: number of its sums, moments and entries of B.
-_SHARED_MOMENTS = {58: (45, 11)}
 
 
 def _layout(n_sums: int) -> tuple[int, int]:
     """Number of moments and of entries of B, or b, among the sums."""
-    own = ((n * (n + 1) // 2, n) for n in range(1, 13) if n * (n + 1) // 2 + n + 2 == n_sums)
-    return _SHARED_MOMENTS.get(n_sums) or next(own)
+    return next((n * (n + 1) // 2, n) for n in range(1, 13) if n * (n + 1) // 2 + n + 2 == n_sums)
 
 
 def sum_name(index: int, n_sums: int, layout: tuple[int, int] | None = None) -> str:
@@ -74,7 +62,7 @@ class Comparison:
 def first_difference(
     core: Record,
     twin: Record,
-    p_names: Sequence[str] = P_NAMES,
+    p_names: Sequence[str],
     moments: int = 0,
     layout: tuple[int, int] | None = None,
 ) -> Difference | None:
@@ -105,26 +93,3 @@ def first_difference(
         return None
     tick, _, variable, core_word, twin_word = min(found)
     return Difference(tick, variable, core_word, twin_word, written="d" if core.is_fixed else "08x")
-
-
-def compare_run(
-    native: Native,
-    config: Settings,
-    phi: npt.ArrayLike,
-    y: npt.ArrayLike,
-    progress: Callable[[int], None] | None = None,
-) -> Comparison:
-    """Runs phi [rad], y [m], or counts, through the core and the twin of a configuration and compares every tick.
-
-    Cost: about 0.5 ms a tick in the strong form, which solves at every tick, 0.01 ms in the weak form.
-    """
-    identifier = native.identifier(config)
-    twin = case_of(config).twin(config).run(phi, y, progress=progress).lane()
-    record = identifier.run(phi, y)
-    hashes = fnv.running_hashes(twin)
-    return Comparison(
-        ticks=len(record.reason),
-        core_hash=identifier.running_hash,
-        twin_hash=int(hashes[-1]) if len(hashes) else fnv.START,
-        difference=first_difference(record, twin),
-    )

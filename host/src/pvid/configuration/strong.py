@@ -35,6 +35,7 @@ _LEAST_DEGREE = 6
 _STIFFER = 2  # degrees more, where the least degree leaves the parameters uncertain: it follows a longer window
 _ENOUGH = 0.05  # largest error, relative
 _DIVIDER = 8  # rows from step to step; projection, solve and folding at rows of their own
+_FIVE_POINTS = (5, 4)  # taps and degree
 _FLOOR = 1e-12  # of the residuals of a kind, relative to its Y
 
 
@@ -99,10 +100,32 @@ def strong_design(model: CompiledModel, recording: Recording, law: Law = Law.STA
             break
     if best is None:
         raise PvidError(f"{len(recording)} samples are too few for derivatives of order {oracle.order}")
+    return _designed(strong, oracle, recording, best, law)
+
+
+def five_point_design(model: CompiledModel, recording: Recording) -> StrongDesign:
+    """The same with central differences of five points, for a recording whose noise they bear: no ring is shorter.
+
+    Raises
+    ------
+    PvidError
+        As `strong_design`.
+    """
+    strong = renamed(strong_functions_of(strong_form(model)))
+    oracle = StrongModel(model)
+    rows = oracle.rows(recording.signals, recording.sample_rate, StrongSettings(*_FIVE_POINTS, 1))
+    p, weights = all_rows(oracle.parameters, rows, oracle.parameters.checked(None))
+    noise = standard_errors(oracle.parameters, rows, p, weights, _FIVE_POINTS[0])
+    return _designed(strong, oracle, recording, Fitted(*_FIVE_POINTS, p, noise, np.zeros_like(p)), Law.STATIONARY)
+
+
+def _designed(
+    strong: StrongFunctions, oracle: StrongModel, recording: Recording, fitted: Fitted, law: Law
+) -> StrongDesign:
     samples = np.stack([np.asarray(recording.signals[one.name], np.float32) for one in strong.signals], axis=1)
-    sd = _residual_sd(oracle, recording, best)
-    config = _config(oracle.parameters, recording.sample_rate, best, law, sd)
-    return StrongDesign(strong, config, best, samples)
+    sd = _residual_sd(oracle, recording, fitted)
+    config = _config(oracle.parameters, recording.sample_rate, fitted, law, sd)
+    return StrongDesign(strong, config, fitted, samples)
 
 
 def _fits(oracle: StrongModel, recording: Recording, degree: int) -> Iterator[Fitted]:

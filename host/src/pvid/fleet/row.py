@@ -16,7 +16,7 @@ from pvid.base.wording import reason
 from pvid.board.mechanism_board import board_of
 from pvid.log.file import Segment
 from pvid.log.reader import LogReader
-from pvid.log.rig import LOG_SUFFIX, engine_text_of_log, hello_of_log, rig_of_log
+from pvid.log.rig import LOG_SUFFIX, engine_text_of_log, hello_of_log
 from pvid.log.verify import Verdict, Verifier
 
 _PIECE = 1 << 20
@@ -176,8 +176,8 @@ def _verified(path: Path, model: str | None) -> str:
     verdict, first = Verdict(), ""
     try:
         text = engine_text_of_log(path)
-        rig = rig_of_log(path) if text is None else board_of(text, model)
-        for stretch in Verifier(rig).stretches(LogReader(path)):
+        board = None if text is None else board_of(text, model)
+        for stretch in Verifier(board).stretches(LogReader(path)):
             verdict.add(stretch)
             if not first and (stretch.difference is not None or stretch.why_not is not None):
                 first = stretch.text

@@ -22,28 +22,16 @@ from pvid.log.values import UNKNOWN_RIG, Values, is_rate
 from pvid.models.model import Mechanism
 from pvid.models.registry import MODELS, shipped
 from pvid.rig.columns import Columns
-from pvid.rig.file import RigFile, parsed_file, without_former_keys
 from pvid.rig.former import mechanism_of_former
+from pvid.rig.mechanism_file import parsed_file
 from pvid.rig.run import MIN_ROWS, Recording
 
 LOG_SUFFIX = ".pvlog"
 _LARGEST = 1e6  # [rad], [m]: no sensor of a rig reads more
 
 
-def rig_of_log(path: Path) -> RigFile | None:
-    """The pendulum's rig file in a log of the strong form; None when the logger was given none.
-
-    Raises
-    ------
-    PvidError
-        When the log cannot be read, or the rig file in it is none.
-    """
-    text = _text_of_log(path)
-    return None if text is None else RigFile.of_document(without_former_keys(toml_document(text)))
-
-
 def engine_text_of_log(path: Path) -> str | None:
-    """The rig of a log with the settings of the weak engine (board.mechanism_board); None: the log has none.
+    """The rig of a log with the settings of its identifier (board.mechanism_board); None: the log has none.
 
     Raises
     ------
@@ -63,7 +51,7 @@ def _text_of_log(path: Path) -> str | None:
 
 
 def is_engine_text(text: str) -> bool:
-    """Whether the rig of a log has the settings of the weak engine."""
+    """Whether the rig of a log has the settings of its identifier."""
     try:
         return isinstance(toml_document(text).get("engine"), dict)
     except PvidError:

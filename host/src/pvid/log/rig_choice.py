@@ -16,9 +16,8 @@ from pvid.models.mechanisms import compiled_of
 from pvid.models.mechanisms import described as description_of
 from pvid.models.registry import asked_for, is_named, names, shipped
 from pvid.rig.columns import Columns, MissingColumnError, parsed
-from pvid.rig.file import parsed_file, rig_path_of
 from pvid.rig.former import translated
-from pvid.rig.mechanism_file import MechanismRig, channels_of, with_settings
+from pvid.rig.mechanism_file import MechanismRig, channels_of, parsed_file, rig_path_of, with_settings
 from pvid.rig.run import is_run, read_recording
 
 

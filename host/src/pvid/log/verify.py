@@ -22,10 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import StreamImage, settings_number
-from pvid.board.stream_rig import stream_rig
-from pvid.cases import case_of
-from pvid.compare.bits import P_NAMES, Difference
+from pvid.board.stream_image import StreamImage
+from pvid.compare.bits import Difference
 from pvid.link.frames import (
     MAX_P,
     Configuration,
@@ -34,26 +32,45 @@ from pvid.link.frames import (
     Credit,
     Estimate,
     EstimateQ31,
+    Form,
     Hash,
-    Hello,
     Loss,
     Raw,
     RawCount,
     RefinedEstimate,
 )
 from pvid.log.reader import Gap, Record, Restart
-from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason
-from pvid.settings.kinds import Settings
-from pvid.settings.record import HASHED_TYPES
+from pvid.settings.record import Record as Steps
 from pvid.twin import fnv
 from pvid.twin.printed import PrintedTwin
 
 Check = Estimate | EstimateQ31 | RefinedEstimate | Hash | Credit
 
 
+class EngineTwin(Protocol):
+    """PrintedTwin of the weak form, or StrongModelTwin of the strong form."""
+
+    samples: int  # of a tick
+    reach: int
+    running_hash: int
+    refinement: Any
+
+    @property
+    def n_p(self) -> int: ...
+
+    @property
+    def estimate(self) -> Any: ...
+
+    @property
+    def counters(self) -> Mapping[str, int]: ...
+
+    def run(self, samples: npt.NDArray[Any]) -> Steps:
+        """Goes on over samples [ticks, samples]."""
+
+
 class EngineBoard(Protocol):
-    """A board that identifies by the weak engine: MechanismBoard of pvid.board, and that in fixed point."""
+    """A board of pvid.board: by the weak form, in fixed point too, or by the strong form."""
 
     @property
     def stream_image(self) -> StreamImage: ...
@@ -64,7 +81,7 @@ class EngineBoard(Protocol):
     @property
     def matrix(self) -> str: ...
 
-    def twin_of(self, frame: Configuration) -> PrintedTwin: ...
+    def twin_of(self, frame: Configuration) -> EngineTwin: ...
 
 
 _CONFIGURATIONS = 8  # of the latest sessions; older ones are forgotten
@@ -202,23 +219,21 @@ class Verifier:
 
     Parameters
     ----------
-    rig
-        The board's rig file of the strong form, or its board with the weak engine; None: nothing can be verified.
+    board
+        What sent the log; None: nothing can be verified.
     progress
         Called with the number of ticks computed so far.
 
     Memory: the samples of the longest stretch.
     """
 
-    def __init__(self, rig: RigFile | EngineBoard | None, progress: Callable[[int], None] | None = None) -> None:
-        self.rig = rig
+    def __init__(self, board: EngineBoard | None, progress: Callable[[int], None] | None = None) -> None:
+        self.board = board
         self._progress = progress
         self._done = 0
-        self._hello: Hello | None = None
         self._configurations: dict[int, Configure | ConfigureQ31] = {}
         self._open: _Open | None = None
         self._before: tuple[int, int] | None = None  # segment and tick where the last samples ended
-        self._settings: dict[float, tuple[Settings, int]] = {}
         self._number: int | None = None  # of the board's image
 
     def stretches(self, records: Iterable[Record]) -> Iterator[Stretch]:
@@ -229,8 +244,6 @@ class Verifier:
 
     def _take(self, record: Record) -> Iterator[Stretch]:
         match record.item:
-            case Hello() as hello:
-                self._hello = hello
             case Configure() | ConfigureQ31() as configuration:
                 self._configurations.pop(configuration.session, None)
                 self._configurations[configuration.session] = configuration
@@ -333,10 +346,10 @@ class Verifier:
 
     def _is_of_another_image(self, configuration: Configuration) -> bool:
         """Whether bits may differ because this version, with the log's settings, makes another image of the engine."""
-        if self.rig is None or isinstance(self.rig, RigFile):
+        if self.board is None:
             return False
         if self._number is None:
-            self._number = self.rig.stream_image.number
+            self._number = self.board.stream_image.number
         return configuration.settings != self._number
 
     def _count(self, ticks: int) -> None:
@@ -346,27 +359,12 @@ class Verifier:
 
     def _twin(self, configuration: Configuration) -> tuple[_Twin, tuple[str, ...]]:
         """The twin with the values of the configuration, and the names of p."""
-        if self.rig is None:
-            raise PvidError("the log holds no rig file: name it with --rig")
-        if isinstance(self.rig, RigFile):
-            return _StrongTwin(self._config(self.rig, configuration)), P_NAMES
-        twin = self.rig.twin_of(configuration)
-        return _EngineTwin(twin, self.rig.matrix, getattr(self.rig, "shown", ())), self.rig.p_names
-
-    def _config(self, rig: RigFile, configuration: Configuration) -> Settings:
-        """The identifier's settings: those of the rig file, with the values of the configuration."""
-        if rig.identifier.form_traits.publishes:
-            raise PvidError("the log has no settings of the weak engine: a version before it recorded the log")
-        if self._hello is None:
-            raise PvidError("the board has not sent its identity (a Hello frame)")
-        rate = float(self._hello.sample_rate)
-        if rate not in self._settings:
-            board = stream_rig(rig, rig.sample_rate or rate)
-            self._settings[rate] = (board.config, settings_number(board))
-        config, number = self._settings[rate]
-        if configuration.settings != number:
-            raise PvidError("the board's image was made for other settings than the rig file's")
-        return case_of(config).configured(config, configuration)
+        board = self.board
+        if board is None and configuration.form == Form.STRONG:
+            raise PvidError("version 0.1 verifies logs of its own strong form; export and identify read them")
+        if board is None:
+            raise PvidError("the log holds no settings of an identifier: name its rig file with --rig")
+        return _Twin(board.twin_of(configuration), board.matrix, getattr(board, "shown", ())), board.p_names
 
 
 def _pace(configuration: Configuration) -> int:
@@ -376,32 +374,6 @@ def _pace(configuration: Configuration) -> int:
 
 # Called after a tick that is checked: the tick, its reason, the last reason that reports something, the running hash.
 _After = Callable[[int, int, int, int], None]
-
-
-class _Twin(Protocol):
-    """An identifier that computes a stretch again."""
-
-    samples: int  # of a tick
-    reach: int
-    matrix: str  # of an estimate
-
-    def follow(
-        self, samples: npt.NDArray[Any], ticks: Sequence[int], after: _After, count: Callable[[int], None]
-    ) -> None:
-        """Steps through samples [ticks, samples] up to the last one of `ticks`; calls `after` after each of them, and
-        `count` with the number of ticks since its last call."""
-
-    def estimate(self) -> Mapping[str, Any]:
-        """What the board says at present."""
-
-    @property
-    def n_p(self) -> int: ...
-
-    @property
-    def updates(self) -> int: ...
-
-    def refined(self) -> _Refined | None:
-        """The estimates of the second stage at the last tick; None: there is no second stage."""
 
 
 @dataclass(frozen=True)
@@ -414,68 +386,23 @@ class _Refined:
     told: int
 
 
-class _StrongTwin:
-    """The strong form, in the rig file's core."""
-
-    samples = 2
-
-    def __init__(self, config: Settings) -> None:
-        case = case_of(config)
-        self._twin = case.twin(config)
-        self.matrix = case.matrix
-        self.reach, self._estimator = self._twin.reach, self._twin.estimator
-        self.n_p = len(self._estimator.p)
-
-    def follow(
-        self, samples: npt.NDArray[Any], ticks: Sequence[int], after: _After, count: Callable[[int], None]
-    ) -> None:
-        running, verdict, wanted = fnv.START, int(Reason.WARMING_UP), set(ticks)
-
-        def each(tick: int, reasons: npt.NDArray[np.uint8]) -> None:
-            nonlocal running, verdict
-            reason = int(reasons[0])
-            running = fnv.fold_bytes(running, self._state(reason))
-            verdict = verdict if reason == Reason.ACCUMULATED else reason
-            count(1)
-            if tick in wanted:
-                after(tick, reason, verdict, running)
-
-        self._twin.follow(samples[:, 0], samples[:, 1], each)
-
-    def _state(self, reason: int) -> bytes:
-        """The bytes that the hash covers, as in fnv.h."""
-        estimator, (narrow, wide) = self._estimator, HASHED_TYPES[self._estimator.p.dtype.kind]
-        state: bytes = estimator.p[:, 0].astype(narrow).tobytes() + estimator.sums[:, 0].astype(wide).tobytes()
-        if hasattr(estimator, "exponent"):  # of the sums, in fixed point
-            state += int(estimator.exponent[0]).to_bytes(4, "little")
-        return state + reason.to_bytes(4, "little")
-
-    def estimate(self) -> Any:
-        return self._estimator.assess()[0]
-
-    @property
-    def updates(self) -> int:
-        return int(self._estimator.counters["updates"][0])
-
-    def refined(self) -> None:
-        return None
-
-
-class _EngineTwin:
-    """The weak form of any mechanism, in either arithmetic, which reports what it publishes.
+class _Twin:
+    """An identifier that computes a stretch again.
 
     Parameters
     ----------
     shown : refined parameters that the board sends, with a second stage
     """
 
-    def __init__(self, twin: PrintedTwin, matrix: str, shown: Sequence[int]) -> None:
+    def __init__(self, twin: EngineTwin, matrix: str, shown: Sequence[int]) -> None:
         self._twin, self.matrix, self._shown = twin, matrix, shown
         self.samples, self.reach, self.n_p = twin.samples, twin.reach, twin.n_p
 
     def follow(
         self, samples: npt.NDArray[Any], ticks: Sequence[int], after: _After, count: Callable[[int], None]
     ) -> None:
+        """Steps through samples [ticks, samples] up to the last one of `ticks`; calls `after` after each of them, and
+        `count` with the number of ticks since its last call."""
         first, verdict, reason = 0, int(Reason.WARMING_UP), int(Reason.WARMING_UP)
         for tick in ticks:
             while first <= tick:
@@ -489,6 +416,7 @@ class _EngineTwin:
             after(tick, reason, verdict, self._twin.running_hash)
 
     def estimate(self) -> Mapping[str, Any]:
+        """What the board says at present."""
         return self._fields(self._twin.estimate)
 
     def _fields(self, estimate: Any) -> Mapping[str, Any]:
@@ -498,11 +426,13 @@ class _EngineTwin:
 
     @property
     def updates(self) -> int:
+        """Steps of p."""
         return self._twin.counters["updates"]
 
     def refined(self) -> _Refined | None:
+        """The estimates of the second stage at the last tick; None: there is no second stage."""
         twin = self._twin
-        if twin.refinement is None:
+        if not isinstance(twin, PrintedTwin) or twin.refinement is None:
             return None
         (stage, best), own, state = twin.best, twin.refined, twin.refinement
         zeros = [np.float32(0)] * len(state.linear)

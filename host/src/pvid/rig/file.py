@@ -18,21 +18,20 @@ becomes a PvidError that names it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, get_args
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.base.toml_text import MOST_BYTES, TOO_LONG, toml_document
+from pvid.base.toml_text import toml_document
 from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
+from pvid.rig.mechanism_file import parsed_file
 from pvid.settings.enums import Form
 from pvid.settings.forms import CORES, FORMS, AnyCore, CoreTraits, FormTraits
-
-_Parsed = TypeVar("_Parsed")
 
 Law = Literal["stationary", "pseudovelocity"]
 Core = AnyCore
@@ -313,40 +312,9 @@ class RigFile:
             raise PvidError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def rig_path_of(run_path: Path) -> Path:
-    """RUN.toml, beside RUN.csv or RUN.csv.gz."""
-    name = run_path.name.removesuffix(".gz")
-    return run_path.with_name(Path(name).stem + ".toml")
-
-
 def load(path: str | Path) -> RigFile:
     """Reads a rig file; PvidError names the file and the key."""
     return parsed_file(path, RigFile.parse)
-
-
-def is_strong(document: Mapping[str, Any]) -> bool:
-    """Whether a file asks for the pendulum's strong form."""
-    identifier = document.get("identifier")
-    return isinstance(identifier, Mapping) and identifier.get("form") == "strong"
-
-
-def parsed_file(path: str | Path, parse: Callable[[str], _Parsed]) -> _Parsed:
-    """What `parse` makes of a file's text; PvidError names the file, and what `parse` names."""
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise PvidError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(data) > MOST_BYTES:
-        raise PvidError(f"{path}: {TOO_LONG}")
-    try:
-        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    except ValueError as error:
-        raise PvidError(f"{path}: is not UTF-8 text") from error
-    try:
-        return parse(text)
-    except PvidError as error:
-        raise PvidError(f"{path}: {error}") from error
 
 
 _TABLES: dict[str, type] = {
@@ -369,14 +337,6 @@ _GONE = {
     **dict.fromkeys(("full_angle", "damping"), _REFINED),
     "zero": "the weak form estimates the zero of the encoder always; leave it out",
 }
-
-
-def without_former_keys(document: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables of a file that an older version wrote, as in a log, without the keys that there are no more."""
-    table = document.get("identifier")
-    if not isinstance(table, Mapping):
-        return dict(document)
-    return {**document, "identifier": {key: value for key, value in table.items() if key not in _GONE}}
 
 
 def _known(owner: type, given: Mapping[str, Any], place: str) -> dict[str, Any]:

@@ -26,15 +26,15 @@ A key that the model does not have becomes a PvidError that names it and lists t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pvid.base.atomic_write import write_whole
 from pvid.base.errors import PvidError
-from pvid.base.toml_text import NotATableError, copied, key_and_value, put, quoted, toml_document
+from pvid.base.toml_text import MOST_BYTES, TOO_LONG, NotATableError, copied, key_and_value, put, quoted, toml_document
 from pvid.base.wording import listed, shown
 from pvid.models.model import Channel
 from pvid.rig.columns import channel_of
@@ -42,6 +42,8 @@ from pvid.rig.columns import channel_of
 if TYPE_CHECKING:  # it loads SymPy
     from pvid.model.compiled import CompiledModel, Unknown
     from pvid.model.description import Model as Description
+
+_Read = TypeVar("_Read")
 
 _OF_AN_INPUT = ("gain_sd", "reach")
 OF_A_SENSOR = ("resolution", "noise", "gain_sd", "neglected", "delay", "reach")
@@ -226,6 +228,31 @@ class MechanismRig:
             typed = " ".join(f"--set known.{one.name}={one.value:g}" for one in lacking)
             names = listed(f"{one.name} [{one.unit}]" if one.unit else one.name for one in lacking)
             raise PvidError(f"{names} of the rig is missing: use {typed} with the value of your rig")
+
+
+def rig_path_of(run_path: Path) -> Path:
+    """RUN.toml, beside RUN.csv or RUN.csv.gz."""
+    name = run_path.name.removesuffix(".gz")
+    return run_path.with_name(Path(name).stem + ".toml")
+
+
+def parsed_file(path: str | Path, parse: Callable[[str], _Read]) -> _Read:
+    """What `parse` makes of a file's text; PvidError names the file, and what `parse` names."""
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise PvidError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(data) > MOST_BYTES:
+        raise PvidError(f"{path}: {TOO_LONG}")
+    try:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except ValueError as error:
+        raise PvidError(f"{path}: is not UTF-8 text") from error
+    try:
+        return parse(text)
+    except PvidError as error:
+        raise PvidError(f"{path}: {error}") from error
 
 
 def channels_of(model: CompiledModel | Description) -> tuple[Channel, ...]:

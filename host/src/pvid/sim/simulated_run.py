@@ -18,8 +18,7 @@ from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.evaluation import numpy_function
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import Servo, SimulatedRig, simulated_rig
-from pvid.rig.file import rig_path_of
-from pvid.rig.mechanism_file import MechanismRig, channels_of
+from pvid.rig.mechanism_file import MechanismRig, channels_of, rig_path_of
 from pvid.rig.run import Recording, write_recording
 from pvid.sim.drives import drive_named
 from pvid.sim.imperfections import Imperfections, disturbance, eccentric, with_play

@@ -1,7 +1,8 @@
+/* The printed strong form of any mechanism; STREAM_NAME(verb) is NAME_strong_<verb>_f32. */
 #include "frames_f32.h"
 #include "identifier.h"
+#include "pvid/arithmetic.h"
 #include "pvid/little_endian.h"
-#include "pvid/pvid.h"
 #include "stream_tables.h"
 
 static STREAM_TYPE identifier;
@@ -13,32 +14,38 @@ uint32_t identifier_arithmetic_faults(void)
 
 pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
 {
-    static STREAM_CONFIG config; /* the identifier reads it where it is */
-    config = stream_config;
+    static STREAM_CONFIG_TYPE config; /* the identifier reads it where it is */
+    config = STREAM_CONFIG;
     get_estimator_config(&config.estimator, payload);
-    return STREAM_INIT(&identifier, &config);
+    return STREAM_NAME(init)(&identifier, &config);
 }
 
 void identifier_sample(const int32_t counts[STREAM_SAMPLES], uint8_t sample[SAMPLE_BYTES])
 {
-    pvid_put_f32(sample, (float)counts[0] * STREAM_PHI_LSB);
-    pvid_put_f32(&sample[4], (float)counts[1] * STREAM_Y_LSB);
+    static const float lsb[STREAM_SAMPLES] = STREAM_LSB;
+    for (size_t i = 0; i < STREAM_SAMPLES; i++) {
+        pvid_put_f32(&sample[4u * i], (float)counts[i] * lsb[i]);
+    }
 }
 
 pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
 {
-    return STREAM_STEP(&identifier, pvid_get_f32(sample), pvid_get_f32(&sample[4]));
+    float values[STREAM_SAMPLES];
+    for (size_t i = 0; i < STREAM_SAMPLES; i++) {
+        values[i] = pvid_get_f32(&sample[4u * i]);
+    }
+    return STREAM_NAME(step)(&identifier, values);
 }
 
 uint32_t identifier_hash(uint32_t hash, pvid_reason reason)
 {
-    return STREAM_HASH(hash, &identifier.estimator, reason);
+    return STREAM_NAME(fnv)(hash, &identifier.estimator, reason);
 }
 
 void identifier_estimate(uint8_t payload[PVID_ESTIMATE_BYTES], uint32_t session, pvid_reason reason)
 {
     pvid_estimate_f32 estimate;
-    STREAM_ASSESS(&STREAM_ASSESSED, &estimate);
+    STREAM_NAME(assess)(&identifier, &estimate);
     put_estimate(payload, &estimate, session, identifier.estimator.counters.updates, reason);
 }
 
