@@ -22,6 +22,7 @@ from pvid.board.field import collect
 from pvid.board.mechanism_board import MechanismBoard, board_of
 from pvid.board.stream_image import settings_number
 from pvid.board.target import HOST_TARGET, open_target
+from pvid.configuration.refine import full_motion_of
 from pvid.link.frames import RefinedEstimate, Source
 from pvid.log.export import export_log
 from pvid.log.reader import LogReader, LogStream, Record
@@ -29,13 +30,12 @@ from pvid.log.recorder import EmulatorSource, Logger
 from pvid.log.rig import engine_text_of_log, mechanism_of_log
 from pvid.log.status import StatusLine
 from pvid.log.verify import Stretch, Verdict, Verifier
+from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import MODELS
-from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason, Stage
 from pvid.show.log_figure import write_log_figure
 from pvid.show.page_state import LiveState
 from pvid.show.view import LiveView
-from pvid.sim.pendulum import simulate, standard_sensors
 
 TICKS = 4400  # of the pendulum's full equations: refined estimates are published from about 3600 on
 EVERY = 400  # ticks between estimates where all of them are compared
@@ -45,8 +45,8 @@ EVERY = 400  # ticks between estimates where all of them are compared
 def pendulum() -> MechanismBoard:
     """The board of a rig; its sensors read a simulation of the full equations."""
     board = MechanismBoard.of_guess(field_board.rig(), refined=True)
-    found = simulate(sensors=standard_sensors(), truth="full", duration=TICKS / 1000 + 1, seed=1).run
-    return replace(board, recording=board.readings(found.y, found.phi)[:TICKS])
+    found = full_motion_of(compiled_of("kapitza"), TICKS / 1000 + 1)
+    return replace(board, recording=board.readings(found["y"], found["phi"])[:TICKS])
 
 
 @pytest.fixture(scope="module")
@@ -154,9 +154,7 @@ def test_what_has_no_second_stage_is_refused(tmp_path: Path) -> None:
     field_board.rig().write(rig)
     for given in (("--model", "kapitza"), ("--rig", str(rig))):
         assert "float32 alone" in refusal(*given, "--core", "q31")
-    own = RigFile.standard()
-    replace(own, identifier=replace(own.identifier, form="strong")).write(rig)
-    assert "behind the weak form" in refusal("--rig", str(rig))
+    assert "without a second stage" in refusal("--model", "kapitza", "--form", "strong")
 
 
 def test_a_shipped_rig_has_both_stages_of_its_full_equations() -> None:

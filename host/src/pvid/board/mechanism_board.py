@@ -5,7 +5,6 @@ from __future__ import annotations
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from pvid.base.toml_text import toml_document
 from pvid.base.wording import printable
 from pvid.board.float_board import FloatBoard, recording_header
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
+from pvid.board.settings_text import TABLE, array_of, part_of, written
 from pvid.board.stream_image import MOST_TICKS, SLOWEST, StreamImage, c_string
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.generated import GeneratedModel
@@ -64,8 +64,6 @@ if TYPE_CHECKING:
 
 _COMMAND = "pvid log"
 _ARRAYS: dict[str, type[np.generic]] = {"error_order": np.uint8}  # the others are float32
-TABLE = "engine"
-_SHORT, _WORDS = 16, 12  # numbers that are written as such; words in a line
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,7 +330,7 @@ def board_of(text: str, model: str | None = None) -> MechanismBoard | MechanismB
         raise PvidError(f"the settings of the engine in the log are damaged: {error}") from error
 
 
-# ---- the text of the settings: numbers as Python writes them, which read back exactly; long tables as their bits
+# ---- the text of the settings
 
 
 def _flat(config: WeakConfig, refine: RefineConfig | None) -> dict[str, Any]:
@@ -349,44 +347,6 @@ def _flat(config: WeakConfig, refine: RefineConfig | None) -> dict[str, Any]:
     for part, owner in parts.items():
         found |= {f"{part}_{one.name}": getattr(owner, one.name) for one in fields(owner) if one.name != "model"}
     return {name: value for name, value in found.items() if value is not None}
-
-
-def written(value: Any) -> str:
-    """A setting in the text of a log."""
-    match value:
-        case bool():
-            return str(value).lower()
-        case IntEnum():
-            return str(int(value))
-        case WeakFilter():
-            return written(value.weights)
-        case RefineSignal():
-            return written([value.sample, value.order, value.scale, value.range, int(value.source)])
-        case np.ndarray() if value.size > _SHORT:  # the bits
-            words = [f"{word:08x}" for word in value.view(np.uint32).tolist()]
-            rows = [" ".join(words[k : k + _WORDS]) for k in range(0, len(words), _WORDS)]
-            return "\n".join(["'''", *rows, "'''"])
-        case WeakNoise():
-            return written([value.kind, value.power, value.a, value.b, float(value.factor)])
-        case np.ndarray():
-            return written(value.tolist())
-        case tuple() | list():
-            apart = ",\n" if len(value) > _SHORT else ", "
-            return f"[{apart.join(map(written, value))}]"
-        case _:
-            return repr(value)
-
-
-def array_of(value: Any, kind: type[np.generic] = np.float32) -> npt.NDArray[Any]:
-    """Numbers, or the bits of a long table."""
-    if isinstance(value, str):
-        return np.array([int(word, 16) for word in value.split()], np.uint32).view(np.float32)
-    return np.array(value, kind)
-
-
-def part_of(engine: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The keys of a part without its name."""
-    return {key.removeprefix(f"{name}_"): value for key, value in engine.items() if key.startswith(f"{name}_")}
 
 
 def _refine(engine: Mapping[str, Any]) -> RefineConfig | None:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pvid.base.errors import PvidError
 from pvid.board.float_board import FloatBoard, recording_header
-from pvid.board.mechanism_board import TABLE, array_of, part_of, written
+from pvid.board.settings_text import TABLE, array_of, part_of, written
 from pvid.board.stream_image import MOST_TICKS, SLOWEST, StreamImage, c_string
 from pvid.codegen import files_strong, files_strong_design
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
