@@ -92,6 +92,8 @@ def profile(board: Board, form: Form, core: Core = "f32", model: str = DEFAULT) 
     PvidError
         When the board's emulator is not QEMU or takes no plugins, something does not build, or the image fails.
     """
+    if board.toolchain == "avr":
+        raise PvidError(f"{board.name}: only QEMU counts by function")
     return _counted(board, *_PLAYED[form](board, core, model))
 
 
@@ -123,8 +125,6 @@ _PLAYED = dict(zip(FORMS, (_weak, _strong), strict=True))
 
 
 def _counted(board: Board, image: Path, entry: str, measure_from: int) -> Profile:
-    if board.toolchain == "avr":
-        raise PvidError(f"{board.name}: only QEMU counts by function")
     prepare_emulator(board)
     _build_plugin()
     symbols = _symbols(board, image)
