@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
-from bench.accidents import ACCIDENTS, HEADER, Accident, Outcome, outcome_of, row_of, spoilt, told
+from bench.accidents import ACCIDENTS, HEADER, MECHANISMS, SEEDS, Accident, Outcome, outcome_of, row_of, spoilt, told
 from pvid.models.mechanisms import compiled_of
 
 
@@ -37,3 +38,12 @@ def test_a_wrong_answer_counts_unless_it_has_a_warning() -> None:
     row = dict(zip(HEADER, row_of("m", ACCIDENTS[0], [silent, warned, nothing]), strict=True))
     assert (row["answered"], row["warned"], row["wrong, no warning"]) == ("2 of 3", "1", "1")
     assert row_of("m", ACCIDENTS[0], [Outcome(None, None, True)])[3:6] == ("-", "-", "-")
+
+
+def test_the_page_has_every_kind_of_every_mechanism() -> None:
+    text = (ROOT / "host/docs/benchmarks/robustness.md").read_text(encoding="utf-8")
+    lines = text.partition("<!-- accidents -->")[2].partition("<!-- /accidents -->")[0].strip().splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    assert tuple(rows[0]) == HEADER
+    assert [(row[0], row[1]) for row in rows[2:]] == [(name, one.label) for name in MECHANISMS for one in ACCIDENTS]
+    assert all(row[2].endswith(f"of {SEEDS}") for row in rows[2:])

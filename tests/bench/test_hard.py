@@ -28,7 +28,11 @@ def test_without_motion_nothing_is_published_and_the_row_has_the_reason(name: st
     found = run_case(name, still, 2)
     assert not found.published.any() and len(found.held) == 2
     cells = dict(zip(HEADER, row(name, still, found, found), strict=True))
-    assert cells["published"] == "0/2" and cells["RMS %"] == "-" and cells["else held"].startswith("held")
+    assert (
+        cells["published"] == "0/2"
+        and cells["RMS % of each parameter"] == "-"
+        and cells["else held"].startswith("held")
+    )
 
 
 def test_a_case_changes_the_rig_as_it_is_named() -> None:

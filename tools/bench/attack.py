@@ -486,7 +486,6 @@ _COLUMNS = (
     *("t=1,phi=2,i=3", "phi=phi:deg", "phi=phi:rev/0", "t=t:1e300", "t=t:1e-300", "y=-y", "y=y:-mm", "t", "=", "a=b=c"),
     *("t=99", "t=0", "phi=y,y=phi", "phi=t", "t=phi", "t=t:nan", "t=t:inf", "phi=phi:", "", "y=y:um,y=y:mm"),
 )
-_CHOICES = ("weak", "strong", "f32", "q31", "f64", "all", "stationary", "nope", "", "[/x]")
 # Commands that neither record nor emulate, and end by themselves.
 _TRIED = (
     *("identify", "validate", "compare", "tune", "plot", "design", "tables", "models", "schema", "verify", "export"),
