@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy.typing as npt
 import pytest
 from generated import WARNINGS
 
+from pvid.base.errors import PvidError
 from pvid.codegen.files_strong_q31 import files_of
 from pvid.codegen.strong_library_q31 import StrongNativeQ31
 from pvid.codegen.strong_twin_q31 import StrongTwinQ31
@@ -298,6 +300,17 @@ def test_no_operation_of_a_wild_run_is_undefined(sources: Path) -> None:
         identifier = native.started()
         identifier.run_samples(readings)
         assert (done.returncode, int(done.stdout or -1)) == (0, identifier.running_hash), done.stderr
+
+
+def test_counts_beyond_24_bits_are_refused_and_made_coarser_to_identify() -> None:
+    run, model = recording("dc_motor"), simulation_of("dc_motor").model
+    fine = replace(model, signals=tuple(replace(one, resolution=1e-8) for one in model.signals))
+    base = strong_design(fine, run)
+    with pytest.raises(PvidError, match=r"V reaches 8.* counts of its sensor and the fixed-point core takes 2\^24"):
+        fixed_design(fine, run, base)
+    design = fixed_design(fine, run, base, between_counts=True)
+    assert 2**23 <= np.abs(design.counts).max() <= 2**24
+    assert np.all(np.abs(design.counts) <= design.engine.config.full_scale)
 
 
 def test_an_integral_since_the_start_of_the_run_goes_on_over_a_gap() -> None:

@@ -139,13 +139,25 @@ def _counting(
 ) -> tuple[tuple[float, ...], tuple[int, ...]]:
     """Value of a count and full scale of each signal."""
     lsb = lsb_of(model, [one.name for one in strong.signals])
-    tops = [max(FULL_SCALE * one.reach, float(np.max(np.abs(np.asarray(run[one.name]))))) for one in strong.signals]
+    largest = [float(np.max(np.abs(np.asarray(run[one.name], np.float64)))) for one in strong.signals]
+    tops = [max(FULL_SCALE * one.reach, most) for one, most in zip(strong.signals, largest, strict=True)]
     if between_counts:
         lsb = tuple(
-            finer(step, run[one.name], FULL_SCALE_LIMIT / (top / step))
-            for one, step, top in zip(strong.signals, lsb, tops, strict=True)
+            finer(step, run[one.name], FULL_SCALE_LIMIT / (top / step)) * 2 ** _too_many(most / step)
+            for one, step, top, most in zip(strong.signals, lsb, tops, largest, strict=True)
         )
+    for one, step, most in zip(strong.signals, lsb, largest, strict=True):
+        if _too_many(most / step):
+            raise PvidError(
+                f"{one.name} reaches {most / step:.3g} counts of its sensor and the fixed-point core takes 2^24: "
+                "state a coarser resolution, and read so many bits less on the board"
+            )
     return lsb, tuple(max(round(min(top / step, FULL_SCALE_LIMIT)), 16) for step, top in zip(lsb, tops, strict=True))
+
+
+def _too_many(counts: float) -> int:
+    """Bits that counts are beyond full scale."""
+    return max(0, math.ceil(math.log2(counts / FULL_SCALE_LIMIT))) if counts > 0 else 0
 
 
 def _counts(strong: StrongFunctions, run: Mapping[str, npt.ArrayLike], lsb: Sequence[float]) -> npt.NDArray[np.int32]:
