@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.core.native import Native
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.parts import EstimatorConfig
 from pvid.settings.q31 import EstimatorConfigQ31
 
 Int = npt.NDArray[np.int64]

@@ -19,28 +19,18 @@ from weak_rig import engine_rig
 
 from pvid.codegen.weak_library import weak_native_q31
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
-from pvid.core import snapshot
 from pvid.core.headers import Headers, Scalar, default_library
-from pvid.core.native import Identifier, Native, Stepper
+from pvid.core.native import Native, Stepper
 from pvid.core.weak_native_q31 import WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
-from pvid.rig.file import RigFile
 from pvid.settings.enums import Status
-from pvid.settings.f32 import EstimatorConfig
-from pvid.setup.f32 import strong_config
-from pvid.setup.q31 import strong_config_q31
+from pvid.settings.parts import EstimatorConfig
 
-RIG = RigFile.standard()
 HEADERS = Headers.of(default_library())
 HUGE = float(np.finfo(np.float32).max)
 SMALLEST = float(np.nextafter(np.float32(0), np.float32(1)))
 OWN_RATE = 1024.0  # Hz, of the estimator without a form: four ticks are 2^-8 s exactly
 ROOM = 20_000  # entries of a table of zeros, which is longer than any size asks for
-
-
-def rig_with(**settings: Any) -> RigFile:
-    """The standard rig with other settings of its identifier."""
-    return replace(RIG, identifier=replace(RIG.identifier, **settings))
 
 
 # ---- what a field may hold ----
@@ -100,17 +90,8 @@ ESTIMATOR = {
 }
 RIG_FIELDS = {
     "sample_rate_hz": Range(1e-3, 1e6, Status.BAD_SAMPLE_RATE, (Status.BAD_FORGETTING, Status.BAD_UPDATE_RATE)),
-    "l1": Range(1e-6, 1e6, Status.BAD_LENGTH),
-    "drive_min": Range(0.0, 1e9, Status.BAD_DRIVE_MIN),
     "gate.sigmas": Range(2.0, 1e3, Status.BAD_GATE_SIGMAS, besides=(0.0,)),
     "gate.patience_s": Range(0.0, 1e12, Status.BAD_GATE_PATIENCE),
-}
-STRONG = {
-    **RIG_FIELDS,
-    **ESTIMATOR,
-    "estimator.correlation": Range(1.0, 1e6, Status.BAD_CORRELATION),
-    "estimator.row_weight": Range(1.0, 1.0, Status.BAD_ROW_WEIGHT),
-    "exact_every": Range(0, 255, Status.BAD_DIVIDER),
 }
 LEAST = -(2**31)
 FORMAT = Range(-64, 64, Status.BAD_FORMAT)
@@ -135,33 +116,6 @@ ESTIMATOR_Q31 = {
     "gate.patience_groups": Range(0, 2**30, Status.BAD_GATE_PATIENCE),
     "estimator.divider": Range(1, 65535, Status.BAD_DIVIDER),
 }
-SHIFT = Range(0, 62, Status.BAD_SHIFT)
-COUNTS = Range(1, 2**24, Status.BAD_FULL_SCALE)
-STRONG_Q31 = {
-    **ESTIMATOR_Q31,
-    "estimator.p_bits": Range(-64, 64, Status.BAD_FORMAT, (Status.BAD_FORMAT,)),
-    "row.phi_shift": Range(-31, 31, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
-    "row.finer": Range(-31, 31, Status.BAD_SHIFT, (Status.BAD_FORMAT, Status.BAD_SHIFT)),
-    "row.phi3": Range(1, 2**31 - 1, Status.BAD_SHIFT),
-    "row.reference": Range(0, 2**29, Status.BAD_SHIFT),
-    "u_multiplier": Range(1, 2**31 - 1, Status.BAD_U_MULTIPLIER),
-    "u_shift": SHIFT,
-    "phi_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "y_offset": Range(LEAST, 2**31 - 1, Status.OK),
-    "drive_min": Range(0, 2**30, Status.BAD_DRIVE_MIN),
-    "drive_ticks": Range(1, 2**30, Status.BAD_DRIVE_TICKS),
-    # what counts within full scale could overflow is refused, too
-    **dict.fromkeys(("bank.phi_max", "bank.y_max"), replace(COUNTS, also=(Status.BAD_FULL_SCALE, Status.BAD_SHIFT))),
-    "bank.centre": Range(1, 2**30, Status.BAD_CENTRE, (Status.BAD_SHIFT,)),
-    "bank.phi_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
-    "bank.y_shift": Range(0, 62, Status.BAD_SHIFT, (Status.BAD_SHIFT,)),
-}
-
-# Sizes of the tables.
-BANK = {
-    "bank.half": Range(2, 160, Status.BAD_HALF),
-    "bank.stride": Range(1, 80, Status.BAD_STRIDE),
-}
 TRUST = {
     "trust.kappa_min": Range(0.0, 0.999, Status.BAD_PUBLISH_KAPPA),
     "trust.se_max": Range(1e-9, 1e9, Status.BAD_SE_MAX),
@@ -173,7 +127,7 @@ TRUST = {
     "iterations": Range(1, 10, Status.BAD_ITERATIONS, (Status.BAD_ITERATIONS,)),
 }
 WEAK = {
-    **{name: RIG_FIELDS[name] for name in ("sample_rate_hz", "gate.sigmas", "gate.patience_s")},
+    **RIG_FIELDS,
     **ESTIMATOR,
     **TRUST,
 }
@@ -194,27 +148,16 @@ OWN = {
     "estimator.row_weight": Range(1e-6, 1.0, Status.BAD_ROW_WEIGHT),
 }
 RANGES = {
-    "strong": STRONG,
-    "strong q31": STRONG_Q31,
     "weak": WEAK,
     "weak q31": WEAK_Q31,
     "estimator": OWN,
 }
 IDENTIFIERS = tuple(name for name in RANGES if name != "estimator")
-SIZES = {
-    "strong": {**BANK, "bank.block": Range(0, 65535, Status.OK)},
-    "strong q31": {**BANK, "bank.block": Range(0, 65535, Status.BAD_FULL_SCALE, (Status.BAD_FULL_SCALE,))},
-    "weak": {},
-    "weak q31": {},
-    "estimator": {},
-}
 WITHOUT = {"weights": Status.BAD_BANK, "model": Status.BAD_MODEL}
 SET_BY_INIT = {"estimator.model", "estimator.update_rate_hz"}  # what a form's init fills in
 # Of the engine: tests/core/test_weak_valid_q31.py, tests/unit/test_weak.c.
 ELSEWHERE = {"design", "refine", "range", "drive_min", "offset"}
 UNUSED = {
-    "strong": SET_BY_INIT,
-    "strong q31": SET_BY_INIT | {"estimator.n_bits", "estimator.y_bits"},
     "weak": SET_BY_INIT | {"estimator.correlation", "estimator.row_weight", "compensation"} | ELSEWHERE,
     "weak q31": SET_BY_INIT | {"estimator.row_weight", "compensation"} | ELSEWHERE,
     "estimator": set(),
@@ -243,8 +186,7 @@ class Subject:
         self.tables: dict[str, Any] = {}
         all_of_them = {field.name: field for field in headers.scalars(config, prefix)}
         self.fields = {name: field for name, field in all_of_them.items() if not name.startswith("design.")}
-        model = getattr(self.identifier.estimator, "model", None)  # the strong forms have estimators of their own
-        self.n_theta = int(model.n_theta) if model is not None else 0
+        self.n_theta = int(self.identifier.estimator.model.n_theta)
         self.entries = {
             name: sizes[name.rpartition(".")[2]]
             for name, field in self.fields.items()
@@ -269,13 +211,11 @@ class Subject:
         return self.identifier.initialise()
 
     def empty_tables(self) -> dict[str, Any]:
-        """Gives it tables of zeros that are longer than any size asks for, by name, and a window of five samples."""
+        """Gives it tables of zeros that are longer than any size asks for, by name."""
         for field in self.fields.values():
             if field.name in self.entries:
                 self.tables[field.name] = HEADERS.ffi.new(f"{field.kind.item.cname.removeprefix('const ')}[]", ROOM)
                 field.set(self.tables[field.name])
-        if "bank.stride" in self.fields:
-            self.fields["bank.stride"].set(1)
         self.keep()
         return self.tables
 
@@ -286,10 +226,10 @@ class Subject:
             return field.place < self.identifier.n_p
         return field.group not in UNUSED[self.name] and (name != "n_bits" or field.place < self.n_theta)
 
-    def ranged(self, ranges: dict[str, dict[str, Range]] = RANGES) -> Iterator[tuple[Scalar, Range]]:
+    def ranged(self) -> Iterator[tuple[Scalar, Range]]:
         """Every field that is used, with what it may hold."""
         for field in self.fields.values():
-            known = ranges[self.name].get(field.group)
+            known = RANGES[self.name].get(field.group)
             if known is not None and self.is_used(field):
                 yield field, known
 
@@ -301,9 +241,8 @@ class Subject:
 
     def edges(self) -> Iterator[tuple[str, Any, tuple[Status, ...]]]:
         """Field, value and what init may answer, for all edges of all fields."""
-        for ranges in (RANGES, SIZES):
-            for field, known in self.ranged(ranges):
-                yield from ((field.name, value, known.answers(value)) for value in known.edges(field))
+        for field, known in self.ranged():
+            yield from ((field.name, value, known.answers(value)) for value in known.edges(field))
         for field, status in self.pointers():
             yield field.name, HEADERS.ffi.NULL, (status,)
 
@@ -335,11 +274,8 @@ def fixed_identifier() -> Stepper:
 
 
 def subjects(native: Native) -> dict[str, Subject]:
-    """Both forms in both cores, and an estimator by itself."""
-    strong = rig_with(form="strong", differentiator="finite-difference", stride=20)
+    """The weak form in both cores, and an estimator by itself."""
     made: dict[str, Stepper] = {
-        "strong": native.identifier(strong_config(strong, 1000.0)),
-        "strong q31": native.identifier(strong_config_q31(strong, 1000.0)),
         "weak": engine_rig("kapitza").native.identifier_of(engine_rig("kapitza").config),
         "weak q31": fixed_identifier(),
         "estimator": estimator_of_rows(native),
@@ -356,13 +292,11 @@ TOGETHER: tuple[dict[str, Any], ...] = (
 
 
 def digest(native: Native) -> str:
-    """What init answers to all edges of all fields and tables, and the states that it makes."""
+    """What init answers to all edges of all fields and tables."""
     told = hashlib.sha256()
 
     def tell(subject: Subject, what: object, status: Status) -> None:
         told.update(f"{what} {status}\n".encode())
-        if status is Status.OK and isinstance(subject.identifier, Identifier):
-            told.update(snapshot.save(subject.identifier))
 
     for subject in subjects(native).values():
         subject.empty_tables()

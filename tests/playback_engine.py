@@ -32,7 +32,7 @@ from pvid.core.weak_native_q31 import WeakIdentifierQ31, WeakNativeQ31
 from pvid.models.mechanisms import compiled_of
 from pvid.settings.cores import FIXED, FLOAT
 from pvid.settings.enums import Law
-from pvid.settings.f32 import GateConfig, TrustConfig
+from pvid.settings.parts import GateConfig, TrustConfig
 from pvid.setup.weak_sizes import sizes_of_design, sizes_of_q31
 
 # Steps of Runge-Kutta but for those of the pendulum and the rigid body, which are Adams's.
@@ -295,3 +295,10 @@ def set_in(core: WeakIdentifierQ31, name: str, value: Any) -> Any:
 def subjects() -> tuple[Subject, ...]:
     """All of them."""
     return (*map(BothStages.of, BOTH_STAGES), *map(InFixedPoint.of, IN_FIXED_POINT))
+
+
+def unit_tests() -> list[Path]:
+    """The CMocka programs of the core and the link: those that CMake gives no other sources."""
+    folder = Path(__file__).resolve().parent / "unit"
+    listed = (folder / "CMakeLists.txt").read_text(encoding="utf-8")
+    return [path for path in sorted(folder.glob("test_*.c")) if f"target_sources({path.stem} " not in listed]

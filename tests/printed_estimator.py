@@ -14,7 +14,7 @@ from pvid.core.native import Native
 from pvid.core.sources import FOLDERS, sources_of
 from pvid.settings.bounds import SIZES
 from pvid.settings.enums import Core
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.parts import EstimatorConfig
 from pvid.settings.q31 import EstimatorConfigQ31
 from pvid.twin.printer.program import printed_module
 from pvid.twin.printer.values import filled, number

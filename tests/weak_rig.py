@@ -18,7 +18,7 @@ from pvid.models.simulated_rig import simulated_rig
 from pvid.oracle.weak.design import WeakDesign
 from pvid.oracle.weak.identify import ready
 from pvid.oracle.weak.rows import WeakRows
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.parts import EstimatorConfig
 from pvid.settings.record import Record
 from pvid.settings.weak import WeakConfig
 from pvid.setup.weak import circle_of, config_of, design_tables, for_engine

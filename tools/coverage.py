@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Branch coverage of the C core and the link by the quick tests: the CMocka programs, what tests/playback.py plays
-through the shared library, and what compiles the core with the generated C of mechanisms: the tests of MECHANISMS and
+"""Branch coverage of the C core and the link by the quick tests: the CMocka programs, what tests/configurations.py asks
+of the shared library, and what compiles the core with the generated C of mechanisms: the tests of MECHANISMS and
 tests/playback_engine.py.
 
     build/venv/bin/python tools/coverage.py
@@ -31,7 +31,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-import playback  # noqa: E402 - of tests
+import playback_engine  # noqa: E402 - of tests
 
 from pvid.core import sources  # noqa: E402
 from pvid.settings.bounds import SIZES  # noqa: E402
@@ -49,14 +49,14 @@ COUNTED = ("--coverage", "-Dalways_inline=unused", "-DPVID_ASSERT(condition)=((v
 NATIVE = [*FLAGS, *SIZES, '-DPVID_NATIVE_BUILD="coverage"']
 WANTED = 95.0
 PYTHONPATH = os.pathsep.join(str(ROOT / folder) for folder in ("host/src", "tests"))
-PLAY = "import playback; from pvid.core.native import Native; list(playback.digests(Native()))"
+PLAY = "import configurations; from pvid.core.native import Native; configurations.digest(Native())"
 PLAY_ENGINE = "import playback_engine; [list(one.digests(one.library)) for one in playback_engine.subjects()]"
 # The weak engine in float32 and fixed point, and the refinement: every shipped mechanism, hostile samples, snapshots.
 MECHANISMS = (
     *(f"tests/twin/test_{name}.py" for name in ("weak_f32", "weak_q31", "second_stage", "refinement")),
     *(f"tests/core/test_{name}_q31.py" for name in ("weak_snapshot", "weak_engine", "trust")),
-    *(f"tests/twin/test_{name}.py" for name in ("kinds", "kinds_q31", "estimator_q31", "gate", "misfit")),
-    *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "freeze", "renewal", "snapshot_weak")),
+    *(f"tests/twin/test_{name}.py" for name in ("kinds", "kinds_q31", "estimator_q31")),
+    *(f"tests/core/test_{name}.py" for name in ("bad_config", "dead_zone", "renewal", "snapshot_weak")),
     "tests/core/test_weak_valid_q31.py",
     "tests/codegen/test_fitted_sizes.py",  # builds for one design
 )
@@ -109,7 +109,7 @@ def build() -> list[Path]:
     """The core with counters, as the CMocka programs and the shared library have it; returns the programs."""
     shutil.rmtree(BUILD, ignore_errors=True)
     core = [*sources.core_sources(), FIRMWARE / "link" / "link.c"]
-    tests = playback.unit_tests()
+    tests = playback_engine.unit_tests()
     plain = sorted((ROOT / "host" / "native").glob("[lr]*.c"))
     jobs = [(BUILD / "unit" / f"{path.stem}.o", path, [*FLAGS, *COUNTED]) for path in core]
     jobs += [(BUILD / "native" / f"{path.stem}.o", path, [*NATIVE, *COUNTED]) for path in core]
@@ -229,7 +229,7 @@ def report_of(files: list[File]) -> str:
     return f"""# Branch coverage
 
 {taken} of the {branches} branches of `firmware/src`, `firmware/models` and `firmware/link` ({share(files):.1f} %)
-are taken by the CMocka programs, by what `tests/playback.py` and `tests/playback_engine.py` play, and by
+are taken by the CMocka programs, by what `tests/configurations.py` and `tests/playback_engine.py` play, and by
 {len(MECHANISMS)} files of tests that compile the core with a mechanism, as gcov counts them at -O0: every operand of
 a `&&` or `||` has two. Other tests do not count. PVID_ASSERT, which ends the program,
 was compiled out. Missed:

@@ -5,8 +5,9 @@
     build/venv/bin/python tools/mutate.py --count 10       ten of them; writes nothing
     build/venv/bin/python tools/mutate.py --recorded       of all bits only the running hashes that the tests record
 
-The quick tests are two: what tests/playback.py plays of the strong form and tests/playback_engine.py of the weak engine
-and its second stage with the generated C of mechanisms, whose bits the suite compares with the numpy twin; and the
+The quick tests are two: what init answers to every edge of every setting (tests/configurations.py), and what
+tests/playback_engine.py plays of the weak engine and its second stage with the generated C of mechanisms, whose bits
+the suite compares with the numpy twin; and the
 CMocka programs of tests/unit, as they are, then those that take less than a second under clang's address and
 undefined-behaviour sanitizers. A crash and a loop without an end are noticed, too. A change that leaves the object code
 of every build as it was is no mutant.
@@ -39,7 +40,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-import playback  # noqa: E402 - of tests
+import configurations  # noqa: E402 - of tests
 import playback_engine  # noqa: E402 - of tests
 
 from pvid.core import sources  # noqa: E402
@@ -243,8 +244,7 @@ def playbacks() -> dict[Kit, Digests]:
     """The builds that are played, and what one shows by variant."""
     found: dict[Kit, Digests] = {}
     if not RECORDED:
-        playback.variants()
-        found[NATIVE] = lambda library: playback.digests(Native(library))
+        found[NATIVE] = lambda library: [("configurations", configurations.digest(Native(library)))]
     for one in playback_engine.subjects():
         folder = one.library.parent
         options = ("-std=c99", *one.definitions, f"-I{folder}", f"-I{ROOT / 'host' / 'native'}")
@@ -281,7 +281,7 @@ def tests_of(kit: Kit) -> dict[str, float]:
     folder = BUILD / kit.name
     kit.links(folder / "libpvidcore.so", made(kit))
     seconds = {}
-    for test in made(replace(kit, name=f"{kit.name}/tests", sources=tuple(playback.unit_tests()))):
+    for test in made(replace(kit, name=f"{kit.name}/tests", sources=tuple(playback_engine.unit_tests()))):
         before = time.monotonic()
         if not kit.links_test(test.with_suffix(""), folder) or not passes(test.with_suffix(""), folder):
             raise SystemExit(f"{test.stem} fails with the core as it is ({kit.name})")
@@ -313,7 +313,7 @@ class Baseline:
         return sorted(self.seconds, key=lambda test: (stem not in test, self.seconds[test]))
 
 
-TESTS = replace(PLAIN, name="plain/tests", sources=tuple(playback.unit_tests()))
+TESTS = replace(PLAIN, name="plain/tests", sources=tuple(playback_engine.unit_tests()))
 
 
 def headers_of(kit: Kit, source: Path) -> set[str]:
@@ -472,7 +472,7 @@ def killed_by_tests(kit: Kit, mutant: Mutant, base: Baseline, folder: Path) -> s
         program = BUILD / kit.name / "tests" / test
         if test in anew:
             program = folder / kit.name / test
-            source = playback.UNIT / f"{test}.c"
+            source = ROOT / "tests" / "unit" / f"{test}.c"
             built = kit.compiles(program.with_suffix(".o"), source, folder)
             if not built or not kit.links_test(program, library[0].parent):
                 raise SystemExit(f"{test} does not compile with {kit.name}: {mutant.describe()}")
@@ -649,8 +649,8 @@ def report_of(results: list[tuple[Mutant, str | None]], seed: int) -> str:
 file's number of them: one operator, sign or constant changed. {told.killed} were killed:
 {100 * told.killed / told.mutants:.1f} % of all, and {100 * told.rate:.1f} % of the {could} that are not
 equivalent. {told.by_bits} of them by the bits of a few seconds of data
-(`tests/playback.py`, `tests/playback_engine.py`), the others by a CMocka program. The slower tests (every build against
-the twin over 40 000 ticks, oracles, accuracy) were not asked.
+(`tests/configurations.py`, `tests/playback_engine.py`), the others by a CMocka program. The slower tests (every build
+against the twin over 40 000 ticks, oracles, accuracy) were not asked.
 
 ## Survivors that a test could kill
 

@@ -1,6 +1,5 @@
-"""Plays the strong form of the library that PVID_NATIVE_LIBRARY names, and the weak engine as the compiler of CC makes
-it, in both cores: a good run first and then what no sensor sends; for a compiler that checks every access and every
-operation and ends the program at the first fault.
+"""Plays the weak form as the compiler of CC makes it, in both cores: a good run first and then what no sensor sends;
+for a compiler that checks every access and every operation and ends the program at the first fault.
 
     python hostile_runs.py            all of it; prints how many ticks
     python hostile_runs.py --planted  reads one byte behind an array, to show that it would be seen
@@ -10,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -20,26 +19,15 @@ import numpy.typing as npt
 from pvid.codegen.weak_library import weak_native, weak_native_q31
 from pvid.configuration.weak import config_for_simulated_rig
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
-from pvid.core import snapshot
-from pvid.core.native import Identifier, Native, Publisher
+from pvid.core.native import Native, Publisher
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT
-from pvid.rig.file import RigFile
-from pvid.rig.run import Run
-from pvid.setup.f32 import strong_config
-from pvid.setup.q31 import counts_of, strong_config_q31
-from pvid.sim.pendulum import simulate, standard_sensors, standard_start
+from pvid.sim.simulated_run import simulation_of
 
 Samples = npt.NDArray[Any]
 
 TICKS = 3000  # past the work on the first two windows
 RANDOM = np.random.default_rng(7)
-STRONG: tuple[dict[str, Any], ...] = (
-    {},
-    {"differentiator": "finite-difference", "stride": 20, "law": "pseudovelocity"},
-    {"differentiator": "finite-difference", "stride": 1, "forgetting_s": 0.1, "divider": 4},
-    {"outlier_gate": 6.0, "outlier_patience_s": 0.5},
-)
 # Of the estimator, in float32 and in fixed point.
 WEAK: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
     ({}, {}),
@@ -48,16 +36,9 @@ WEAK: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
 )
 
 
-def rig_of(**identifier: Any) -> RigFile:
-    """The standard rig with the strong form and an encoder of 20 bits."""
-    rig = RigFile.standard()
-    sensor = replace(rig.sensor, phi_lsb=standard_sensors(20).phi_lsb)
-    return replace(rig, identifier=replace(rig.identifier, form="strong", **identifier), sensor=sensor)
-
-
-def float_samples(run: Run) -> Iterator[tuple[Samples, Samples]]:
+def float_samples(run: Mapping[str, Samples]) -> Iterator[tuple[Samples, Samples]]:
     """The run; then no numbers, infinities, what overflows when squared, subnormals, any words, squares, zeros."""
-    phi, y = run.phi[:TICKS].astype(np.float32), run.y[:TICKS].astype(np.float32)
+    phi, y = (run[name][:TICKS].astype(np.float32) for name in ("phi", "y"))
     yield phi, y
     spoilt = phi.copy()
     spoilt[[0, 3, 700, 1800]] = np.nan, np.inf, -np.inf, 3e38
@@ -87,23 +68,10 @@ def count_samples(phi: Samples, y: Samples, phi_max: int, y_max: int) -> Iterato
     yield np.zeros(TICKS, np.int64), np.zeros(TICKS, np.int64)
 
 
-def play(identifier: Identifier, samples: Iterator[tuple[Samples, Samples]]) -> int:
-    """One after the other through the same identifier of the strong form, a snapshot and an assessment after each."""
-    done = 0
-    for phi, y in samples:
-        identifier.run(phi, y)
-        identifier.assess()
-        image = snapshot.save(identifier)
-        snapshot.restore(identifier, image[:-1])
-        snapshot.restore(identifier, image)
-        done += len(phi)
-    return done
-
-
 def play_engine(
     identifier: Publisher, run: Callable[[Samples], object], parts: Iterator[tuple[Samples, Samples]]
 ) -> int:
-    """The same of the weak engine, which takes y first; samples are missing after each."""
+    """One after the other through the same identifier, which takes y first; samples are missing after each."""
     done = 0
     for phi, y in parts:
         run(np.stack([y, phi], axis=1))
@@ -113,21 +81,13 @@ def play_engine(
     return done
 
 
-def play_all(native: Native) -> int:
+def play_all() -> int:
     """Every form, core and setting; returns the ticks."""
     done = 0
-    run = simulate(sensors=standard_sensors(20), truth="linear", duration=4.0, seed=1).run
-    start = standard_start(3)
-    for settings in STRONG:
-        rig = rig_of(**settings)
-        done += play(native.identifier(strong_config(rig, 1000.0, start)), float_samples(run))
-        fixed = strong_config_q31(rig, 1000.0, start)
-        phi, y = (counts[:TICKS] for counts in counts_of(rig, run))
-        bank = fixed.design.bank
-        done += play(native.identifier(fixed), count_samples(phi, y, bank.phi_max, bank.y_max))
+    run = simulation_of(DEFAULT).run(1)
     compiled = compiled_of(DEFAULT)
     config, engine = config_for_simulated_rig(compiled), engine_for_simulated_rig(compiled)
-    y, phi = engine.counts_of({"phi": run.phi[:TICKS], "y": run.y[:TICKS]}).T
+    y, phi = engine.counts_of({name: run[name][:TICKS] for name in ("phi", "y")}).T
     for in_float, in_fixed in WEAK:
         own = replace(config, estimator=replace(config.estimator, **in_float), range=None)
         identifier = weak_native(compiled, config.design).identifier_of(own)
@@ -150,4 +110,4 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["--planted"]:
         read_behind_an_array(library)
     else:
-        print(f"{play_all(library)} ticks")
+        print(f"{play_all()} ticks")

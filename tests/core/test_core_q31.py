@@ -14,9 +14,9 @@ from conftest import ROOT
 
 from pvid.cli.main import commands
 from pvid.core.sources import INCLUDES, PUBLIC_INCLUDES, core_sources, source
-from pvid.rig.file import RigFile
-from pvid.rig.run import write_run
-from pvid.sim.pendulum import STANDARD_PENDULUM, simulate, standard_sensors
+from pvid.models.mechanisms import compiled_of
+from pvid.models.simulated_rig import simulated_rig
+from pvid.sim.simulated_run import RigSimulation, write_simulated_run
 
 FIRMWARE = ROOT / "firmware"
 # Of the fixed-point core, and what both cores need.
@@ -38,11 +38,9 @@ FLOAT_INSTRUCTION = re.compile(
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A run of the standard rig, 10 s, and its rig file."""
     folder = tmp_path_factory.mktemp("q31")
-    run = simulate(sensors=standard_sensors(14), truth="full", duration=10.0, seed=2).run
-    write_run(folder / "run.csv", run)
-    exact = replace(RigFile.standard().sensor, y_gain_sd=0.0)  # else the errors are those of the gain and of l1
-    replace(RigFile.standard(), l1_sd=0.0, sensor=exact).write(folder / "rig.toml")
-    return folder / "run.csv", folder / "rig.toml"
+    rig = replace(simulated_rig("kapitza"), duration=10.0)
+    simulation = RigSimulation.of(compiled_of("kapitza"), rig, whole=True)
+    return folder / "run.csv", write_simulated_run(folder / "run.csv", simulation.run(2), simulation)
 
 
 def tool(*command: str | Path) -> str:
@@ -98,12 +96,12 @@ def test_identify_answers_from_the_fixed_point_core(recorded: tuple[Path, Path])
     done = CliRunner().invoke(commands, ["identify", str(run), "--rig", str(rig), "--core", "q31", "--json"])
     answer = json.loads(done.stdout)
     assert answer["core"] == "q31"
-    truth = dict(zip(("w", "d1", "d2"), STANDARD_PENDULUM.linear, strict=True))
-    for name, value in truth.items():
+    truth = simulated_rig("kapitza").truth
+    for name, value in ((name, truth[name]) for name in ("w", "d1", "d2")):
         # ten seconds: 4 standard errors, and these below half a per cent
         one = answer["parameters"][name]
         assert abs(one["value"] - value) < 4 * one["se"] and one["se_noise"] < 0.005 * value
-    assert answer["parameters"]["g"]["value"] == pytest.approx(STANDARD_PENDULUM.g, rel=0.005)
+    assert answer["parameters"]["g"]["value"] == pytest.approx(9.5, rel=0.005)
 
 
 def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
@@ -119,8 +117,8 @@ def test_an_encoder_without_a_resolution_has_the_step_that_the_run_shows(
     recorded: tuple[Path, Path], tmp_path: Path
 ) -> None:
     """A resolution of 0 explains no residual."""
-    rig = RigFile.standard()
-    replace(rig, sensor=replace(rig.sensor, phi_lsb=0.0)).write(tmp_path / "rig.toml")
+    text = recorded[1].read_text(encoding="utf-8")
+    (tmp_path / "rig.toml").write_text(f"{text}\n[sensor.phi]\nresolution = 0.0\n", encoding="utf-8")
     command = ["identify", str(recorded[0]), "--rig", str(tmp_path / "rig.toml"), "--core", "q31"]
     done = CliRunner().invoke(commands, command)
     assert done.exit_code == 0 and "nothing identified" not in done.stderr

@@ -13,7 +13,6 @@ from conftest import ROOT
 from pvid.core import headers
 from pvid.core.native import Native
 from pvid.settings.bounds import MAX_MOMENTS, MAX_WINDOW
-from pvid.twin import estimates
 
 
 def test_the_enumerations_are_those_of_the_headers() -> None:
@@ -21,11 +20,6 @@ def test_the_enumerations_are_those_of_the_headers() -> None:
         [sys.executable, ROOT / "tools" / "print_headers.py", "--check"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-
-
-def test_the_twin_lays_its_estimates_out_as_the_core_does(native: Native) -> None:
-    assert native.headers.dtype("pvid_estimate_f32") == estimates.F32
-    assert native.headers.dtype("pvid_estimate_q31") == estimates.Q31
 
 
 def test_the_sizes_are_those_of_the_build(native: Native) -> None:

@@ -21,13 +21,9 @@ from engine_snapshots import (
 )
 from weak_rig import EngineRig, engine_rig
 
-from pvid.cases import CASES
-from pvid.core import snapshot
-from pvid.core.native import Native
 from pvid.core.weak_native import WeakIdentifier
-from pvid.rig.file import RigFile
 from pvid.settings.enums import Reason, SnapshotStatus
-from pvid.settings.f32 import TrustConfig
+from pvid.settings.parts import TrustConfig
 from pvid.settings.weak import WeakConfig
 
 
@@ -117,13 +113,3 @@ def test_a_model_with_the_same_tables_and_another_function_is_another_model() ->
     nothing = one.ffi.callback("void(*)(float *, float *)", lambda p, theta: None)
     one.config.design.model.model.theta = nothing
     assert one.restore(image) is SnapshotStatus.OTHER_MODEL
-
-
-def test_snapshot_of_another_form_is_of_another_kind(native: Native) -> None:
-    rig = engine_rig("kapitza")
-    one, _, _owner = engines(rig, rig.config)
-    standard = RigFile.standard()
-    own = replace(standard, identifier=replace(standard.identifier, form="strong"))
-    strong = native.identifier(CASES["strong", "f32"].settings(own, 1000.0))
-    assert one.restore(snapshot.save(strong)) is SnapshotStatus.OTHER_KIND
-    assert snapshot.restore(strong, one.save()) is SnapshotStatus.OTHER_KIND

@@ -27,12 +27,13 @@ from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogReader, LogStream
 from pvid.log.rig import recording_of_log
 from pvid.log.values import UNKNOWN_RIG, Values, tables_of
-from pvid.rig.file import RigFile
+from pvid.models.model import Mechanism
+from pvid.models.registry import MODELS
 from pvid.rig.run import read_run
 from pvid.settings.enums import Reason
 
 TICKS = 4000
-MECHANISM = RigFile.standard().mechanism
+MECHANISM = Mechanism(MODELS["kapitza"], {"l1": 0.3})
 TABLES = tables_of(MECHANISM.model)
 
 

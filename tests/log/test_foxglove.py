@@ -26,9 +26,9 @@ from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogStream, Observer
 from pvid.log.values import UNKNOWN_RIG, tables_of
 from pvid.models.model import Mechanism
-from pvid.rig.file import RigFile
+from pvid.models.registry import MODELS
 
-PENDULUM = RigFile.standard().mechanism
+PENDULUM = Mechanism(MODELS["kapitza"], {"l1": 0.3})
 MOTOR = b"motor\nsample V V\nsample i A\nsample phi rad\np R ohm\np L H\np k N*m/A\np J kg*m^2\np i0"
 SUBPROTOCOL = "foxglove.sdk.v1"  # of foxglove-sdk; it refuses the older foxglove.websocket.v1
 BEGUN = 12  # messages of a run, the first samples among them

@@ -25,9 +25,8 @@ from pvid.log.live_stream import live_stream
 from pvid.log.reader import LogStream
 from pvid.models.model import Mechanism
 from pvid.models.registry import DEFAULT, MODELS
-from pvid.rig.file import RigFile
 
-PENDULUM = RigFile.standard().mechanism
+PENDULUM = Mechanism(MODELS["kapitza"], {"l1": 0.3})
 MOTOR = b"motor\nsample V V\nsample i A\nsample phi rad\np R ohm\np L H\np k N*m/A\np J kg*m^2\np i0"
 MECHANISMS = [PENDULUM, Mechanism(MODELS[DEFAULT]), mechanism_of(MOTOR)]
 

@@ -13,7 +13,7 @@ from typing import Any
 from conftest import ROOT
 
 LIMIT = 22
-HOMES = ("host/src/pvid/cases.py", "host/src/pvid/twin/printed.py")
+HOMES = ("host/src/pvid/twin/printed.py",)
 
 NAMES = {"weak", "strong", "f32", "q31", "f64"}
 MEMBERS = {("Form", "WEAK"), ("Form", "STRONG"), ("Core", "F32"), ("Core", "Q31")}

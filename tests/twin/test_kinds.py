@@ -12,7 +12,7 @@ from printed_estimator import PrintedEstimator, block_model, printed_core
 
 from pvid.core.native import Native
 from pvid.settings.enums import Law, Reason
-from pvid.settings.f32 import EstimatorConfig
+from pvid.settings.parts import EstimatorConfig
 
 Float32 = npt.NDArray[np.float32]
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from pendulum_plant import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
 
 from pvid.core.model_library import NATIVE, core_of
 from pvid.core.native import Native
@@ -20,7 +21,6 @@ from pvid.models.kapitza.refinement import refine_rig, sample_sd
 from pvid.settings.cores import FLOAT
 from pvid.settings.enums import Reason
 from pvid.settings.refine import RefineConfig
-from pvid.sim.pendulum import STANDARD_PENDULUM, Sensors, simulate, standard_sensors
 from pvid.twin import fnv
 from pvid.twin.printer.program import printed_module
 from pvid.twin.printer.values import filled, numbers

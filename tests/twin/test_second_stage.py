@@ -21,7 +21,7 @@ from pvid.core.weak_native import RefinedIdentifier, RefinedRecord, WeakNative
 from pvid.models.mechanisms import compiled_of
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.enums import Reason, SnapshotStatus
-from pvid.settings.f32 import TrustConfig
+from pvid.settings.parts import TrustConfig
 from pvid.settings.refine import RefineConfig
 from pvid.twin.printed import PrintedTwin
 

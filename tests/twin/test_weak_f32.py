@@ -10,7 +10,7 @@ from weak_rig import EngineRig, Float32, assert_equals_the_twin, engine_rig
 
 from pvid.models import mechanisms
 from pvid.settings.enums import Law, Reason
-from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
+from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import WeakConfig
 
 NO_GATE = GateConfig()

@@ -51,7 +51,7 @@ from pvid.rig.mechanism_file import MechanismRig
 from pvid.rig.run import Recording
 from pvid.settings.cores import CORES, FLOAT
 from pvid.settings.enums import Law
-from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
+from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.refine import RefineConfig, RefineSignal
 from pvid.settings.weak import Source as SignalSource
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakNoise

@@ -19,7 +19,6 @@ from pvid.design.refine import refine_config
 from pvid.model.compiled import CompiledModel, Signal
 from pvid.model.evaluation import numpy_function
 from pvid.model.signals import Integral, Jet, jets
-from pvid.models.kapitza.refinement import PARAMETERS
 from pvid.models.simulated_rig import simulated_rig
 from pvid.settings.refine import BIG_STEP, RefineConfig, RefineRig, RefineSignal
 from pvid.settings.weak import Source, WeakConfig
@@ -154,29 +153,6 @@ def refine_settings(
     if made.observer:
         settings = _with_observer(settings, made, r, states)
     return settings if model.refinement.equations else replace(settings, distance=0.0)
-
-
-def rig_with_options(made: RefineFunctions, rig: RefineRig, p: npt.ArrayLike) -> RefineRig:
-    """What the pendulum's refinement with options depends on.
-
-    Parameters
-    ----------
-    rig : without options, from refine_rig
-    p : parameters near those of the rig, as the weak form has them
-    """
-    prior_sd, gain_sd = (dict(zip(PARAMETERS, one, strict=True)) for one in (rig.prior_sd, rig.gain_sd))
-    rig = replace(
-        rig,
-        prior_sd=tuple(prior_sd.get(one.name, one.prior_sd) for one in made.parameters),
-        gain_sd=tuple(gain_sd.get(one.name, 0.0) for one in made.parameters),
-    )
-    if not made.runge_kutta:
-        return rig
-    n = len(made.coordinates)
-    angles, rates = rig.state_limit[: n // 2], rig.state_limit[n // 2 :]
-    rig = replace(rig, state_limit=tuple(limit for pair in zip(angles, rates, strict=True) for limit in pair))
-    jumps = _jumps(made, r_of(made, p), [_at_rest(made)])
-    return _with_steps(rig, made, jumps, 2.0 / rig.slow_hz)
 
 
 def _with_steps(rig: RefineRig, made: RefineFunctions, jumps: Sequence[float], block_s: float) -> RefineRig:

@@ -13,14 +13,9 @@ import numpy.typing as npt
 from pvid.base.errors import PvidError
 from pvid.core.headers import Filled, Headers, Tables, default_library
 from pvid.core.refusals import refused
-from pvid.models.registry import DEFAULT
 from pvid.settings.enums import Core, Status
-from pvid.settings.f32 import StrongConfig
-from pvid.settings.forms import FORMS
-from pvid.settings.kinds import Settings
-from pvid.settings.q31 import EstimatorConfigQ31, ScaleQ31
 from pvid.settings.record import Record
-from pvid.settings.tables import FirBankQ31, RowFormatQ31
+from pvid.settings.tables import FirBankQ31
 
 Float32 = npt.NDArray[np.float32]
 Int32 = npt.NDArray[np.int32]
@@ -36,15 +31,13 @@ class OfEstimator(NamedTuple):
 
 
 class Arithmetic(NamedTuple):
-    """Properties of a core. sample, sums: numpy types of samples and p, and of the sums; any_model, strong: the
-    estimator of any model, and the strong form's own, which has the pendulum's sums."""
+    """Properties of a core. sample, sums: numpy types of samples and p, and of the sums; any_model: its estimator."""
 
     sample: type[np.generic]
     sums: type[np.generic]
     exponents: bool  # of the sums
     misfit_unit: float
     any_model: OfEstimator
-    strong: OfEstimator
 
 
 def _sizes_f32(one: Any) -> tuple[int, int]:
@@ -58,7 +51,6 @@ _ARITHMETIC: dict[Core, Arithmetic] = {
         False,
         1.0,
         OfEstimator(_sizes_f32, "pvid_estimator_assess_f32"),
-        OfEstimator(lambda one: (len(one.p), len(one.sums.low)), "pvid_strong_assess_f32", of_identifier=True),
     ),
     "q31": Arithmetic(
         np.int32,
@@ -66,7 +58,6 @@ _ARITHMETIC: dict[Core, Arithmetic] = {
         True,
         2.0**-16,
         OfEstimator(lambda one: (int(one.model.n_p), int(one.information.n_sums)), "pvid_estimator_assess_q31"),
-        OfEstimator(lambda one: (len(one.p), len(one.sums)), f"pvid_{DEFAULT}_estimator_assess_q31"),
     ),
 }
 
@@ -111,37 +102,6 @@ class Native:
         """pvid_arithmetic_faults_f32: 0 when float32 behaves as the bits need."""
         return int(self.library.pvid_arithmetic_faults_f32())
 
-    def identifier(self, config: Settings) -> Identifier:
-        """An initialised identifier of the configuration's form and core."""
-        return Identifier(self, config)
-
-    def of_derivatives(self, config: StrongConfig) -> Stepper:
-        """An initialised identifier of the strong form in float32; its input are phi [ticks, 5] and u [ticks, 3]."""
-        return StrongStepper(self, "strong", "f32", config, replay="derivatives")
-
-    def strong_rows(self, phi: npt.ArrayLike, u: npt.ArrayLike) -> tuple[Float32, Float32]:
-        """Rows of the strong form: N [ticks, 11], Y [ticks] from phi [ticks, 5], u [ticks, 3]."""
-        phi32, u32 = (np.ascontiguousarray(x, np.float32) for x in (phi, u))
-        n, y = np.empty((len(phi32), 11), np.float32), np.empty(len(phi32), np.float32)
-        self.library.pvid_replay_strong_rows_f32(len(phi32), *map(self.headers.pointer, (phi32, u32, n, y)))
-        return n, y
-
-    def strong_estimator_q31(self, config: EstimatorConfigQ31, row_format: RowFormatQ31) -> StrongEstimatorQ31:
-        """An initialised fixed-point estimator of the strong form, for rows of this format."""
-        return StrongEstimatorQ31(self, config, row_format)
-
-    def strong_rows_q31(
-        self, row_format: RowFormatQ31, phi: npt.ArrayLike, u: npt.ArrayLike
-    ) -> tuple[Int32, npt.NDArray[np.bool_]]:
-        """Rows [ticks, 13] of the fixed-point strong form, and whether each fits."""
-        filled = self.headers.filled("pvid_strong_row_q31", row_format)
-        given = [np.ascontiguousarray(x, np.int32) for x in (phi, u)]
-        ticks = len(given[0])
-        out = np.zeros((ticks, 13), np.int32), np.zeros(ticks, np.uint8)
-        pointers = map(self.headers.pointer, (*given, *out))
-        self.library.pvid_replay_strong_rows_q31(self.headers.ffi.addressof(filled.struct), ticks, *pointers)
-        return out[0], out[1].astype(np.bool_)
-
     def derivatives_q31(
         self, bank: FirBankQ31, phi: npt.ArrayLike, y: npt.ArrayLike
     ) -> tuple[Int32, Int32, npt.NDArray[np.bool_]]:
@@ -161,23 +121,6 @@ class Native:
         out = np.zeros((ticks, 5), np.int32), np.zeros((ticks, 3), np.int32), np.zeros(ticks, np.uint8)
         self.library.pvid_replay_derivatives_q31(state, ticks, *map(self.headers.pointer, (*counts, *out)))
         return out[0], out[1], out[2].astype(np.bool_)
-
-    def physical(self, estimate: npt.NDArray[np.void], l1: float) -> tuple[Float32, Float32] | None:
-        """pvid_kapitza_physical_f32: (g, l2, rho2) and standard errors, None outside the physical region."""
-        one = np.ascontiguousarray(estimate, self.headers.dtype("pvid_estimate_f32"))
-        value, se = np.empty(3, np.float32), np.empty(3, np.float32)
-        pointer = self.headers.pointer
-        ok = self.library.pvid_kapitza_physical_f32(pointer(one), l1, pointer(value), pointer(se))
-        return (value, se) if ok else None
-
-    def physical_q31(self, estimate: npt.NDArray[np.void], scale: ScaleQ31) -> tuple[Int32, Int32] | None:
-        """pvid_kapitza_physical_q31: (g, l2, rho2) and standard errors in 2^-24, None outside the physical region."""
-        one = np.ascontiguousarray(estimate, self.headers.dtype("pvid_estimate_q31"))
-        value, se = np.empty(3, np.int32), np.empty(3, np.int32)
-        struct = self.headers.ffi.addressof(self.headers.filled("pvid_kapitza_scale_q31", scale).struct)
-        pointer = self.headers.pointer
-        ok = self.library.pvid_kapitza_physical_q31(pointer(one), struct, pointer(value), pointer(se))
-        return (value, se) if ok else None
 
 
 class Stepper:
@@ -343,43 +286,6 @@ class Stepper:
         return out
 
 
-class StrongStepper(Stepper):
-    """The strong form's state in C, with its own estimator."""
-
-    @property
-    def estimator(self) -> Any:
-        """pvid_strong_estimator_f32 in it."""
-        return self.state.estimator
-
-    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
-        return arithmetic.strong
-
-
-class StrongEstimatorQ31(Stepper):
-    """The fixed-point estimator of the strong form; its input are rows."""
-
-    _configured = "estimator"
-
-    def __init__(self, native: Native, config: EstimatorConfigQ31, row_format: RowFormatQ31) -> None:
-        self._row_format = native.headers.filled("pvid_strong_row_q31", row_format)
-        super().__init__(native, f"{DEFAULT}_estimator", "q31", config, replay=f"{DEFAULT}_rows")
-
-    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
-        return arithmetic.strong
-
-    def initialise(self) -> Status:
-        """Runs init on the present configuration."""
-        formats = self.native.headers.ffi.addressof(self._row_format.struct)
-        return Status(self._call("init", self.config_pointer, formats))
-
-    def run_rows(
-        self, rows: npt.ArrayLike, *, sums: bool = True, hashes: bool = True, estimate_every: int = 0
-    ) -> Record:
-        """Steps through rows [ticks, 13]."""
-        own = np.ascontiguousarray(rows, np.int32)
-        return self._recorded(len(own), [own], sums, hashes, estimate_every)
-
-
 class Publisher(Stepper):
     """An identifier that publishes: the weak form's state in C."""
 
@@ -400,7 +306,7 @@ class Publisher(Stepper):
 
     @property
     def estimate(self) -> npt.NDArray[np.void]:
-        """The published estimate (before the first one the start); in the strong form the present estimate."""
+        """The published estimate (before the first one the start)."""
         return self.native.headers.viewed(self.state.trust.estimate) if self.publishes else self.assess()
 
     @property
@@ -420,19 +326,3 @@ class Publisher(Stepper):
     def gap(self) -> None:
         """Samples are missing before the next call of `run`."""
         self._call("gap")
-
-
-class Identifier(Publisher):
-    """The identifier of a form and core: phi [rad], y [m], in fixed point counts of them."""
-
-    def __init__(self, native: Native, config: Settings) -> None:
-        self.form = config.form
-        super().__init__(native, config.form, config.core, config, replay=config.form)
-
-    def _kind_of(self, arithmetic: Arithmetic) -> OfEstimator:
-        return arithmetic.strong
-
-    @property
-    def publishes(self) -> bool:
-        """Whether it publishes trusted estimates only."""
-        return FORMS[self.form].publishes

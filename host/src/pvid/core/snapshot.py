@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pvid.core.native import Identifier, Native, Publisher
+from pvid.core.native import Native, Publisher
 from pvid.settings.enums import SnapshotStatus
 
 ROOM_BESIDE_THE_OBJECT = 40  # header and checksum
@@ -19,18 +19,8 @@ class Choice:
     generation: int
 
 
-def save(identifier: Identifier, generation: int = 1) -> bytes:
-    """A snapshot of the identifier as it stands."""
-    return save_as(f"{identifier.form}_{identifier.core}", identifier, len(identifier.state_bytes), generation)
-
-
-def restore(identifier: Identifier, image: bytes) -> SnapshotStatus:
-    """Restores a freshly made identifier of the same configuration; unless RESTORED, it is left as it was."""
-    return restore_as(f"{identifier.form}_{identifier.core}", identifier, image)
-
-
 def save_as(kind: str, identifier: Publisher, size: int, generation: int = 1) -> bytes:
-    """The same of an identifier of any mechanism; kind: end of the function's name; size: of the objects in it."""
+    """A snapshot of the identifier as it stands; kind: end of the function's name; size: of the objects in it."""
     ffi, library = identifier.native.headers.ffi, identifier.native.library
     image = ffi.new("uint8_t[]", size + ROOM_BESIDE_THE_OBJECT)
     function = getattr(library, f"pvid_snapshot_save_{kind}")
@@ -39,7 +29,7 @@ def save_as(kind: str, identifier: Publisher, size: int, generation: int = 1) ->
 
 
 def restore_as(kind: str, identifier: Publisher, image: bytes) -> SnapshotStatus:
-    """The same of an identifier of any mechanism."""
+    """Restores a freshly made identifier of the same configuration; unless RESTORED, it is left as it was."""
     function = getattr(identifier.native.library, f"pvid_snapshot_restore_{kind}")
     return SnapshotStatus(function(identifier.state, identifier.config_pointer, image, len(image)))
 

@@ -29,7 +29,7 @@ class WeakNativeQ31(Native):
         super().__init__(path)
         self.name, self.config, self.sources = name, config, sources
 
-    def identifier(self, start: npt.ArrayLike | None = None) -> WeakIdentifierQ31:  # type: ignore[override]
+    def identifier(self, start: npt.ArrayLike | None = None) -> WeakIdentifierQ31:
         """An initialised identifier.
 
         Parameters

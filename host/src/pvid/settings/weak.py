@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.settings.enums import Core
-from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
+from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 
 Float32 = npt.NDArray[np.float32]
 UInt8 = npt.NDArray[np.uint8]

@@ -17,7 +17,7 @@ from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.rows import EquationError, WeakRows
 from pvid.oracle.weak.solve import Fit
-from pvid.settings.f32 import EstimatorConfig, GateConfig, TrustConfig
+from pvid.settings.parts import EstimatorConfig, GateConfig, TrustConfig
 from pvid.settings.weak import WeakConfig, WeakDesign32, WeakFilter, WeakModel, WeakNoise
 
 HIGHEST_POWER = 8  # n of sin^n

@@ -13,12 +13,13 @@ from pvid.base.errors import PvidError
 from pvid.oracle.weak.functions import Float
 from pvid.oracle.weak.parameters import Parameters
 from pvid.oracle.weak.rows import EquationError, WeakRows
-from pvid.settings.f32 import GateConfig
-from pvid.settings.q31 import EstimatorConfigQ31
+from pvid.settings.parts import GateConfig
+from pvid.settings.q31 import EstimatorConfigQ31, GateConfigQ31
 from pvid.settings.weak import WeakDesign32
 from pvid.settings.weak_q31 import WeakConfigQ31, WeakDesignQ31
-from pvid.setup.q31 import forgetting_groups_q31, gate_config_q31
 
+PATIENCE_MAX = 2**30  # groups of rows, of gate_q31.h
+FORGETTING_MIN, FORGETTING_MAX = 4, 2**24  # likewise, of estimator_q31.h
 _NOISE_MARGIN = 16  # as in float32
 _ROW_BITS = 28  # of an entry of a row
 _MARGIN_BITS = 3  # that the entries of a run leave free
@@ -160,3 +161,26 @@ def start_q31(parameters: Parameters, p_bits: Sequence[int], start: Float | None
         "upper": whole(upper),
         "p_bits": tuple(p_bits),
     }
+
+
+def forgetting_groups_q31(forgetting_s: float, groups_hz: float) -> int:
+    """The time constant of forgetting in rows or windows, which come at groups_hz; 0: none."""
+    groups = round(forgetting_s * groups_hz)
+    if forgetting_s > 0 and not FORGETTING_MIN <= groups <= FORGETTING_MAX:
+        wrong = "short" if groups < FORGETTING_MIN else "long"
+        raise PvidError(
+            f"[identifier] forgetting_s = {forgetting_s:g} is too {wrong} for core q31, which forgets within 4 to 2^24 "
+            f"rows or windows ({FORGETTING_MIN / groups_hz:.4g} to {FORGETTING_MAX / groups_hz:.4g} s here); 0: never"
+        )
+    return groups
+
+
+def gate_config_q31(gate: GateConfig, groups_hz: float) -> GateConfigQ31:
+    """The gate of the float core in integers, for rows or windows that come at groups_hz."""
+    patience = gate.patience_s * groups_hz
+    if patience > PATIENCE_MAX:
+        raise PvidError(
+            f"[identifier] outlier_patience_s = {gate.patience_s:g} is too long for core q31, which counts up to 2^30 "
+            f"rows or windows ({PATIENCE_MAX / groups_hz:.4g} s here); 0: never"
+        )
+    return GateConfigQ31(round(gate.sigmas * 2**16), max(round(patience), 1) if patience > 0 else 0)

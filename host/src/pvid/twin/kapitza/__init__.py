@@ -1,1 +1,0 @@
-"""The pendulum's own parts of the twin."""
