@@ -20,14 +20,12 @@ from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
 from pvid.codegen.strong_library import strong_native
 from pvid.codegen.strong_sums import StrongSums, chains_of, over, strong_sums_of, times
 from pvid.codegen.strong_twin import StrongModelTwin
-from pvid.core.native import Native
 from pvid.core.sources import INCLUDES
 from pvid.design.fir import savitzky_golay
 from pvid.model import Model
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
 from pvid.models import mechanisms
-from pvid.oracle import strong as oracle
 from pvid.settings.enums import Law, Reason
 from pvid.settings.parts import EstimatorConfig, GateConfig
 from pvid.settings.strong import StrongModelConfig
@@ -256,26 +254,6 @@ def test_the_pendulums_sums_are_as_few_as_by_hand() -> None:
     sums = strong_sums_of(renamed(paper_pendulum()))
     assert len(sums.places) == 58 and len(sums.chains) == 57 and sums.shift is not None
     assert sums.projection.operations <= 284
-
-
-def test_the_pendulums_row_is_the_hand_made_one(native: Native) -> None:
-    """Kapitza's pendulum without an unknown zero: 11 entries, 18 non-zeros, and the residuals of the core's row."""
-    strong = paper_pendulum()
-    assert len(strong.functions.theta.labels) == 11 and len(strong.functions.c_row) == 18
-    random = np.random.default_rng(3)
-    phis, us = random.normal(size=(200, 5)), random.normal(size=(200, 3))
-    n, y = native.strong_rows(phis, us)
-    p = np.array([31.67, 8.875, 5.625])
-    hand = oracle.BINOMIAL * oracle.theta(p)
-    jets = {"phi": phis, "u": us}
-    columns = rows_of(strong, np.stack([jets[one.symbol.of][:, one.symbol.order] for one in strong.functions.inputs]))
-    values = dict(zip(strong.functions.model.p, p, strict=True))
-    theta = np.array([float(one.subs(values)) for one in strong.functions.theta.expressions])
-    ours = columns[-1] - theta @ columns[:-1]
-    theirs = y.astype(np.float64) - n.astype(np.float64) @ hand
-    size = np.abs(y) + np.abs(n.astype(np.float64)) @ np.abs(hand)
-    sign = np.sign(ours[0] * theirs[0])
-    assert (np.abs(ours - sign * theirs) <= 1e-6 * size).all()  # a few roundings to float32
 
 
 def test_chains_make_each_product_by_one_multiplication_of_known_ones() -> None:

@@ -39,7 +39,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A run of the standard rig, 10 s, and its rig file."""
     folder = tmp_path_factory.mktemp("q31")
     rig = replace(simulated_rig("kapitza"), duration=10.0)
-    simulation = RigSimulation.of(compiled_of("kapitza"), rig, whole=True)
+    simulation = RigSimulation.of(compiled_of("kapitza"), rig)
     return folder / "run.csv", write_simulated_run(folder / "run.csv", simulation.run(2), simulation)
 
 
@@ -111,14 +111,3 @@ def test_compare_runs_both_cores(recorded: tuple[Path, Path]) -> None:
     )
     assert re.search(r"f32 .*equal", done.stdout) and re.search(r"q31 .*equal", done.stdout), done.stdout
     assert "DIFFERENT" not in done.stdout
-
-
-def test_an_encoder_without_a_resolution_has_the_step_that_the_run_shows(
-    recorded: tuple[Path, Path], tmp_path: Path
-) -> None:
-    """A resolution of 0 explains no residual."""
-    text = recorded[1].read_text(encoding="utf-8")
-    (tmp_path / "rig.toml").write_text(f"{text}\n[sensor.phi]\nresolution = 0.0\n", encoding="utf-8")
-    command = ["identify", str(recorded[0]), "--rig", str(tmp_path / "rig.toml"), "--core", "q31"]
-    done = CliRunner().invoke(commands, command)
-    assert done.exit_code == 0 and "nothing identified" not in done.stderr
