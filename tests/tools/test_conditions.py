@@ -1,6 +1,6 @@
 """Where the sources tell the identifiers apart: by form (weak, strong) or core (f32, q31, f64).
 
-pvid.cases, and the door of the printed twin, are the places for it. Elsewhere few conditions may be left.
+The door of the printed twin is the place for it. Elsewhere few conditions may be left.
 """
 
 from __future__ import annotations

@@ -14,14 +14,14 @@ SOURCE = ROOT / "host" / "src"
 
 # Each imports from itself and from those before it.
 ORDER = """
-base settings model models core rig sim design oracle setup twin codegen link cases configuration compare
+base settings model models core rig sim design oracle setup twin codegen link configuration compare
 deploy board log identification show api fleet cli
 """.split()
 
 # Names of the pendulum's parameters stand in its own rooms only: what shows, stores or sends them asks the model.
-PENDULUMS = ("models/kapitza", "twin/kapitza", "oracle", "sim", "models/two_link_arm")  # the arm has a c1 and a c2
-# The rough guess of a rig file; the command that simulates the pendulum.
-MAY_NAME = ("rig/file.py", "cli/main.py", "cli/simulate.py")
+PENDULUMS = ("models/kapitza", "oracle", "sim", "models/two_link_arm")  # the arm has a c1 and a c2
+# The options of version 0.1 that the command line names.
+MAY_NAME = ("cli/main.py",)
 NAMES = {"d1", "d2", "c1", "c2", "l2", "rho2"}
 
 Graph = Mapping[str, set[str]]
