@@ -1,7 +1,7 @@
 /* pvid/elementary.h - sine, cosine and sign in float32, with the same bits on every processor.
  *
  * The functions that `pvid model build` writes call these. They use + - * / and comparisons only, no library function;
- * pvid.twin.f32.elementary has the same operations in numpy. Pure functions: no state, reentrant.
+ * Pure functions: no state, reentrant.
  *
  *   const float moment = weight * pvid_sin_f32(angle);
  */

@@ -1,7 +1,7 @@
 /* pvid/elementary_q31.h - sine, cosine, sign, products and quotients in integers.
  *
  * The fixed-point functions that `pvid model build` writes call these. Each int32 has its own format: the value is the
- * integer times 2^-bits. pvid.twin.q31.elementary has the same operations in numpy. Pure functions.
+ * integer times 2^-bits. Pure functions.
  */
 #ifndef PVID_ELEMENTARY_Q31_H
 #define PVID_ELEMENTARY_Q31_H

@@ -29,6 +29,7 @@ _DAMPINGS = (1e-3, 1e-2, 0.1, 1.0, 10.0)  # of a step that leads nowhere
 _SETTLED = 0.01  # standard errors: of the last step
 _NEARLY = 0.3  # of one from which rounding leads no farther
 _RUNS_AWAY = 1e100  # a reading, or its derivative: the square of a larger one overflows
+_NO_SQUARE = 1e150  # of residuals over the sensors' noise, and of their derivatives
 _START_SD = 1e3  # of the outputs' spread: the starts are free
 _MORE = 1.05  # times the samples: what shorter blocks must cover
 _GATE = 6.0  # standard deviations of the residuals: a sample beyond is left out
@@ -237,7 +238,8 @@ class Problem:
         self.budget.left -= steps * columns
 
     def block(self, r: Float, cut: Cut, starts: Float, use: Bool, move: bool = True) -> Block | None:
-        """One pass; None where the motion runs away. `move` False: r stays, and there are no derivatives by it."""
+        """One pass; None where the motion runs away, or where residuals over a noise have no squares. `move` False: r
+        stays, and there are no derivatives by it."""
         m = self.measured
         self._spend(cut, 1 + (self.kernel.columns if move else self.kernel.states))
         z, jacobian, _ = self.kernel.blocks(
@@ -252,7 +254,10 @@ class Problem:
         jacobian *= use[..., None]
         blocks, columns = len(cut.first), jacobian.shape[-1]
         stacked = np.concatenate([jacobian.reshape(blocks, -1, columns), error.reshape(blocks, -1, 1)], -1)
-        return Block(jacobian, error, np.asarray(np.linalg.qr(stacked, mode="r")))
+        triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
+        if not np.abs(triangle).max() < _NO_SQUARE:  # LAPACK's search for the singular values of no numbers has no end
+            return None
+        return Block(jacobian, error, triangle)
 
     def cost(self, r: Float, cut: Cut, starts: Float, use: Bool, prior: Prior) -> float:
         """Sum of squares of residuals and prior; inf where the motion is no number."""

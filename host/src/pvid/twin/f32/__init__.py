@@ -1,1 +1,0 @@
-"""The float32 core in numpy, operation by operation."""

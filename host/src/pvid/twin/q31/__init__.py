@@ -1,1 +1,0 @@
-"""The fixed-point core in numpy, integer by integer."""
