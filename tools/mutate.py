@@ -244,7 +244,7 @@ def playbacks() -> dict[Kit, Digests]:
     """The builds that are played, and what one shows by variant."""
     found: dict[Kit, Digests] = {}
     if not RECORDED:
-        found[NATIVE] = lambda library: [("configurations", configurations.digest(Native(library)))]
+        found[NATIVE] = lambda library: iter([("configurations", configurations.digest(Native(library)))])
     for one in playback_engine.subjects():
         folder = one.library.parent
         options = ("-std=c99", *one.definitions, f"-I{folder}", f"-I{ROOT / 'host' / 'native'}")

@@ -338,4 +338,4 @@ def test_a_model_that_fixed_point_cannot_compute_gets_the_float_files_alone() ->
     assert generated_model(MOTOR).fixed.refusal is None
     files = files_of(wide)
     assert "motor_f32.c" in files and not [name for name in files if "q31" in name]
-    assert "q31" not in files["motor_test.c"] and "q31" not in files["CMakeLists.txt"]
+    assert "q31" not in files["motor_test.c"] and "motor_q31" not in files["CMakeLists.txt"]

@@ -64,8 +64,8 @@ class Case:
     @property
     def code(self) -> str:
         """In C: f in float, g in integers."""
-        floats = f"void f{self.number}(const float in[], float out[])"
-        integers = f"bool g{self.number}(const int32_t in[], int32_t out[])"
+        floats = f"void f_{self.number}(const float in[], float out[])"
+        integers = f"bool g_{self.number}(const int32_t in[], int32_t out[])"
         limits = [2**30] * len(NAMES)
         return "\n".join(
             [
@@ -105,19 +105,19 @@ def test_random_expressions(tmp_path: Path) -> None:
     subprocess.run(["gcc", *options, *sources, "-o", str(tmp_path / "random.so"), "-lm"], check=True)
     library = ctypes.CDLL(str(tmp_path / "random.so"))
     code = (tmp_path / "random.c").read_text(encoding="utf-8")
-    names = [f"{kind}{k}" for kind in "fg" for k in range(COUNT)]
+    names = [f"{kind}_{k}" for kind in "fg" for k in range(COUNT)]
     twin = printed_module(core, FOLDERS, {}, names, {"random.c": code})
     drawn = np.random.default_rng(5).uniform(-1, 1, (len(NAMES), VECTORS)) * np.array(REACH)[:, None]
     floats = drawn.astype(np.float32)
     places = np.array([bits_of((-one, one)) for one in REACH])[:, None]
     integers = np.rint(drawn * 2.0**places).astype(np.int32)
     for one in cases:
-        found, counts = each(library, f"f{one.number}", floats), each(library, f"g{one.number}", integers)
+        found, counts = each(library, f"f_{one.number}", floats), each(library, f"g_{one.number}", integers)
         for k in range(PRINTED):
             own, other = [np.float32(0)], [0]
-            getattr(twin, f"f{one.number}")(list(floats[:, k]), own)
+            getattr(twin, f"f_{one.number}")(list(floats[:, k]), own)
             assert np.float32(own[0]).tobytes() == found[k].tobytes(), one.whole
-            assert getattr(twin, f"g{one.number}")(integers[:, k].tolist(), other) and other[0] == counts[k], one.whole
+            assert getattr(twin, f"g_{one.number}")(integers[:, k].tolist(), other) and other[0] == counts[k], one.whole
         given = floats.astype(np.float64)
         bound = bounds_of(one.program, given, FLOAT32)[0]
         assert (np.abs(found - one.exactly(given)) <= bound).all(), one.whole

@@ -73,7 +73,7 @@ class Memory(Arithmetic):
         place = self.expression(node.subscript, scope)
         if not (isinstance(base.type, tuple) and base.type[0] in ("ptr", "arr")):
             raise self.refuse(node, "a subscript of no array")
-        base = self._as_list(base, place)
+        base = self._as_list(base)
         inner = base.type[1]
         count, entry = self._spread(inner)
         at = moved(base.at, self._scaled(place, inner))
@@ -83,9 +83,9 @@ class Memory(Arithmetic):
             return Value(base.code, inner, base.level)
         return self._lvalue(f"{base.within(ATOM)}[{at}]", inner, ("entry", base.slot))
 
-    def _as_list(self, base: Value, place: Value | None) -> Value:
-        """A pointer to one struct becomes one into a list, if it is moved."""
-        if base.single and not (place is not None and place.const == 0):
+    def _as_list(self, base: Value) -> Value:
+        """A pointer to one struct becomes one into a list, where it is moved or has a subscript, even 0."""
+        if base.single:
             self.flags.add((base.slot, "list"))
             return replace(base, single=False)
         return base
@@ -121,10 +121,7 @@ class Memory(Arithmetic):
         if isinstance(inner, c_ast.ArrayRef):
             base = self._unpaired(self._decayed(self.expression(inner.name, scope)), node)
             place = self.expression(inner.subscript, scope)
-            if base.single:
-                base = self._as_list(base, place)
-                if base.single:
-                    return base
+            base = self._as_list(base)
             return replace(
                 Value(base.code, ("ptr", base.type[1])), at=moved(base.at, self._scaled(place, base.type[1]))
             )
@@ -192,7 +189,7 @@ class Memory(Arithmetic):
         if op in ("+", "-") and (is_pointer(a) or is_pointer(b)):
             if is_pointer(b):
                 a, b = b, a
-            a = self._as_list(self._unpaired(a, node), None)
+            a = self._as_list(self._unpaired(a, node))
             offset = self._scaled(b, a.type[1])
             return replace(
                 Value(a.code, a.type), at=moved(a.at, offset) if op == "+" else f"{a.at} - {operand(offset)}"
