@@ -80,7 +80,7 @@ def standard(form: str, core: str = "f32") -> Standard:
     if form == "strong":
         strong = StrongBoard.of_shipped_rig(DEFAULT)
         signals = tuple(strong.recording[:TICKS].T)
-        return Standard(strong, signals, strong.hashes(Native(), *signals))
+        return Standard(strong.without_recording, signals, strong.hashes(Native(), *signals))
     rig = MechanismRig(DEFAULT, known=simulated_rig(DEFAULT).knowns)
     if core == "q31":
         fixed = fixed_run(DEFAULT, TICKS)

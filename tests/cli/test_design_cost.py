@@ -44,8 +44,10 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_cost_of_both_stages_is_measured_for_a_recording(pendulum: Path) -> None:
-    done = pvid("design", "--run", pendulum, "--on", BOARD, "--refine", "--clock", "168", "--json")
+def test_the_cost_of_both_stages_is_measured_for_a_recording(tmp_path: Path) -> None:
+    run = tmp_path / "run.csv"  # long enough for a second stage with few ticks of its own
+    assert pvid("simulate", run, "--duration", "12", "--seed", "1").return_value == DONE
+    done = pvid("design", "--run", run, "--on", BOARD, "--refine", "--clock", "168", "--json")
     weak, printed, light = json.loads(done.stdout)["cost"]
     assert [one["form"] for one in (weak, printed, light)] == ["weak", "refined", "refined"]
     assert (printed["jobs"], printed["rests"], light["jobs"], light["rests"]) == (3, 1, 3, 255)

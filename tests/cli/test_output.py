@@ -111,7 +111,7 @@ def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     names = [tmp_path / name for name in ("rig.toml", "figure.png", "run.csv")]
     for path in names:
         path.write_text("old", encoding="utf-8")
-    with files_up_to(100), replacing():
+    with files_up_to(10), replacing():
         with pytest.raises(PvidError, match="rig.toml: cannot be written: File too large"):
             MechanismRig("kapitza").write(names[0])
         with pytest.raises(PvidError, match="cannot write the figure .*File too large"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,11 @@ class FloatBoard:
     compiled: CompiledModel
     config: Any
     recording: npt.NDArray[np.float32]
+
+    @property
+    def without_recording(self) -> Self:
+        """The same, for a board that gets its samples from the PC."""
+        return replace(self, recording=self.recording[:1])
 
     @property
     def p_names(self) -> tuple[str, ...]:

@@ -230,11 +230,6 @@ class MechanismBoard(FloatBoard):
             weak_sources(self.compiled, self.config.design, equations), self.configured(frame), self.refine
         )
 
-    @property
-    def without_recording(self) -> MechanismBoard:
-        """The same, for a board that gets its samples from the PC."""
-        return replace(self, recording=self.recording[:1])
-
     def hashes(self, _: Native, *signals: npt.ArrayLike) -> npt.NDArray[np.uint32]:
         """Running hash after every tick in the engine on this machine [ticks]."""
         samples = self.readings(*signals)

@@ -260,7 +260,7 @@ def _ranked(
     if rates:
         filters = _RATES + (_FLAT_RATES if rates_of_drives(model) else ())
         attempt(made(best.design, rate_taps=taps, rate_degree=degree) for taps, degree in filters)
-        best = _least_smoothed(tried) if errors else min(tried, key=_order)
+        best = _least_smoothed(tried) if errors and model.channels.signs else min(tried, key=_order)
     place = windows.index(best.design.window_s)
     near = windows[max(place - 1, 0) : place + 2]
     attempt(
@@ -273,7 +273,7 @@ def _ranked(
         best = min(tried, key=_order)
         attempt(made(best.design, joint=True, functions=count) for count in {best.design.functions, _FUNCTIONS[-1]})
     ordered = sorted(tried, key=_order)
-    if rates and errors:
+    if rates and errors and model.channels.signs:
         ordered.insert(0, ordered.pop(ordered.index(_least_smoothed(tried))))
     return ordered
 
