@@ -123,7 +123,8 @@ missing_packages() {
         need why3 command -v why3
         need z3 command -v z3
         if [[ $(uname -m) == x86_64 ]]; then
-            need gcc-multilib links_with gcc -m32
+            # Not gcc-multilib: it excludes every cross compiler, that for PowerPC too.
+            need "gcc-$(gcc -dumpversion 2>/dev/null || echo 12)-multilib" links_with gcc -m32
         fi
     fi
     printf '%s' "${missing[*]}"
