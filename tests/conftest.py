@@ -27,9 +27,9 @@ settings.load_profile("seeded")
 SLOW = (
     *("tools/pages", "board/targets", "tools/wheel", "identification/refined"),
     *("cli/design_cost", "cli/identify_in_c", "log/log", "deploy/deploy", "cli/cli"),
-    *("show/report", "board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
+    *("board/stream", "board/memory", "bench/refine_mechanisms", "bench/longevity"),
     *("bench/liar", "log/verify", "bench/attack", "show/page", "core/core_q31"),
-    *("board/ports", "tools/notebooks", "cli/run_input", "identification/wild_samples", "models/scale_errors"),
+    *("board/ports", "tools/notebooks", "cli/run_input", "identification/wild_samples", "identification/scale_errors"),
     *("cli/identify_run", "tools/consumer", "twin/weak_q31"),
     *("board/refined_stream", "fleet/batch", "twin/weak_f32", "twin/refinement"),
     *("cli/api", "codegen/build", "bench/year", "show/view"),

@@ -9,9 +9,9 @@
 #include "pvid/estimator.h"
 #include "pvid/little_endian.h"
 
-static inline void get_floats(float to[], const uint8_t from[])
+static inline void get_floats(float to[], const uint8_t from[], size_t count)
 {
-    for (size_t i = 0; i < STREAM_N_P; i++) {
+    for (size_t i = 0; i < count; i++) {
         to[i] = pvid_get_f32(&from[4u * i]);
     }
 }
@@ -20,10 +20,10 @@ static inline void get_floats(float to[], const uint8_t from[])
 static inline void get_estimator_config(pvid_estimator_config_f32 *estimator,
                                         const uint8_t payload[PVID_CONFIGURE_BYTES])
 {
-    get_floats(estimator->start, &payload[PVID_CONFIGURE_START]);
-    get_floats(estimator->start_sd, &payload[PVID_CONFIGURE_START_SD]);
-    get_floats(estimator->lower, &payload[PVID_CONFIGURE_LOWER]);
-    get_floats(estimator->upper, &payload[PVID_CONFIGURE_UPPER]);
+    get_floats(estimator->start, &payload[PVID_CONFIGURE_START], STREAM_N_P);
+    get_floats(estimator->start_sd, &payload[PVID_CONFIGURE_START_SD], STREAM_N_P);
+    get_floats(estimator->lower, &payload[PVID_CONFIGURE_LOWER], STREAM_N_P);
+    get_floats(estimator->upper, &payload[PVID_CONFIGURE_UPPER], STREAM_N_P);
     estimator->row_sd = pvid_get_f32(&payload[PVID_CONFIGURE_ROW_SD]);
     estimator->forgetting_s = pvid_get_f32(&payload[PVID_CONFIGURE_FORGETTING_S]);
     estimator->feedback_hz = pvid_get_f32(&payload[PVID_CONFIGURE_FEEDBACK_HZ]);

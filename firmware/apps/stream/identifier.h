@@ -53,9 +53,6 @@ uint32_t identifier_arithmetic_faults(void);
 /* Starts over with the settings of a Configure frame. */
 pvid_status identifier_start(const uint8_t payload[IDENTIFIER_CONFIGURE_BYTES]);
 
-/* What counts of the board's own sensors, in the identifier's order, are to it, as in a frame. */
-void identifier_sample(const int32_t counts[STREAM_SAMPLES], uint8_t sample[SAMPLE_BYTES]);
-
 pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES]);
 
 /* The running hash (fnv.h) with the present state and `reason`. */

@@ -37,20 +37,10 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_BYTES])
     return pvid_weak_init_f32(&identifier, &config);
 }
 
-void identifier_sample(const int32_t counts[STREAM_SAMPLES], uint8_t sample[SAMPLE_BYTES])
-{
-    static const float lsb[STREAM_SAMPLES] = STREAM_LSB;
-    for (size_t i = 0; i < STREAM_SAMPLES; i++) {
-        pvid_put_f32(&sample[4u * i], (float)counts[i] * lsb[i]);
-    }
-}
-
 pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
 {
     float values[STREAM_SAMPLES];
-    for (size_t i = 0; i < STREAM_SAMPLES; i++) {
-        values[i] = pvid_get_f32(&sample[4u * i]);
-    }
+    get_floats(values, sample, STREAM_SAMPLES);
     return pvid_weak_step_f32(&identifier, values);
 }
 

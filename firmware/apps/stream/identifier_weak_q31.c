@@ -20,13 +20,6 @@ pvid_status identifier_start(const uint8_t payload[PVID_CONFIGURE_Q31_BYTES])
     return pvid_weak_init_q31(&identifier, &config);
 }
 
-void identifier_sample(const int32_t counts[STREAM_SAMPLES], uint8_t sample[SAMPLE_BYTES])
-{
-    for (size_t i = 0; i < STREAM_SAMPLES; i++) {
-        pvid_put_i32(&sample[4u * i], counts[i]);
-    }
-}
-
 pvid_reason identifier_step(const uint8_t sample[SAMPLE_BYTES])
 {
     int32_t readings[STREAM_SAMPLES];

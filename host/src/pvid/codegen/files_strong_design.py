@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pvid.codegen import describe
 from pvid.codegen.c_text import guarded, initialised, inner, number
-from pvid.codegen.files_weak import fields_in_c
+from pvid.codegen.files_weak import fields_in_c, size_check
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.strong import StrongFunctions
 from pvid.design.c_tables import float_array
@@ -58,9 +58,7 @@ def header(strong: StrongFunctions, config: StrongModelConfig, command: str) -> 
     body = [
         f'#include "{name}.h"',
         "",
-        f"#if PVID_MAX_WINDOW < {config.memory}",
-        f'#error "compile pvid and this file with -DPVID_MAX_WINDOW={config.memory}"',
-        "#endif",
+        *size_check({"PVID_MAX_WINDOW": config.memory}),
         "",
         float_array(
             f"{name}_weights", config.weights, "[order][point - 1], order k per point^k: pvid/differentiator.h"

@@ -189,15 +189,6 @@ class Model:
 
 
 @dataclass(frozen=True)
-class ScaleError:
-    """What the error of a scale adds to the standard errors, of either sign: of the mapped parameters and of the
-    physical ones [..., n]; the latter NaN outside the physical region."""
-
-    p: Float
-    physical: Float
-
-
-@dataclass(frozen=True)
 class Mechanism:
     """A model with the values of its constants; None: they are not known, and the physical parameters are NaN.
 
@@ -228,27 +219,6 @@ class Mechanism:
         """The mapped parameters of a mechanism with these physical ones [n_physical]."""
         assert self.constants is not None
         return self.model.mapped_of(physical, self.constants)
-
-    def scale_errors(self, p: npt.ArrayLike, sd: Mapping[str, float]) -> dict[str, ScaleError]:
-        """By name of the model's scales; `sd` holds their standard deviations, relative."""
-        at, physical = self._mapped(p), self.physical(p)
-        assert self.constants is not None
-        gradient = self.model.gradient_of(at, self.constants)
-        errors = {}
-        for scale in self.model.scales:
-            change = at * np.array(scale.p)
-            with np.errstate(invalid="ignore"):
-                through = np.einsum("...ij,...j->...i", gradient, change)
-                direct = np.array(scale.physical) * physical
-                errors[scale.name] = ScaleError(sd[scale.name] * change, sd[scale.name] * (through + direct))
-        return errors
-
-    def added_covariance(self, p: npt.ArrayLike, sd: Mapping[str, float]) -> Float:
-        """What all scales together add to the covariance of the mapped parameters: [..., n_mapped, n_mapped]."""
-        at = self._mapped(p)
-        changes = [sd[scale.name] * at * np.array(scale.p) for scale in self.model.scales]
-        nothing = np.zeros((*at.shape, at.shape[-1]))
-        return sum((one[..., :, None] * one[..., None, :] for one in changes), nothing)
 
     def _mapped(self, p: npt.ArrayLike) -> Float:
         return np.asarray(p, np.float64)[..., : self.model.n_mapped]

@@ -9,8 +9,6 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
-from pvid.base.rounding import with_error
-
 Float = npt.NDArray[np.float64]
 
 
@@ -25,13 +23,6 @@ def interesting(value: Float, band: Float) -> tuple[float, float]:
     high = max(float(settled.max()), float(value[last] + 2 * band[last]))
     margin = 0.05 * (high - low)
     return low - margin, high + margin
-
-
-def draw_answer(axis: Axes, value: float, se: float) -> None:
-    """The answer of a whole run: a line with +-2 of its standard errors, and its number as a title."""
-    axis.axhspan(value - 2 * se, value + 2 * se, color="C1", alpha=0.4, label="answer ±2 s.e.")
-    axis.axhline(value, color="C1", linewidth=1.0, label="answer")
-    axis.set_title(" ± ".join(with_error(value, se)), fontsize="medium", loc="left")
 
 
 def plain_ticks(axis: Axes) -> None:
