@@ -165,10 +165,14 @@ def test_standard_deviation_of_a_constant_is_part_of_the_errors(tmp_path: Path) 
 def test_advice_is_printed_and_part_of_the_json(motor: Path) -> None:
     """Whatever stage answers."""
     sentence = "V seems to have the opposite sign: --columns V=V:-1"
-    for more in ((), ("--refine",), ("--core", "f32")):
-        answer = pvid("identify", motor, "--columns", "V=V:-1", "--json", *more)
-        assert json.loads(answer.stdout)["advice"] == [sentence], more
+    shown = {}
+    for stage in ("", "--refine", "--core=f32"):
+        answer = pvid("identify", motor, "--columns", "V=V:-1", "--json", *filter(None, [stage]))
+        shown[stage] = json.loads(answer.stdout)
+        assert shown[stage]["advice"] == [sentence], stage
         assert f"pvid: advice: {sentence}" in answer.stderr
+    refinement = shown["--refine"]["refinement"]  # no search that could not end well
+    assert refinement == {"adopted": False, "text": "not refined: the advice about the columns comes first"}
     assert json.loads(pvid("identify", motor, "--json").stdout)["advice"] == []
 
 

@@ -233,7 +233,7 @@ class Analysis(Answer):
             f"verdict {found.verdict.word}; {of_weak}chi2 {found.chi2:.2g}; {len(found.times)} windows of "
             f"{found.design.window_s:.3g} s; R^2 {explained}"
         ]
-        if self.refinement is not None and self.identified:
+        if self.refinement is not None:
             extras = self.refinement.fit.extras if self.refinement.fit is not None and self.refinement.adopted else {}
             shown = [f"{name} {value:.3g} ± {se:.1g}" for name, (value, se) in extras.items()]
             lines.append("; ".join([self.refinement.text, *([", ".join(shown)] if shown else [])]))

@@ -46,15 +46,15 @@ def identified(
     if refine is None:
         refine = bool(model.refinement.equations) and weights == "residuals" and not recording.origins
         refine = refine and not another_column
-    if refine:
+    if refine and another_column:
+        answer = replace(answer, refinement=Refinement(False, "not refined: the advice about the columns comes first"))
+    elif refine:
         from pvid.identification.refinement.adoption import refined_answer  # loads the simulation
 
         with working("refining"):
             found, fit, text = refined_answer(answer)
         answer = replace(found, refinement=Refinement(found is not answer, text, fit))
-    elif another_column:
-        return answer
-    return judged_by_prediction(answer) if predict else answer
+    return judged_by_prediction(answer) if predict and not another_column else answer
 
 
 def judged_by_prediction(answer: Analysis) -> Analysis:
