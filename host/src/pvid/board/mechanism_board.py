@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -17,7 +16,7 @@ from pvid.base.wording import printable
 from pvid.board.float_board import FloatBoard, recording_header
 from pvid.board.mechanism_board_q31 import MechanismBoardQ31
 from pvid.board.settings_text import TABLE, array_of, part_of, written
-from pvid.board.stream_image import MOST_TICKS, SLOWEST, StreamImage, c_string
+from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_refine, files_weak
 from pvid.codegen.generated import GeneratedModel
 from pvid.codegen.refine import RefineFunctions, refine_functions, widths
@@ -35,10 +34,8 @@ from pvid.configuration.weak import (
     with_neglected,
 )
 from pvid.core.native import Native
-from pvid.core.sizes import raised
 from pvid.core.weak_native import RefinedIdentifier
-from pvid.design.c_tables import float_literal
-from pvid.link.frames import Configuration, Core, Form
+from pvid.link.frames import Configuration, Form
 from pvid.link.names import BoardNames, shown_of_refined
 from pvid.model.compiled import CompiledModel
 from pvid.models.mechanisms import constants_of
@@ -159,8 +156,7 @@ class MechanismBoard(FloatBoard):
         return cls(rig, made.compiled, config, samples_of(config, run)[:MOST_TICKS], refine)
 
     def __post_init__(self) -> None:
-        if not self.config.sample_rate >= SLOWEST:
-            raise PvidError(f"the sample rate is {self.config.sample_rate:g} Hz, and a board streams at 1 Hz and more")
+        refuse_slow(self.config.sample_rate)
 
     @cached_property
     def equations(self) -> RefineFunctions:
@@ -190,37 +186,26 @@ class MechanismBoard(FloatBoard):
     @property
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
-        model, design = self.config.design.model, self.config.design
         code = files_weak.printed(GeneratedModel(self.compiled, _COMMAND))
         code["stream_tables.h"] = files_weak.design_header(self._shared, self.compiled, _COMMAND)
         if self.refine is not None:
             code |= files_refine.files_of(self.equations, _COMMAND)
             code["stream_refine.h"] = _refine_header(self.refine, self.shown)
-        units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
-        macros = [
-            f"#define STREAM_CORE {int(Core.F32)}",
-            f"#define STREAM_FORM {int(Form.WEAK)}",
-            f"#define STREAM_CONFIG {model.name}_config_f32",
-            f"#define STREAM_N_P {len(self.compiled.unknowns)}u",
-            f"#define STREAM_SAMPLES {model.samples}u",
-            f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
-            *[f"#define {one} 0.0f" for one in ("STREAM_PHI_LSB", "STREAM_Y_LSB")],
-            f"#define STREAM_LSB {{{', '.join(['0.0f'] * model.samples)}}}",
-            f"#define STREAM_P_UNIT {{{units}}}",
-            f"#define STREAM_NAMES {c_string(self.names.text)}",
-            *([] if self.refine is None else ["#define STREAM_REFINED"]),
-            *(["#define STREAM_REPEATS"] if self.repeats else []),
-        ]
-        return StreamImage(
-            number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
-            macros=macros,
-            files={**code, "stream_recording.h": recording_header(self.recording)},
-            form="weak",
-            core="f32",
-            identifier="weak_f32",
-            sensor="sensor_recording.c",
-            sizes={name: str(value) for name, value in raised(sizes_of_design(design)).items()},
+        return StreamImage.made(
+            "weak",
+            "f32",
+            own=[f"#define STREAM_CONFIG {self.config.design.model.name}_config_f32"],
+            names=self.names,
+            sample_rate=self.sample_rate,
+            units=["1.0f"] * len(self.compiled.unknowns),
+            code=code,
+            recording=recording_header(self.recording),
+            sizes=sizes_of_design(self.config.design),
             refined=self.refine is not None,
+            more=[
+                *([] if self.refine is None else ["#define STREAM_REFINED"]),
+                *(["#define STREAM_REPEATS"] if self.repeats else []),
+            ],
         )
 
     def twin_of(self, frame: Configuration) -> PrintedTwin:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pvid.base.errors import PvidError
-from pvid.board.stream_image import MOST_TICKS, SLOWEST, StreamImage, c_string
+from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_weak_q31
 from pvid.codegen.weak import weak_functions_of
 from pvid.codegen.weak_library import weak_native_q31, weak_sources_q31
@@ -28,10 +27,9 @@ from pvid.configuration.weak_q31 import (
     with_neglected,
 )
 from pvid.core.native import Native
-from pvid.core.sizes import raised
 from pvid.design.c_tables import float_literal
 from pvid.design.weak_q31 import circle_of
-from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Core, Count, Form, Message, Source
+from pvid.link.frames import MAX_P, Configuration, ConfigureQ31, Count, Form, Message, Source
 from pvid.link.names import BoardNames
 from pvid.models.mechanisms import constants_of
 from pvid.models.simulated_rig import simulated_rig
@@ -98,8 +96,7 @@ class MechanismBoardQ31:
         return cls(rig, engine, engine.counts_of(run)[:MOST_TICKS])
 
     def __post_init__(self) -> None:
-        if not self.engine.sample_rate >= SLOWEST:
-            raise PvidError(f"the sample rate is {self.engine.sample_rate:g} Hz, and a board streams at 1 Hz and more")
+        refuse_slow(self.engine.sample_rate)
 
     @property
     def config(self) -> WeakConfigQ31:
@@ -155,28 +152,16 @@ class MechanismBoardQ31:
             f"{name}_weak_q31.c": files_weak_q31.source(engine.made, engine.parameters, _COMMAND),
             "stream_tables.h": files_weak_q31.design_header(self.config, name, sizes, _COMMAND, []),
         }
-        units = ", ".join(float_literal(np.float32(2.0**-bits)) for bits in engine.parameters.p_bits)
-        macros = [
-            f"#define STREAM_CORE {int(Core.Q31)}",
-            f"#define STREAM_FORM {int(Form.WEAK)}",
-            f"#define STREAM_CONFIG {name}_config_q31",
-            f"#define STREAM_N_P {len(engine.parameters.p_bits)}u",
-            f"#define STREAM_SAMPLES {self.config.design.model.samples}u",
-            f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
-            *[f"#define {one} 0.0f" for one in ("STREAM_PHI_LSB", "STREAM_Y_LSB")],
-            f"#define STREAM_LSB {{{', '.join(['0.0f'] * len(engine.lsb))}}}",
-            f"#define STREAM_P_UNIT {{{units}}}",
-            f"#define STREAM_NAMES {c_string(self.names.text)}",
-        ]
-        return StreamImage(
-            number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
-            macros=macros,
-            files={**code, "stream_recording.h": _recording(self.recording)},
-            core="q31",
-            form="weak",
-            identifier="weak_q31",
-            sensor="sensor_recording.c",
-            sizes={macro: str(value) for macro, value in raised(sizes).items()},
+        return StreamImage.made(
+            "weak",
+            "q31",
+            own=[f"#define STREAM_CONFIG {name}_config_q31"],
+            names=self.names,
+            sample_rate=self.sample_rate,
+            units=[float_literal(np.float32(2.0**-bits)) for bits in engine.parameters.p_bits],
+            code=code,
+            recording=_recording(self.recording),
+            sizes=sizes,
         )
 
     def configure(

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
+from pvid.base.errors import PvidError
 from pvid.board.boards import BUILD, Board, build, keep_header, one_at_a_time
 from pvid.core.host_compiler import host_compiler, objects_of, run_compiler
 from pvid.core.model_library import core_options, of_second_stage
-from pvid.core.sizes import options_of, roomy
+from pvid.core.sizes import options_of, raised, roomy
 from pvid.core.sources import FIRMWARE, SRC, core_sources, left_out
+from pvid.design.c_tables import float_literal
+from pvid.link import frames
 from pvid.link.frames import Configuration, Source
+from pvid.link.names import BoardNames
 from pvid.settings.enums import Core, Form
 
 HOST = "host"
@@ -21,7 +28,13 @@ SLOWEST = 1.0  # ticks a second: the image counts the time between two samples i
 MOST_TICKS = 40_000  # of a simulation that an image contains
 
 
-def c_string(text: str) -> str:
+def refuse_slow(sample_rate: float) -> None:
+    """PvidError for a rate that an image cannot count."""
+    if not sample_rate >= SLOWEST:
+        raise PvidError(f"the sample rate is {sample_rate:g} Hz, and a board streams at 1 Hz and more")
+
+
+def _c_string(text: str) -> str:
     """A literal of C."""
     return '"' + text.replace("\n", "\\n") + '"'
 
@@ -37,8 +50,6 @@ class StreamImage:
     files : generated headers and sources by name
     form : weak or strong
     core : arithmetic
-    identifier : firmware/apps/stream/identifier_<identifier>.c
-    sensor : a file of firmware/apps/stream
     sizes : PVID_MAX_ macro -> value
     refined : with the second stage, whose refine_model_f32.h and pvid/refine_shape.h are among the files
     """
@@ -48,10 +59,59 @@ class StreamImage:
     files: dict[str, str]
     form: Form
     core: Core
-    identifier: str
-    sensor: str
     sizes: dict[str, str]
     refined: bool = False
+
+    @classmethod
+    def made(
+        cls,
+        form: Form,
+        core: Core,
+        *,
+        own: Sequence[str],
+        names: BoardNames,
+        sample_rate: float,
+        units: Sequence[str],
+        code: Mapping[str, str],
+        recording: str,
+        sizes: Mapping[str, int],
+        refined: bool = False,
+        more: Sequence[str] = (),
+    ) -> StreamImage:
+        """What a board of either form and arithmetic has in common.
+
+        Parameters
+        ----------
+        own : lines of stream_rig.h that name the identifier's types and configuration
+        units : of the parameters in a frame, as C
+        code : generated headers and sources, stream_tables.h among them
+        recording : stream_recording.h
+        more : further lines of stream_rig.h
+        """
+        samples = len(names.samples)
+        macros = [  # logs contain the number: lines that nothing reads any more stay, and their order
+            f"#define STREAM_CORE {int(frames.Core[core.upper()])}",
+            f"#define STREAM_FORM {int(frames.Form[form.upper()])}",
+            *own,
+            f"#define STREAM_N_P {len(names.parameters)}u",
+            f"#define STREAM_SAMPLES {samples}u",
+            f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(sample_rate))}",
+            *[f"#define {one} 0.0f" for one in ("STREAM_PHI_LSB", "STREAM_Y_LSB")],
+            f"#define STREAM_LSB {{{', '.join(['0.0f'] * samples)}}}",
+            f"#define STREAM_P_UNIT {{{', '.join(units)}}}",
+            f"#define STREAM_NAMES {_c_string(names.text)}",
+            *more,
+        ]
+        number = zlib.crc32("\n".join([*macros, *code.values()]).encode())
+        files = {**code, "stream_recording.h": recording}
+        return cls(
+            number, macros, files, form, core, {name: str(size) for name, size in raised(sizes).items()}, refined
+        )
+
+    @property
+    def identifier(self) -> str:
+        """firmware/apps/stream/identifier_<this>.c."""
+        return f"{self.form}_{self.core}"
 
     @property
     def headers(self) -> dict[str, str]:
@@ -105,7 +165,6 @@ def build_image(rig: Streamed, board: Board | None) -> Path:
         with one_at_a_time(tree):
             return _build_for_host(image, folder, tree)
     options = {"PVID_STREAM_RIG": str(folder), "PVID_STREAM_CORE": image.identifier, **image.sizes}
-    options["PVID_STREAM_SENSOR"] = image.sensor
     options["PVID_LEAVE_OUT"] = image.left_out
     if image.refined:
         options["PVID_REFINE_MODEL"] = str(folder)
@@ -123,7 +182,10 @@ def _build_for_host(made: StreamImage, folder: Path, tree: Path) -> Path:
         FIRMWARE / "link" / "link.c",
         FIRMWARE / "ports" / "host" / "port.c",
         FIRMWARE / "ports" / "host" / "receiver.c",
-        *(application / file for file in ("main.c", "answers.c", made.sensor, f"identifier_{made.identifier}.c")),
+        *(
+            application / file
+            for file in ("main.c", "answers.c", "sensor_recording.c", f"identifier_{made.identifier}.c")
+        ),
         *(folder / name for name in sorted(made.files) if name.endswith(".c")),
     ]
     image = tree / "stream"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
@@ -10,10 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pvid.base.errors import PvidError
 from pvid.board.float_board import FloatBoard, recording_header
 from pvid.board.settings_text import TABLE, array_of, part_of, written
-from pvid.board.stream_image import MOST_TICKS, SLOWEST, StreamImage, c_string
+from pvid.board.stream_image import MOST_TICKS, StreamImage, refuse_slow
 from pvid.codegen import files_strong, files_strong_design
 from pvid.codegen.strong import StrongFunctions, renamed, strong_functions_of
 from pvid.codegen.strong_library import sizes_of_strong, strong_native
@@ -21,9 +19,7 @@ from pvid.codegen.strong_twin import StrongModelTwin
 from pvid.configuration.nominal_run import nominal_run
 from pvid.configuration.strong import strong_design
 from pvid.core.native import Native
-from pvid.core.sizes import raised
-from pvid.design.c_tables import float_literal
-from pvid.link.frames import Configuration, Core, Form
+from pvid.link.frames import Configuration, Form
 from pvid.link.names import BoardNames
 from pvid.model.strong import strong_form
 from pvid.models.mechanisms import constants_of
@@ -87,8 +83,7 @@ class StrongBoard(FloatBoard):
         return cls.of_recording(rig, nominal_run(rig).recording)
 
     def __post_init__(self) -> None:
-        if not self.config.sample_rate >= SLOWEST:
-            raise PvidError(f"the sample rate is {self.config.sample_rate:g} Hz, and a board streams at 1 Hz and more")
+        refuse_slow(self.config.sample_rate)
 
     @property
     def names(self) -> BoardNames:
@@ -100,34 +95,24 @@ class StrongBoard(FloatBoard):
     @property
     def stream_image(self) -> StreamImage:
         """Headers, generated C and sizes."""
-        name, samples = self.strong.functions.name, len(self.strong.signals)
+        name = self.strong.functions.name
         code = dict(files_strong.files_of(self.strong, _COMMAND))
         code["stream_tables.h"] = files_strong_design.header(self.strong, self._shared, _COMMAND)
-        units = ", ".join(["1.0f"] * len(self.compiled.unknowns))
-        macros = [
-            f"#define STREAM_CORE {int(Core.F32)}",
-            f"#define STREAM_FORM {int(self.form)}",
-            f"#define STREAM_TYPE {name}_f32",
-            f"#define STREAM_CONFIG_TYPE {name}_config_f32",
-            f"#define STREAM_CONFIG {name}_config",
-            f"#define STREAM_NAME(verb) {name}_##verb##_f32",
-            f"#define STREAM_N_P {len(self.compiled.unknowns)}u",
-            f"#define STREAM_SAMPLES {samples}u",
-            f"#define STREAM_SAMPLE_RATE {float_literal(np.float32(self.sample_rate))}",
-            *[f"#define {one} 0.0f" for one in ("STREAM_PHI_LSB", "STREAM_Y_LSB")],
-            f"#define STREAM_LSB {{{', '.join(['0.0f'] * samples)}}}",
-            f"#define STREAM_P_UNIT {{{units}}}",
-            f"#define STREAM_NAMES {c_string(self.names.text)}",
-        ]
-        return StreamImage(
-            number=zlib.crc32("\n".join([*macros, *code.values()]).encode()),
-            macros=macros,
-            files={**code, "stream_recording.h": recording_header(self.recording)},
-            form="strong",
-            core="f32",
-            identifier="strong_f32",
-            sensor="sensor_recording.c",
-            sizes={one: str(value) for one, value in raised(sizes_of_strong(self.strong, self.config)).items()},
+        return StreamImage.made(
+            "strong",
+            "f32",
+            own=[
+                f"#define STREAM_TYPE {name}_f32",
+                f"#define STREAM_CONFIG_TYPE {name}_config_f32",
+                f"#define STREAM_CONFIG {name}_config",
+                f"#define STREAM_NAME(verb) {name}_##verb##_f32",
+            ],
+            names=self.names,
+            sample_rate=self.sample_rate,
+            units=["1.0f"] * len(self.compiled.unknowns),
+            code=code,
+            recording=recording_header(self.recording),
+            sizes=sizes_of_strong(self.strong, self.config),
         )
 
     def twin_of(self, frame: Configuration) -> StrongModelTwin:
