@@ -1,5 +1,5 @@
-"""Plays the weak form as the compiler of CC makes it, in both cores: a good run first and then what no sensor sends;
-for a compiler that checks every access and every operation and ends the program at the first fault.
+"""Plays the weak and the strong form as the compiler of CC makes them, in both cores: a good run first and then what no
+sensor sends; for a compiler that checks every access and every operation and ends the program at the first fault.
 
     python hostile_runs.py            all of it; prints how many ticks
     python hostile_runs.py --planted  reads one byte behind an array, to show that it would be seen
@@ -16,12 +16,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pvid.codegen.strong_library import strong_native
+from pvid.codegen.strong_library_q31 import StrongNativeQ31
 from pvid.codegen.weak_library import weak_native, weak_native_q31
+from pvid.configuration.strong import strong_design
+from pvid.configuration.strong_q31 import fixed_design
 from pvid.configuration.weak import config_for_simulated_rig
 from pvid.configuration.weak_q31 import engine_for_simulated_rig
-from pvid.core.native import Native, Publisher
+from pvid.core.native import Native, Stepper
 from pvid.models.mechanisms import compiled_of
 from pvid.models.registry import DEFAULT
+from pvid.rig.run import Recording
+from pvid.settings.enums import Law
+from pvid.settings.parts import GateConfig
 from pvid.sim.simulated_run import simulation_of
 
 Samples = npt.NDArray[Any]
@@ -34,6 +41,8 @@ WEAK: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
     ({"forgetting_s": 5.0, "divider": 2}, {"forgetting_groups": 8, "divider": 2}),
     ({"kappa_min": 0.0, "noise_margin": 0.0}, {"kappa_min": 0, "noise_margin": 0}),
 )
+# Of the strong form in float32: law, divider, exact_every and gate.
+STRONG = ((Law.STATIONARY, 8, 0, 0.0), (Law.STATIONARY, 1, 8, 6.0), (Law.PSEUDOVELOCITY, 1, 1, 6.0))
 
 
 def float_samples(run: Mapping[str, Samples]) -> Iterator[tuple[Samples, Samples]]:
@@ -68,9 +77,7 @@ def count_samples(phi: Samples, y: Samples, phi_max: int, y_max: int) -> Iterato
     yield np.zeros(TICKS, np.int64), np.zeros(TICKS, np.int64)
 
 
-def play_engine(
-    identifier: Publisher, run: Callable[[Samples], object], parts: Iterator[tuple[Samples, Samples]]
-) -> int:
+def play_engine(identifier: Stepper, run: Callable[[Samples], object], parts: Iterator[tuple[Samples, Samples]]) -> int:
     """One after the other through the same identifier, which takes y first; samples are missing after each."""
     done = 0
     for phi, y in parts:
@@ -95,6 +102,19 @@ def play_all() -> int:
         of_counts = replace(engine.config, estimator=replace(engine.config.estimator, **in_fixed))
         counting = weak_native_q31(engine.made, engine.parameters, of_counts).identifier()
         done += play_engine(counting, counting.run_samples, count_samples(phi, y, 2**12, 2**13))
+    recording = Recording(run["t"], {name: run[name] for name in ("y", "phi")}, simulation_of(DEFAULT).rig.sample_rate)
+    base = strong_design(compiled, recording)
+    assert [one.name for one in base.strong.signals] == ["y", "phi"]
+    for law, divider, exact_every, sigmas in STRONG:
+        estimator = replace(base.config.estimator, law=law, divider=divider, forgetting_s=3.0 if sigmas else 0.0)
+        settings = replace(base.config, estimator=estimator, exact_every=exact_every, gate=GateConfig(sigmas, 1.0))
+        strong = strong_native(base.strong, settings).identifier_of(settings)
+        done += play_engine(strong, strong.run_samples, float_samples(run))
+    fixed = fixed_design(compiled, recording, base)
+    y_max, phi_max = fixed.engine.config.full_scale
+    y, phi = fixed.counts[:TICKS].T
+    in_counts = StrongNativeQ31(fixed.engine).started()
+    done += play_engine(in_counts, in_counts.run_samples, count_samples(phi, y, phi_max, y_max))
     return done
 
 

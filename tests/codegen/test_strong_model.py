@@ -26,7 +26,7 @@ from pvid.model import Model
 from pvid.model.signals import sgn
 from pvid.model.strong import strong_form
 from pvid.models import mechanisms
-from pvid.settings.enums import Law, Reason
+from pvid.settings.enums import Law, Reason, Status
 from pvid.settings.parts import EstimatorConfig, GateConfig
 from pvid.settings.strong import StrongModelConfig
 from pvid.sim.simulated_run import simulation_of
@@ -226,14 +226,86 @@ def test_an_outlier_is_rejected_and_a_frozen_identifier_keeps_its_state() -> Non
     wrong = samples[400:440].copy()
     wrong[20] += np.float32(3)
     assert (identifier.run_samples(wrong).reason == Reason.REJECTED_OUTLIER).sum() >= 1
-    library, state = identifier.native.library, identifier.state
-    library.rigid_body_strong_freeze_f32(state, True)
+    identifier.freeze(True)
     kept = identifier.state_bytes
     frozen = identifier.run_samples(samples[440:480])
     assert (frozen.reason == Reason.HELD_FROZEN).all() and len(np.unique(frozen.p, axis=0)) == 1
-    library.rigid_body_strong_freeze_f32(state, False)
+    identifier.freeze(False)
     assert identifier.run_samples(samples[480:500]).reason[-1] in (Reason.ACCUMULATED, Reason.UPDATED)
     assert len(kept) == len(identifier.state_bytes)
+
+
+def test_before_init_and_with_null_nothing_is_done() -> None:
+    """A refused init leaves zeros, whatever stood in the memory: an object that is not ready."""
+    config = config_of("rigid_body", weights=FIVE)
+    identifier = strong_native(strong_of("rigid_body"), config).identifier_of(config)
+    ffi, library = identifier.native.headers.ffi, identifier.native.library
+    ffi.buffer(identifier.state)[:] = b"\xff" * len(identifier.state_bytes)
+    identifier.config_struct.gate.sigmas = 1
+    assert identifier.initialise() is Status.BAD_GATE_SIGMAS and not any(identifier.state_bytes)
+    inputs, sums = ffi.new("float[64]"), ffi.new("float[256]", [7.0] * 256)
+    for one in (identifier.state, ffi.NULL):
+        for _ in range(2 * config.window):
+            assert library.rigid_body_strong_step_f32(one, inputs) == Reason.NOT_READY
+            assert library.rigid_body_strong_row_step_f32(one, inputs) == Reason.NOT_READY
+        library.rigid_body_strong_gap_f32(one)
+        library.rigid_body_strong_freeze_f32(one, True)
+        library.rigid_body_strong_read_sums_f32(one, sums)
+        estimate = ffi.new("pvid_estimate_f32 *", {"kappa": 7.0})
+        library.rigid_body_strong_assess_f32(one, estimate)
+        assert set(sums) == {7.0} and not any(bytes(ffi.buffer(estimate)))
+        library.rigid_body_strong_assess_f32(one, ffi.NULL)
+    assert not any(identifier.state_bytes)
+    layout = library.pvid_layout()
+    init = library.rigid_body_strong_init_layout_f32
+    assert init(ffi.NULL, identifier.config_pointer, layout) == Status.BAD_POINTER
+    assert init(identifier.state, ffi.NULL, layout) == Status.BAD_POINTER
+    assert init(identifier.state, identifier.config_pointer, layout + 1) == Status.BAD_LAYOUT
+
+
+@pytest.mark.parametrize("weights", [FIVE, None], ids=["five points", "window"])
+def test_a_bad_sample_empties_the_window_as_a_gap_does_and_keeps_the_sums(weights: Float32 | None) -> None:
+    samples, _ = recorded("rigid_body")
+    config = config_of("rigid_body", weights=weights)
+    native = strong_native(strong_of("rigid_body"), config)
+    with_gaps, with_bad = (native.identifier_of(config) for _ in range(2))
+    start = with_gaps.run_samples(samples[:300])
+    before = with_bad.run_samples(samples[:300])
+    warming = int((start.reason == Reason.WARMING_UP).sum())
+    assert config.window - 2 <= warming <= config.window + 2  # a held input is known three samples later
+    begin = 301
+    for k, bad in enumerate((np.inf, -np.inf, np.nan)):
+        wrong = samples[begin - 1 : begin].copy()
+        wrong[0, k % wrong.shape[1]] = bad
+        rejected = with_bad.run_samples(wrong)
+        assert rejected.reason.tolist() == [Reason.REJECTED_NOT_FINITE]
+        assert (rejected.sums[-1] == before.sums[-1]).all() and (rejected.p[-1] == before.p[-1]).all()
+        with_gaps.gap()
+        after, before = (one.run_samples(samples[begin : begin + 300]) for one in (with_gaps, with_bad))
+        assert (after.reason == before.reason).all() and (after.p == before.p).all()
+        assert ((after.reason == Reason.WARMING_UP) == (np.arange(300) < warming)).all()
+        begin += 301
+    assert with_gaps.counters["rejected_not_finite"] == 0 and with_bad.counters["rejected_not_finite"] == 3
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "dc_motor"])
+def test_any_bits_as_samples_leave_finite_numbers_within_the_bounds(name: str) -> None:
+    """Any words, with stretches of numbers that are long enough to fill the window."""
+    random, signals = np.random.default_rng(5), len(strong_of(name).signals)
+    words = random.integers(0, 2**32, (20_000, signals), np.uint32)
+    words[np.arange(20_000) % 200 > 20] &= 0xBFFFFFFF
+    config = config_of(name, divider=1, weights=FIVE)
+    identifier = strong_native(strong_of(name), config).identifier_of(config)
+    record = identifier.run_samples(words.view(np.float32), estimate_every=1)
+    estimate, n_p = record.estimate, len(config.estimator.start)
+    assert (record.p >= config.estimator.lower).all() and (record.p <= config.estimator.upper).all()
+    assert np.isfinite(record.sums).all()
+    for one in ("se", "covariance"):
+        assert np.isfinite(estimate[one]).all()
+    assert (estimate["se"][:, :n_p] >= 0).all() and (estimate["residual_sd"] >= 0).all()
+    assert np.isfinite(estimate["residual_sd"]).all()
+    assert ((estimate["kappa"] >= 0) & (estimate["kappa"] <= 1)).all()
+    assert Reason.UPDATED in record.reason
 
 
 def paper_pendulum() -> StrongFunctions:

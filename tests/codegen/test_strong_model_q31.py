@@ -204,6 +204,48 @@ def test_the_window_at_full_scale_ends_no_word() -> None:
     assert difference(core, StrongTwinQ31(design.engine).run(readings)) == ""
 
 
+def test_a_count_beyond_full_scale_is_refused_and_empties_the_window() -> None:
+    design, native = made("dc_motor")
+    config, identifier = design.engine.config, native.started()
+    warming = int((identifier.run_samples(design.counts[:300]).reason == Reason.WARMING_UP).sum())
+    assert 0 < warming < 200
+    for reading, refused in ((1, True), (0, False), (MOST, True), (-MOST - 1, True)):
+        most = np.array(config.offset) + np.array(config.full_scale)
+        row = design.counts[300].copy()
+        row[1] = reading if abs(reading) > 1 else most[1] + reading
+        before = identifier.counters["rejected_saturated"]
+        reason = identifier.run_samples(row[None]).reason[0]
+        if refused:
+            assert reason == Reason.REJECTED_SATURATED and identifier.counters["rejected_saturated"] == before + 1
+            after = identifier.run_samples(design.counts[301:601]).reason
+            assert ((after == Reason.WARMING_UP) == (np.arange(300) < warming)).all()
+        else:
+            assert identifier.state.missing == 0  # the window stays full, whatever becomes of its row
+            identifier.gap()
+            identifier.run_samples(design.counts[:300])
+
+
+def test_before_init_and_with_null_nothing_is_done() -> None:
+    native = made("dc_motor")[1]
+    identifier = native.started()
+    ffi, library, name = native.headers.ffi, native.library, native.engine.name
+    identifier.config_struct.gate.sigmas = 1
+    assert identifier.initialise() is Status.BAD_GATE_SIGMAS and not any(identifier.state_bytes)
+    reading, estimate = ffi.new("int32_t[64]"), ffi.new("pvid_estimate_q31 *")
+    for one in (identifier.state, ffi.NULL):
+        for _ in range(100):
+            assert getattr(library, f"{name}_step_q31")(one, reading) == Reason.NOT_READY
+        getattr(library, f"{name}_gap_q31")(one)
+        getattr(library, f"{name}_freeze_q31")(one, True)
+        getattr(library, f"{name}_assess_q31")(one, estimate)
+        getattr(library, f"{name}_assess_q31")(one, ffi.NULL)
+    assert not any(identifier.state_bytes) and not any(bytes(ffi.buffer(estimate)))
+    init, layout = getattr(library, f"{name}_init_layout_q31"), library.pvid_layout()
+    assert init(ffi.NULL, identifier.config_pointer, layout) == Status.BAD_POINTER
+    assert init(identifier.state, ffi.NULL, layout) == Status.BAD_POINTER
+    assert init(identifier.state, identifier.config_pointer, layout + 1) == Status.BAD_LAYOUT
+
+
 def _set(struct: Any, path: str, value: Any) -> None:
     *parts, last = path.split(".")
     for one in parts:

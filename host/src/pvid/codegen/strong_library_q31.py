@@ -94,14 +94,6 @@ class StrongIdentifierQ31(Stepper):
         """pvid_estimator_q31 in it."""
         return self.state.estimator
 
-    def gap(self) -> None:
-        """Samples are missing before the next run."""
-        self._call("gap")
-
-    def freeze(self, frozen: bool) -> None:
-        """Freezes (True) or resumes (False) it."""
-        self._call("freeze", frozen)
-
     def run_samples(self, readings: npt.ArrayLike, *, sums: bool = True, estimate_every: int = 0) -> Record:
         """Steps through readings [ticks, signals]."""
         given = np.ascontiguousarray(readings, np.int32)

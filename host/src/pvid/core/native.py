@@ -285,6 +285,14 @@ class Stepper:
         assess(self.state if self._kind.of_identifier else headers.ffi.addressof(self.estimator), headers.pointer(out))
         return out
 
+    def freeze(self, frozen: bool) -> None:
+        """Freezes (True) or resumes (False) an identifier."""
+        self._call("freeze", frozen)
+
+    def gap(self) -> None:
+        """Samples of an identifier are missing before the next call of `run`."""
+        self._call("gap")
+
 
 class Publisher(Stepper):
     """An identifier that publishes: the weak form's state in C."""
@@ -318,11 +326,3 @@ class Publisher(Stepper):
     def misfit(self) -> float:
         """Residual variance of the estimate's rows over its expectation from the sensors' noise; NaN: not judged."""
         return float(self.estimate["misfit"]) * self._arithmetic.misfit_unit or math.nan
-
-    def freeze(self, frozen: bool) -> None:
-        """Freezes (True) or resumes (False) the identifier: pvid_weak_freeze_f32."""
-        self._call("freeze", frozen)
-
-    def gap(self) -> None:
-        """Samples are missing before the next call of `run`."""
-        self._call("gap")
